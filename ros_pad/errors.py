@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors of ros_pad, named after what is wrong.
+
+Every message says the value, its unit, the allowed range and where the value came from.
+"""
+
+from __future__ import annotations
+
+
+class PadError(Exception):
+    """Base of every error that ros_pad raises on purpose."""
+
+
+class InvalidInput(PadError, ValueError):
+    """A value is non-finite, of the wrong kind, or outside its physical range."""
+
+
+class ConfigError(PadError):
+    """A YAML file or parameter has an unknown key, or a value that is not allowed."""
+
+
+class NoEquilibrium(PadError):
+    """The pad has no shape in equilibrium at this pressure and force.
+
+    Attributes
+    ----------
+    status : str
+        Which end of the model was reached: ``no_inflation``, ``flattened`` or ``fold_zone``.
+    """
+
+    def __init__(self, message: str, status: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class NoBridge(PadError):
+    """A liquid bridge of this volume or filling angle does not exist: it has ruptured."""
+
+
+class MeshError(PadError):
+    """A mesh cannot be wetted: open, flipped, non-manifold, or off the floor."""
+
+
+class TransportError(PadError):
+    """The line to a device is closed, silent or broken."""
+
+
+class ProtocolError(PadError):
+    """A device answered something that its protocol does not allow."""
+
+
+class DeviceFault(PadError):
+    """A device reports a fault of its own."""
+
+
+class LimitError(PadError):
+    """A command would take a pad past a limit, for instance its pressure ceiling."""
+
+
+class BagError(PadError):
+    """A bag cannot be written or read."""
