@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+# `make run` and `make test` need only Python 3.11 or later with venv; the rest goes into .venv.
+
+PYTHON ?= python3
+JOBS ?= 2
+BIN := .venv/bin
+
+# A sourced ROS environment or another virtualenv must not reach .venv, whose ROS 2 is its own.
+# What a user sets on purpose stays.
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV LD_LIBRARY_PATH CMAKE_PREFIX_PATH
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
+  $(filter ROS_% AMENT_% COLCON_% RMW_% FASTRTPS_% FASTDDS_% CYCLONEDDS_%,$(.VARIABLES)))
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help run test clean FORCE
+
+help:
+	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
+	@echo 'make test   ruff, mypy and every test'
+	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
+	@echo 'The first two make .venv if need be; PYTHON=python3.12 chooses its Python.'
+
+run: .venv/ros.stamp
+	@$(BIN)/pad run hexapod_patches $(ARGS)
+
+test: .venv/test.stamp
+	$(BIN)/python -m ruff check
+	$(BIN)/python -m ruff format --check
+	$(BIN)/python -m mypy
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+
+# A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
+STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
+
+.venv/ros.stamp: EXTRAS := ros
+.venv/test.stamp: EXTRAS := ros,test
+.venv/ros.stamp .venv/test.stamp: setup.py setup.cfg $(STALE)
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { $(MAKE_VENV); }
+	@echo 'Installing ros_pad[$(EXTRAS)] with ROS 2 Jazzy into .venv:' \
+	  'about 600 MB, one minute on a fast line ...'
+	@$(BIN)/python -m pip install --quiet --editable '.[$(EXTRAS)]' || { \
+	  echo 'ros_pad was not installed: pip says why above. Can this machine reach pypi.org?'; \
+	  exit 1; }
+	@pwd > .venv/ros.stamp
+	@pwd > $@
+
+# On Debian and Ubuntu ensurepip, and with it a working venv, comes in a package of its own.
+define MAKE_VENV
+  if command -v $(PYTHON) >/dev/null && \
+     ! $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then \
+    echo "ros_pad needs Python 3.11 or later; $(PYTHON) is $$($(PYTHON) -V)."; \
+    echo 'Name another one, for instance: make $(MAKECMDGOALS) PYTHON=python3.12'; exit 1; fi; \
+  $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+    echo '$(PYTHON) is missing, or cannot make a virtual environment. Run this once:'; \
+    echo '  sudo apt install $(notdir $(PYTHON))-venv'; exit 1; }; \
+  $(PYTHON) -m venv --clear .venv || { rm -rf .venv; exit 1; }
+endef
+
+clean:
+	rm -rf .venv build install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

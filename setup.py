@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Build ros_pad with colcon (``ament_python``) or with pip."""
+
+import os
+from glob import glob
+
+from setuptools import find_packages
+from setuptools import setup
+
+NAME = 'ros_pad'
+NODES = ['controller', 'estimator', 'recorder', 'regulator', 'simulator']
+
+
+def shared_files() -> list[tuple[str, list[str]]]:
+    """Return what goes under ``share/``: ament's marker, package.xml, the tree of config/."""
+    files = [
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+    ]
+    for folder, _, _ in os.walk('config'):
+        files.append((f'share/{NAME}/{folder}', sorted(glob(f'{folder}/*.*'))))
+    return files
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='Shape-changing feet for legged robots on ROS 2: model, simulation, nodes',
+    license='Apache-2.0',
+    maintainer='ros_pad maintainers',
+    maintainer_email='ros-pad@example.org',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    data_files=shared_files(),
+    zip_safe=False,
+    python_requires='>=3.11',
+    # The lower bounds are the versions of Ubuntu 24.04, on which a Jazzy from apt runs.
+    install_requires=[
+        'numpy>=1.26',
+        'scipy>=1.11',
+        'matplotlib>=3.6',
+        'pyyaml>=6.0',
+        'tqdm>=4.66',
+        'mcap>=1.1',
+        'mcap-ros2-support>=0.5',
+    ],
+    extras_require={
+        # ROS 2 Jazzy as wheels; leave this extra out where Jazzy is installed from apt.
+        'ros': [
+            'ros-jazzy-rclpy[fastrtps]',
+            'ros-jazzy-ament-index-python',
+            'ros-jazzy-diagnostic-msgs',
+            'ros-jazzy-geometry-msgs',
+            'ros-jazzy-lifecycle-msgs',
+            'ros-jazzy-rcl-interfaces',
+            'ros-jazzy-rosgraph-msgs',
+            'ros-jazzy-sensor-msgs',
+            'ros-jazzy-std-msgs',
+            'ros-jazzy-std-srvs',
+        ],
+        # ruff and mypy change their verdicts between minor versions, so these are pinned.
+        'test': [
+            'colcon-common-extensions',
+            'hypothesis',
+            'mypy==2.4.*',
+            'pytest>=7.4',
+            'pytest-xdist',
+            'rosbags',
+            'ruff==0.17.*',
+            'types-PyYAML',
+        ],
+    },
+    entry_points={
+        'console_scripts': [
+            'pad = ros_pad.cli:main',
+            *(f'{node}_node = ros_pad.nodes.{node}:main' for node in NODES),
+        ],
+    },
+)
