@@ -1,1 +1,74 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Pressure regulators: the protocol that every backend meets, and the backends by name."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable
+from collections.abc import Iterable
+from typing import Any
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.regulators.protocol import Reading
+from ros_pad.regulators.protocol import Regulator
+from ros_pad.regulators.simulated import SimulatedRegulator
+
+__all__ = ['BACKENDS', 'Reading', 'Regulator', 'SimulatedRegulator', 'create']
+
+BACKENDS: dict[str, Callable[..., Regulator]] = {'simulated': SimulatedRegulator}
+"""What ``create`` can make: a class or function for each name, its arguments the options."""
+
+
+def create(backend: str, **options: Any) -> Regulator:
+    """Make a regulator, not yet open.
+
+    Parameters
+    ----------
+    backend : str
+        A key of ``BACKENDS``.
+    **options
+        The arguments of that backend.
+
+    Returns
+    -------
+    Regulator
+
+    Raises
+    ------
+    ConfigError
+        When there is no such backend or option, or the value of an option is not allowed; the
+        message says what is.
+
+    Examples
+    --------
+    >>> regulator = create('simulated', hose_diameter=0.002)
+    >>> regulator.open()
+    >>> regulator.set_pressure(75e3)
+    """
+    if backend not in BACKENDS:
+        raise ConfigError(
+            f'no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: '
+            f'there are {", ".join(sorted(BACKENDS))}'
+        )
+    make = BACKENDS[backend]
+    allowed = inspect.signature(make).parameters
+    for name, value in options.items():
+        if name not in allowed:
+            raise ConfigError(
+                f'regulator backend {backend!r} has no option {name!r} (= {value!r})'
+                f'{_nearest(name, allowed)}: there are {", ".join(allowed)}'
+            )
+    missing = [name for name, p in allowed.items() if p.default is p.empty and name not in options]
+    if missing:
+        raise ConfigError(f'regulator backend {backend!r} needs the option {missing[0]!r}')
+    try:
+        return make(**options)
+    except InvalidInput as error:
+        raise ConfigError(f'regulator backend {backend!r}: {error}') from error
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(str(name), list(known), n=1)
+    return f' (did you mean {near[0]!r}?)' if near else ''

@@ -1,0 +1,404 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pressure regulator, the hose behind it, and the pad at the end of the hose.
+
+Pressures are gauge Pa unless a name says absolute. Steps are plain Python on floats: a robot
+takes some thousand of them a second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from numbers import Real
+
+from ros_pad.errors import InvalidInput
+
+ATMOSPHERE = 101325.0
+"""Ambient pressure, absolute Pa."""
+
+REFERENCE_PRESSURE = 100e3
+"""Pressure of the reference air (ANR) of ISO 6358, absolute Pa."""
+
+REFERENCE_DENSITY = 1.185
+"""Density of the reference air (ANR) of ISO 6358, at 20 °C and 65 % humidity, kg/m³."""
+
+LINEAR_RATIO = 0.999
+"""Above this pressure ratio the flow is taken as linear in the pressure difference (ISO 6358)."""
+
+MAX_STEP = 0.005
+"""Longest internal step, s. The pad is then within 1 % of a full step at every moment."""
+
+_SETTLED = 0.1  # Pa: a hundredth of what the sensor resolves, and then the rest is skipped
+_INSTANT = 1e-9  # s: shorter times are rounding of the caller's clock
+_CELLS = 100  # of the table of the pad's volume, from zero to full scale
+
+
+def _check(name: str, value: float, unit: str, low: float, high: float) -> None:
+    if not isinstance(value, Real) or isinstance(value, bool) or not low <= value <= high:
+        raise InvalidInput(
+            f'{name} = {value!r} is not allowed: '
+            f'a number from {low:g} to {high:g} {unit} is needed'
+        )
+
+
+@dataclass(frozen=True)
+class RegulatorModel:
+    """An electro-pneumatic regulator as it looks from its outlet.
+
+    A set-point is rounded to the quantum, ignored when it lies within the dead band of the one
+    last accepted (zero never is: it opens the exhaust), delayed by the dead time, limited in
+    slew, and followed as a second-order system. The outlet stays between zero and full scale.
+
+    Parameters
+    ----------
+    natural_frequency : float
+        rad/s, 1 to 1000.
+    damping : float
+        Damping ratio, 0.1 to 10.
+    dead_time : float
+        s, 0 to 1.
+    dead_band : float
+        Fraction of full scale, 0 to 0.1.
+    full_scale : float
+        Pa, 1e3 to 1e6.
+    quantum : float
+        Resolution of the set-point, Pa, 0 (none) to 1e4.
+    slew_limit : float
+        Pa/s, from 1e3; infinite for none.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is outside its range.
+    """
+
+    natural_frequency: float = 45.0
+    damping: float = 0.9
+    dead_time: float = 0.010
+    dead_band: float = 0.005
+    full_scale: float = 100e3
+    quantum: float = 100.0
+    slew_limit: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check('natural_frequency', self.natural_frequency, 'rad/s', 1.0, 1000.0)
+        _check('damping', self.damping, '(ratio)', 0.1, 10.0)
+        _check('dead_time', self.dead_time, 's', 0.0, 1.0)
+        _check('dead_band', self.dead_band, 'of full scale', 0.0, 0.1)
+        _check('full_scale', self.full_scale, 'Pa', 1e3, 1e6)
+        _check('quantum', self.quantum, 'Pa', 0.0, 1e4)
+        _check('slew_limit', self.slew_limit, 'Pa/s', 1e3, math.inf)
+
+    def transition(self, time: float) -> tuple[float, float, float, float]:
+        """Return the exact transition matrix of (error, error rate) over a time in s, by rows."""
+        w, z = self.natural_frequency, self.damping
+        decay = math.exp(-z * w * time)
+        if z < 1.0:
+            beat = w * math.sqrt(1.0 - z * z)
+            c, s = math.cos(beat * time), math.sin(beat * time) / beat
+        elif z > 1.0:
+            beat = w * math.sqrt(z * z - 1.0)
+            c, s = math.cosh(beat * time), math.sinh(beat * time) / beat
+        else:
+            c, s = 1.0, time
+        return decay * (c + z * w * s), decay * s, -decay * w * w * s, decay * (c - z * w * s)
+
+
+@dataclass(frozen=True)
+class Hose:
+    """A hose as ISO 6358 describes it: by sonic conductance C and critical pressure ratio b.
+
+    Parameters
+    ----------
+    inner_diameter : float
+        D, m, 0.5e-3 to 20e-3.
+    length : float
+        L, m, 0 to 50.
+    measured_conductance : float, optional
+        C of the whole line, m³/(s Pa), if it is known better than by the formula: for instance
+        when a fitting or the regulator's own valve is narrower than the hose.
+        1e-8 m³/(s Pa) = 1 dm³/(s bar).
+    measured_critical_ratio : float, optional
+        b, 0 to 0.9, likewise.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is outside its range.
+
+    Notes
+    -----
+    ``C = 0.029 D²/√(L/D^1.25 + 510)`` and ``b = 474 C/D²`` hold for D and L in **metres** and
+    give C in **m³/(s Pa)**. With millimetres C comes out some sixty times too small.
+    """
+
+    inner_diameter: float
+    length: float
+    measured_conductance: float | None = None
+    measured_critical_ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        _check('inner_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
+        _check('length', self.length, 'm', 0.0, 50.0)
+        if self.measured_conductance is not None:
+            _check('measured_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
+        if self.measured_critical_ratio is not None:
+            _check('measured_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume of the bore, m³."""
+        return math.pi / 4.0 * self.inner_diameter**2 * self.length
+
+    @cached_property
+    def sonic_conductance(self) -> float:
+        """C, m³/(s Pa)."""
+        if self.measured_conductance is not None:
+            return self.measured_conductance
+        d = self.inner_diameter
+        return 0.029 * d * d / math.sqrt(self.length / d**1.25 + 510.0)
+
+    @cached_property
+    def critical_ratio(self) -> float:
+        """b, the pressure ratio (absolute, downstream over upstream) below which it chokes."""
+        if self.measured_critical_ratio is not None:
+            return self.measured_critical_ratio
+        return 474.0 * self.sonic_conductance / self.inner_diameter**2
+
+    @cached_property
+    def _choked(self) -> float:
+        return self.sonic_conductance * REFERENCE_DENSITY
+
+    @cached_property
+    def _linear(self) -> float:
+        x = (LINEAR_RATIO - self.critical_ratio) / (1.0 - self.critical_ratio)
+        return self._choked * math.sqrt(1.0 - x * x) / (1.0 - LINEAR_RATIO)
+
+    def conductance(self, first: float, second: float) -> float:
+        """Return mass flow over pressure difference between two absolute pressures, kg/(s Pa).
+
+        It is finite and positive also where the pressures meet.
+        """
+        up, down = (first, second) if first > second else (second, first)
+        ratio = down / up
+        if ratio > LINEAR_RATIO:
+            return self._linear
+        b = self.critical_ratio
+        if ratio <= b:
+            return self._choked * up / (up - down)
+        x = (ratio - b) / (1.0 - b)
+        return self._choked * up * math.sqrt(1.0 - x * x) / (up - down)
+
+    def mass_flow(self, first: float, second: float) -> float:
+        """Return the mass flow from the first to the second absolute pressure, kg/s (ISO 6358)."""
+        return self.conductance(first, second) * (first - second)
+
+
+class PneumaticChannel:
+    """Regulator, hose and pad of one foot, over time.
+
+    Parameters
+    ----------
+    regulator : RegulatorModel
+    hose : Hose
+    pad_volume : float or callable
+        Air volume of all pads of the foot and the chamber that feeds them, m³: a constant, or a
+        function of gauge pressure in Pa. A function is tabulated once, from 0 to full scale.
+    ambient : float
+        Absolute Pa, 1e3 to 2e5.
+
+    Attributes
+    ----------
+    outlet_pressure, pad_pressure : float
+        Gauge Pa, in [0, full scale].
+    setpoint : float
+        The last set-point given, gauge Pa.
+    settled : bool
+        Nothing moves any more: further steps with the same set-point return at once.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is outside its range, or the gas content does not grow with pressure.
+
+    Notes
+    -----
+    Air is an isothermal ideal gas. The volume of the hose is added to the pad's, behind the
+    whole resistance: a slightly pessimistic lump of a distributed line. Over a step the
+    regulator is solved exactly; the hose's conductance is frozen at its value at mid-step, and
+    the pad then relaxes exactly towards an outlet that moves linearly. That never overshoots
+    the outlet, however small the volume, and its error falls with the square of the step.
+    """
+
+    def __init__(
+        self,
+        regulator: RegulatorModel,
+        hose: Hose,
+        pad_volume: float | Callable[[float], float],
+        ambient: float = ATMOSPHERE,
+    ) -> None:
+        _check('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
+        self.regulator = regulator
+        self.hose = hose
+        self.outlet_pressure = 0.0
+        self.pad_pressure = 0.0
+        self.setpoint = 0.0
+        self.settled = True
+        self._ambient = ambient
+        self._outlet_rate = 0.0
+        self._time = 0.0  # counts only while something moves
+        self._accepted = 0.0  # the set-point that the dead band compares with
+        self._pending: tuple[tuple[float, float], ...] = ()  # (due time, target), dead time
+        self._target = 0.0
+        self._reference = 0.0  # the target behind the slew limit
+        self._transition_time = 0.0
+        self._transition = regulator.transition(0.0)
+        self._tabulate(pad_volume)
+        self._content = self._contents[0]
+        self._drawn = 0.0
+
+    def _tabulate(self, pad_volume: float | Callable[[float], float]) -> None:
+        """Tabulate the gas content p V in Pa m³ and its slope, the capacity, in m³."""
+        if callable(pad_volume):
+            self._cell = self.regulator.full_scale / _CELLS
+            pressures = [i * self._cell for i in range(_CELLS + 1)]
+            volumes = [pad_volume(pressure) for pressure in pressures]
+        else:
+            self._cell = self.regulator.full_scale
+            pressures = [0.0, self._cell]
+            volumes = [pad_volume, pad_volume]
+        for pressure, volume in zip(pressures, volumes, strict=True):
+            _check(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
+        self._contents = [
+            (p + self._ambient) * (float(v) + self.hose.volume)
+            for p, v in zip(pressures, volumes, strict=True)
+        ]
+        self._capacities = [(high - low) / self._cell for low, high in pairwise(self._contents)]
+        if min(self._capacities) <= 0.0:
+            raise InvalidInput('pad_volume falls so fast with pressure that air would be expelled')
+        self._last_cell = len(self._capacities) - 1
+
+    @property
+    def air_used(self) -> float:
+        """Air drawn from the regulator since the start, kg. What is exhausted is not returned."""
+        return self._drawn * REFERENCE_DENSITY / REFERENCE_PRESSURE
+
+    def step(self, setpoint: float, dt: float) -> float:
+        """Hold a set-point for a time and return the pad's pressure at its end.
+
+        Parameters
+        ----------
+        setpoint : float
+            Gauge Pa, 0 to full scale.
+        dt : float
+            s, finite and not negative. Longer times than ``MAX_STEP`` are divided.
+
+        Returns
+        -------
+        float
+            ``pad_pressure``, gauge Pa.
+
+        Raises
+        ------
+        InvalidInput
+            When the set-point or the time is outside its range; nothing has moved then.
+        """
+        if not 0.0 <= dt < math.inf:
+            raise InvalidInput(f'dt = {dt!r} s is not allowed: it must be finite and not negative')
+        if setpoint != self.setpoint:
+            self._command(setpoint)
+        while dt > _INSTANT and not self.settled:
+            h = dt if dt <= MAX_STEP else dt / math.ceil(dt / MAX_STEP)
+            if self._pending:
+                due, target = self._pending[0]
+                if due - self._time <= _INSTANT:
+                    self._target = target
+                    self._pending = self._pending[1:]
+                    continue
+                h = min(h, due - self._time)
+            slope = 0.0
+            if self._reference != self._target:
+                limit = self.regulator.slew_limit
+                away = self._target - self._reference
+                if abs(away) <= limit * _INSTANT:
+                    self._reference = self._target
+                else:
+                    h = min(h, abs(away) / limit)
+                    slope = math.copysign(limit, away)
+            self._advance(h, slope)
+            dt -= h
+        return self.pad_pressure
+
+    def _command(self, setpoint: float) -> None:
+        """Round a new set-point, compare it with the dead band, and send it on its way."""
+        model = self.regulator
+        _check('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
+        self.setpoint = setpoint
+        target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
+        target = min(target, model.full_scale)  # where full scale is no multiple of the quantum
+        moved = abs(target - self._accepted)
+        if moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0):
+            self._accepted = target
+            self._pending = (*self._pending, (self._time + model.dead_time, target))
+            self.settled = False
+
+    def _advance(self, h: float, slope: float) -> None:
+        """Move regulator and pad by a time h, the reference rising at a constant slope."""
+        model = self.regulator
+        if h != self._transition_time:
+            self._transition_time, self._transition = h, model.transition(h)
+        ff, fr, rf, rr = self._transition
+        # A second-order system follows a ramp with a constant lag, and forgets the rest.
+        start = self.outlet_pressure
+        lag = 2.0 * model.damping * slope / model.natural_frequency
+        error = start - self._reference + lag
+        rate = self._outlet_rate - slope
+        self._reference += slope * h
+        outlet = self._reference - lag + ff * error + fr * rate
+        self._outlet_rate = slope + rf * error + rr * rate
+        if not 0.0 <= outlet <= model.full_scale:
+            # Neither the exhaust nor the supply can carry it further.
+            outlet = 0.0 if outlet < 0.0 else model.full_scale
+            self._outlet_rate = 0.0
+        self.outlet_pressure = outlet
+
+        # gap = pad − outlet obeys gap' = −relaxation gap − ramp.
+        gap = self.pad_pressure - start
+        ramp = (outlet - start) / h
+        relaxation = self._relaxation(start, self.pad_pressure)
+        done = -math.expm1(-0.5 * relaxation * h)
+        middle = 0.5 * (start + outlet)
+        relaxation = self._relaxation(middle, middle + gap - (gap + ramp / relaxation) * done)
+        done = -math.expm1(-relaxation * h)
+        self._fill(outlet + gap - (gap + ramp / relaxation) * done)
+
+        self._time += h
+        if (
+            abs(self.pad_pressure - self._target) < _SETTLED
+            and abs(outlet - self._target) < _SETTLED
+            and abs(self._outlet_rate) < _SETTLED * model.natural_frequency
+            and self._reference == self._target
+            and not self._pending
+        ):
+            self.outlet_pressure = self._target
+            self._outlet_rate = 0.0
+            self._fill(self._target)
+            self.settled = True
+
+    def _relaxation(self, outlet: float, pad: float) -> float:
+        """Return the rate in 1/s at which the pad approaches the outlet."""
+        capacity = self._capacities[min(int(pad / self._cell), self._last_cell)]
+        conductance = self.hose.conductance(outlet + self._ambient, pad + self._ambient)
+        return conductance * REFERENCE_PRESSURE / (REFERENCE_DENSITY * capacity)
+
+    def _fill(self, pressure: float) -> None:
+        """Set the pad's pressure and book the air that it took."""
+        cell = min(int(pressure / self._cell), self._last_cell)
+        content = self._contents[cell] + self._capacities[cell] * (pressure - cell * self._cell)
+        if content > self._content:
+            self._drawn += content - self._content
+        self._content = content
+        self.pad_pressure = pressure
