@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The floors of docs/architecture.md: every import runs down, and only the nodes need ROS."""
+
+import ast
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+SOURCE = pathlib.Path(__file__).resolve().parent.parent / 'ros_pad'
+
+# The table of docs/architecture.md: what each part of ros_pad may import of the others.
+GROUND = {'errors', 'configuration'}
+MAY_IMPORT = {
+    'errors': set(),
+    'configuration': {'errors'},
+    'contact': GROUND,
+    'estimation': GROUND | {'contact'},
+    'control': GROUND | {'contact'},
+    'simulation': GROUND | {'contact'},
+    'regulators': GROUND | {'contact', 'estimation', 'control', 'simulation'},
+}
+MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
+MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
+MAY_IMPORT['cli'] = MAY_IMPORT['nodes'] | {'nodes'}
+
+NUMERICS = {'numpy', 'scipy', 'yaml'}
+FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'tqdm'}
+ROS = {
+    *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
+    *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
+}
+FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
+    'errors': set(),
+    'trials': NUMERICS | FILES,
+    'nodes': NUMERICS | FILES | ROS,
+    'cli': NUMERICS | FILES,
+}
+
+
+def files(part: str) -> list[pathlib.Path]:
+    """Return the source files of a part, which is one module or one package."""
+    return [*SOURCE.glob(f'{part}.py'), *SOURCE.glob(f'{part}/**/*.py')]
+
+
+def imports(path: pathlib.Path) -> set[str]:
+    """Return the absolute dotted names that a file imports, at its top or inside functions."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}: write imports out in full'
+            found |= {f'{node.module}.{alias.name}' for alias in node.names}
+    return found
+
+
+def test_every_part_has_its_floor():
+    parts = {
+        path.stem for path in SOURCE.glob('*') if path.name not in ('__init__.py', 'py.typed')
+    }
+    assert parts - {'__pycache__'} == set(MAY_IMPORT)
+
+
+@pytest.mark.parametrize('part', MAY_IMPORT)
+def test_imports_run_down(part: str):
+    paths = files(part)
+    assert paths
+    for path in paths:
+        for name in imports(path):
+            top, _, rest = name.partition('.')
+            if top == 'ros_pad':
+                other = rest.split('.')[0]
+                assert other == part or other in MAY_IMPORT[part], f'{path} imports {name}'
+            elif top not in sys.stdlib_module_names:
+                assert top in FOREIGN[part], f'{path} imports {name}'
+
+
+def test_the_reader_of_imports_sees_them_all(tmp_path: pathlib.Path):
+    path = tmp_path / 'module.py'
+    path.write_text(
+        'import a.b\nfrom c import d as e\ndef f():\n    if 1:\n        from g.h import i\n'
+    )
+    assert imports(path) == {'a.b', 'c.d', 'g.h.i'}
+
+
+WITHOUT_ROS = """
+import importlib
+import pkgutil
+import sys
+
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        if name.split('.')[0] in {ros}:
+            raise ModuleNotFoundError(f'there is no {{name}} here')
+
+sys.meta_path.insert(0, NoRos())
+import ros_pad
+
+for module in pkgutil.walk_packages(ros_pad.__path__, 'ros_pad.'):
+    if module.name != 'ros_pad.nodes' and not module.name.startswith('ros_pad.nodes.'):
+        importlib.import_module(module.name)
+        print(module.name)
+try:
+    import rclpy
+except ModuleNotFoundError:
+    print('no rclpy')
+"""
+
+
+def test_everything_but_the_nodes_imports_without_ros():
+    child = subprocess.run(
+        [sys.executable, '-c', WITHOUT_ROS.format(ros=sorted(ROS))],
+        cwd=SOURCE.parent,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert child.returncode == 0, child.stderr
+    imported = child.stdout.split('\n')
+    assert 'no rclpy' in imported
+    expected = {
+        '.'.join(path.relative_to(SOURCE.parent).with_suffix('').parts).removesuffix('.__init__')
+        for part in MAY_IMPORT
+        if part != 'nodes'
+        for path in files(part)
+    }
+    assert expected <= set(imported)
+
+
+ROSDEP_KEY = {
+    'yaml': 'python3-yaml',
+    'mcap': 'mcap-ros2-support',
+    'mcap_ros2': 'mcap-ros2-support',
+}
+PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
+
+
+def test_what_is_imported_is_declared():
+    package_xml = (SOURCE.parent / 'package.xml').read_text(encoding='utf-8')
+    setup_py = (SOURCE.parent / 'setup.py').read_text(encoding='utf-8')
+    names = {
+        name.split('.')[0] for part in MAY_IMPORT for path in files(part) for name in imports(path)
+    }
+    foreign = names - sys.stdlib_module_names - {'ros_pad'}
+    assert {'numpy', 'rclpy'} <= foreign
+    for name in foreign:
+        key = name if name in ROS else ROSDEP_KEY.get(name, f'python3-{name}')
+        assert f'<exec_depend>{key}</exec_depend>' in package_xml
+        pip_name = (
+            f'ros-jazzy-{name.replace("_", "-")}' if name in ROS else PIP_NAME.get(name, name)
+        )
+        assert re.search(rf"'{pip_name}['>\[]", setup_py), f'{pip_name} is not in setup.py'

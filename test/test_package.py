@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""colcon builds the package, and what ``ros2 run`` and the ament index need is in place."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree
+
+import pytest
+
+pytest.importorskip('colcon_core', reason='colcon is not installed: pip install ros_pad[test]')
+packages = pytest.importorskip('ament_index_python.packages')
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+NODES = {
+    f'{node}_node' for node in ('controller', 'estimator', 'recorder', 'regulator', 'simulator')
+}
+EXECUTABLES = NODES | {'pad'}
+
+# Read off ros/rosdistro: packages of jazzy/distribution.yaml, keys of rosdep/python.yaml.
+ROSDEP_KEYS = {
+    *('ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
+    *('lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs'),
+    *('std_msgs', 'std_srvs', 'visualization_msgs'),
+    *('mcap-ros2-support', 'python3-hypothesis', 'python3-matplotlib', 'python3-numpy'),
+    *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
+    *('python3-serial', 'python3-tqdm', 'python3-yaml'),
+}
+
+
+@pytest.fixture(scope='module', params=[[], ['--symlink-install']], ids=['copied', 'linked'])
+def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+    """Return a colcon workspace in which ros_pad has just been built."""
+    folder = tmp_path_factory.mktemp('workspace')
+    source = folder / 'src' / 'ros_pad'
+    source.mkdir(parents=True)
+    for name in ('package.xml', 'setup.py', 'setup.cfg', 'LICENSE'):
+        shutil.copy(ROOT / name, source)
+    for name in ('config', 'resource', 'ros_pad'):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
+    build = subprocess.run(
+        [sys.executable, '-m', 'colcon', 'build', *request.param],
+        cwd=folder,
+        env=os.environ | {'COLCON_HOME': str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert build.returncode == 0, build.stdout + build.stderr
+    assert '1 package finished' in build.stdout
+    return folder
+
+
+def in_workspace(workspace: pathlib.Path, *command: str) -> str:
+    """Return what a command prints in a shell that has sourced the workspace."""
+    child = subprocess.run(
+        ['bash', '-c', '. install/setup.bash && exec "$@"', 'bash', *command],
+        cwd=workspace,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert child.returncode == 0, child.stdout + child.stderr
+    return child.stdout
+
+
+def test_the_ament_index_lists_package_and_executables(
+    workspace: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    prefix = workspace / 'install' / 'ros_pad'
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    assert packages.get_packages_with_prefixes() == {'ros_pad': str(prefix)}
+    # This is how `ros2 run` looks for executables.
+    folder = prefix / 'lib' / 'ros_pad'
+    found = {path.name for path in folder.iterdir() if os.access(path, os.X_OK)}
+    assert found == EXECUTABLES
+
+
+def test_every_config_file_is_shared(workspace: pathlib.Path):
+    shared = workspace / 'install' / 'ros_pad' / 'share' / 'ros_pad'
+    files = [path for path in (ROOT / 'config').rglob('*') if path.is_file()]
+    assert files
+    for path in files:
+        assert (shared / path.relative_to(ROOT)).read_bytes() == path.read_bytes()
+    assert (shared / 'package.xml').is_file()
+
+
+def test_the_command_runs_and_finds_its_scenes(workspace: pathlib.Path):
+    pad = 'install/ros_pad/lib/ros_pad/pad'
+    assert 'pad run' in in_workspace(workspace, pad, 'run', '--help')
+    assert 'hexapod_patches' in in_workspace(workspace, pad, 'scenes')
+
+
+ENTRY_POINTS = """
+import importlib.metadata, sys
+ros_pad = importlib.metadata.distribution('ros_pad')
+for entry in ros_pad.entry_points.select(group='console_scripts'):
+    assert callable(entry.load())
+    print(entry.name, sys.modules[entry.module].__file__)
+"""
+
+
+def test_every_executable_has_its_entry_point_in_the_workspace(workspace: pathlib.Path):
+    lines = in_workspace(workspace, sys.executable, '-c', ENTRY_POINTS).splitlines()
+    place = dict(line.split(' ', 1) for line in lines)
+    assert set(place) == EXECUTABLES
+    for path in place.values():
+        assert pathlib.Path(path).resolve().is_relative_to(workspace.resolve())
+
+
+def test_package_xml():
+    package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
+    assert package.get('format') == '3'
+    assert package.findtext('name') == 'ros_pad'
+    assert package.findtext('license') == 'Apache-2.0'
+    licence = package.find('license').get('file')
+    assert 'Apache License' in (ROOT / licence).read_text(encoding='utf-8')
+    assert package.findtext('export/build_type') == 'ament_python'
+    assert f"version='{package.findtext('version')}'" in (ROOT / 'setup.py').read_text()
+    keys = {node.text for node in package if node.tag.endswith('depend')}
+    assert 'rclpy' in keys
+    assert keys <= ROSDEP_KEYS
