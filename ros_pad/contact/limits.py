@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much force an inflated pad carries, by three named criteria, and the pressure for a force.
+
+``measured``
+    A line through the thesis' three measurements (0.15, 0.30, 0.40 N at 65, 75, 85 kPa).
+``max_depth``
+    The force at which the cap is cut off deepest: pressing on lets the dome collapse sideways.
+``flattening``
+    The force at which the contact reaches the rim and the model ends.
+
+The two of the model use its default adhesion, and the variables of :mod:`ros_pad.contact.dome`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.contact.dome import BURST
+from ros_pad.contact.dome import flattening_force
+from ros_pad.contact.dome import largest_tension
+from ros_pad.contact.dome import signed_adhesion
+from ros_pad.contact.pad import LARGE_PAD
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Floats
+from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import choice
+from ros_pad.contact.pad import quantity
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+
+CRITERIA = ('measured', 'flattening', 'max_depth')
+
+# The fit: force per pad of 1.5 mm, N, against gauge pressure, Pa.
+_FIT_FORCE, _FIT_PRESSURE, _FIT_SLOPE = 0.2833, 75e3, 1.25e-5
+# No pad was measured above 85 kPa; the line is drawn on to where that pad's model ends.
+_FIT_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
+
+# Height over radius of the deepest dome at the model's largest pressure, from above.
+_HEIGHT_AT_END = 0.655
+
+
+def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') -> Floats:
+    """Return the largest normal force one pad carries at a pressure, N.
+
+    Parameters
+    ----------
+    pad : Pad
+    pressure : float or array
+        Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`);
+        for ``measured`` also at most 91.36 kPa, whatever the pad.
+    criterion : {'measured', 'flattening', 'max_depth'}
+        ``measured`` is ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm and in proportion
+        to the radius squared for others, which nobody has measured.
+
+    Returns
+    -------
+    float or array
+        0 where the pad carries nothing (``measured``: below 52.3 kPa). In arrays NaN above the
+        end of the model.
+
+    Raises
+    ------
+    NoEquilibrium
+        For a scalar pressure above the end of the model: ``fold_zone``, or ``no_inflation``.
+    InvalidInput
+        For an unknown criterion, or a pressure that is negative, not finite, or past the
+        measurements.
+    """
+    choice('criterion', criterion, CRITERIA)
+    p = quantity('pressure', pressure, 'Pa')
+    a = signed_adhesion(pad, 'matlab')
+    tension = p * (pad.radius / pad.stiffness)
+    inside = tension <= largest_tension(a)
+    if np.ndim(p) == 0 and not inside:
+        status = 'fold_zone' if tension < BURST else 'no_inflation'
+        raise NoEquilibrium(
+            f'pressure {p:g} Pa on {pad} has no force limit: the model ends at '
+            f'{largest_tension(a) * pad.stiffness / pad.radius:.6g} Pa',
+            status,
+        )
+    if criterion == 'measured':
+        quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_FIT_END)
+        limit = (_FIT_FORCE + _FIT_SLOPE * (p - _FIT_PRESSURE)) * _area_ratio(pad)
+    else:
+        tension = np.where(inside, tension, 1.0)
+        if criterion == 'flattening':
+            f = flattening_force(tension, a)
+        else:
+            f = _deepest_force(tension, a)
+        limit = f * (math.pi * pad.stiffness * pad.radius)
+    limit = np.where(inside, np.maximum(limit, 0.0), np.nan)
+    return float(limit) if limit.ndim == 0 else limit
+
+
+def pressure_for(
+    pad: Pad, force: npt.ArrayLike, criterion: str = 'measured', margin: npt.ArrayLike = 1.0
+) -> Floats:
+    """Return the pressure whose force limit is ``margin * force``, Pa gauge.
+
+    Parameters
+    ----------
+    pad : Pad
+    force : float or array
+        Normal force on this one pad, N, from 0. For no force at all the answer is the pressure
+        at which the limit leaves zero.
+    criterion : {'measured', 'flattening', 'max_depth'}
+        As for :func:`force_limit`.
+    margin : float or array
+        Factor on the force, above 0.
+
+    Returns
+    -------
+    float or array
+        NaN in arrays where no pressure of the model carries the force.
+
+    Raises
+    ------
+    NoEquilibrium
+        For scalars where no pressure up to the end of the model carries that force: a higher
+        one would be in the ``fold_zone``.
+    InvalidInput
+        For an unknown criterion, or values that are negative, not finite, or do not broadcast.
+    """
+    choice('criterion', criterion, CRITERIA)
+    load = quantity('force', force, 'N')
+    factor = quantity('margin', margin, '(factor)', above=True)
+    try:
+        load = load * factor
+    except ValueError as error:
+        raise InvalidInput('force and margin do not broadcast') from error
+    a = signed_adhesion(pad, 'matlab')
+    end = largest_tension(a) * pad.stiffness / pad.radius
+    if criterion == 'measured':
+        end = min(end, _FIT_END)
+    strongest = force_limit(pad, end * (1.0 - 1e-15), criterion)
+    carried = load <= strongest
+    if np.ndim(load) == 0 and not carried:
+        raise NoEquilibrium(
+            f'force {load:g} N (margin included) on {pad} is more than any pressure carries: '
+            f'at most {strongest:.6g} N at {end:.6g} Pa by the criterion {criterion}',
+            'fold_zone',
+        )
+    load = np.where(carried, load, 0.0)
+    if criterion == 'measured':
+        p = _FIT_PRESSURE + (load / _area_ratio(pad) - _FIT_FORCE) / _FIT_SLOPE
+    else:
+        f = load / (math.pi * pad.stiffness * pad.radius)
+        invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
+        p = invert(f, a) * (pad.stiffness / pad.radius)
+    p = np.where(carried, p, np.nan)
+    return float(p) if p.ndim == 0 else p
+
+
+def _area_ratio(pad: Pad) -> float:
+    return (pad.radius / LARGE_PAD.radius) ** 2
+
+
+def _tension_at_flattening(f: Array, a: float) -> Array:
+    return _rising_root(
+        lambda tension: flattening_force(tension, a) - f, 0.0 * f, largest_tension(a) + 0.0 * f
+    )
+
+
+def _deepest_force(tension: Array, a: float) -> Array:
+    height = _rising_root(lambda x: _deepest(x, a)[0] - tension, *_heights(tension, a))
+    return _deepest(height, a)[1]
+
+
+def _tension_at_deepest(f: Array, a: float) -> Array:
+    height = _rising_root(lambda x: _deepest(x, a)[1] - f, *_heights(f, a))
+    return _deepest(height, a)[0]
+
+
+def _heights(like: Array, a: float) -> tuple[Array, Array]:
+    """Return the heights between which the deepest domes of the model lie."""
+    return math.sqrt(a / (2.0 - a)) + 1e-12 + 0.0 * like, _HEIGHT_AT_END + 0.0 * like
+
+
+def _deepest(x: Array, a: float) -> tuple[Array, Array]:
+    """Return pressure ``P`` and force ``f`` at which a dome of height x is at its deepest.
+
+    Without the force, 3.53 and 3.58 say ``P A(x, d) = B(x, d)`` for height x and depth d. The
+    depth is greatest where also ``P dA/dx = dB/dx``, so ``A dB/dx = B dA/dx`` gives d for each x,
+    and the pressure follows. At the lowest pressures d reaches x first: the dome flattens.
+    """
+    rho = 0.5 * (x + 1.0 / x)
+    rho_slope = 0.5 - 0.5 / (x * x)
+
+    def balance(d: Array) -> tuple[Array, Array, Array]:
+        sigma = np.sqrt(1.0 + (x - d) * (x + d))
+        area = rho * (x - d) + d * d
+        pull = (x + d) * (3.0 * sigma - 2.0) - 2.0 * a * rho
+        area_slope = rho_slope * (x - d) + rho
+        pull_slope = 3.0 * sigma - 2.0 + 3.0 * (x + d) * x / sigma - 2.0 * a * rho_slope
+        return area, pull, pull * area_slope - area * pull_slope
+
+    d = _rising_root(lambda depth: balance(depth)[2], 0.0 * x, x)
+    area, pull, _ = balance(d)
+    tension = pull / area
+    return tension, tension * d * (2.0 * rho - d) - 2.0 * a * rho
+
+
+def _rising_root(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Return where a rising function crosses zero (Illinois); the end where it does not."""
+    at_low, at_high = function(low), function(high)
+    # An end that is already past zero is the answer: close the bracket on it.
+    high = np.where(at_low >= 0, low, high)
+    low = np.where(at_high <= 0, high, low)
+    at_low, at_high = np.minimum(at_low, 0.0), np.maximum(at_high, 0.0)
+    x = low
+    kept = np.zeros_like(low)  # which end stayed last time: -1 the low one, 1 the high one
+    for _ in range(100):
+        rise = at_high - at_low
+        new = high - at_high * (high - low) / np.where(rise > 0, rise, 1.0)
+        value = function(new)
+        above = value > 0
+        # An end that stays twice gets half its weight, so that the other one moves too.
+        at_low = np.where(above, np.where(kept < 0, 0.5 * at_low, at_low), value)
+        at_high = np.where(above, value, np.where(kept > 0, 0.5 * at_high, at_high))
+        low, high = np.where(above, low, new), np.where(above, new, high)
+        kept = np.where(above, -1, 1)
+        done = (abs(new - x) <= 4e-16 * abs(new)) | (value == 0)
+        x = new
+        if np.all(done):
+            break
+    return x
