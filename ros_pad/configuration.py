@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterator
 from collections.abc import Sequence
 from contextlib import contextmanager
+from contextlib import suppress
 from typing import Any
 
 import yaml
@@ -125,6 +126,10 @@ class Table:
     ) -> float:
         """Take a finite number in [low, high]."""
         value = self._take(key, default)
+        if isinstance(value, str):
+            # PyYAML reads 90e3 as text (YAML 1.1 wants 90.0e+3); to everyone else it is a number.
+            with suppress(ValueError):
+                value = float(value)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not math.isfinite(value) or not low <= value <= high:
             raise ConfigError(

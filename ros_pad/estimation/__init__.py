@@ -1,1 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
+"""What a foot feels: slip alarm, wetness, friction and margin, from force and motion."""
+
+from ros_pad.estimation.foot import Estimate
+from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation.foot import Tuning
+
+__all__ = ['Estimate', 'FootEstimator', 'Tuning']

@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Trials: the closed loop without ROS, its metrics, bags and reports."""

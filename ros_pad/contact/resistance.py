@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tangential resistance of a whole foot: flat or dome, dry or wet.
+
+The thesis writes F_re = μ N + τ A + F_cap (Eqs 3.65 to 3.67) and gives neither μ nor τ. Two
+contact areas turn that one law into the four states it describes:
+
+- a *flat* sole conforms to the floor: A = N / p_c until the whole sole touches, which on dry
+  ground makes adhesion its larger part;
+- *domes* touch only where their air pressure p carries the load, A = N / p (Eq. 3.53 without
+  adhesion), several times less: a dome holds less on dry ground;
+- a liquid film of thickness h leaves dry contact on a share exp(-(h/h_c)^m) of the area, and
+  boundary friction on the rest; the high pressure under a dome drains it, the flat sole floats.
+
+Domes past their force limit are pressed flat, and the sole carries what they cannot.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.contact.dome import inflate
+from ros_pad.contact.limits import force_limit
+from ros_pad.contact.pad import Pad
+from ros_pad.errors import InvalidInput
+
+FORCE_LIMITS = ('measured', 'max_depth', 'flattening')
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A sole with equal pads, and the constants of its friction.
+
+    Attributes
+    ----------
+    name : str
+        What the file that describes it is called.
+    pad : Pad
+        One pad.
+    pads : int
+        How many of them share the load.
+    sole_radius : float
+        Radius of the sole, m.
+    friction : float
+        Load-proportional part of dry friction, μ of Eq. 3.66.
+    shear_strength : float
+        Shear strength of adhesive contact, τ of Eq. 3.67, Pa.
+    conforming_pressure : float
+        Mean pressure at which a flat sole touches all over, Pa.
+    boundary_friction : float
+        Friction coefficient on a film that does not drain.
+    critical_film : float
+        Film thickness that leaves 1/e of dry contact (exponent 1), m.
+    film_exponent : float
+        How sharply contact is lost with film thickness.
+    shear_stiffness : float
+        Tangential stiffness of sole and pads, N/m.
+    chamber_volume : float
+        Air in the foot besides that under the pads, m³.
+    ceiling : float
+        Gauge pressure that is never exceeded, Pa.
+    limit : str
+        Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
+    """
+
+    name: str
+    pad: Pad
+    pads: int
+    sole_radius: float
+    friction: float
+    shear_strength: float
+    conforming_pressure: float
+    boundary_friction: float
+    critical_film: float
+    film_exponent: float
+    shear_stiffness: float
+    chamber_volume: float
+    ceiling: float
+    limit: str = 'measured'
+    _limit_table: tuple[float, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # The limit is asked for at every simulated step: tabulate it once, each 0.5 kPa.
+        pressures = np.arange(0.0, self.ceiling + 500.0, 500.0)
+        limits = [0.0]
+        limits += [self.pads * float(force_limit(self.pad, p, self.limit)) for p in pressures[1:]]
+        object.__setattr__(self, '_limit_table', tuple(limits))
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str]) -> Foot:
+        """Read ``config/feet/<name>.yaml`` or a file of one's own.
+
+        Raises
+        ------
+        ConfigError
+            Naming file, key, value and allowed range.
+        """
+        path = configuration.locate('feet', name_or_path)
+        table = Table.load(path)
+        table.text('description', default='')
+        with table.table('pad') as pad_table:
+            pad = Pad(
+                radius=pad_table.number('radius', 'm', 1e-4, 1e-2),
+                stiffness=pad_table.number('stiffness', 'N/m', 1.0, 1e4),
+                adhesion_energy=pad_table.number('adhesion_energy', 'J/m2', 0.0, 1.0),
+            )
+        foot = cls(
+            name=path.stem,
+            pad=pad,
+            pads=table.integer('pads', 1, 10000),
+            sole_radius=table.number('sole_radius', 'm', 1e-3, 0.2),
+            friction=table.number('friction', '(coefficient)', 0.0, 3.0),
+            shear_strength=table.number('shear_strength', 'Pa', 0.0, 1e6),
+            conforming_pressure=table.number('conforming_pressure', 'Pa', 1.0, 1e7),
+            boundary_friction=table.number('boundary_friction', '(coefficient)', 0.0, 3.0),
+            critical_film=table.number('critical_film', 'm', 1e-9, 1e-3),
+            film_exponent=table.number('film_exponent', '(exponent)', 0.1, 10.0),
+            shear_stiffness=table.number('shear_stiffness', 'N/m', 1.0, 1e7),
+            chamber_volume=table.number('chamber_volume', 'm3', 0.0, 1e-3),
+            ceiling=table.number('ceiling', 'Pa', 1e3, 1e6),
+            limit=table.choice('force_limit', FORCE_LIMITS, default='measured'),
+        )
+        table.finish()
+        return foot
+
+    @property
+    def sole_area(self) -> float:
+        """Area of the sole, m²."""
+        return math.pi * self.sole_radius**2
+
+    def air_volume(self, pressure: float) -> float:
+        """Air that pads and chamber hold at a gauge pressure, Pa: m³ (free domes)."""
+        domes = self.pads * float(inflate(self.pad, pressure).volume) if pressure > 0.0 else 0.0
+        return self.chamber_volume + domes
+
+    def dome_load(self, load: float, pressure: float) -> float:
+        """Part of the load, N, that the domes carry at a gauge pressure, Pa: up to their limit."""
+        place = pressure / 500.0
+        index = int(place)
+        if pressure <= 0.0:
+            return 0.0
+        table = self._limit_table
+        if index >= len(table) - 1:
+            limit = table[-1]
+        else:
+            limit = table[index] + (place - index) * (table[index + 1] - table[index])
+        return load if load < limit else limit
+
+    def resistance_of(
+        self,
+        dome_load: float,
+        sole_load: float,
+        pressure: float,
+        dome_film: float,
+        sole_film: float,
+    ) -> float:
+        """Resistance in newtons for a given share of the load: the kernel, scalars only."""
+        total = 0.0
+        if dome_load > 0.0:
+            dry = self.friction * dome_load + self.shear_strength * dome_load / pressure
+            total += self._on_film(dry, dome_load, dome_film)
+        if sole_load > 0.0:
+            area = min(self.sole_area, sole_load / self.conforming_pressure)
+            dry = self.friction * sole_load + self.shear_strength * area
+            total += self._on_film(dry, sole_load, sole_film)
+        return total
+
+    def _on_film(self, dry: float, load: float, film: float) -> float:
+        if film <= 0.0:
+            return dry
+        touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
+        return touching * dry + (1.0 - touching) * self.boundary_friction * load
+
+
+def tangential_resistance(
+    foot: Foot,
+    load: ArrayLike,
+    pressure: ArrayLike,
+    dome_film: ArrayLike = 0.0,
+    sole_film: ArrayLike = 0.0,
+) -> np.ndarray | float:
+    """Largest tangential force that a foot holds, N (Eqs 3.65 to 3.67 with a film model).
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot.
+    load : array_like
+        Normal force on the foot, N, >= 0.
+    pressure : array_like
+        Gauge pressure in the pads, Pa, from 0 (flat) to ``foot.ceiling``.
+    dome_film, sole_film : array_like
+        Liquid film under the domes and under the flat sole, m, >= 0; 0 is dry ground.
+
+    Returns
+    -------
+    float or ndarray
+        Resistance in newtons, broadcast over the inputs. The capillary force is left out: per pad
+        it is bounded by :func:`ros_pad.contact.meniscus` at 1e-3 of the friction of a loaded pad.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of its range.
+    """
+    ranges = {
+        'load': (load, 'N', math.inf),
+        'pressure': (pressure, 'Pa', foot.ceiling),
+        'dome_film': (dome_film, 'm', math.inf),
+        'sole_film': (sole_film, 'm', math.inf),
+    }
+    arrays = []
+    for name, (value, unit, high) in ranges.items():
+        array = np.asarray(value, dtype=float)
+        bad = ~np.isfinite(array) | (array < 0.0) | (array > high)
+        if bad.any():
+            raise InvalidInput(
+                f'{name} = {array[bad].flat[0]!r} {unit}: must be finite and in [0, {high:g}] {unit}'
+            )
+        arrays.append(array)
+
+    def one(load: float, pressure: float, dome_film: float, sole_film: float) -> float:
+        on_domes = foot.dome_load(load, pressure)
+        return foot.resistance_of(on_domes, load - on_domes, pressure, dome_film, sole_film)
+
+    result = np.vectorize(one, otypes=[float])(*arrays)
+    return float(result) if result.ndim == 0 else result

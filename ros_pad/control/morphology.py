@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flat or dome: the choice for each foot's next step.
+
+A foot never changes shape while it stands. It decides when it lifts off, so that the air has the
+swing to move, and keeps the shape to the next lift-off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.control.pressure import dome_pressure
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
+
+FLAT = 'flat'
+DOME = 'dome'
+
+
+@dataclass(frozen=True)
+class LiftOff:
+    """What a policy knows when a foot lifts off.
+
+    Attributes
+    ----------
+    leg : int
+        Number of the leg.
+    morphology : str
+        Shape of the step that ends, ``flat`` or ``dome``.
+    steps : int
+        Steps taken in that shape, this one counted.
+    probing : bool
+        Whether that step was a probe.
+    wet_probability : float
+        Belief about the ground it stood on.
+    position : tuple of float
+        Where it stood, m.
+    """
+
+    leg: int
+    morphology: str
+    steps: int
+    probing: bool
+    wet_probability: float
+    position: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A shape for the next step, and whether it is only a probe of the ground."""
+
+    morphology: str
+    probe: bool = False
+
+
+Policy = Callable[[LiftOff], Choice]
+
+
+def flat(step: LiftOff) -> Choice:
+    """Stay flat."""
+    return Choice(FLAT)
+
+
+def dome(step: LiftOff) -> Choice:
+    """Stay domed."""
+    return Choice(DOME)
+
+
+def adaptive(
+    wet_above: float = 0.65,
+    dry_below: float = 0.35,
+    dwell: int = 2,
+    probe_every: int = 4,
+) -> Policy:
+    """Return a policy that follows the belief, with hysteresis, dwell and probes.
+
+    Parameters
+    ----------
+    wet_above, dry_below : float
+        Beliefs P(wet) beyond which a foot turns to dome, and back to flat.
+    dwell : int
+        Steps that a shape is kept at least.
+    probe_every : int
+        Domed steps after which one flat step asks the ground. A dome feels wet and dry ground
+        alike: without probes a foot that was once on wet ground would stay domed for ever.
+    """
+
+    def choose(step: LiftOff) -> Choice:
+        if step.morphology == FLAT:
+            settled = step.probing or step.steps >= dwell
+            return Choice(DOME) if settled and step.wet_probability > wet_above else Choice(FLAT)
+        if step.steps >= dwell and step.wet_probability < dry_below:
+            return Choice(FLAT)
+        # Legs take turns, so that not all feet of a robot give up their grip at once.
+        due = step.steps >= dwell and (step.steps + step.leg) % probe_every == 0
+        return Choice(FLAT, probe=True) if due else Choice(DOME)
+
+    return choose
+
+
+def oracle(wet_ahead: Callable[[float, float], bool], stride: float) -> Policy:
+    """Return a policy that knows the ground where the foot will stand next.
+
+    Parameters
+    ----------
+    wet_ahead : callable
+        ``wet_ahead(x, y)`` tells whether the ground is wet at a position, m.
+    stride : float
+        Way from one footprint to the next along x, m.
+    """
+
+    def choose(step: LiftOff) -> Choice:
+        x, y = step.position
+        return Choice(DOME if wet_ahead(x + stride, y) else FLAT)
+
+    return choose
+
+
+POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
+
+
+def policy_named(
+    name: str, wet_ahead: Callable[[float, float], bool] | None = None, stride: float = 0.0
+) -> Policy:
+    """Return a policy by its name; ``oracle`` needs the ground and the stride.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown name, or an oracle without ground to look at.
+    """
+    if name == 'oracle':
+        if wet_ahead is None:
+            raise InvalidInput("policy = 'oracle': needs a floor that is known")
+        return oracle(wet_ahead, stride)
+    policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive()}
+    if name not in policies:
+        raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
+    return policies[name]
+
+
+class _Leg:
+    """Memory of the controller about one leg."""
+
+    __slots__ = ('morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps', 'touched')
+
+    def __init__(self, morphology: str, peak: float) -> None:
+        self.morphology = morphology
+        self.steps = 0
+        self.probing = False
+        self.standing = False
+        self.peak = peak
+        self.touched = 0.0
+        self.setpoint = 0.0
+
+
+class MorphologyController:
+    """Turns each foot's load and belief into a shape and a set-point.
+
+    Parameters
+    ----------
+    foot : Foot
+        All feet are of this kind.
+    legs : sequence of int
+        Numbers of the legs.
+    policy : callable
+        Chooses at each lift-off, see :func:`adaptive`.
+    expected_load : float
+        Normal force in stance, N.
+    start : str
+        Shape before the first lift-off.
+    margin : float
+        On the load, for the pressure of a dome.
+    fixed_pressure : float or None
+        Gauge pressure of every dome, Pa; None chooses it from the load.
+    load_gate : float
+        Share of the expected load above which a foot stands.
+    """
+
+    def __init__(
+        self,
+        foot: Foot,
+        legs: Sequence[int],
+        policy: Policy,
+        expected_load: float,
+        start: str = FLAT,
+        margin: float = 1.2,
+        fixed_pressure: float | None = None,
+        load_gate: float = 0.3,
+    ) -> None:
+        if not (math.isfinite(expected_load) and expected_load > 0.0):
+            raise InvalidInput(f'expected_load = {expected_load!r} N: must be finite and > 0 N')
+        if start not in (FLAT, DOME):
+            raise InvalidInput(f'start = {start!r}: must be {FLAT!r} or {DOME!r}')
+        self._foot = foot
+        self._policy = policy
+        self._margin = margin
+        self._fixed_pressure = fixed_pressure
+        self._gate = load_gate * expected_load
+        self._legs = {leg: _Leg(start, 1.5 * expected_load) for leg in legs}
+        self.refusals: dict[int, str] = {}
+        self.switches = dict.fromkeys(legs, 0)
+        for leg in legs:
+            self._apply(leg, Choice(start))
+
+    def morphology(self, leg: int) -> str:
+        """Shape chosen for a leg's current or next step."""
+        return self._legs[leg].morphology
+
+    def setpoint(self, leg: int) -> float:
+        """Gauge pressure wanted for a leg, Pa."""
+        return self._legs[leg].setpoint
+
+    def feel(self, leg: int, load: float) -> None:
+        """Take one sample of a leg's normal force, N; call it for every wrench."""
+        state = self._legs[leg]
+        if load > state.touched:
+            state.touched = load
+
+    def update(
+        self, leg: int, load: float, wet_probability: float, position: Sequence[float]
+    ) -> float:
+        """Take an estimate and return the gauge pressure wanted, Pa.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+        load : float
+            Normal force now, N.
+        wet_probability : float
+            Belief about the ground below it, 0 to 1.
+        position : sequence of float
+            Of the foot, m.
+        """
+        state = self._legs[leg]
+        if load >= self._gate:
+            state.standing = True
+        elif state.standing:
+            state.standing = False
+            self._lift_off(leg, wet_probability, position)
+        return state.setpoint
+
+    def _lift_off(self, leg: int, wet_probability: float, position: Sequence[float]) -> None:
+        state = self._legs[leg]
+        state.steps += 1
+        # Remember the heaviest step, but forget it over some tens of steps.
+        state.peak = max(state.touched, state.peak + 0.1 * (state.touched - state.peak))
+        state.touched = 0.0
+        step = LiftOff(
+            leg, state.morphology, state.steps, state.probing, wet_probability,
+            (position[0], position[1]),
+        )  # fmt: skip
+        self._apply(leg, self._policy(step))
+
+    def _apply(self, leg: int, choice: Choice) -> None:
+        state = self._legs[leg]
+        morphology = choice.morphology
+        setpoint = 0.0
+        self.refusals.pop(leg, None)
+        if morphology == DOME:
+            try:
+                setpoint = self._fixed_pressure or dome_pressure(
+                    self._foot, state.peak, self._margin
+                )
+            except LimitError as error:
+                # Domes that cannot carry the foot are worse than none.
+                self.refusals[leg] = str(error)
+                morphology = FLAT
+        if morphology != state.morphology:
+            self.switches[leg] += 1
+            state.steps = 0
+            state.morphology = morphology
+        state.probing = choice.probe
+        state.setpoint = setpoint

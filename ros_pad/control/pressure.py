@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which pressure a foot needs so that its domes carry its load."""
+
+from __future__ import annotations
+
+from ros_pad.contact.limits import pressure_for
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import LimitError
+from ros_pad.errors import NoEquilibrium
+
+RESOLUTION = 10.0  # Pa: what the regulators take, and exact when an ambient pressure is added
+
+
+def dome_pressure(foot: Foot, load: float, margin: float) -> float:
+    """Gauge pressure, Pa, at which the domes carry a load with a margin.
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot.
+    load : float
+        Largest normal force expected on the foot, N.
+    margin : float
+        Factor on the load: 10 % of missing pressure costs a third of the limit at 75 kPa.
+
+    Raises
+    ------
+    LimitError
+        When the pressure would be above the foot's ceiling.
+    """
+    try:
+        pressure = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
+    except NoEquilibrium as error:
+        raise LimitError(f'{load:g} N on {foot.pads} pads of {foot.name}: {error}') from error
+    if pressure > foot.ceiling:
+        raise LimitError(
+            f'{load:g} N with margin {margin:g} on {foot.pads} pads of {foot.name} needs'
+            f' {pressure:.0f} Pa, above the ceiling of {foot.ceiling:.0f} Pa'
+        )
+    return RESOLUTION * round(pressure / RESOLUTION)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Slip alarm: a one-sided CUSUM test on the slip speed (Page 1954)."""
+
+from __future__ import annotations
+
+
+class SlipAlarm:
+    """Raises when the evidence for slip at a given speed has piled up.
+
+    The statistic g ← max(0, g + v1/σ² (v - v1/2)) is the log-likelihood ratio of slip at v1
+    against stick, added up since stick last looked likelier.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the speed while the foot sticks, m/s.
+    correlation_time : float
+        Over which the noise of the speed is correlated, s: samples closer than this count less.
+    speed : float
+        Slip speed v1 worth an alarm, m/s.
+    threshold : float
+        Of the statistic; e^-threshold bounds how often noise alone gets there.
+    """
+
+    __slots__ = ('_correlation_time', '_noise', '_speed', '_threshold', 'statistic')
+
+    def __init__(
+        self,
+        noise: float,
+        correlation_time: float,
+        speed: float = 0.03,
+        threshold: float = 4.0,
+    ) -> None:
+        self._noise = noise
+        self._correlation_time = correlation_time
+        self._speed = speed
+        self._threshold = threshold
+        self.statistic = 0.0
+
+    def reset(self) -> None:
+        """Forget; call it at touch-down."""
+        self.statistic = 0.0
+
+    def update(self, speed: float, dt: float) -> bool:
+        """Take one sample of the slip speed, m/s, dt seconds after the last; True is alarm."""
+        variance = self._noise**2 * max(1.0, self._correlation_time / dt)
+        gain = self._speed / variance * (speed - 0.5 * self._speed)
+        # Bounded above so that the alarm ends soon after the slip does.
+        self.statistic = min(max(0.0, self.statistic + gain), 2.0 * self._threshold)
+        return self.statistic > self._threshold

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimator of one foot: slip, wetness, friction, and margin to slip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.friction import GroundFilter
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What an estimator may be told about robot, sensors and ground; defaults suit most.
+
+    Attributes
+    ----------
+    position_noise : float
+        Standard deviation of a marker coordinate, m.
+    force_noise : float
+        Standard deviation of a force component, N.
+    load_gate : float
+        Share of the expected load above which a foot stands.
+    smoothing : float
+        Time constant of the speed, s.
+    filter_period : float
+        Between updates of the wetness and friction filter, s.
+    wet_prior : float
+        Probability of wet ground where nothing is known.
+    patch_length : float
+        Way over which wet and dry ground change, m.
+    ratio_noise : float
+        Model error of T/N, added to the sensors'.
+    """
+
+    position_noise: float = 1.5e-4
+    force_noise: float = 0.03
+    load_gate: float = 0.3
+    smoothing: float = 0.02
+    filter_period: float = 0.02
+    wet_prior: float = 0.5
+    patch_length: float = 1.5
+    ratio_noise: float = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What is known of a foot after a sample.
+
+    Attributes
+    ----------
+    time : float
+        Of the sample, s.
+    standing : bool
+        Whether the foot carries load.
+    slipping : bool
+        Alarm.
+    slip_velocity : tuple of float
+        Velocity of the contact over the floor along its tangential force, m/s, x and y.
+    slip_speed : float
+        The same against that force, m/s: positive when the foot gives way.
+    slip_speed_sd : float
+        Standard deviation of the slip speed, m/s.
+    wet_probability : float
+        Probability that the ground is wet, 0 to 1.
+    friction_mean, friction_sd : float
+        Of the coefficient of friction.
+    margin : float
+        5 % quantile of μ - T/N: below zero, slip is likely.
+    fresh : bool
+        Whether wetness and friction were updated by this sample.
+    """
+
+    time: float
+    standing: bool
+    slipping: bool
+    slip_velocity: tuple[float, float]
+    slip_speed: float
+    slip_speed_sd: float
+    wet_probability: float
+    friction_mean: float
+    friction_sd: float
+    margin: float
+    fresh: bool
+
+
+class FootEstimator:
+    """Estimates slip, wetness and friction of one foot from its force, marker and pressure.
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot: expected friction and shear stiffness come from it.
+    expected_load : float
+        Normal force in stance, N, > 0.
+    tuning : Tuning
+        Noise and ground.
+    """
+
+    def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
+        if not (math.isfinite(expected_load) and expected_load > 0.0):
+            raise InvalidInput(f'expected_load = {expected_load!r} N: must be finite and > 0 N')
+        self._tuning = tuning = tuning or Tuning()
+        self._foot = foot
+        self._expected_load = expected_load
+        self._gate = tuning.load_gate * expected_load
+        noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
+        self._speed_noise = noise / tuning.smoothing
+        self._alarm = SlipAlarm(self._speed_noise, tuning.smoothing)
+        self._ground = GroundFilter(
+            FrictionPrior.of(foot, expected_load),
+            wet_prior=tuning.wet_prior,
+            patch_length=tuning.patch_length,
+        )
+        self._time = -math.inf
+        self._standing = False
+        self._smooth_x = self._smooth_y = 0.0
+        self._footprint: tuple[float, float] | None = None
+        self._window_start = 0.0
+        self._samples = 0
+        self._sum_load = self._sum_tangential = self._sum_speed = 0.0
+        mean, sd = self._ground.friction
+        self.estimate = Estimate(
+            self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
+            self._ground.wet_probability, mean, sd, self._ground.quantile(0.05), True,
+        )  # fmt: skip
+
+    def update(
+        self,
+        time: float,
+        force: Sequence[float],
+        position: Sequence[float],
+        pressure: float,
+    ) -> Estimate:
+        """Take one sample.
+
+        Parameters
+        ----------
+        time : float
+            s, later than the last one's.
+        force : sequence of 3 floats
+            Of the ground on the foot, N; z is the normal force.
+        position : sequence of 3 floats
+            Of the foot's marker, m.
+        pressure : float
+            Gauge pressure in the pads, Pa.
+
+        Returns
+        -------
+        Estimate
+            What is known now.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, or time does not advance.
+        """
+        fx, fy, fz = force
+        x, y, _ = position
+        if not math.isfinite(time + fx + fy + fz + x + y + pressure):
+            raise InvalidInput(
+                f'sample at {time!r} s: force {tuple(force)} N, position {tuple(position)} m,'
+                f' pressure {pressure!r} Pa: all must be finite'
+            )
+        if time <= self._time:
+            raise InvalidInput(f'time = {time!r} s: must be later than the last, {self._time!r} s')
+        dt, self._time = time - self._time, time
+        if fz < self._gate:
+            return self._swing(time)
+        # The marker rides on a soft pad: take its shear off to see the contact itself.
+        contact_x = x + fx / self._foot.shear_stiffness
+        contact_y = y + fy / self._foot.shear_stiffness
+        if not self._standing:
+            self._touch_down(time, contact_x, contact_y, fz, pressure)
+            dt = self._tuning.smoothing / 10.0 if math.isinf(dt) else dt
+        smoothing = self._tuning.smoothing
+        share = dt / (smoothing + dt)
+        self._smooth_x += share * (contact_x - self._smooth_x)
+        self._smooth_y += share * (contact_y - self._smooth_y)
+        velocity_x = (contact_x - self._smooth_x) / smoothing
+        velocity_y = (contact_y - self._smooth_y) / smoothing
+        tangential = math.hypot(fx, fy)
+        # A foot gives way against the force that holds it; across it there is only noise.
+        along = (velocity_x * fx + velocity_y * fy) / tangential if tangential > 0.0 else 0.0
+        velocity = (along * fx / tangential, along * fy / tangential) if along else (0.0, 0.0)
+        speed = -along
+        slipping = self._alarm.update(speed, dt)
+        self._samples += 1
+        self._sum_load += fz
+        self._sum_tangential += tangential
+        self._sum_speed += speed
+        last = self.estimate
+        fresh = time - self._window_start >= self._tuning.filter_period - 1e-9
+        if fresh:
+            self._filter(time - self._window_start)
+            self._window_start = time
+            friction_mean, friction_sd = self._ground.friction
+            wet = self._ground.wet_probability
+            quantile = self._ground.quantile(0.05)
+            self._quantile = quantile
+        else:
+            friction_mean, friction_sd = last.friction_mean, last.friction_sd
+            wet, quantile = last.wet_probability, self._quantile
+        self.estimate = Estimate(
+            time, True, slipping, velocity, speed, self._speed_noise,
+            wet, friction_mean, friction_sd, quantile - tangential / fz, fresh,
+        )  # fmt: skip
+        return self.estimate
+
+    def _swing(self, time: float) -> Estimate:
+        last = self.estimate
+        fresh = self._standing
+        self._standing = False
+        self.estimate = Estimate(
+            time, False, False, (0.0, 0.0), 0.0, self._speed_noise, last.wet_probability,
+            last.friction_mean, last.friction_sd, last.margin, fresh,
+        )  # fmt: skip
+        return self.estimate
+
+    def _touch_down(self, time: float, x: float, y: float, load: float, pressure: float) -> None:
+        self._standing = True
+        self._alarm.reset()
+        self._smooth_x, self._smooth_y = x, y
+        before = self._footprint or (x, y)
+        self._footprint = (x, y)
+        domed = self._foot.dome_load(self._expected_load, pressure) > 0.5 * self._expected_load
+        self._ground.touch_down(math.dist(before, (x, y)), domed)
+        self._quantile = self._ground.quantile(0.05)
+        self._window_start = time
+        self._clear_window()
+
+    def _clear_window(self) -> None:
+        self._samples = 0
+        self._sum_load = self._sum_tangential = self._sum_speed = 0.0
+
+    def _filter(self, duration: float) -> None:
+        count = self._samples
+        load = self._sum_load / count
+        ratio = self._sum_tangential / self._sum_load
+        tuning = self._tuning
+        noise = math.hypot(
+            tuning.ratio_noise, tuning.force_noise * math.sqrt((1.0 + ratio**2) / count) / load
+        )
+        self._ground.update(ratio, noise, self._sum_speed / count, self._speed_noise, duration)
+        self._clear_window()

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One step of a planar body on frictional feet.
+
+The unknown is the twist q = (vx, vy, ω) at the end of the step. Each foot at lever arm (rx, ry)
+moves over the floor with s = (vx - ω ry + ux, vy + ω rx + uy), u being what the gait makes it do
+relative to the body. A step minimises the convex function
+
+    ½ (q - b)ᵀ M (q - b) + dt Σ φ_i(s_i),     b = twist before the step + dt M⁻¹ applied wrench
+
+so the twist is unique. What differs is φ, the potential of the foot's friction with cap c:
+
+``elastic``
+    The pad shears with stiffness k up to the cap: φ' = min(K |z|, c) along z = s + e/dt, with e
+    the shear at the start and K = k dt (a Huber function). Feet that stick share the load by their
+    stiffness, so that forces are unique too, and there is no creep. The default.
+``creeping``
+    Pseudo-Huber on the slip speed, φ' = c |s| / √(s² + ε²): fast and smooth, creeps at
+    about ε; sticking feet share the load in proportion to their caps.
+``exact_stick``
+    Rigid-plastic, by block Gauss-Seidel on impulses in discs of radius c dt: sticks exactly.
+    The reference. With three or more sticking feet the forces depend on the starting impulses:
+    started from zero, which is the split that is reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Twist = tuple[float, float, float]
+
+
+class Contact:
+    """One foot, or a drag, in a step: lever arm, imposed motion, cap, and pad shear.
+
+    All in world axes and SI units; lever arms from the centre of mass. After a step it holds the
+    force on the body, and how far its contact slid over the floor.
+    """
+
+    __slots__ = (
+        'cap', 'force_x', 'force_y', 'lever_x', 'lever_y', 'motion_x', 'motion_y',
+        'shear_x', 'shear_y', 'slid', 'stiffness',
+    )  # fmt: skip
+
+    def __init__(self, stiffness: float) -> None:
+        self.stiffness = stiffness
+        self.cap = 0.0
+        self.lever_x = self.lever_y = 0.0
+        self.motion_x = self.motion_y = 0.0
+        self.shear_x = self.shear_y = 0.0
+        self.force_x = self.force_y = 0.0
+        self.slid = 0.0
+
+    def slip(self, twist: Twist) -> tuple[float, float]:
+        """Velocity of the foot over the floor, m/s."""
+        vx, vy, omega = twist
+        return (
+            vx - omega * self.lever_y + self.motion_x,
+            vy + omega * self.lever_x + self.motion_y,
+        )
+
+
+def elastic(
+    free: Twist,
+    mass: float,
+    inertia: float,
+    contacts: Sequence[Contact],
+    dt: float,
+    start: Twist,
+) -> Twist:
+    """Step with sheared pads; sets each contact's force and shear (N on the body, m).
+
+    Parameters
+    ----------
+    free : tuple
+        Twist (m/s, m/s, rad/s) that the body would have without the contacts.
+    mass, inertia : float
+        kg and kg m².
+    contacts : sequence of Contact
+        Those with a cap of zero are skipped and lose their shear.
+    dt : float
+        Step, s.
+    start : tuple
+        First guess of the twist; the last twist is a good one.
+
+    Returns
+    -------
+    tuple
+        Twist at the end of the step.
+    """
+    active = []
+    for contact in contacts:
+        if contact.cap > 0.0:
+            rate = contact.stiffness * dt
+            active.append((
+                contact.lever_x, contact.lever_y,
+                contact.motion_x + contact.shear_x / dt, contact.motion_y + contact.shear_y / dt,
+                contact.cap, rate, contact.cap / rate,
+            ))  # fmt: skip
+        else:
+            contact.shear_x = contact.shear_y = contact.force_x = contact.force_y = 0.0
+            contact.slid = 0.0
+    twist = _newton(free, mass, inertia, active, dt, start, _shear_law)
+    for contact, (rx, ry, ox, oy, cap, rate, edge) in zip(
+        [c for c in contacts if c.cap > 0.0], active, strict=True
+    ):
+        zx = twist[0] - twist[2] * ry + ox
+        zy = twist[1] + twist[2] * rx + oy
+        size = math.hypot(zx, zy)
+        gain = rate if size <= edge else cap / size
+        contact.slid = (size - edge) * dt if size > edge else 0.0
+        contact.force_x, contact.force_y = -gain * zx, -gain * zy
+        contact.shear_x = gain * zx / contact.stiffness
+        contact.shear_y = gain * zy / contact.stiffness
+    return twist
+
+
+def creeping(
+    free: Twist,
+    mass: float,
+    inertia: float,
+    contacts: Sequence[Contact],
+    dt: float,
+    start: Twist,
+    creep: float = 1e-5,
+) -> Twist:
+    """Step with pseudo-Huber friction of creep speed ε, m/s; sets each contact's force."""
+    active = [
+        (c.lever_x, c.lever_y, c.motion_x, c.motion_y, c.cap, c.cap / creep, creep)
+        for c in contacts
+        if c.cap > 0.0
+    ]
+    twist = _newton(free, mass, inertia, active, dt, start, _pseudo_huber_law)
+    for contact in contacts:
+        sx, sy = contact.slip(twist)
+        gain = contact.cap / math.sqrt(sx * sx + sy * sy + creep * creep)
+        contact.force_x, contact.force_y = -gain * sx, -gain * sy
+        contact.slid = math.hypot(sx, sy) * dt
+    return twist
+
+
+def exact_stick(
+    free: Twist,
+    mass: float,
+    inertia: float,
+    contacts: Sequence[Contact],
+    dt: float,
+    tolerance: float = 1e-13,
+    sweeps: int = 20000,
+) -> Twist:
+    """Step with rigid-plastic friction, by block Gauss-Seidel; sets each contact's force.
+
+    Raises
+    ------
+    ArithmeticError
+        When the impulses still change by more than the tolerance (m/s) after all sweeps.
+    """
+    vx, vy, omega = free
+    impulses = [(0.0, 0.0)] * len(contacts)
+    # A step along the gradient no longer than the inverse of the stiffest direction of a contact
+    # keeps each block a contraction.
+    gains = [1.0 / (1.0 / mass + (c.lever_x**2 + c.lever_y**2) / inertia) for c in contacts]
+    for _ in range(sweeps):
+        change = 0.0
+        for index, contact in enumerate(contacts):
+            rx, ry, limit = contact.lever_x, contact.lever_y, contact.cap * dt
+            px, py = impulses[index]
+            qx = px - gains[index] * (vx - omega * ry + contact.motion_x)
+            qy = py - gains[index] * (vy + omega * rx + contact.motion_y)
+            size = math.hypot(qx, qy)
+            if size > limit:
+                qx, qy = qx * limit / size, qy * limit / size
+            dx, dy = qx - px, qy - py
+            impulses[index] = (qx, qy)
+            vx += dx / mass
+            vy += dy / mass
+            omega += (rx * dy - ry * dx) / inertia
+            change = max(change, abs(dx), abs(dy))
+        if change <= tolerance * mass:
+            break
+    else:
+        raise ArithmeticError(f'impulses still change by {change:g} N s after {sweeps} sweeps')
+    for contact, (px, py) in zip(contacts, impulses, strict=True):
+        contact.force_x, contact.force_y = px / dt, py / dt
+        contact.slid = math.hypot(*contact.slip((vx, vy, omega))) * dt
+    return vx, vy, omega
+
+
+def _shear_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float, float]:
+    """Potential, force / size, and its slope beyond that along the motion, of a sheared pad."""
+    if size <= edge:
+        return 0.5 * rate * size * size, rate, 0.0
+    gain = cap / size
+    return cap * (size - 0.5 * edge), gain, -gain
+
+
+def _pseudo_huber_law(
+    size: float, cap: float, rate: float, edge: float
+) -> tuple[float, float, float]:
+    root = math.sqrt(size * size + edge * edge)
+    gain = cap / root
+    return cap * root, gain, -gain * (size / root) ** 2
+
+
+def _newton(free, mass, inertia, active, dt, start, law):  # type: ignore[no-untyped-def]
+    """Newton with a line search on the convex step; scalars throughout, for speed."""
+    bx, by, bw = free
+    vx, vy, w = start
+
+    def value_at(vx: float, vy: float, w: float) -> float:
+        total = 0.5 * (mass * ((vx - bx) ** 2 + (vy - by) ** 2) + inertia * (w - bw) ** 2)
+        for rx, ry, ox, oy, cap, rate, edge in active:
+            total += dt * law(math.hypot(vx - w * ry + ox, vy + w * rx + oy), cap, rate, edge)[0]
+        return total
+
+    scale = mass * (1e-13 + 1e-12 * (abs(bx) + abs(by)))
+    for _ in range(60):
+        gx, gy, gw = mass * (vx - bx), mass * (vy - by), inertia * (w - bw)
+        hxx = hyy = mass
+        hww = inertia
+        hxy = hxw = hyw = 0.0
+        for rx, ry, ox, oy, cap, rate, edge in active:
+            zx = vx - w * ry + ox
+            zy = vy + w * rx + oy
+            size = math.sqrt(zx * zx + zy * zy)
+            _, gain, bend = law(size, cap, rate, edge)
+            gain *= dt
+            fx, fy = gain * zx, gain * zy
+            gx += fx
+            gy += fy
+            gw += rx * fy - ry * fx
+            if bend:
+                # Curvature: gain (I - n nᵀ) beyond the cap, written gain I + bend n nᵀ.
+                bend *= dt / (size * size)
+                kxx, kxy, kyy = gain + bend * zx * zx, bend * zx * zy, gain + bend * zy * zy
+            else:
+                kxx, kxy, kyy = gain, 0.0, gain
+            hxx += kxx
+            hxy += kxy
+            hyy += kyy
+            hxw += rx * kxy - ry * kxx
+            hyw += rx * kyy - ry * kxy
+            hww += rx * (rx * kyy - ry * kxy) - ry * (rx * kxy - ry * kxx)
+        if abs(gx) + abs(gy) + 10.0 * abs(gw) < scale:
+            break
+        # Cholesky of the 3 x 3 Hessian, which the masses keep positive definite.
+        lyx, lwx = hxy / hxx, hxw / hxx
+        dy = hyy - lyx * hxy
+        lwy = (hyw - lyx * hxw) / dy
+        dw = hww - lwx * hxw - lwy * (hyw - lyx * hxw)
+        yy = gy - lyx * gx
+        yw = gw - lwx * gx - lwy * yy
+        step_w = yw / dw
+        step_y = yy / dy - lwy * step_w
+        step_x = gx / hxx - lyx * step_y - lwx * step_w
+        slope = gx * step_x + gy * step_y + gw * step_w
+        before = value_at(vx, vy, w)
+        length = 1.0
+        while length > 1e-6:
+            value = value_at(vx - length * step_x, vy - length * step_y, w - length * step_w)
+            if value <= before - 1e-4 * length * slope + 1e-15 * abs(before):
+                break
+            length *= 0.5
+        vx -= length * step_x
+        vy -= length * step_y
+        w -= length * step_w
+    return vx, vy, w

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every simulated robot shows to the rest: the one interface of all rungs of the ladder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+Vector = tuple[float, float, float]
+
+
+class FootState:
+    """The true state of one foot after a step, in world axes and SI units.
+
+    Attributes
+    ----------
+    position : tuple of float
+        Marker on the foot, above its soft pads, m.
+    force : tuple of float
+        Force of the ground on the foot, N; z up out of the floor.
+    standing : bool
+        Whether the foot carries load.
+    wet : bool
+        Whether the ground below it is wet.
+    grip : float
+        Tangential force that the foot could hold now, N.
+    slip_speed : float
+        Speed of its contact over the floor, m/s.
+    slip_path : float
+        Way its contact has slid under load since the start, m.
+    overload_time : float
+        Time that its domes were past their force limit, s.
+    """
+
+    __slots__ = (
+        'force', 'grip', 'overload_time', 'position', 'slip_path', 'slip_speed', 'standing', 'wet',
+    )  # fmt: skip
+
+    def __init__(self) -> None:
+        self.position: Vector = (0.0, 0.0, 0.0)
+        self.force: Vector = (0.0, 0.0, 0.0)
+        self.standing = False
+        self.wet = False
+        self.grip = 0.0
+        self.slip_speed = 0.0
+        self.slip_path = 0.0
+        self.overload_time = 0.0
+
+
+class Robot(Protocol):
+    """A simulated robot: step it with the pads' gauge pressures, then read its feet and body.
+
+    Attributes
+    ----------
+    legs : tuple of int
+        Numbers of the legs, thesis numbering.
+    period : float
+        Step, s.
+    time : float
+        Simulated time, s.
+    feet : sequence of FootState
+        One for each leg, in the order of ``legs``.
+    dissipation : float
+        Work lost in slipping feet, J.
+    verdict : str or None
+        Why the walk is no longer valid, for instance a tip-over; None while it is.
+    """
+
+    legs: tuple[int, ...]
+    period: float
+    time: float
+    feet: Sequence[FootState]
+    dissipation: float
+    verdict: str | None
+
+    def step(self, pressures: Sequence[float]) -> None:
+        """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
+
+    @property
+    def body(self) -> Vector:
+        """Position x, y, m, and heading, rad, of the body in the world."""

@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene: robot, feet, floor, what makes grip matter, gait, and how well it must be known."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import ConfigError
+from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.terrain import FLOORS
+from ros_pad.simulation.terrain import Floor
+
+
+@dataclass(frozen=True)
+class HexapodBody:
+    """Mass and stance of a hexapod.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    inertia : float
+        About the vertical axis, kg m².
+    height : float
+        Of the centre of mass above the floor, m.
+    homes : tuple of (float, float)
+        Where feet 1 to 6 stand in the body, fore and left, m.
+    """
+
+    mass: float
+    inertia: float
+    height: float
+    homes: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class RailBody:
+    """The thesis' walking mechanism on a rail (5.2): a body on wheels pushed by one foot.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    rolling_drag : float
+        Force that the wheels need to roll, N.
+    load : float
+        With which springs press the foot to the floor, N.
+    goal : float
+        Way to the end of the rail, m.
+    """
+
+    mass: float
+    rolling_drag: float
+    load: float
+    goal: float
+
+
+@dataclass(frozen=True)
+class RailGait:
+    """The foot's stroke on the rail.
+
+    Attributes
+    ----------
+    stroke : float
+        Way of the foot under the body in stance, m.
+    stance, swing : float
+        Durations, s.
+    lift : float
+        Height of the foot in the middle of its swing, m.
+    """
+
+    stroke: float
+    stance: float
+    swing: float
+    lift: float
+
+    @property
+    def cycle(self) -> float:
+        """Duration of a cycle, s."""
+        return self.stance + self.swing
+
+
+@dataclass(frozen=True)
+class Tow:
+    """A load dragged over the same floor: what makes grip matter on level ground.
+
+    Attributes
+    ----------
+    weight : float
+        N; zero for none.
+    friction_dry, friction_wet : float
+        Of the load on dry and on wet ground.
+    distance : float
+        Behind the centre of the body, m.
+    height : float
+        Of the line above the floor where it pulls at the body, m.
+    stiffness : float
+        Of the line, N/m.
+    """
+
+    weight: float = 0.0
+    friction_dry: float = 0.0
+    friction_wet: float = 0.0
+    distance: float = 0.0
+    height: float = 0.0
+    stiffness: float = 2000.0
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Rate and white noise of the foot sensors.
+
+    Attributes
+    ----------
+    rate : float
+        Samples per second, Hz.
+    force : float
+        Standard deviation of each force component, N.
+    position : float
+        Standard deviation of each marker coordinate, m.
+    """
+
+    rate: float
+    force: float
+    position: float
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """What the floor is made of; :meth:`build` makes it for a seed.
+
+    Attributes
+    ----------
+    kind : str
+        ``dry``, ``wet`` or ``patches``.
+    film_thickness : float
+        Depth of the liquid where it is wet, m.
+    viscosity : float
+        Of the liquid, Pa s.
+    wet_fraction, patch_length : float
+        Share of wet floor, and mean length of a wet patch, m; patches only.
+    """
+
+    kind: str
+    film_thickness: float
+    viscosity: float
+    wet_fraction: float = 0.0
+    patch_length: float = 0.0
+
+    def build(self, seed: int) -> Floor:
+        """Return the floor for a seed."""
+        if self.kind == 'patches':
+            return Floor.patches(self.wet_fraction, self.patch_length, self.film_thickness, seed)
+        return Floor.uniform(self.kind == 'wet', self.film_thickness)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that a trial needs but policy and seed. See ``config/scenes/*.yaml``.
+
+    Attributes
+    ----------
+    name, description : str
+        Of the file.
+    robot : str
+        ``hexapod`` or ``rail_leg``.
+    body : HexapodBody or RailBody
+    gait : TripodGait or RailGait
+    heading_gain : float
+        How fast the gait steers back to heading zero, 1/s.
+    foot : Foot
+    floor : FloorPlan
+    tow : Tow
+    sensors : SensorNoise
+    regulator : dict
+        Options of the simulated regulator.
+    policy : str
+        Policy that the scene is made for.
+    dome_pressure : float or None
+        Fixed gauge pressure of a dome, Pa; None chooses it from the load.
+    settle : float
+        Time that the robot stands before it walks, s, for the pads to fill.
+    cycles : int
+        Gait cycles of a trial.
+    accuracy : float
+        Relative error of the distance that the scene tolerates.
+    """
+
+    name: str
+    description: str
+    robot: str
+    body: HexapodBody | RailBody
+    gait: TripodGait | RailGait
+    heading_gain: float
+    foot: Foot
+    floor: FloorPlan
+    tow: Tow
+    sensors: SensorNoise
+    regulator: dict[str, Any]
+    policy: str
+    dome_pressure: float | None
+    settle: float
+    cycles: int
+    accuracy: float
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of a trial, s."""
+        return self.settle + self.cycles * self.gait.cycle
+
+    @property
+    def legs(self) -> tuple[int, ...]:
+        """Numbers of the robot's legs."""
+        return (1, 2, 3, 4, 5, 6) if self.robot == 'hexapod' else (1,)
+
+    @property
+    def expected_load(self) -> float:
+        """Normal force that a foot carries in stance on average, N."""
+        if isinstance(self.body, HexapodBody):
+            return self.body.mass * 9.81 / 3.0
+        return self.body.load
+
+    @property
+    def stride(self) -> float:
+        """Advance of the body in a cycle without slip, m."""
+        return self.gait.stride if isinstance(self.gait, TripodGait) else self.gait.stroke
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str]) -> Scene:
+        """Read ``config/scenes/<name>.yaml`` or a file of one's own.
+
+        Raises
+        ------
+        ConfigError
+            Unknown scene (lists them, with the nearest name), or a file with an unknown key or a
+            value outside its range (names file, key, value and range).
+        """
+        path = configuration.locate('scenes', name_or_path)
+        return cls.read(Table.load(path), path.stem)
+
+    @classmethod
+    def read(cls, table: Table, name: str) -> Scene:
+        """Read a scene from a table; the whole table must be used up."""
+        robot = table.choice('robot', ('hexapod', 'rail_leg'))
+        description = table.text('description', default='')
+        try:
+            foot = Foot.load(table.text('foot'))
+        except ConfigError as error:
+            raise ConfigError(f'{table.origin}: foot: {error}') from error
+        body: HexapodBody | RailBody
+        gait: TripodGait | RailGait
+        heading_gain = 0.0
+        if robot == 'hexapod':
+            with table.table('body') as part:
+                body = _hexapod_body(part)
+            with table.table('gait') as part:
+                gait = TripodGait(
+                    cycle=part.number('cycle', 's', 0.1, 60.0),
+                    stride=part.number('stride', 'm', 1e-3, 1.0),
+                    duty=part.number('duty', '(share)', 0.51, 0.9),
+                    lift=part.number('lift', 'm', 1e-3, 0.2),
+                )
+                heading_gain = part.number('heading_gain', '1/s', 0.0, 10.0, default=0.0)
+        else:
+            with table.table('body') as part:
+                body = RailBody(
+                    mass=part.number('mass', 'kg', 0.01, 100.0),
+                    rolling_drag=part.number('rolling_drag', 'N', 0.0, 1000.0),
+                    load=part.number('load', 'N', 0.01, 1000.0),
+                    goal=part.number('goal', 'm', 0.01, 1000.0),
+                )
+            with table.table('gait') as part:
+                gait = RailGait(
+                    stroke=part.number('stroke', 'm', 1e-3, 1.0),
+                    stance=part.number('stance', 's', 0.05, 60.0),
+                    swing=part.number('swing', 's', 0.05, 60.0),
+                    lift=part.number('lift', 'm', 1e-3, 0.2),
+                )
+        with table.table('floor') as part:
+            floor = _floor_plan(part)
+        with table.table('tow', default={}) as part:
+            tow = Tow(
+                weight=part.number('weight', 'N', 0.0, 1e4, default=0.0),
+                friction_dry=part.number('friction_dry', '(coefficient)', 0.0, 3.0, default=0.0),
+                friction_wet=part.number('friction_wet', '(coefficient)', 0.0, 3.0, default=0.0),
+                distance=part.number('distance', 'm', 0.0, 10.0, default=0.0),
+                height=part.number('height', 'm', 0.0, 1.0, default=0.0),
+                stiffness=part.number('stiffness', 'N/m', 1.0, 1e7, default=2000.0),
+            )
+        with table.table('sensors') as part:
+            sensors = SensorNoise(
+                rate=part.number('rate', 'Hz', 50.0, 1000.0),
+                force=part.number('force_noise', 'N', 0.0, 10.0),
+                position=part.number('position_noise', 'm', 0.0, 0.01),
+            )
+        with table.table('regulator') as part:
+            regulator = {
+                'hose_diameter': part.number('hose_diameter', 'm', 5e-4, 0.02),
+                'hose_length': part.number('hose_length', 'm', 0.01, 20.0),
+            }
+        policy = table.choice('policy', ('flat', 'dome', 'adaptive', 'oracle'))
+        pressure = None
+        if 'dome_pressure' in table:
+            pressure = table.number('dome_pressure', 'Pa', 1.0, foot.ceiling)
+        scene = cls(
+            name=name,
+            description=description,
+            robot=robot,
+            body=body,
+            gait=gait,
+            heading_gain=heading_gain,
+            foot=foot,
+            floor=floor,
+            tow=tow,
+            sensors=sensors,
+            regulator=regulator,
+            policy=policy,
+            dome_pressure=pressure,
+            settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
+            cycles=table.integer('cycles', 1, 100000),
+            accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
+        )
+        table.finish()
+        return scene
+
+
+def _hexapod_body(part: Table) -> HexapodBody:
+    corner_x = part.number('corner_fore', 'm', 0.01, 1.0)
+    corner_y = part.number('corner_side', 'm', 0.01, 1.0)
+    middle_y = part.number('middle_side', 'm', 0.01, 1.0)
+    return HexapodBody(
+        mass=part.number('mass', 'kg', 0.05, 200.0),
+        inertia=part.number('inertia', 'kg m2', 1e-5, 100.0),
+        height=part.number('height', 'm', 0.0, 2.0),
+        # Left front, middle, rear, then right rear, middle, front: 2 and 5 are the middle legs,
+        # and each tripod has one side's corners and the other side's middle.
+        homes=(
+            (corner_x, corner_y),
+            (0.0, middle_y),
+            (-corner_x, corner_y),
+            (-corner_x, -corner_y),
+            (0.0, -middle_y),
+            (corner_x, -corner_y),
+        ),
+    )
+
+
+def _floor_plan(part: Table) -> FloorPlan:
+    kind = part.choice('kind', FLOORS)
+    patches = kind == 'patches'
+    return FloorPlan(
+        kind=kind,
+        film_thickness=part.number('film_thickness', 'm', 1e-9, 0.01, default=3e-4),
+        viscosity=part.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
+        wet_fraction=part.number('wet_fraction', '(share)', 0.01, 0.99) if patches else 0.0,
+        patch_length=part.number('patch_length', 'm', 0.1, 10.0) if patches else 0.0,
+    )

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The closed loop of a trial without ROS: robot, estimators, controller, regulators.
+
+The composed nodes make the same calls on the same objects in the same order; the order is written
+here once, in :meth:`ClosedLoop.tick`.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+
+from ros_pad.control import MorphologyController
+from ros_pad.control import policy_named
+from ros_pad.estimation import FootEstimator
+from ros_pad.estimation import Tuning
+from ros_pad.pace import Pace
+from ros_pad.regulators import Regulator
+from ros_pad.regulators import create
+from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.sensors import Sensors
+from ros_pad.trials.log import TrialLog
+from ros_pad.trials.trial import Trial
+
+CONTROL_PERIOD_NS = 20_000_000  # 50 Hz: what a regulator on a serial line manages
+
+Progress = Callable[[float], None]
+
+
+def sample_period_ns(scene: Scene) -> int:
+    """Return the period of the sensors, ns."""
+    return round(1e9 / scene.sensors.rate)
+
+
+def tuning_for(scene: Scene) -> Tuning:
+    """Return what an estimator is told of a scene: its sensors, not its ground."""
+    return Tuning(position_noise=scene.sensors.position, force_noise=scene.sensors.force)
+
+
+def simulated_regulator(scene: Scene, clock: Callable[[], float]) -> Regulator:
+    """Return the simulated regulator of one foot of a scene."""
+    foot = scene.foot
+    return create(
+        'simulated',
+        clock=clock,
+        ceiling=foot.ceiling,
+        pad_volume=foot.air_volume,
+        **scene.regulator,
+    )
+
+
+class ClosedLoop:
+    """Everything of a trial in one process, advanced sample by sample.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to walk on, with what.
+    policy : str
+        ``flat``, ``dome``, ``adaptive`` or ``oracle``.
+    seed : int
+        Of floor and noise.
+    """
+
+    def __init__(self, scene: Scene, policy: str, seed: int) -> None:
+        self.period_ns = sample_period_ns(scene)
+        self.floor = scene.floor.build(seed)
+        self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9)
+        self.sensors = Sensors(scene.sensors, len(scene.legs), seed)
+        tuning = tuning_for(scene)
+        self.estimators = [
+            FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs
+        ]
+        self.controller = MorphologyController(
+            scene.foot,
+            scene.legs,
+            policy_named(policy, self.floor.wet, scene.stride),
+            scene.expected_load,
+            start='dome' if policy == 'dome' else 'flat',
+            fixed_pressure=scene.dome_pressure,
+        )
+        self._now = 0.0
+        self.regulators = [simulated_regulator(scene, self._clock) for _ in scene.legs]
+        for regulator, leg in zip(self.regulators, scene.legs, strict=True):
+            regulator.open()
+            regulator.set_pressure(self.controller.setpoint(leg))
+        self.pressures = [0.0] * len(scene.legs)
+        self._legs = scene.legs
+        self._pace = Pace(CONTROL_PERIOD_NS)
+        self._stamp_ns = 0
+
+    def _clock(self) -> float:
+        return self._now
+
+    def tick(self, log: TrialLog) -> None:
+        """Advance by one sample.
+
+        The robot moves; each foot is estimated with the pressure it last reported; at control
+        steps the regulators report, the controller decides, and the regulators get its set-points.
+        """
+        self._stamp_ns += self.period_ns
+        now = self._now = self._stamp_ns * 1e-9
+        self.robot.step(self.pressures)
+        readings = self.sensors.read(self.robot)
+        controller = self.controller
+        due = self._pace.due(self._stamp_ns)
+        estimates = []
+        for index, leg in enumerate(self._legs):
+            force, position = readings[index]
+            controller.feel(leg, force[2])
+            estimates.append(
+                self.estimators[index].update(now, force, position, self.pressures[index])
+            )
+        log.sample(now, self.robot.body, readings)
+        if due:
+            for index, leg in enumerate(self._legs):
+                self.pressures[index] = self.regulators[index].read().pressure
+            for index, leg in enumerate(self._legs):
+                force, position = readings[index]
+                setpoint = controller.update(
+                    leg, force[2], estimates[index].wet_probability, position
+                )
+                self.regulators[index].set_pressure(setpoint)
+            log.control(now, self.pressures, estimates, controller)
+
+    def close(self) -> None:
+        """Vent and close the regulators."""
+        for regulator in self.regulators:
+            regulator.vent()
+            regulator.close()
+
+
+def run(
+    scene: Scene | str | os.PathLike[str],
+    policy: str | None = None,
+    seed: int = 0,
+    fidelity: str = 'auto',
+    progress: Progress | None = None,
+) -> Trial:
+    """Run a trial without ROS.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A scene, the name of one, or a YAML file.
+    policy : str or None
+        ``flat``, ``dome``, ``adaptive`` or ``oracle``; None takes the scene's own.
+    seed : int
+        Of floor and noise; the same seed gives the same trial.
+    fidelity : str
+        ``auto`` or a rung of the ladder.
+    progress : callable or None
+        Called now and then with the simulated time, s.
+
+    Returns
+    -------
+    Trial
+        Time series and metrics.
+
+    Raises
+    ------
+    ConfigError, InvalidInput
+        Naming what is wrong with scene, policy or fidelity.
+    """
+    if not isinstance(scene, Scene):
+        scene = Scene.load(scene)
+    policy = policy or scene.policy
+    rung = ladder.rung(scene, fidelity)
+    loop = ClosedLoop(scene, policy, seed)
+    log = TrialLog(scene, policy, seed, rung)
+    started = time.perf_counter()
+    samples = round(scene.duration * 1e9) // loop.period_ns
+    for sample in range(samples):
+        loop.tick(log)
+        if progress and sample % 250 == 0:
+            progress(loop.robot.time)
+        if loop.robot.verdict:
+            break
+    wall = time.perf_counter() - started
+    loop.close()
+    return log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)

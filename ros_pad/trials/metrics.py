@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures that sum up a trial."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ros_pad.control import MorphologyController
+from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.trial import Metrics
+from ros_pad.trials.trial import Trial
+
+LOAD_GATE = 0.3  # share of the expected load above which a foot counts as standing
+
+
+def summarise(
+    scene: Scene, trial: Trial, robot: Robot, controller: MorphologyController
+) -> Metrics:
+    """Return the metrics of a trial from its series and from the robot that walked it."""
+    x, y, heading = robot.body
+    cycles = max(0.0, robot.time - scene.settle) / scene.gait.cycle
+    return Metrics(
+        distance_m=x,
+        duration_s=robot.time,
+        cycles=cycles,
+        distance_per_cycle_m=x / cycles if cycles else 0.0,
+        slip_path_m=[foot.slip_path for foot in robot.feet],
+        lateral_drift_m=y,
+        yaw_drift_rad=heading,
+        dissipation_j=robot.dissipation,
+        switches=[controller.switches[leg] for leg in trial.legs],
+        overload_s=[foot.overload_time for foot in robot.feet],
+        wet_accuracy=wet_accuracy(trial, LOAD_GATE * scene.expected_load),
+        verdict=robot.verdict,
+    )
+
+
+def stance_ends(trial: Trial, load_gate: float) -> list[np.ndarray]:
+    """Return for each leg the rows of the slow series at which a stance has just ended."""
+    standing = trial.standing(load_gate)
+    ends = []
+    for column in range(len(trial.legs)):
+        rows = np.flatnonzero(standing[:-1, column] & ~standing[1:, column])
+        slow = np.searchsorted(trial.slow_time, trial.time[rows] + 1e-9)
+        ends.append(slow[slow < len(trial.slow_time)])
+    return ends
+
+
+def wet_accuracy(trial: Trial, load_gate: float) -> float | None:
+    """Share of flat stances at whose end P(wet) is on the right side of one half.
+
+    Domed stances do not count: a dome cannot feel the difference. None without flat stances.
+    """
+    if trial.floor is None:
+        return None
+    wet = trial.wet()
+    right = total = 0
+    for column, rows in enumerate(stance_ends(trial, load_gate)):
+        flat = rows[trial.pressure[np.maximum(rows - 1, 0), column] < 1000.0]
+        total += len(flat)
+        before = np.maximum(flat - 1, 0)
+        right += int(np.sum((trial.wet_probability[flat, column] > 0.5) == wet[before, column]))
+    return right / total if total else None

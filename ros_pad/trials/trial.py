@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a trial leaves: its time series and its metrics, whoever ran it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from dataclasses import dataclass
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from ros_pad.simulation.terrain import Floor
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Figures of a trial. Lists have one entry for each leg.
+
+    Attributes
+    ----------
+    distance_m : float
+        Advance of the body along x.
+    duration_s : float
+        Simulated time.
+    cycles : float
+        Gait cycles walked.
+    distance_per_cycle_m : float
+    slip_path_m : list of float
+        Way that each foot slid under load.
+    lateral_drift_m, yaw_drift_rad : float
+        Of the body at the end.
+    dissipation_j : float
+        Work lost in slipping feet.
+    switches : list of int
+        Changes of shape.
+    overload_s : list of float
+        Time that inflated domes were past their force limit.
+    wet_accuracy : float
+        Share of flat stances of loaded feet at whose end P(wet) was on the right side of one half.
+    verdict : str or None
+        Why the walk is not valid.
+    """
+
+    distance_m: float
+    duration_s: float
+    cycles: float
+    distance_per_cycle_m: float
+    slip_path_m: list[float]
+    lateral_drift_m: float
+    yaw_drift_rad: float
+    dissipation_j: float
+    switches: list[int]
+    overload_s: list[float]
+    wet_accuracy: float | None
+    verdict: str | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return asdict(self)
+
+
+@dataclass
+class Trial:
+    """Time series and metrics of one trial.
+
+    Fast series (``time``) have one row for each sensor sample, slow series (``slow_time``) one for
+    each control step; columns are legs, in the order of ``legs``. NaN where nothing is known.
+
+    Attributes
+    ----------
+    scene, policy, fidelity : str
+    seed : int
+    legs : tuple of int
+    time : ndarray (n,)
+        s.
+    body : ndarray (n, 3)
+        x, y, m, and heading, rad.
+    force, position : ndarray (n, legs, 3)
+        As measured, N and m.
+    slow_time : ndarray (m,)
+        s.
+    pressure, setpoint : ndarray (m, legs)
+        Gauge, Pa.
+    wet_probability, friction, margin, slip_speed : ndarray (m, legs)
+        As estimated.
+    slipping, dome : ndarray of bool (m, legs)
+        Alarm, and shape chosen.
+    floor : Floor or None
+        The true floor, where there is one.
+    metrics : Metrics or None
+        None where the truth is not known, as for a robot's bag.
+    settings : dict
+        Foot, gait and whatever else was recorded of the set-up.
+    real_time_factor : float or None
+        Simulated over wall time.
+    """
+
+    scene: str
+    policy: str
+    fidelity: str
+    seed: int
+    legs: tuple[int, ...]
+    time: np.ndarray
+    body: np.ndarray
+    force: np.ndarray
+    position: np.ndarray
+    slow_time: np.ndarray
+    pressure: np.ndarray
+    setpoint: np.ndarray
+    wet_probability: np.ndarray
+    friction: np.ndarray
+    margin: np.ndarray
+    slip_speed: np.ndarray
+    slipping: np.ndarray
+    dome: np.ndarray
+    floor: Floor | None = None
+    metrics: Metrics | None = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    real_time_factor: float | None = None
+
+    def standing(self, load_gate: float) -> np.ndarray:
+        """Whether each foot carries more than ``load_gate`` newtons: bool (n, legs)."""
+        return self.force[:, :, 2] > load_gate
+
+    def wet(self) -> np.ndarray:
+        """Whether the true ground below each foot is wet at each control step: (m, legs) bool."""
+        if self.floor is None:
+            raise ValueError('the floor of this trial is not known')
+        rows = np.clip(np.searchsorted(self.time, self.slow_time - 1e-9), 0, len(self.time) - 1)
+        return self.floor.wet_along(self.position[rows, :, 0], self.position[rows, :, 1])
+
+    def to_json(self) -> str:
+        """Return metrics and set-up as JSON text."""
+        return json.dumps(
+            {
+                'scene': self.scene,
+                'policy': self.policy,
+                'seed': self.seed,
+                'fidelity': self.fidelity,
+                'legs': list(self.legs),
+                'metrics': self.metrics.as_dict() if self.metrics else None,
+                'settings': self.settings,
+            }
+        )
