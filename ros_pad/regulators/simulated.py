@@ -35,6 +35,8 @@ class SimulatedRegulator:
         Highest set-point, gauge Pa, above 0 up to ``full_scale``.
     hose_diameter, hose_length : float
         m; see :class:`~ros_pad.simulation.pneumatics.Hose`.
+    hose_conductance : float, optional
+        Measured sonic conductance of the whole line, m³/(s Pa), in place of the hose formula.
     pad_volume : float or callable
         Air volume of the pads and the chamber that feeds them, m³, or a function that gives it
         for a gauge pressure in Pa.
@@ -68,6 +70,7 @@ class SimulatedRegulator:
         ceiling: float = 90e3,
         hose_diameter: float = 0.004,
         hose_length: float = 1.0,
+        hose_conductance: float | None = None,
         pad_volume: float | Callable[[float], float] = 5e-6,
         natural_frequency: float = 45.0,
         damping: float = 0.9,
@@ -99,7 +102,8 @@ class SimulatedRegulator:
             raise InvalidInput(f'clock = {clock!r} is not allowed: a function is needed')
         self._clock = clock
         self._ceiling = float(ceiling)
-        self._channel = PneumaticChannel(model, Hose(hose_diameter, hose_length), pad_volume)
+        hose = Hose(hose_diameter, hose_length, hose_conductance)
+        self._channel = PneumaticChannel(model, hose, pad_volume)
         self._resolution = sensor_resolution
         self._noise = sensor_noise
         self._random = random.Random(seed)

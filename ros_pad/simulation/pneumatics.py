@@ -141,12 +141,12 @@ class Hose:
     measured_critical_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        _check('inner_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
-        _check('length', self.length, 'm', 0.0, 50.0)
+        _check('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
+        _check('hose_length', self.length, 'm', 0.0, 50.0)
         if self.measured_conductance is not None:
-            _check('measured_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
+            _check('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
         if self.measured_critical_ratio is not None:
-            _check('measured_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
+            _check('hose_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
 
     @cached_property
     def volume(self) -> float:

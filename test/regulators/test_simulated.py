@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+import random
+import time
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
+from ros_pad.errors import TransportError
+from ros_pad.regulators import Reading
+from ros_pad.regulators import Regulator
+from ros_pad.regulators import SimulatedRegulator
+from ros_pad.regulators import create
+
+
+class Clock:
+    def __init__(self, now=0.0):
+        self.now = now
+
+    def __call__(self):
+        return self.now
+
+
+def opened(now=0.0, **options):
+    clock = Clock(now)
+    regulator = create('simulated', clock=clock, **options)
+    regulator.open()
+    return regulator, clock
+
+
+# --- the protocol ------------------------------------------------------------------------------
+
+
+def test_it_is_a_regulator_at_rest():
+    regulator, _ = opened(12.5)
+    assert isinstance(regulator, Regulator)
+    assert regulator.ceiling == 90e3
+    assert regulator.read() == Reading(pressure=0.0, setpoint=0.0, faults=(), time=12.5)
+
+
+def test_it_reaches_its_setpoint_and_vents():
+    regulator, clock = opened()
+    regulator.set_pressure(75e3)
+    assert regulator.read() == Reading(0.0, 75e3, (), 0.0)
+    clock.now = 1.0
+    assert regulator.read() == Reading(75e3, 75e3, (), 1.0)
+    regulator.vent()
+    assert regulator.read().setpoint == 0.0
+    clock.now = 2.0
+    assert regulator.read() == Reading(0.0, 0.0, (), 2.0)
+
+
+def test_half_way_up_it_shows_the_second_order_response():
+    # Hardly any hose or volume, so that the pad follows the outlet.
+    regulator, clock = opened(hose_length=0.0, pad_volume=1e-8)
+    regulator.set_pressure(75e3)
+    clock.now = 0.047
+    system = signal.lti([45.0**2], [1.0, 81.0, 45.0**2])
+    _, unit = signal.step(system, T=[0.0, 0.037])
+    assert 20e3 < 75e3 * unit[1] < 60e3
+    assert regulator.read().pressure == pytest.approx(75e3 * unit[1], abs=20.0)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, -0.1, '75e3', None, True])
+def test_setpoint_that_is_no_pressure(value):
+    regulator, _ = opened()
+    regulator.set_pressure(40e3)
+    with pytest.raises(InvalidInput, match=r'set-point .* Pa is not allowed: 0 to 90000 Pa'):
+        regulator.set_pressure(value)
+    assert regulator.read().setpoint == 40e3
+
+
+def test_setpoint_above_the_ceiling_is_refused_not_clipped():
+    regulator, clock = opened(ceiling=60e3)
+    regulator.set_pressure(60e3)
+    with pytest.raises(LimitError, match='above the ceiling of 60000 Pa gauge: refused'):
+        regulator.set_pressure(60e3 + 0.1)
+    regulator.set_pressure(40e3)
+    with pytest.raises(LimitError):
+        regulator.set_pressure(75e3)
+    clock.now = 2.0
+    assert regulator.read() == Reading(40e3, 40e3, (), 2.0)
+
+
+@pytest.mark.parametrize('call', ['read', 'vent', 'set_pressure'])
+def test_closed_it_answers_nothing(call):
+    regulator = create('simulated')
+    arguments = (1e3,) if call == 'set_pressure' else ()
+    with pytest.raises(TransportError, match='not open'):
+        getattr(regulator, call)(*arguments)
+    regulator.open()
+    getattr(regulator, call)(*arguments)
+    regulator.close()
+    with pytest.raises(TransportError, match='not open'):
+        getattr(regulator, call)(*arguments)
+
+
+def test_open_and_close_may_be_repeated_and_the_air_stays():
+    regulator, clock = opened()
+    regulator.set_pressure(50e3)
+    clock.now = 2.0
+    regulator.open()
+    regulator.close()
+    regulator.close()
+    clock.now = 0.5  # another clock may run from here
+    regulator.open()
+    assert regulator.read() == Reading(50e3, 50e3, (), 0.5)
+
+
+def test_close_does_not_lose_the_last_part_of_a_step():
+    regulator, clock = opened()
+    regulator.set_pressure(75e3)
+    clock.now = 0.051
+    seen = regulator.read()
+    regulator.close()
+    regulator.open()
+    assert regulator.read() == seen
+    assert 20e3 < seen.pressure < 60e3
+
+
+# --- time --------------------------------------------------------------------------------------
+
+
+def trajectory(read_times):
+    """Follow three commands, reading also at these times; return what is seen at fixed times."""
+    commands = {0.0: 75e3, 0.0613: 20e3, 0.25: 85e3}
+    fixed = np.round(np.arange(0.0, 0.6, 0.0173), 6).tolist()
+    regulator, clock = opened(sensor_resolution=0.1)
+    seen = []
+    for now in sorted({*commands, *fixed, *read_times}):
+        clock.now = now
+        if now in commands:
+            regulator.set_pressure(commands[now])
+        reading = regulator.read()
+        if now in fixed:
+            seen.append(reading.pressure)
+    return seen
+
+
+def test_the_trajectory_does_not_depend_on_the_readings():
+    rng = random.Random(3)
+    sparse = trajectory([])
+    assert trajectory([rng.uniform(0.0, 0.6) for _ in range(500)]) == sparse
+    assert trajectory([i * 0.004 for i in range(150)]) == sparse
+    assert max(sparse) - min(sparse) > 40e3
+
+
+def test_repeating_a_command_changes_nothing():
+    regulator, clock = opened(sensor_resolution=0.1)
+    other, other_clock = opened(sensor_resolution=0.1)
+    regulator.set_pressure(75e3)
+    other.set_pressure(75e3)
+    seen = []
+    for i in range(1, 60):
+        clock.now = other_clock.now = i * 0.0031
+        regulator.set_pressure(75e3)
+        seen.append(regulator.read())
+        assert other.read() == seen[-1]
+    assert seen[20].pressure > seen[10].pressure > 100.0
+
+
+def test_reading_twice_at_one_instant_gives_the_same():
+    regulator, clock = opened(sensor_noise=200.0)
+    regulator.set_pressure(75e3)
+    clock.now = 0.0523
+    first = regulator.read()
+    assert [regulator.read() for _ in range(5)] == [first] * 5
+
+
+def test_a_clock_that_goes_back():
+    regulator, clock = opened(10.0)
+    regulator.set_pressure(75e3)
+    clock.now = 10.0503
+    before = regulator.read()
+    for backwards in (10.0502, 9.0, math.nan):
+        clock.now = backwards
+        with pytest.raises(InvalidInput, match=r'clock went from 10\.0503 s'):
+            regulator.read()
+        with pytest.raises(InvalidInput, match='clock went'):
+            regulator.set_pressure(20e3)
+    clock.now = 10.0503
+    assert regulator.read() == before
+
+
+def test_a_day_without_a_reading_is_quick():
+    regulator, clock = opened()
+    regulator.set_pressure(75e3)
+    clock.now = 86400.0
+    start = time.perf_counter()
+    assert regulator.read().pressure == 75e3
+    assert time.perf_counter() - start < 1.0  # 21.6 million steps would take a minute
+
+
+def test_real_time():
+    regulator = SimulatedRegulator()
+    regulator.open()
+    regulator.set_pressure(75e3)
+    first = regulator.read()
+    deadline = time.monotonic() + 10.0
+    while regulator.read().pressure < 74e3 and time.monotonic() < deadline:
+        time.sleep(0.002)
+    reading = regulator.read()
+    assert reading.pressure >= 74e3
+    assert 0.08 < reading.time - first.time < 10.0
+
+
+# --- sensor ------------------------------------------------------------------------------------
+
+
+def test_readings_survive_absolute_pressure_and_back():
+    regulator, clock = opened()
+    regulator.set_pressure(75e3)
+    seen = set()
+    for i in range(200):
+        clock.now = i * 0.0013
+        pressure = regulator.read().pressure
+        assert (pressure + 101325.0) - 101325.0 == pressure
+        assert pressure % 10.0 == 0.0
+        seen.add(pressure)
+    assert len(seen) > 50
+
+
+def test_noise_has_its_size_and_seed_and_leaves_the_pad_alone():
+    noisy, clock = opened(sensor_noise=100.0, seed=7, sensor_resolution=1.0)
+    again, again_clock = opened(sensor_noise=100.0, seed=7, sensor_resolution=1.0)
+    other, other_clock = opened(sensor_noise=100.0, seed=8, sensor_resolution=1.0)
+    series = {}
+    for name, regulator, own in [
+        ('noisy', noisy, clock),
+        ('again', again, again_clock),
+        ('other', other, other_clock),
+    ]:
+        regulator.set_pressure(50e3)
+        series[name] = []
+        for i in range(2000):
+            own.now = 1.0 + i * 0.004
+            series[name].append(regulator.read().pressure)
+    assert series['noisy'] == series['again'] != series['other']
+    assert np.mean(series['noisy']) == pytest.approx(50e3, abs=10.0)
+    assert np.std(series['noisy']) == pytest.approx(100.0, rel=0.1)
+
+
+def test_air_used():
+    regulator, clock = opened(pad_volume=10e-6, damping=1.0)
+    regulator.set_pressure(75e3)
+    clock.now = 2.0
+    regulator.read()
+    assert regulator.air_used == pytest.approx(2.0055e-5, rel=1e-3)  # Δp V ρ0/p0
+
+
+# --- create ------------------------------------------------------------------------------------
+
+
+def test_unknown_backend_lists_what_there_is():
+    with pytest.raises(ConfigError, match=r"no regulator backend 'simulatd' .*'simulated'"):
+        create('simulatd')
+
+
+def test_unknown_option_names_the_nearest_and_lists_all():
+    with pytest.raises(ConfigError, match=r"'hose_lenght' \(= 2.0\).*'hose_length'.*ceiling"):
+        create('simulated', hose_lenght=2.0)
+
+
+@pytest.mark.parametrize(
+    'name, value, allowed',
+    [
+        ('ceiling', 120e3, '1 to 100000 Pa'),
+        ('ceiling', math.nan, '1 to 100000 Pa'),
+        ('hose_diameter', 4.0, '0.0005 to 0.02 m'),
+        ('hose_length', -1.0, '0 to 50 m'),
+        ('hose_conductance', 1.2, '1e-12 to 1e-05 m³/(s Pa)'),
+        ('pad_volume', 0.0, '1e-09 to 0.01 m³'),
+        ('pad_volume', 'big', '1e-09 to 0.01 m³'),
+        ('natural_frequency', math.inf, '1 to 1000 rad/s'),
+        ('dead_time', '10 ms', '0 to 1 s'),
+        ('sensor_resolution', 0.0, '0.1 to 1000 Pa'),
+        ('sensor_noise', -1.0, '0 to 10000 Pa'),
+        ('seed', 1.5, 'a whole number'),
+        ('clock', 3.0, 'a function'),
+    ],
+)
+def test_bad_option_names_value_and_range(name, value, allowed):
+    with pytest.raises(ConfigError) as caught:
+        create('simulated', **{name: value})
+    message = str(caught.value)
+    assert 'simulated' in message
+    assert name in message
+    assert repr(value) in message
+    assert allowed in message
+
+
+def test_options_reach_the_pneumatics():
+    plain, plain_clock = opened()
+    plain.set_pressure(75e3)
+    plain_clock.now = 0.1
+    assert plain.read().pressure > 65e3
+    for options in (
+        {'hose_diameter': 0.001, 'hose_length': 5.0, 'pad_volume': 20e-6},
+        {'hose_conductance': 3e-10},
+        {'natural_frequency': 20.0},
+        {'dead_time': 0.05},
+        {'slew_limit': 3e5},
+    ):
+        slow, clock = opened(**options)
+        slow.set_pressure(75e3)
+        clock.now = 0.1
+        assert 0.0 < slow.read().pressure < 0.85 * plain.read().pressure, options

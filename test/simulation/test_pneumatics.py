@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation.pneumatics import Hose
+from ros_pad.simulation.pneumatics import PneumaticChannel
+from ros_pad.simulation.pneumatics import RegulatorModel
+
+FOUR_BY_ONE = Hose(0.004, 1.0)
+BARE = RegulatorModel(dead_time=0.0, dead_band=0.0, quantum=0.0)
+
+
+def walk(channel, setpoint, duration, dt):
+    return np.array([channel.step(setpoint, dt) for _ in range(round(duration / dt))])
+
+
+# --- hose -------------------------------------------------------------------------------------
+
+
+def test_conductance_of_a_hose_in_si_units():
+    # By hand: 1/0.004^1.25 = 994.1, √1504.1 = 38.783, 0.029·16e-6/38.783.
+    assert FOUR_BY_ONE.sonic_conductance == pytest.approx(1.1964e-8, rel=1e-4)
+    assert FOUR_BY_ONE.critical_ratio == pytest.approx(0.3544, rel=1e-3)
+    assert FOUR_BY_ONE.volume == pytest.approx(12.566e-6, rel=1e-4)
+
+
+@pytest.mark.parametrize('diameter, length', [(0.002, 1.0), (0.004, 2.0), (0.006, 5.0)])
+def test_conductance_agrees_with_turbulent_pipe_flow(diameter, length):
+    # Choked isothermal flow in a smooth pipe, Blasius friction, half a dynamic head lost at the
+    # inlet: nothing of ISO 6358 in it. It tells metres from millimetres (a factor of sixty).
+    upstream, rt, viscosity = 2.0e5, 287.05 * 293.15, 1.82e-5
+
+    def excess(flux):
+        friction = 0.316 * (flux * diameter / viscosity) ** -0.25 * length / diameter + 1.5
+        choked = flux * math.sqrt(rt)
+        return (upstream**2 - choked**2) / rt - flux**2 * (
+            friction + 2.0 * math.log(upstream / choked)
+        )
+
+    flux = brentq(excess, 1.0, 0.9 * upstream / math.sqrt(rt))
+    expected = flux * math.pi / 4.0 * diameter**2 / (1.185 * upstream)
+    assert Hose(diameter, length).sonic_conductance == pytest.approx(expected, rel=0.15)
+
+
+def test_choked_mass_flow():
+    # 1.19636e-8 m³/(s Pa) · 1.185 kg/m³ · 600 kPa; 150/600 lies below b.
+    assert FOUR_BY_ONE.mass_flow(600e3, 150e3) == pytest.approx(8.506e-3, rel=1e-3)
+    assert FOUR_BY_ONE.mass_flow(600e3, 10e3) == FOUR_BY_ONE.mass_flow(600e3, 150e3)
+
+
+def test_subsonic_mass_flow():
+    # r = 0.8, (r − b)/(1 − b) = 0.69021, √(1 − 0.69021²) = 0.72362; choked at 200 kPa: 2.8354e-3.
+    assert FOUR_BY_ONE.mass_flow(200e3, 160e3) == pytest.approx(2.0517e-3, rel=1e-3)
+    assert FOUR_BY_ONE.mass_flow(160e3, 200e3) == -FOUR_BY_ONE.mass_flow(200e3, 160e3)
+
+
+def test_flow_is_continuous_and_linear_near_equal_pressures():
+    at = [FOUR_BY_ONE.mass_flow(1e5, 1e5 * r) for r in (0.9990001, 0.9989999)]
+    assert at[0] == pytest.approx(at[1], rel=1e-3)
+    half = FOUR_BY_ONE.mass_flow(1e5, 1e5 * 0.9995)
+    assert half == pytest.approx(at[0] / 2.0, rel=1e-3)
+    assert FOUR_BY_ONE.mass_flow(1e5, 1e5) == 0.0
+
+
+def test_measured_figures_replace_the_formulae():
+    line = Hose(0.004, 1.0, measured_conductance=1e-9, measured_critical_ratio=0.5)
+    assert line.mass_flow(600e3, 100e3) == pytest.approx(1e-9 * 1.185 * 600e3)
+    assert line.volume == FOUR_BY_ONE.volume
+
+
+# --- regulator --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('damping', [0.5, 0.9, 1.0, 1.7])
+@pytest.mark.parametrize('dt', [0.001, 0.004, 0.017])
+def test_outlet_is_the_exact_second_order_response(damping, dt):
+    model = RegulatorModel(damping=damping, dead_time=0.0, dead_band=0.0, quantum=0.0)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
+    times = np.arange(1, round(0.2 / dt)) * dt
+    system = signal.lti([45.0**2], [1.0, 2.0 * damping * 45.0, 45.0**2])
+    _, unit = signal.step(system, T=np.concatenate([[0.0], times]))
+    outlet = []
+    for _ in times:
+        channel.step(50e3, dt)
+        outlet.append(channel.outlet_pressure)
+    assert outlet == pytest.approx(50e3 * unit[1:], abs=0.2)
+
+
+def test_dead_time_need_not_be_a_number_of_steps():
+    model = RegulatorModel(dead_time=0.0101, dead_band=0.0)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
+    walk(channel, 50e3, 0.008, 0.004)
+    assert channel.outlet_pressure == 0.0
+    walk(channel, 50e3, 0.032, 0.004)
+    system = signal.lti([45.0**2], [1.0, 81.0, 45.0**2])
+    _, unit = signal.step(system, T=[0.0, 0.040 - 0.0101])
+    assert channel.outlet_pressure == pytest.approx(50e3 * unit[1], abs=0.2)
+
+
+def test_commands_in_flight_arrive_one_after_another():
+    model = RegulatorModel(dead_time=0.050)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
+    walk(channel, 80e3, 0.020, 0.004)
+    walk(channel, 10e3, 0.030, 0.002)
+    assert channel.outlet_pressure == pytest.approx(0.0, abs=1e-6)  # the first arrives now
+    walk(channel, 10e3, 0.020, 0.004)
+    assert channel.outlet_pressure > 8e3  # risen towards the first
+    walk(channel, 10e3, 1.0, 0.004)
+    assert channel.outlet_pressure == 10e3
+
+
+def test_slew_limit_against_the_integrated_ramp():
+    model = RegulatorModel(dead_time=0.0, slew_limit=1e6)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
+
+    def rate(t, y):
+        return [y[1], 45.0**2 * (min(1e6 * t, 75e3) - y[0]) - 81.0 * y[1]]
+
+    exact = solve_ivp(rate, (0.0, 0.2), [0.0, 0.0], rtol=1e-8, atol=1e-3, max_step=1e-3)
+    for time in np.arange(1, 29) * 0.007:
+        channel.step(75e3, 0.007)
+        assert channel.outlet_pressure == pytest.approx(
+            np.interp(time, exact.t, exact.y[0]), abs=20.0
+        )
+
+
+def test_quantum_rounds_the_setpoint():
+    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    assert channel.step(50_049.0, 2.0) == 50_000.0
+    assert PneumaticChannel(BARE, FOUR_BY_ONE, 5e-6).step(50_049.0, 2.0) == 50_049.0
+
+
+def test_dead_band_ignores_small_changes_but_never_zero():
+    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    assert channel.step(400.0, 2.0) == 0.0  # the band is 500 Pa
+    assert channel.step(50_000.0, 2.0) == 50_000.0
+    assert channel.step(50_500.0, 2.0) == 50_000.0
+    assert channel.step(50_600.0, 2.0) == 50_600.0
+    channel = PneumaticChannel(RegulatorModel(dead_band=0.1), FOUR_BY_ONE, 5e-6)
+    channel.step(12e3, 2.0)
+    channel.step(1e3, 2.0)
+    assert channel.pad_pressure == 1e3
+    assert channel.step(0.0, 2.0) == 0.0
+
+
+def test_outlet_stays_between_zero_and_full_scale():
+    model = RegulatorModel(damping=0.2, dead_band=0.0)
+    channel = PneumaticChannel(model, FOUR_BY_ONE, 1e-7)
+    seen = np.concatenate([walk(channel, p, 0.3, 0.003) for p in (100e3, 0.0, 95e3, 5e3)])
+    assert seen.min() == 0.0
+    assert seen.max() == 100e3
+
+
+def test_full_scale_that_is_no_multiple_of_the_quantum():
+    channel = PneumaticChannel(RegulatorModel(full_scale=99_950.0), FOUR_BY_ONE, 5e-6)
+    assert channel.step(99_950.0, 2.0) == 99_950.0
+    assert channel.settled
+
+
+# --- pad --------------------------------------------------------------------------------------
+
+
+def reference(hose, volume, setpoint, start, times):
+    """Integrate regulator and pad with SciPy, from ISO 6358 written out anew."""
+    c, b = hose.sonic_conductance, hose.critical_ratio
+
+    def rate(t, y):
+        outlet, speed, pad = y
+        high, low = max(outlet, pad) + 101325.0, min(outlet, pad) + 101325.0
+        r = low / high
+        if r <= b:
+            psi = 1.0
+        else:
+            psi = math.sqrt(1.0 - ((min(r, 0.999) - b) / (1.0 - b)) ** 2)
+            psi *= min(1.0, (1.0 - r) / 0.001)
+        flow = math.copysign(c * high * psi, outlet - pad)
+        return [speed, 45.0**2 * (setpoint - outlet) - 81.0 * speed, 100e3 * flow / volume(pad)]
+
+    result = solve_ivp(
+        rate, (0.0, times[-1]), [start, 0.0, start], 'LSODA', times, rtol=1e-7, atol=1e-2
+    )
+    assert result.success
+    return result.y[2]
+
+
+LINES = [
+    (Hose(0.002, 0.5), 5e-6),
+    (Hose(0.002, 2.0), 0.4e-6),
+    (Hose(0.002, 2.0), 100e-6),
+    (Hose(0.004, 1.0), 5e-6),
+    (Hose(0.006, 2.0), 50e-6),
+]
+
+
+@pytest.mark.parametrize('hose, volume', LINES)
+@pytest.mark.parametrize('start, end', [(0.0, 75e3), (40e3, 75e3), (85e3, 20e3)])
+def test_filling_and_venting_against_scipy(hose, volume, start, end):
+    channel = PneumaticChannel(BARE, hose, volume)
+    channel.step(start, 60.0)
+    times = np.arange(1, 126) * 0.004
+    exact = reference(hose, lambda p: volume + hose.volume, end, start, times)
+    pad = walk(channel, end, 0.5, 0.004)
+    assert np.abs(pad - exact).max() < 0.01 * abs(end - start)
+    assert np.ptp(pad) > 0.3 * abs(end - start)
+
+
+def test_stiff_orifice_fills_in_the_isothermal_time():
+    # With the outlet at once at 75 kPa: p V = ∫ C p1 ψ p0 dt, so t = V/(C p0) ∫ dp/(p1 ψ).
+    line = Hose(0.004, 1.0, measured_conductance=2e-10, measured_critical_ratio=0.4)
+    model = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0)
+    channel = PneumaticChannel(model, line, 10e-6)
+    supply = 75e3 + 101325.0
+    p = np.linspace(101325.0, 101325.0 + 50e3, 20001)
+    psi = np.sqrt(1.0 - ((p / supply - 0.4) / 0.6) ** 2)
+    integrand = 1.0 / (supply * psi)
+    integral = np.sum((integrand[1:] + integrand[:-1]) / 2.0 * np.diff(p))
+    expected = (10e-6 + line.volume) / (2e-10 * 100e3) * integral
+    time = 0.0
+    while channel.pad_pressure < 50e3 and time < 5.0:
+        channel.step(75e3, 0.001)
+        time += 0.001
+    assert time == pytest.approx(expected + 0.002, abs=0.003)  # 2/ω: the regulator's own lag
+    assert expected > 0.3
+
+
+def test_pad_that_swells_against_scipy():
+    def volume(pressure):
+        return 2e-6 + 30e-6 * (pressure / 75e3) ** 2
+
+    def capacity(pressure):  # d(p V)/dp, p absolute
+        slope = 60e-6 * pressure / 75e3**2
+        return volume(pressure) + hose.volume + (pressure + 101325.0) * slope
+
+    hose = Hose(0.002, 1.0)
+    channel = PneumaticChannel(BARE, hose, volume)
+    times = np.arange(1, 126) * 0.004
+    exact = reference(hose, capacity, 75e3, 0.0, times)
+    pad = walk(channel, 75e3, 0.5, 0.004)
+    assert np.abs(pad - exact).max() < 750.0
+
+
+@pytest.mark.parametrize('hose, volume', LINES)
+@pytest.mark.parametrize('start, end', [(0.0, 75e3), (75e3, 0.0)])
+def test_four_milliseconds_against_a_tenth(hose, volume, start, end):
+    fine = PneumaticChannel(RegulatorModel(), hose, volume)
+    coarse = PneumaticChannel(RegulatorModel(), hose, volume)
+    for channel in (fine, coarse):
+        channel.step(start, 60.0)
+    for _ in range(100):
+        for _ in range(40):
+            fine.step(end, 1e-4)
+        coarse.step(end, 0.004)
+        assert coarse.pad_pressure == pytest.approx(fine.pad_pressure, abs=750.0)
+    assert abs(coarse.pad_pressure - start) > 30e3
+
+
+@pytest.mark.parametrize('dt', [0.001, 0.004, 0.005, 0.007, 0.020])
+@pytest.mark.parametrize('volume', [1e-9, 1e-7, 5e-6, 2e-4])
+@pytest.mark.parametrize('diameter', [0.002, 0.006])
+def test_filling_is_monotone_at_any_step(dt, volume, diameter):
+    model = RegulatorModel(damping=1.0)  # which does not overshoot by itself
+    channel = PneumaticChannel(model, Hose(diameter, 0.1), volume)
+    for end, sign in ((75e3, 1.0), (76e3, 1.0), (0.0, -1.0)):
+        start = channel.pad_pressure
+        pad = walk(channel, end, 2.0, dt)
+        assert (sign * np.diff(pad, prepend=start)).min() >= -1e-6
+        assert pad[-1] == end
+        assert pad.min() >= 0.0
+
+
+def test_air_used_is_the_air_in_the_pad():
+    channel = PneumaticChannel(RegulatorModel(damping=1.0), FOUR_BY_ONE, 10e-6)
+    channel.step(75e3, 5.0)
+    # Δp V ρ0/p0 = 75e3 · 22.566e-6 · 1.185/100e3
+    once = 2.0055e-5
+    assert channel.air_used == pytest.approx(once, rel=1e-3)
+    channel.step(0.0, 5.0)
+    assert channel.air_used == pytest.approx(once, rel=1e-3)
+    channel.step(75e3, 5.0)
+    assert channel.air_used == pytest.approx(2.0 * once, rel=1e-3)
+
+
+def test_air_of_a_swelling_pad():
+    channel = PneumaticChannel(
+        RegulatorModel(damping=1.0), FOUR_BY_ONE, lambda p: 5e-6 + 1e-6 * p / 75e3
+    )
+    channel.step(75e3, 5.0)
+    hose = FOUR_BY_ONE.volume
+    content = 176325.0 * (6e-6 + hose) - 101325.0 * (5e-6 + hose)
+    assert channel.air_used == pytest.approx(content * 1.185 / 100e3, rel=1e-3)
+
+
+def test_settled_channel_skips_an_hour():
+    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    assert channel.settled
+    channel.step(75e3, 0.004)
+    assert not channel.settled
+    steps = 0
+    advance = channel._advance
+
+    def counted(*arguments):
+        nonlocal steps
+        steps += 1
+        advance(*arguments)
+
+    channel._advance = counted
+    assert channel.step(75e3, 3600.0) == 75e3
+    assert channel.settled
+    assert 50 < steps < 500
+
+
+# --- time to nine tenths ------------------------------------------------------------------------
+
+
+def time_to_ninety_percent(hose, volume):
+    channel = PneumaticChannel(RegulatorModel(), hose, volume)
+    time = 0.0
+    while channel.step(75e3, 0.001) < 67.5e3 and time < 5.0:
+        time += 0.001
+    return time + 0.001
+
+
+@pytest.mark.parametrize('size', [(0.002, 0.5), (0.002, 1.0), (0.004, 1.0), (0.004, 2.0)])
+def test_regulator_is_the_lag_of_a_foot_of_a_few_millilitres(size):
+    # The regulator alone takes 0.086 s: dead time 10 ms, and 3.42/45 s of a ζ = 0.9 step.
+    assert time_to_ninety_percent(Hose(*size), 5e-6) == pytest.approx(0.087, abs=0.004)
+
+
+@pytest.mark.parametrize(
+    'diameter, length, expected',
+    [(2, 500, 0.31), (2, 1000, 0.57), (2, 2000, 1.25), (4, 1000, 0.41), (4, 2000, 0.87)],
+)
+def test_times_that_a_hose_formula_in_millimetres_gives(diameter, length, expected):
+    # A slip to know: these follow from the formula with D and L in mm and C taken as
+    # dm³/(s bar), and 0.8 mL of pads. A line as narrow as that can be had by its measured C.
+    c = 0.029 * diameter**2 / math.sqrt(length / diameter**1.25 + 510.0)
+    line = Hose(diameter / 1e3, length / 1e3, c * 1e-8, 474.0 * c / diameter**2)
+    assert time_to_ninety_percent(line, 0.8e-6) == pytest.approx(expected, rel=0.03)
+    assert Hose(diameter / 1e3, length / 1e3).sonic_conductance > 40.0 * c * 1e-8
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'name, value',
+    [
+        ('natural_frequency', 0.0),
+        ('damping', math.nan),
+        ('dead_time', -0.01),
+        ('dead_band', 0.5),
+        ('full_scale', math.inf),
+        ('quantum', 'fine'),
+        ('slew_limit', True),
+    ],
+)
+def test_regulator_refuses(name, value):
+    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed: a number from'):
+        RegulatorModel(**{name: value})
+
+
+@pytest.mark.parametrize('diameter, length', [(4.0, 1.0), (0.004, -1.0), (math.nan, 1.0)])
+def test_hose_refuses(diameter, length):
+    with pytest.raises(InvalidInput, match=r'hose_(diameter|length) = .* m is needed'):
+        Hose(diameter, length)
+
+
+@pytest.mark.parametrize('volume', [0.0, -1e-6, math.nan, 5.0, lambda p: 1e-3 - p * 1e-8])
+def test_pad_volume_refused(volume):
+    with pytest.raises(InvalidInput, match='pad_volume'):
+        PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, volume)
+
+
+@pytest.mark.parametrize('setpoint', [-1.0, 100_001.0, math.nan, math.inf])
+def test_setpoint_refused_and_nothing_moves(setpoint):
+    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    channel.step(50e3, 0.1)
+    before = channel.pad_pressure
+    with pytest.raises(InvalidInput, match=r'setpoint .* Pa is needed'):
+        channel.step(setpoint, 0.004)
+    assert (channel.pad_pressure, channel.setpoint) == (before, 50e3)
+
+
+@pytest.mark.parametrize('dt', [-0.004, math.nan, math.inf])
+def test_time_refused(dt):
+    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    with pytest.raises(InvalidInput, match='dt = '):
+        channel.step(50e3, dt)
+    assert channel.settled
