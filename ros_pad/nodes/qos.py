@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The QoS profiles of ros_pad by name, and how a bag writes one down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import yaml
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import HistoryPolicy
+from rclpy.qos import LivelinessPolicy
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+
+SENSOR = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Subscribe to measurements: the latest count, and any driver's publisher matches."""
+
+SENSOR_PUBLISH = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Publish measurements and estimates: reliable serves both kinds of subscriber."""
+
+COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""Set-points: only the newest counts, and it must arrive."""
+
+STATE = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""Latched state such as the morphology: whoever comes late gets the last one."""
+
+CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Subscribe to ``/clock``, as rclpy itself does."""
+
+CLOCK_PUBLISH = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""Publish ``/clock``."""
+
+DIAGNOSTICS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""``/diagnostics``, as diagnostic_updater publishes it."""
+
+RECORD = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+"""Record a topic whose publishers are reliable."""
+
+
+def recording(offered: Sequence[QoSProfile]) -> QoSProfile:
+    """Return the strictest profile with which a recorder hears every publisher of a topic.
+
+    Parameters
+    ----------
+    offered : sequence of QoSProfile
+        What the publishers offer. A single best-effort one makes the subscription best effort,
+        a single volatile one makes it volatile. With none, it is :data:`RECORD`.
+    """
+    reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
+    latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
+    return QoSProfile(
+        depth=RECORD.depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL if offered and latched else DurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+_HISTORY = {HistoryPolicy.KEEP_LAST: 'keep_last', HistoryPolicy.KEEP_ALL: 'keep_all'}
+_RELIABILITY = {
+    ReliabilityPolicy.RELIABLE: 'reliable',
+    ReliabilityPolicy.BEST_EFFORT: 'best_effort',
+}
+_DURABILITY = {
+    DurabilityPolicy.TRANSIENT_LOCAL: 'transient_local',
+    DurabilityPolicy.VOLATILE: 'volatile',
+}
+_LIVELINESS = {
+    LivelinessPolicy.AUTOMATIC: 'automatic',
+    LivelinessPolicy.MANUAL_BY_TOPIC: 'manual_by_topic',
+}
+_INFINITE = {'sec': 9223372036, 'nsec': 854775807}  # RMW_DURATION_INFINITE, 2**63 - 1 ns
+
+
+def offered_profiles(*profiles: QoSProfile) -> str:
+    """Return profiles as the YAML text that a bag of ROS 2 Jazzy keeps with a topic.
+
+    A policy left to the middleware is ``unknown`` there, and a duration of zero, which means
+    unspecified, is infinite.
+    """
+
+    def duration(value: Duration) -> dict[str, int]:
+        if value.nanoseconds == 0:
+            return dict(_INFINITE)
+        seconds, nanoseconds = divmod(value.nanoseconds, 10**9)
+        return {'sec': seconds, 'nsec': nanoseconds}
+
+    return yaml.safe_dump(
+        [
+            {
+                'history': _HISTORY.get(profile.history, 'unknown'),
+                'depth': profile.depth,
+                'reliability': _RELIABILITY.get(profile.reliability, 'unknown'),
+                'durability': _DURABILITY.get(profile.durability, 'unknown'),
+                'deadline': duration(profile.deadline),
+                'lifespan': duration(profile.lifespan),
+                'liveliness': _LIVELINESS.get(profile.liveliness, 'automatic'),
+                'liveliness_lease_duration': duration(profile.liveliness_lease_duration),
+                'avoid_ros_namespace_conventions': profile.avoid_ros_namespace_conventions,
+            }
+            for profile in profiles
+        ],
+        sort_keys=False,
+    )
