@@ -33,15 +33,16 @@ setup(
     data_files=shared_files(),
     zip_safe=False,
     python_requires='>=3.11',
-    # The lower bounds are the versions of Ubuntu 24.04, on which a Jazzy from apt runs.
+    # The lower bounds are the versions of Ubuntu 24.04, on which a Jazzy from apt runs; mcap,
+    # which it does not have, writes to disk on request from 1.5 on.
     install_requires=[
         'numpy>=1.26',
         'scipy>=1.11',
         'matplotlib>=3.6',
         'pyyaml>=6.0',
         'tqdm>=4.66',
-        'mcap>=1.1',
-        'mcap-ros2-support>=0.5',
+        'mcap>=1.5',
+        'mcap-ros2-support>=0.5.3',
     ],
     extras_require={
         # ROS 2 Jazzy as wheels; leave this extra out where Jazzy is installed from apt.

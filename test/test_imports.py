@@ -12,9 +12,10 @@ import pytest
 SOURCE = pathlib.Path(__file__).resolve().parent.parent / 'ros_pad'
 
 # The table of docs/architecture.md: what each part of ros_pad may import of the others.
-GROUND = {'errors', 'configuration'}
+GROUND = {'errors', 'configuration', 'pace'}
 MAY_IMPORT = {
     'errors': set(),
+    'pace': set(),
     'configuration': {'errors'},
     'contact': GROUND,
     'estimation': GROUND | {'contact'},
@@ -62,6 +63,9 @@ def test_every_part_has_its_floor():
         path.stem for path in SOURCE.glob('*') if path.name not in ('__init__.py', 'py.typed')
     }
     assert parts - {'__pycache__'} == set(MAY_IMPORT)
+    table = (SOURCE.parent / 'docs' / 'architecture.md').read_text(encoding='utf-8')
+    for part in parts & set(MAY_IMPORT):
+        assert f'`ros_pad.{part}`' in table
 
 
 @pytest.mark.parametrize('part', MAY_IMPORT)
