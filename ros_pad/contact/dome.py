@@ -87,6 +87,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     Parameters
     ----------
     pad : Pad
+        What the pad is made of.
     pressure : float or array
         Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome.
 
@@ -108,19 +109,19 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     """
     p = quantity('pressure', pressure, 'Pa')
     deficit = _deficit(pad, p)
-    code = np.where(deficit > 0, _OK, _NO_INFLATION)
-    if code.ndim == 0 and code != _OK:
+    code = _where(deficit > 0, _OK, _NO_INFLATION)
+    if np.ndim(code) == 0 and code != _OK:
         _refuse(code, pad, p)
     good = code == _OK
     height = free_height(
-        np.where(good, p * (pad.radius / pad.stiffness), 1.0), np.where(good, deficit, BURST - 1.0)
+        _where(good, p * (pad.radius / pad.stiffness), 1.0), _where(good, deficit, BURST - 1.0)
     )
-    height = np.where(good, height, np.nan)
+    height = _where(good, height, np.nan)
     with np.errstate(divide='ignore', over='ignore'):  # a flat pad has an infinite radius
         sphere = 0.5 * (height + 1.0 / height)
         volume = math.pi / 6.0 * height * (3.0 + height * height)
     r = pad.radius
-    return Inflated(*_plain(r * height, r * sphere, r**3 * volume), _words(code))
+    return Inflated(_plain(r * height), _plain(r * sphere), _plain(r**3 * volume), _words(code))
 
 
 def press(
@@ -135,6 +136,7 @@ def press(
     Parameters
     ----------
     pad : Pad
+        What the pad is made of.
     pressure : float or array
         Gauge pressure, Pa, from 0. The model ends at ``P = p r/k`` of about 3.425 (91.3 kPa for
         the large pad): beyond, the same force has several equilibria.
@@ -169,36 +171,42 @@ def press(
     f = load / (math.pi * pad.stiffness * pad.radius)
 
     flat_at = flattening_force(tension, a) if a > 0 else tension
-    code = np.where(f >= flat_at, _FLATTENED, _OK)
-    code = np.where(tension > largest_tension(a), _FOLD_ZONE, code)
-    code = np.where(_deficit(pad, p) <= 0, _NO_INFLATION, code)
-    if code.ndim == 0 and code != _OK:
+    code = _where(f >= flat_at, _FLATTENED, _OK)
+    code = _where(tension > largest_tension(a), _FOLD_ZONE, code)
+    code = _where(_deficit(pad, p) <= 0, _NO_INFLATION, code)
+    if np.ndim(code) == 0 and code != _OK:
         _refuse(code, pad, p, load)
     # Rows without an answer go through the solver as a harmless one.
     good = code == _OK
-    tension = np.where(good, tension, 1.0)[()]
-    f = np.where(good, f, 0.5)[()]
+    tension, f = _where(good, tension, 1.0), _where(good, f, 0.5)
 
     free = free_height(tension, BURST - tension)
     height, certified = _pressed_height(tension, f, a, free)
     rho, spread, depth = _cap(height, tension, f, a)
     # Without a certified root the force is past the fold, where the text's sign ends the branch.
-    code = np.where(good & ~certified, _FLATTENED, code)
-    if code.ndim == 0 and code != _OK:
+    code = _where(good & ~certified, _FLATTENED, code)
+    if np.ndim(code) == 0 and code != _OK:
         _refuse(code, pad, p, load)
     apart = spread <= 0
-    code = np.where((code == _OK) & apart, _NO_CONTACT, code)
+    code = _where((code == _OK) & apart, _NO_CONTACT, code)
 
-    lost = np.where(code > _NO_CONTACT, np.nan, 0.0)
-    height = np.where(apart, free, height) + lost
-    depth = np.where(apart, 0.0, depth) + lost
-    contact = np.sqrt(np.where(apart, 0.0, spread)) + lost
-    sphere = np.where(apart, 0.5 * (free + 1.0 / free), rho) + lost
+    lost = _where(code > _NO_CONTACT, np.nan, 0.0)
+    height = _where(apart, free, height) + lost
+    depth = _where(apart, 0.0, depth) + lost
+    contact = np.sqrt(_where(apart, 0.0, spread)) + lost
+    sphere = _where(apart, 0.5 * (free + 1.0 / free), rho) + lost
     # (1 - b²) = (c - a)(1/c - a) has no cancellation where the dome is nearly flat.
     unspread = ((tension - f) - 2.0 * a * rho) / tension
-    gap = np.where(apart, free, unspread / (1.0 / height - depth)) + lost
+    gap = _where(apart, free, unspread / (1.0 / height - depth)) + lost
     r = pad.radius
-    return Pressed(*_plain(r * height, r * depth, r * contact, r * sphere, r * gap), _words(code))
+    return Pressed(
+        height=_plain(r * height),
+        depth=_plain(r * depth),
+        contact_radius=_plain(r * contact),
+        sphere_radius=_plain(r * sphere),
+        gap=_plain(r * gap),
+        status=_words(code),
+    )
 
 
 def free_height(tension: Array, deficit: Array) -> Array:
@@ -225,7 +233,7 @@ def free_height(tension: Array, deficit: Array) -> Array:
     tall = 6.0 / (sigma * (sigma + x)) + 4.0 * x / (sigma * sigma) - deficit
     cosine = 1.0 / sigma
     slope = (6.0 * cosine - 8.0 * cosine * cosine + 4.0) * cosine * cosine
-    return x + np.where(x < 1.0, shallow, tall) / slope
+    return x + _where(x < 1.0, shallow, tall) / slope
 
 
 def largest_tension(a: float) -> float:
@@ -268,7 +276,7 @@ def _balance(x: Array, tension: Array, f: Array, a: float) -> tuple[Array, Array
     ``P - f``, so that it keeps its digits near flattening. The certificate is positive where the
     depth that balances the height is continuous with the free dome.
     """
-    rho, spread, depth = _cap(x, tension, f, a)
+    rho, _, depth = _cap(x, tension, f, a)
     wall = rho - depth
     sigma = np.sqrt(1.0 + (x - depth) * (x + depth))
     pull = 3.0 * sigma - 2.0
@@ -286,7 +294,9 @@ def _balance(x: Array, tension: Array, f: Array, a: float) -> tuple[Array, Array
     return residual, slope, certificate
 
 
-def _pressed_height(tension: Array, f: Array, a: float, free: Array) -> tuple[Array, Array]:
+def _pressed_height(
+    tension: Array, f: Array, a: float, free: Array
+) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Return the height in equilibrium and whether it is certified.
 
     Safeguarded Newton. A trial height is too small where the residual is positive and the
@@ -304,21 +314,21 @@ def _pressed_height(tension: Array, f: Array, a: float, free: Array) -> tuple[Ar
         if a < 0:  # left of the fold lies a second root, where the residual still rises
             positive = positive | ((slope > 0) & (x * x < -a))
         small = positive & (certificate > 0)
-        low = np.where(small, x, low)
-        high = np.where(small, high, x)
+        low = _where(small, x, low)
+        high = _where(small, high, x)
         step = -residual / slope
         newton = x + step
         # Newton where it stays inside and at least halves; else halve the decades.
         use = (newton >= low) & (newton <= high) & (abs(step) <= 0.5 * abs(last))
-        new = np.where(use, newton, np.sqrt(low * high))
+        new = _where(use, newton, np.sqrt(low * high))
         last = new - x
         x = new
-        if np.all(abs(last) <= 4e-16 * x):
+        if (abs(last) <= 1e-10 * x).all():  # Newton squares what is left
             break
     residual, slope, certificate = _balance(x, tension, f, a)
     _, spread, depth = _cap(x, tension, f, a)
     # The tolerances are rounding errors of quantities of order P and 1.
-    certified = (
+    certified: npt.NDArray[np.bool_] = (
         (abs(residual) <= 1e-12 * tension)
         & (certificate > 0)
         & (spread <= 1.0 + 1e-9)
@@ -328,6 +338,7 @@ def _pressed_height(tension: Array, f: Array, a: float, free: Array) -> tuple[Ar
 
 
 def signed_adhesion(pad: Pad, adhesion: str) -> float:
+    """Return the relative adhesion ``a`` of a pad; InvalidInput beyond what was checked."""
     choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
     a = ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
     if abs(a) > LARGEST_ADHESION:
@@ -359,8 +370,15 @@ def _refuse(code: Array, pad: Pad, p: Array, load: Array | None = None) -> NoRet
     raise NoEquilibrium(f'{what} on {pad} {_WHY[int(code)]}', str(_STATUS[code]))
 
 
-def _plain(*values: Array) -> list[Floats]:
-    return [float(v) if np.ndim(v) == 0 else v for v in values]
+def _where(condition: Floats, yes: Floats, no: Floats) -> Floats:
+    # np.where takes 2 us for scalars, which is most of what press() would cost.
+    if isinstance(condition, (bool, np.bool_)):
+        return yes if condition else no
+    return np.where(condition, yes, no)
+
+
+def _plain(value: Array) -> Floats:
+    return float(value) if np.ndim(value) == 0 else value
 
 
 def _words(code: Array) -> Floats:

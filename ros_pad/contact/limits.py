@@ -39,8 +39,9 @@ _FIT_FORCE, _FIT_PRESSURE, _FIT_SLOPE = 0.2833, 75e3, 1.25e-5
 # No pad was measured above 85 kPa; the line is drawn on to where that pad's model ends.
 _FIT_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
-# Height over radius of the deepest dome at the model's largest pressure, from above.
-_HEIGHT_AT_END = 0.655
+# Bounds, over the radius, of height and depth of the deepest dome at the model's largest
+# pressure. A second, uncertified solution has depths above 0.57.
+_HIGHEST, _DEEPEST = 0.655, 0.55
 
 
 def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') -> Floats:
@@ -49,6 +50,7 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
     Parameters
     ----------
     pad : Pad
+        What the pad is made of.
     pressure : float or array
         Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`);
         for ``measured`` also at most 91.36 kPa, whatever the pad.
@@ -104,6 +106,7 @@ def pressure_for(
     Parameters
     ----------
     pad : Pad
+        What the pad is made of.
     force : float or array
         Normal force on this one pad, N, from 0. For no force at all the answer is the pressure
         at which the limit leaves zero.
@@ -177,7 +180,7 @@ def _tension_at_deepest(f: Array, a: float) -> Array:
 
 def _heights(like: Array, a: float) -> tuple[Array, Array]:
     """Return the heights between which the deepest domes of the model lie."""
-    return math.sqrt(a / (2.0 - a)) + 1e-12 + 0.0 * like, _HEIGHT_AT_END + 0.0 * like
+    return math.sqrt(a / (2.0 - a)) + 1e-12 + 0.0 * like, _HIGHEST + 0.0 * like
 
 
 def _deepest(x: Array, a: float) -> tuple[Array, Array]:
@@ -198,7 +201,7 @@ def _deepest(x: Array, a: float) -> tuple[Array, Array]:
         pull_slope = 3.0 * sigma - 2.0 + 3.0 * (x + d) * x / sigma - 2.0 * a * rho_slope
         return area, pull, pull * area_slope - area * pull_slope
 
-    d = _rising_root(lambda depth: balance(depth)[2], 0.0 * x, x)
+    d = _rising_root(lambda depth: balance(depth)[2], 0.0 * x, np.minimum(x, _DEEPEST))
     area, pull, _ = balance(d)
     tension = pull / area
     return tension, tension * d * (2.0 * rho - d) - 2.0 * a * rho

@@ -120,6 +120,7 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     pressed : Pressed
         What :func:`ros_pad.contact.press` returned.
     liquid : Liquid
+        What wets the pad; its contact angle is ``liquid.angle``.
     reading : {'corrected', 'thesis'}
         ``thesis`` evaluates 3.80, 3.77 and 3.82 as printed. ``corrected`` solves the weight
         balance exactly, hangs the weight from the liquid's tension, and takes the ring's own
@@ -170,7 +171,7 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     force = 2.0 * liquid.surface_tension * section
 
     nothing = np.where(status == 'no_contact', 0.0, np.nan)
-    values = [np.where(touching, v, nothing) for v in (height, ring, force)]
+    height, ring, force = (np.where(touching, v, nothing) for v in (height, ring, force))
     if status.ndim == 0:
-        return Meniscus(*(float(v) for v in values), str(status))
-    return Meniscus(*values, status)
+        return Meniscus(float(height), float(ring), float(force), str(status))
+    return Meniscus(height, ring, force, status)

@@ -45,7 +45,7 @@ def quantity(
         Naming the first value that is not allowed, its unit and the range.
     """
     if type(value) is float and low < value <= high and value != math.inf:
-        return np.float64(value)  # type: ignore[return-value]
+        return np.float64(value)
     need = f'finite number(s) {"above" if above else "from"} {low:g}'
     need += f' to {high:g} {unit}' if high < math.inf else f' {unit}'
     try:
