@@ -164,6 +164,14 @@ def press(
     one that grows out of the free dome, the floor is above the pad base and the contact inside
     the rim.
     """
+    # Only domes far lower than an atom overflow or underflow: they fail the certificate.
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        return _press(pad, pressure, force, adhesion, model)
+
+
+def _press(
+    pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike, adhesion: str, model: str
+) -> Pressed:
     a = signed_adhesion(pad, adhesion)
     choice('model', model, ('thesis',))
     p, load = _broadcast(quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N'))
@@ -187,23 +195,22 @@ def press(
     code = _where(good & ~certified, _FLATTENED, code)
     if np.ndim(code) == 0 and code != _OK:
         _refuse(code, pad, p, load)
-    apart = spread <= 0
-    code = _where((code == _OK) & apart, _NO_CONTACT, code)
+    code = _where((code == _OK) & (spread <= 0), _NO_CONTACT, code)
 
-    lost = _where(code > _NO_CONTACT, np.nan, 0.0)
-    height = _where(apart, free, height) + lost
-    depth = _where(apart, 0.0, depth) + lost
-    contact = np.sqrt(_where(apart, 0.0, spread)) + lost
-    sphere = _where(apart, 0.5 * (free + 1.0 / free), rho) + lost
+    apart = code == _NO_CONTACT
+    height = _where(apart, free, height)
+    depth = _where(apart, 0.0, depth)
+    rho = 0.5 * (height + 1.0 / height)
     # (1 - b²) = (c - a)(1/c - a) has no cancellation where the dome is nearly flat.
     unspread = ((tension - f) - 2.0 * a * rho) / tension
-    gap = _where(apart, free, unspread / (1.0 / height - depth)) + lost
-    r = pad.radius
+    gap = _where(apart, free, unspread / (1.0 / height - depth))
+    contact = np.sqrt(_where(apart, 0.0, abs(spread)))
+    r = _where(code <= _NO_CONTACT, pad.radius, np.nan)
     return Pressed(
         height=_plain(r * height),
         depth=_plain(r * depth),
         contact_radius=_plain(r * contact),
-        sphere_radius=_plain(r * sphere),
+        sphere_radius=_plain(r * rho),
         gap=_plain(r * gap),
         status=_words(code),
     )
@@ -308,6 +315,7 @@ def _pressed_height(
     high = 1.1 * free
     x = np.maximum(low, free * (1.0 - share) / (1.0 + share * (1.0 - tension / 3.0)))
     last = high
+    settled = x < 0
     for _ in range(100):
         residual, slope, certificate = _balance(x, tension, f, a)
         positive = residual > 0
@@ -321,9 +329,11 @@ def _pressed_height(
         # Newton where it stays inside and at least halves; else halve the decades.
         use = (newton >= low) & (newton <= high) & (abs(step) <= 0.5 * abs(last))
         new = _where(use, newton, np.sqrt(low * high))
-        last = new - x
-        x = new
-        if (abs(last) <= 1e-10 * x).all():  # Newton squares what is left
+        # A row that has settled stays, whatever the others still need.
+        last = _where(settled, 0.0, new - x)
+        x = _where(settled, x, new)
+        settled = settled | (abs(last) <= 1e-10 * x)  # Newton squares what is left
+        if settled.all():
             break
     residual, slope, certificate = _balance(x, tension, f, a)
     _, spread, depth = _cap(x, tension, f, a)
