@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ros_pad.contact.resistance import Foot
+from ros_pad.control.footprints import Footprints
 from ros_pad.control.pressure import dome_pressure
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
@@ -35,18 +36,21 @@ class LiftOff:
         Steps taken in that shape, this one counted.
     probing : bool
         Whether that step was a probe.
-    wet_probability : float
-        Belief about the ground it stood on.
-    position : tuple of float
-        Where it stood, m.
+    wet_ahead : float
+        Probability that the ground is wet where the foot will stand next.
+    next_position : tuple of float
+        Where that is, m.
+    others_probing : bool
+        Whether another leg is probing now.
     """
 
     leg: int
     morphology: str
     steps: int
     probing: bool
-    wet_probability: float
-    position: tuple[float, float]
+    wet_ahead: float
+    next_position: tuple[float, float]
+    others_probing: bool
 
 
 @dataclass(frozen=True)
@@ -73,49 +77,49 @@ def dome(step: LiftOff) -> Choice:
 def adaptive(
     wet_above: float = 0.65,
     dry_below: float = 0.35,
+    probe_below: float = 0.75,
     dwell: int = 2,
-    probe_every: int = 4,
 ) -> Policy:
     """Return a policy that follows the belief, with hysteresis, dwell and probes.
 
     Parameters
     ----------
     wet_above, dry_below : float
-        Beliefs P(wet) beyond which a foot turns to dome, and back to flat.
+        Probabilities of wet ground ahead beyond which a foot turns to dome, and back to flat.
+    probe_below : float
+        Probability below which a domed foot asks the ground with one flat step. A dome feels wet
+        and dry ground alike, so what is known only fades, and without probes feet that were once
+        on wet ground would stay domed for ever. One leg probes at a time.
     dwell : int
         Steps that a shape is kept at least.
-    probe_every : int
-        Domed steps after which one flat step asks the ground. A dome feels wet and dry ground
-        alike: without probes a foot that was once on wet ground would stay domed for ever.
     """
 
     def choose(step: LiftOff) -> Choice:
         if step.morphology == FLAT:
             settled = step.probing or step.steps >= dwell
-            return Choice(DOME) if settled and step.wet_probability > wet_above else Choice(FLAT)
-        if step.steps >= dwell and step.wet_probability < dry_below:
+            return Choice(DOME) if settled and step.wet_ahead > wet_above else Choice(FLAT)
+        if step.steps < dwell:
+            return Choice(DOME)
+        if step.wet_ahead < dry_below:
             return Choice(FLAT)
-        # Legs take turns, so that not all feet of a robot give up their grip at once.
-        due = step.steps >= dwell and (step.steps + step.leg) % probe_every == 0
-        return Choice(FLAT, probe=True) if due else Choice(DOME)
+        if step.wet_ahead < probe_below and not step.others_probing:
+            return Choice(FLAT, probe=True)
+        return Choice(DOME)
 
     return choose
 
 
-def oracle(wet_ahead: Callable[[float, float], bool], stride: float) -> Policy:
-    """Return a policy that knows the ground where the foot will stand next.
+def oracle(is_wet: Callable[[float, float], bool]) -> Policy:
+    """Return a policy that sees the ground where the foot will stand next.
 
     Parameters
     ----------
-    wet_ahead : callable
-        ``wet_ahead(x, y)`` tells whether the ground is wet at a position, m.
-    stride : float
-        Way from one footprint to the next along x, m.
+    is_wet : callable
+        ``is_wet(x, y)`` tells whether the ground is wet at a position, m.
     """
 
     def choose(step: LiftOff) -> Choice:
-        x, y = step.position
-        return Choice(DOME if wet_ahead(x + stride, y) else FLAT)
+        return Choice(DOME if is_wet(*step.next_position) else FLAT)
 
     return choose
 
@@ -123,10 +127,8 @@ def oracle(wet_ahead: Callable[[float, float], bool], stride: float) -> Policy:
 POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
 
 
-def policy_named(
-    name: str, wet_ahead: Callable[[float, float], bool] | None = None, stride: float = 0.0
-) -> Policy:
-    """Return a policy by its name; ``oracle`` needs the ground and the stride.
+def policy_named(name: str, is_wet: Callable[[float, float], bool] | None = None) -> Policy:
+    """Return a policy by its name; ``oracle`` needs the ground.
 
     Raises
     ------
@@ -134,9 +136,9 @@ def policy_named(
         For an unknown name, or an oracle without ground to look at.
     """
     if name == 'oracle':
-        if wet_ahead is None:
+        if is_wet is None:
             raise InvalidInput("policy = 'oracle': needs a floor that is known")
-        return oracle(wet_ahead, stride)
+        return oracle(is_wet)
     policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive()}
     if name not in policies:
         raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
@@ -146,7 +148,9 @@ def policy_named(
 class _Leg:
     """Memory of the controller about one leg."""
 
-    __slots__ = ('morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps', 'touched')
+    __slots__ = (
+        'footprint', 'morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps', 'touched',
+    )  # fmt: skip
 
     def __init__(self, morphology: str, peak: float) -> None:
         self.morphology = morphology
@@ -156,6 +160,7 @@ class _Leg:
         self.peak = peak
         self.touched = 0.0
         self.setpoint = 0.0
+        self.footprint: tuple[float, float] | None = None
 
 
 class MorphologyController:
@@ -201,6 +206,7 @@ class MorphologyController:
         self._margin = margin
         self._fixed_pressure = fixed_pressure
         self._gate = load_gate * expected_load
+        self._footprints = Footprints()
         self._legs = {leg: _Leg(start, 1.5 * expected_load) for leg in legs}
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
@@ -251,10 +257,24 @@ class MorphologyController:
         # Remember the heaviest step, but forget it over some tens of steps.
         state.peak = max(state.touched, state.peak + 0.1 * (state.touched - state.peak))
         state.touched = 0.0
+        x, y = position[0], position[1]
+        if state.morphology == FLAT:
+            self._footprints.add(x, y, wet_probability)
+        # The next step is taken to be as long as the last one.
+        before_x, before_y = state.footprint or (x, y)
+        state.footprint = (x, y)
+        ahead = (2.0 * x - before_x, 2.0 * y - before_y)
         step = LiftOff(
-            leg, state.morphology, state.steps, state.probing, wet_probability,
-            (position[0], position[1]),
-        )  # fmt: skip
+            leg=leg,
+            morphology=state.morphology,
+            steps=state.steps,
+            probing=state.probing,
+            wet_ahead=self._footprints.wet_probability(*ahead),
+            next_position=ahead,
+            others_probing=any(
+                other.probing for number, other in self._legs.items() if number != leg
+            ),
+        )
         self._apply(leg, self._policy(step))
 
     def _apply(self, leg: int, choice: Choice) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
@@ -42,14 +43,13 @@ class Tuning:
     force_noise: float = 0.03
     load_gate: float = 0.3
     smoothing: float = 0.02
-    filter_period: float = 0.02
+    filter_period: float = 0.04
     wet_prior: float = 0.5
     patch_length: float = 1.5
     ratio_noise: float = 0.03
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """What is known of a foot after a sample.
 
     Attributes

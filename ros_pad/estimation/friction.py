@@ -18,6 +18,8 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
 
 GRID = np.linspace(0.01, 1.59, 80)
+_SQUARES = GRID * GRID
+_ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
 _THICK_FILM = 1.0e-3  # m: does not drain within a stance under a flat sole
 
 
@@ -84,7 +86,7 @@ class GroundFilter:
         wet_prior: float = 0.5,
         patch_length: float = 1.5,
         forgetting_time: float = 1.0,
-        temper: float = 0.4,
+        temper: float = 0.8,
     ) -> None:
         self._tables = {False: prior.table(dome=False), True: prior.table(dome=True)}
         self._wet_prior = wet_prior
@@ -120,7 +122,7 @@ class GroundFilter:
         likelihood += slip / (2.5066 * ratio_noise) * np.exp(-0.5 * away * away)
         likelihood = (likelihood + 1e-6) ** self._temper
         joint = self._friction * likelihood
-        evidence = joint.sum(axis=1)
+        evidence = joint @ _ONES
         dry, wet = (1.0 - self.wet_probability) * evidence[0], self.wet_probability * evidence[1]
         # Never certain: one sample in a thousand comes from ground that has just changed.
         self.wet_probability = 0.001 + 0.998 * float(wet / (dry + wet))
@@ -136,7 +138,7 @@ class GroundFilter:
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of the friction coefficient."""
         mean = float(self._marginal @ GRID)
-        return mean, math.sqrt(max(float(self._marginal @ (GRID * GRID)) - mean * mean, 0.0))
+        return mean, math.sqrt(max(float(self._marginal @ _SQUARES) - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
         """Friction coefficient that is larger with probability 1 - share."""

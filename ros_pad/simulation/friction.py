@@ -25,7 +25,9 @@ so the twist is unique. What differs is φ, the potential of the foot's friction
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from collections.abc import Sequence
+from math import sqrt
 
 Twist = tuple[float, float, float]
 
@@ -133,7 +135,7 @@ def creeping(
     twist = _newton(free, mass, inertia, active, dt, start, _pseudo_huber_law)
     for contact in contacts:
         sx, sy = contact.slip(twist)
-        gain = contact.cap / math.sqrt(sx * sx + sy * sy + creep * creep)
+        gain = contact.cap / sqrt(sx * sx + sy * sy + creep * creep)
         contact.force_x, contact.force_y = -gain * sx, -gain * sy
         contact.slid = math.hypot(sx, sy) * dt
     return twist
@@ -186,35 +188,25 @@ def exact_stick(
     return vx, vy, omega
 
 
-def _shear_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float, float]:
-    """Potential, force / size, and its slope beyond that along the motion, of a sheared pad."""
-    if size <= edge:
-        return 0.5 * rate * size * size, rate, 0.0
-    gain = cap / size
-    return cap * (size - 0.5 * edge), gain, -gain
+def _newton(
+    free: Twist,
+    mass: float,
+    inertia: float,
+    active: list[tuple[float, ...]],
+    dt: float,
+    start: Twist,
+    law: Callable[[float, float, float, float], tuple[float, float]],
+) -> Twist:
+    """Newton on the convex step, shortened where it overshoots; scalars throughout, for speed.
 
-
-def _pseudo_huber_law(
-    size: float, cap: float, rate: float, edge: float
-) -> tuple[float, float, float]:
-    root = math.sqrt(size * size + edge * edge)
-    gain = cap / root
-    return cap * root, gain, -gain * (size / root) ** 2
-
-
-def _newton(free, mass, inertia, active, dt, start, law):  # type: ignore[no-untyped-def]
-    """Newton with a line search on the convex step; scalars throughout, for speed."""
+    ``law`` gives the gain f / |z| of a contact, and by how much its slope along z differs from it.
+    """
     bx, by, bw = free
     vx, vy, w = start
-
-    def value_at(vx: float, vy: float, w: float) -> float:
-        total = 0.5 * (mass * ((vx - bx) ** 2 + (vy - by) ** 2) + inertia * (w - bw) ** 2)
-        for rx, ry, ox, oy, cap, rate, edge in active:
-            total += dt * law(math.hypot(vx - w * ry + ox, vy + w * rx + oy), cap, rate, edge)[0]
-        return total
-
     scale = mass * (1e-13 + 1e-12 * (abs(bx) + abs(by)))
-    for _ in range(60):
+    step_x = step_y = step_w = slope = 0.0
+    length = 1.0
+    for _ in range(200):
         gx, gy, gw = mass * (vx - bx), mass * (vy - by), inertia * (w - bw)
         hxx = hyy = mass
         hww = inertia
@@ -222,46 +214,63 @@ def _newton(free, mass, inertia, active, dt, start, law):  # type: ignore[no-unt
         for rx, ry, ox, oy, cap, rate, edge in active:
             zx = vx - w * ry + ox
             zy = vy + w * rx + oy
-            size = math.sqrt(zx * zx + zy * zy)
-            _, gain, bend = law(size, cap, rate, edge)
+            size = sqrt(zx * zx + zy * zy)
+            gain, bend = law(size, cap, rate, edge)
             gain *= dt
             fx, fy = gain * zx, gain * zy
             gx += fx
             gy += fy
             gw += rx * fy - ry * fx
+            kxx = kyy = gain
+            kxy = 0.0
             if bend:
-                # Curvature: gain (I - n nᵀ) beyond the cap, written gain I + bend n nᵀ.
                 bend *= dt / (size * size)
-                kxx, kxy, kyy = gain + bend * zx * zx, bend * zx * zy, gain + bend * zy * zy
-            else:
-                kxx, kxy, kyy = gain, 0.0, gain
+                kxx += bend * zx * zx
+                kxy = bend * zx * zy
+                kyy += bend * zy * zy
+            kxw, kyw = rx * kxy - ry * kxx, rx * kyy - ry * kxy
             hxx += kxx
             hxy += kxy
             hyy += kyy
-            hxw += rx * kxy - ry * kxx
-            hyw += rx * kyy - ry * kxy
-            hww += rx * (rx * kyy - ry * kxy) - ry * (rx * kxy - ry * kxx)
+            hxw += kxw
+            hyw += kyw
+            hww += rx * kyw - ry * kxw
+        # The function is convex: its slope along the step has grown since. Where it has turned
+        # to rise nearly as steeply as it fell, the step was too long: take half of it back.
+        rise = -(gx * step_x + gy * step_y + gw * step_w)
+        if rise > 0.9 * slope and length > 1e-9:
+            length *= 0.5
+            vx += length * step_x
+            vy += length * step_y
+            w += length * step_w
+            continue
         if abs(gx) + abs(gy) + 10.0 * abs(gw) < scale:
             break
         # Cholesky of the 3 x 3 Hessian, which the masses keep positive definite.
         lyx, lwx = hxy / hxx, hxw / hxx
         dy = hyy - lyx * hxy
-        lwy = (hyw - lyx * hxw) / dy
-        dw = hww - lwx * hxw - lwy * (hyw - lyx * hxw)
+        lower = hyw - lyx * hxw
+        lwy = lower / dy
         yy = gy - lyx * gx
-        yw = gw - lwx * gx - lwy * yy
-        step_w = yw / dw
+        step_w = (gw - lwx * gx - lwy * yy) / (hww - lwx * hxw - lwy * lower)
         step_y = yy / dy - lwy * step_w
         step_x = gx / hxx - lyx * step_y - lwx * step_w
         slope = gx * step_x + gy * step_y + gw * step_w
-        before = value_at(vx, vy, w)
         length = 1.0
-        while length > 1e-6:
-            value = value_at(vx - length * step_x, vy - length * step_y, w - length * step_w)
-            if value <= before - 1e-4 * length * slope + 1e-15 * abs(before):
-                break
-            length *= 0.5
-        vx -= length * step_x
-        vy -= length * step_y
-        w -= length * step_w
+        vx -= step_x
+        vy -= step_y
+        w -= step_w
     return vx, vy, w
+
+
+def _shear_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float]:
+    if size <= edge:
+        return rate, 0.0
+    gain = cap / size
+    return gain, -gain
+
+
+def _pseudo_huber_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float]:
+    square = size * size + edge * edge
+    gain = cap / sqrt(square)
+    return gain, -gain * size * size / square

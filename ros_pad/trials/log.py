@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Sequence
 
 import numpy as np
@@ -37,7 +38,7 @@ class TrialLog:
         self._fidelity = fidelity
         self._time: list[float] = []
         self._body: list[Vector] = []
-        self._readings: list[Sequence[tuple[Vector, Vector]]] = []
+        self._readings = array('d')
         self._slow_time: list[float] = []
         self._rows: list[list[tuple[float, ...]]] = []
 
@@ -45,7 +46,9 @@ class TrialLog:
         """Add what the sensors said at a time, s."""
         self._time.append(time)
         self._body.append(body)
-        self._readings.append(readings)
+        for force, position in readings:
+            self._readings.extend(force)
+            self._readings.extend(position)
 
     def control(
         self,
@@ -80,7 +83,7 @@ class TrialLog:
         real_time_factor: float | None,
     ) -> Trial:
         """Return the trial."""
-        readings = np.array(self._readings)
+        readings = np.array(self._readings).reshape(len(self._time), -1, 2, 3)
         slow = np.array(self._rows, dtype=float)
         trial = Trial(
             scene=self._scene.name,

@@ -76,7 +76,7 @@ class ClosedLoop:
         self.controller = MorphologyController(
             scene.foot,
             scene.legs,
-            policy_named(policy, self.floor.wet, scene.stride),
+            policy_named(policy, self.floor.wet),
             scene.expected_load,
             start='dome' if policy == 'dome' else 'flat',
             fixed_pressure=scene.dome_pressure,
