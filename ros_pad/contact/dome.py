@@ -124,6 +124,8 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     return Inflated(_plain(r * height), _plain(r * sphere), _plain(r**3 * volume), _words(code))
 
 
+# Only domes far lower than an atom overflow or underflow: they fail the certificate.
+@np.errstate(divide='ignore', invalid='ignore', over='ignore')
 def press(
     pad: Pad,
     pressure: npt.ArrayLike,
@@ -164,14 +166,6 @@ def press(
     one that grows out of the free dome, the floor is above the pad base and the contact inside
     the rim.
     """
-    # Only domes far lower than an atom overflow or underflow: they fail the certificate.
-    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
-        return _press(pad, pressure, force, adhesion, model)
-
-
-def _press(
-    pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike, adhesion: str, model: str
-) -> Pressed:
     a = signed_adhesion(pad, adhesion)
     choice('model', model, ('thesis',))
     p, load = _broadcast(quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N'))

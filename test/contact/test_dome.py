@@ -1,0 +1,368 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from scipy.optimize import fsolve
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import Pad
+from ros_pad.contact import inflate
+from ros_pad.contact import press
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
+LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
+# The appendix computed with pi = 3.1415. Pi enters only through force/pi, so the same numbers
+# come from the exact pi and a force larger by this factor.
+APPENDIX_PI = math.pi / 3.1415
+
+# Pressure of the large pad and share of its flattening force, over the model's domain.
+pressures = st.floats(1e3, 91e3)
+shares = st.just(0.0) | st.floats(1e-9, 0.98)
+
+
+def rows(name):
+    return json.loads((REFERENCE / name).read_text())['rows']
+
+
+def flattening(pressure, pad=LARGE_PAD):
+    """Closed form of the end of the branch with the appendix' adhesion, to first order."""
+    r, k = pad.radius, pad.stiffness
+    return math.pi * r * (pressure * r - math.sqrt(2 * pad.adhesion_energy * k))
+
+
+class TestFree:
+    def test_appendix_height_at_75_kpa(self):
+        height = inflate(LARGE_PAD, 75e3).height
+        assert height == pytest.approx(1.94126819416178841568e-3, rel=1e-15)
+
+    @pytest.mark.parametrize(
+        ('kilopascal', 'millimetre'),
+        [
+            (5, 0.140024113316),
+            (40, 1.01126692807),
+            (55, 1.37540981938),
+            (65, 1.64161483588),
+            (75, 1.94126819416),
+            (85, 2.2918713161),
+            (100, 2.97571236),
+            (120, 4.52335975),
+            (150, 16.93225490),
+        ],
+    )
+    def test_table_of_heights(self, kilopascal, millimetre):
+        digits = len(f'{millimetre}'.replace('.', '').lstrip('0'))
+        height = inflate(LARGE_PAD, kilopascal * 1e3).height
+        assert height == pytest.approx(millimetre * 1e-3, rel=6 * 10.0**-digits)
+
+    def test_reference_table(self):
+        table = rows('free_dome.json')
+        assert len(table) >= 15
+        for row in table:
+            dome = inflate(LARGE_PAD, float(row['p_Pa']))
+            assert dome.height == pytest.approx(float(row['c1_m']), rel=1e-12)
+            assert dome.sphere_radius == pytest.approx(float(row['R1_m']), rel=1e-12)
+            assert dome.volume == pytest.approx(float(row['V1_m3']), rel=1e-12)
+
+    def test_gentle_pressure_follows_the_series(self):
+        p = np.geomspace(1e-9, 1e-3, 7)
+        expected = LARGE_PAD.radius * (p * LARGE_PAD.radius / LARGE_PAD.stiffness) / 2
+        np.testing.assert_allclose(inflate(LARGE_PAD, p).height, expected, rtol=1e-12)
+
+    def test_flat_at_zero_pressure(self):
+        dome = inflate(LARGE_PAD, 0)
+        assert (dome.height, dome.volume, dome.status) == (0.0, 0.0, 'ok')
+        assert math.isinf(dome.sphere_radius)
+
+    def test_no_inflation_from_the_bursting_pressure_on(self):
+        for pressure in (160e3, 161e3, 1e9):
+            with pytest.raises(NoEquilibrium, match='Pa') as caught:
+                inflate(LARGE_PAD, pressure)
+            assert caught.value.status == 'no_inflation'
+        dome = inflate(LARGE_PAD, [75e3, 160e3, 159.99e3])
+        assert dome.status.tolist() == ['ok', 'no_inflation', 'ok']
+        assert np.isnan(dome.height).tolist() == [False, True, False]
+
+    @given(st.floats(1.0, 159e3), st.floats(1.0001, 1.5))
+    def test_grows_with_pressure(self, pressure, factor):
+        higher = min(pressure * factor, 159.9e3)
+        low, high = inflate(LARGE_PAD, pressure), inflate(LARGE_PAD, higher)
+        assert high.height > low.height
+        assert high.volume > low.volume
+
+    @given(st.floats(0.01, 5.9), st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
+    def test_one_pad_is_every_pad(self, tension, radius, stiffness):
+        unit = inflate(Pad(1.0, 1.0), tension).height
+        scaled = inflate(Pad(radius, stiffness), tension * stiffness / radius).height
+        assert scaled / radius == pytest.approx(unit, rel=1e-12 / (1 - tension / 6))
+
+    def test_array_equals_scalars(self):
+        p = np.linspace(0, 159e3, 12).reshape(3, 4)
+        together = inflate(LARGE_PAD, p)
+        assert together.height.shape == together.status.shape == (3, 4)
+        alone = [inflate(LARGE_PAD, float(v)).height for v in p.flat]
+        np.testing.assert_allclose(together.height.ravel(), alone, rtol=1e-15)
+        assert isinstance(inflate(LARGE_PAD, 75e3).height, float)
+        assert inflate(LARGE_PAD, 75e3).status == 'ok'
+
+    @pytest.mark.parametrize(
+        'pressure',
+        [-1.0, math.nan, math.inf, '75e3', None, True, 1j, [1.0, -2.0], [[1.0], [2, 3]]],
+    )
+    def test_bad_pressure(self, pressure):
+        with pytest.raises(InvalidInput, match='pressure'):
+            inflate(LARGE_PAD, pressure)
+
+
+class TestPressed:
+    # Appendix 7.2.2 at 75 kPa: force N; height, depth and contact radius mm.
+    @pytest.mark.parametrize(
+        ('force', 'height', 'depth', 'contact_radius'),
+        [
+            (0.08, 1.66022279516119, 0.117237907128961, 0.582908051229389),
+            (0.19, 1.26776323737445, 0.293421907887954, 0.898138202873378),
+            (0.285, 0.950178697820088, 0.417039184972249, 1.09994485972161),
+        ],
+    )
+    def test_appendix_states(self, force, height, depth, contact_radius):
+        dome = press(LARGE_PAD, 75e3, force * APPENDIX_PI)
+        assert dome.height == pytest.approx(height * 1e-3, rel=1e-13)
+        assert dome.depth == pytest.approx(depth * 1e-3, rel=1e-13)
+        assert dome.contact_radius == pytest.approx(contact_radius * 1e-3, rel=1e-13)
+
+    def test_reference_table(self):
+        solved = flattened = 0
+        for row in rows('pressed_dome.json'):
+            if 'status' in row:
+                flattened += 1
+                with pytest.raises(NoEquilibrium) as caught:
+                    press(LARGE_PAD, row['pressure'], row['force'])
+                assert caught.value.status == row['status'] == 'flattened'
+                continue
+            solved += 1
+            dome = press(LARGE_PAD, row['pressure'], row['force'])
+            for name in ('height', 'depth', 'contact_radius', 'sphere_radius'):
+                assert getattr(dome, name) == pytest.approx(float(row[name]), rel=1e-10), row
+        assert (solved, flattened) == (39, 15)
+
+    def test_gap_keeps_its_digits_near_flattening(self):
+        row = next(r for r in rows('pressed_dome.json') if r['force'] == 0.524842)
+        dome = press(LARGE_PAD, 75e3, 0.524842)
+        assert dome.gap == pytest.approx(8.078574392658379753167e-8, rel=1e-11)
+        assert row['roots'] == 3  # two of them unphysical
+
+    def test_not_the_root_that_fsolve_falls_for(self):
+        pressure, force = 75e3, 0.52
+        r, k, energy = LARGE_PAD.radius, LARGE_PAD.stiffness, LARGE_PAD.adhesion_energy
+
+        def appendix(scaled):
+            """The two equations of appendix 7.2.2 in millimetres."""
+            a, c = scaled * 1e-3
+            sphere = (r * r + c * c) / (2 * c)
+            b2 = (force + 2 * energy * math.pi * sphere) / (pressure * math.pi)
+            first = sphere - math.sqrt(max(sphere * sphere - b2, 0.0)) - a
+            pull = 2 * k * math.pi * (c + a) * (1.5 * math.sqrt(r * r + c * c - a * a) - r) / r
+            second = pressure * math.pi / 2 * (b2 + a * a + r * r + c * c) - pull - force
+            return [first * 1e3, second]
+
+        wrong, _, flag, _ = fsolve(appendix, [1.0, 1.3], full_output=True)
+        assert flag == 1 and wrong[1] > 0.9  # it says it has solved them
+        right = press(LARGE_PAD, pressure, force)
+        assert right.height < 0.05e-3
+        assert np.abs(appendix(np.array([right.depth, right.height]) * 1e3)).max() < 1e-12
+
+    def test_text_sign_is_not_fooled_by_the_root_at_a_fifth_of_a_micrometre(self):
+        dome = press(LARGE_PAD, 75e3, 0.4, adhesion='text')
+        assert dome.height == pytest.approx(press(LARGE_PAD, 75e3, 0.4).height, rel=0.05)
+
+    @settings(max_examples=200)
+    @given(pressures, shares, st.sampled_from(['matlab', 'text', 'none']))
+    def test_balances_and_certificate(self, pressure, share, adhesion):
+        r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
+        sign = {'matlab': 1, 'text': -1, 'none': 0}[adhesion]
+        if adhesion == 'text':
+            pressure = max(pressure, 5e3)  # below, repulsion leaves no branch worth the name
+        force = share * max(flattening(pressure), 0.0)
+        dome = press(LARGE_PAD, np.array([pressure]), force, adhesion=adhesion)
+        status = dome.status[0]
+        if status != 'ok':
+            gentle = (
+                force
+                <= 2
+                * math.pi
+                * LARGE_PAD.adhesion_energy
+                * inflate(LARGE_PAD, pressure).sphere_radius
+            )
+            end = math.pi * r * (pressure * r - 4 * math.sqrt(LARGE_PAD.adhesion_energy * k))
+            expected = {
+                'matlab': pressure < 500 and 'flattened',
+                'text': 'no_contact' if gentle else force > 0.9 * end and 'flattened',
+                'none': force == 0 and 'no_contact',
+            }
+            assert status == expected[adhesion]
+            return
+        c, a, b, sphere, gap = (float(getattr(dome, name)[0]) for name in LENGTHS)
+        assert 0 < a <= c and 0 < b < r
+        assert gap == pytest.approx(c - a, abs=1e-12 * c)
+        assert sphere == pytest.approx((r * r + c * c) / (2 * c), rel=1e-13)
+        assert a * (2 * sphere - a) == pytest.approx(b * b, rel=1e-12)  # 3.48
+        pull = sign * 2 * math.pi * LARGE_PAD.adhesion_energy * sphere
+        scale = math.pi * r * r * pressure
+        assert pressure * math.pi * b * b == pytest.approx(force + pull, abs=1e-12 * scale)  # 3.53
+        sigma = math.sqrt(1 + (c * c - a * a) / r**2)
+        push = math.pi * (c + a) * (pressure * sphere - 2 * k * (1.5 * sigma - 1))
+        assert push == pytest.approx(force, abs=1e-11 * scale)  # 3.58
+        certificate = (
+            pressure * (sphere - 2 * a) / k + (3 * sigma - 2) - 3 * a * (c + a) / (r * r * sigma)
+        )
+        assert certificate > 0
+
+    @given(pressures, st.floats(1e-5, 0.97), st.floats(1.0001, 1.02))
+    def test_more_force_flattens_more(self, pressure, share, factor):
+        force = share * flattening(max(pressure, 2e3))
+        light = press(LARGE_PAD, max(pressure, 2e3), force)
+        heavy = press(LARGE_PAD, max(pressure, 2e3), force * factor)
+        assert heavy.height < light.height
+        assert heavy.gap < light.gap
+        assert heavy.contact_radius > light.contact_radius
+
+    @given(st.floats(2e3, 89e3), st.floats(1e-4, 0.95), st.floats(1.001, 1.02))
+    def test_more_pressure_lifts_the_pad_and_shrinks_the_contact(self, pressure, share, factor):
+        force = share * flattening(pressure)
+        low, high = press(LARGE_PAD, pressure, force), press(LARGE_PAD, pressure * factor, force)
+        assert high.height > low.height
+        assert high.gap > low.gap
+        assert high.contact_radius < low.contact_radius
+
+    @given(st.floats(0.1, 3.4), shares, st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
+    def test_one_pad_is_every_pad(self, tension, share, radius, stiffness):
+        unit = Pad(1.0, 1.0, adhesion_energy=1.5e-4)
+        scaled = Pad(radius, stiffness, adhesion_energy=1.5e-4 * stiffness)
+        force = share * flattening(tension, unit)
+        one = press(unit, tension, force)
+        other = press(scaled, tension * stiffness / radius, force * stiffness * radius)
+        for name in LENGTHS:
+            assert getattr(other, name) / radius == pytest.approx(getattr(one, name), rel=1e-9)
+
+    def test_arrays_broadcast_and_equal_scalars(self):
+        p, f = np.array([[40e3], [60e3], [75e3]]), np.array([0.0, 0.01, 0.1, 0.25])
+        together = press(LARGE_PAD, p, f)
+        assert together.status.tolist() == [['ok'] * 4] * 3
+        for i in range(3):
+            for j in range(4):
+                alone = press(LARGE_PAD, p[i, 0], f[j])
+                assert alone.status == 'ok'
+                for name in LENGTHS:
+                    value = getattr(together, name)
+                    assert value.shape == (3, 4)
+                    assert value[i, j] == pytest.approx(getattr(alone, name), rel=1e-13)
+        assert isinstance(alone.height, float)
+
+    def test_every_row_of_a_large_array_is_solved(self):
+        # Rows settle after different numbers of steps; none may drift away meanwhile.
+        p, share = np.meshgrid(np.linspace(2e3, 91e3, 60), np.linspace(1e-4, 0.999, 400))
+        dome = press(LARGE_PAD, p, share * flattening(p))
+        assert (dome.status == 'ok').all()
+        assert (np.diff(dome.height, axis=0) < 0).all()
+        assert (np.diff(dome.height, axis=1) > 0)[:200].all()
+        for i, j in [(0, 0), (37, 3), (250, 20), (399, 59)]:
+            alone = press(LARGE_PAD, p[i, j], share[i, j] * flattening(p[i, j]))
+            assert dome.height[i, j] == pytest.approx(alone.height, rel=1e-11)
+
+    def test_statuses_at_the_edges(self):
+        cases = [
+            (0.0, 0.0, 'flattened'),  # a flat pad
+            (461.0, 0.0, 'flattened'),  # adhesion spreads the contact to the rim: sqrt(2 g k)/r
+            (463.0, 0.0, 'ok'),
+            (75e3, flattening(75e3) * 0.9999, 'ok'),
+            (75e3, flattening(75e3) * 1.0001, 'flattened'),
+            (91e3, 0.6, 'ok'),
+            (91.4e3, 0.6, 'fold_zone'),
+            (92.5e3, 0.0, 'fold_zone'),
+            (159e3, 0.1, 'fold_zone'),
+            (160e3, 0.1, 'no_inflation'),
+        ]
+        pressure, force, status = zip(*cases, strict=True)
+        together = press(LARGE_PAD, pressure, force)
+        assert together.status.tolist() == list(status)
+        for name in LENGTHS:
+            assert (np.isnan(getattr(together, name)) == (together.status != 'ok')).all()
+        for p, f, expected in cases:
+            if expected == 'ok':
+                assert press(LARGE_PAD, p, f).status == 'ok'
+            else:
+                with pytest.raises(NoEquilibrium, match=r'Pa.*N') as caught:
+                    press(LARGE_PAD, p, f)
+                assert caught.value.status == expected
+
+    def test_ends_of_the_branch_without_and_with_repulsion(self):
+        area = math.pi * LARGE_PAD.radius**2
+        pa = 75e3 * area
+        end = pa - 4 * math.pi * LARGE_PAD.radius * math.sqrt(0.006 * 40)
+        none = press(LARGE_PAD, 75e3, [pa * (1 - 1e-9), pa * (1 + 1e-9)], adhesion='none')
+        text = press(LARGE_PAD, 75e3, [end * 0.999, end * 1.001], adhesion='text')
+        assert none.status.tolist() == text.status.tolist() == ['ok', 'flattened']
+
+    def test_no_contact_is_the_free_dome(self):
+        free = inflate(LARGE_PAD, 75e3)
+        # The text's sign repels: the pad touches from about 2 pi energy sphere_radius, 58 uN.
+        for force, adhesion in [(0.0, 'none'), (0.0, 'text'), (57e-6, 'text')]:
+            dome = press(LARGE_PAD, 75e3, force, adhesion=adhesion)
+            assert dome.status == 'no_contact'
+            assert (dome.depth, dome.contact_radius) == (0.0, 0.0)
+            assert dome.height == dome.gap == pytest.approx(free.height, rel=1e-15)
+            assert dome.sphere_radius == pytest.approx(free.sphere_radius, rel=1e-15)
+        assert press(LARGE_PAD, 75e3, 59e-6, adhesion='text').status == 'ok'
+
+    def test_small_pad_carries_its_area_share(self):
+        # Same P and f without adhesion: nine times less force at three times the pressure.
+        large = press(LARGE_PAD, 30e3, 0.09, adhesion='none')
+        small = press(SMALL_PAD, 90e3, 0.03, adhesion='none')
+        assert small.height * 3 == pytest.approx(large.height, rel=1e-13)
+
+    @settings(max_examples=300)
+    @given(
+        st.floats(0, 200e3),
+        st.floats(0, 2.0),
+        st.sampled_from(['matlab', 'text', 'none']),
+        st.sampled_from([0.0, 1e-9, 0.006, 0.4]),
+    )
+    def test_never_a_silent_nan(self, pressure, force, adhesion, energy):
+        pad = Pad(1.5e-3, 40.0, energy)
+        dome = press(pad, [pressure], force, adhesion=adhesion)
+        finite = [np.isfinite(getattr(dome, name)).all() for name in LENGTHS]
+        assert all(finite) == (dome.status[0] in ('ok', 'no_contact'))
+        assert all(finite) or not any(finite)
+
+    @pytest.mark.parametrize('value', [-1e-9, math.nan, math.inf, 'x', None, [0.1, math.nan]])
+    def test_bad_numbers(self, value):
+        with pytest.raises(InvalidInput, match=r'force = .*N'):
+            press(LARGE_PAD, 75e3, value)
+        with pytest.raises(InvalidInput, match='pressure = '):
+            press(LARGE_PAD, value, 0.1)
+
+    def test_bad_words_and_shapes(self):
+        with pytest.raises(InvalidInput, match='matlab, text, none'):
+            press(LARGE_PAD, 75e3, 0.1, adhesion='both')
+        with pytest.raises(InvalidInput, match='model'):
+            press(LARGE_PAD, 75e3, 0.1, model='spring')
+        with pytest.raises(InvalidInput, match='broadcast'):
+            press(LARGE_PAD, [1e3, 2e3], [0.1, 0.1, 0.1])
+        with pytest.raises(InvalidInput, match=r'0\.4 J/m²'):
+            press(Pad(1.5e-3, 40.0, adhesion_energy=0.5), 75e3, 0.1)
+
+
+def test_import_needs_no_scipy():
+    code = 'import sys, ros_pad.contact; print("scipy" in sys.modules)'
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == 'False'

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import Pad
+from ros_pad.contact import force_limit
+from ros_pad.contact import press
+from ros_pad.contact import pressure_for
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+
+CRITERIA = ('measured', 'flattening', 'max_depth')
+KILOPASCALS = np.array([65.0, 75.0, 85.0])
+
+
+def test_measured_is_the_fit_to_three_measurements():
+    limit = force_limit(LARGE_PAD, KILOPASCALS * 1e3)
+    np.testing.assert_allclose(limit, [0.1583, 0.2833, 0.4083], rtol=1e-14)
+    np.testing.assert_allclose(limit, [0.15, 0.30, 0.40], atol=0.017)  # the measurements
+
+
+def test_measured_scales_with_area_and_is_zero_at_low_pressure():
+    assert force_limit(SMALL_PAD, 75e3) == pytest.approx(0.2833 / 9, rel=1e-14)
+    assert force_limit(LARGE_PAD, 52.3e3) == 0.0
+    assert force_limit(LARGE_PAD, 52.4e3) > 0.0
+
+
+def test_flattening_matches_its_first_order_closed_form():
+    p = KILOPASCALS * 1e3
+    limit = force_limit(LARGE_PAD, p, 'flattening')
+    r = LARGE_PAD.radius
+    closed = math.pi * r * (p * r - math.sqrt(2 * 0.006 * 40))
+    np.testing.assert_allclose(limit, closed, rtol=1e-4)
+    np.testing.assert_allclose(limit, [0.456, 0.527, 0.598], atol=5e-4)
+
+
+@given(st.floats(600.0, 91e3))
+def test_flattening_is_where_press_ends(pressure):
+    limit = force_limit(LARGE_PAD, pressure, 'flattening')
+    assert press(LARGE_PAD, pressure, limit * (1 - 1e-9)).status == 'ok'
+    with pytest.raises(NoEquilibrium) as caught:
+        press(LARGE_PAD, pressure, limit * (1 + 1e-9))
+    assert caught.value.status == 'flattened'
+
+
+def test_max_depth_at_the_measured_pressures():
+    limit = force_limit(LARGE_PAD, KILOPASCALS * 1e3, 'max_depth')
+    np.testing.assert_allclose(limit, [0.256, 0.323, 0.413], atol=1.5e-3)
+
+
+@pytest.mark.parametrize('adhesion_energy', [0.0, 0.006, 0.4])
+def test_max_depth_is_the_deepest_of_all_forces(adhesion_energy):
+    pad = Pad(1.5e-3, 40.0, adhesion_energy)
+    for pressure in np.linspace(1e3, 90e3, 12):
+        top = force_limit(pad, pressure, 'flattening')
+        if top == 0:
+            assert force_limit(pad, pressure, 'max_depth') == 0
+            continue
+        forces = np.linspace(1e-3, 1 - 1e-9, 4001) * top
+        depth = press(pad, pressure, forces).depth
+        limit = force_limit(pad, pressure, 'max_depth')
+        assert limit == pytest.approx(forces[depth.argmax()], abs=1.5 * (forces[1] - forces[0]))
+
+
+@pytest.mark.parametrize('criterion', CRITERIA)
+@pytest.mark.parametrize('pad', [LARGE_PAD, SMALL_PAD, Pad(1.5e-3, 40.0, 0.0)])
+def test_pressure_for_inverts_the_limit(criterion, pad):
+    pressure = np.linspace(53e3, 90e3, 15)
+    limit = force_limit(pad, pressure, criterion)
+    assert (np.diff(limit) > 0).all()
+    np.testing.assert_allclose(pressure_for(pad, limit, criterion), pressure, rtol=1e-12)
+    half = pressure_for(pad, limit / 2, criterion, margin=2.0)
+    np.testing.assert_allclose(half, pressure, rtol=1e-12)
+    single = pressure_for(pad, float(limit[3]), criterion)
+    assert isinstance(single, float)
+    assert single == pytest.approx(pressure[3], rel=1e-12)
+    assert isinstance(force_limit(pad, 60e3, criterion), float)
+
+
+def test_pressure_for_no_force_is_where_the_limit_leaves_zero():
+    assert pressure_for(LARGE_PAD, 0.0) == pytest.approx(75e3 - 0.2833 / 1.25e-5)
+    spread = math.sqrt(2 * 0.006 * 40) / 1.5e-3  # adhesion alone spreads the contact to the rim
+    assert pressure_for(LARGE_PAD, 0.0, 'flattening') == pytest.approx(spread, rel=1e-3)
+
+
+@pytest.mark.parametrize('criterion', CRITERIA)
+def test_ends_of_the_domain(criterion):
+    assert force_limit(LARGE_PAD, 0.0, criterion) == 0.0
+    for pressure, status in [(91.5e3, 'fold_zone'), (159e3, 'fold_zone'), (160e3, 'no_inflation')]:
+        with pytest.raises(NoEquilibrium, match='Pa') as caught:
+            force_limit(LARGE_PAD, pressure, criterion)
+        assert caught.value.status == status
+    limits = force_limit(LARGE_PAD, [75e3, 91.5e3], criterion)
+    assert np.isnan(limits).tolist() == [False, True]
+    for force, margin in [(0.7, 1.0), (0.1, 7.0)]:
+        with pytest.raises(NoEquilibrium, match='at most') as caught:
+            pressure_for(LARGE_PAD, force, criterion, margin)
+        assert caught.value.status == 'fold_zone'
+    pressures = pressure_for(LARGE_PAD, [0.1, 0.7], criterion)
+    assert np.isnan(pressures).tolist() == [False, True]
+    # A pad that adhesion flattens at any pressure of the model is still answered.
+    assert force_limit(Pad(1.5e-3, 40.0, 0.4), 1e3, 'flattening') == 0.0
+
+
+def test_measured_is_not_stretched_past_its_pad():
+    assert force_limit(SMALL_PAD, 100e3, 'flattening') > 0
+    with pytest.raises(InvalidInput, match='pressure = 100000 Pa'):
+        force_limit(SMALL_PAD, 100e3)
+
+
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'x', None])
+def test_bad_numbers(value):
+    with pytest.raises(InvalidInput, match='pressure'):
+        force_limit(LARGE_PAD, value)
+    with pytest.raises(InvalidInput, match='force'):
+        pressure_for(LARGE_PAD, value)
+    with pytest.raises(InvalidInput, match='margin'):
+        pressure_for(LARGE_PAD, 0.1, margin=value)
+
+
+def test_bad_words():
+    with pytest.raises(InvalidInput, match='margin'):
+        pressure_for(LARGE_PAD, 0.1, margin=0.0)
+    for function in (force_limit, pressure_for):
+        with pytest.raises(InvalidInput, match='measured, flattening, max_depth'):
+            function(LARGE_PAD, 0.1, 'strength')
+    with pytest.raises(InvalidInput, match='broadcast'):
+        pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0])

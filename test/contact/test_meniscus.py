@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import json
+import math
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import THESIS_LIQUID
+from ros_pad.contact import WATER
+from ros_pad.contact import Liquid
+from ros_pad.contact import Pressed
+from ros_pad.contact import contact_angle
+from ros_pad.contact import meniscus
+from ros_pad.contact import press
+from ros_pad.errors import InvalidInput
+
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'meniscus_thesis.json'
+APPENDIX_PI = math.pi / 3.1415  # see test_dome.py
+
+
+# Appendix at 75 kPa: force N; F_cap mN with the appendix' tensions and with those of water.
+@pytest.mark.parametrize(
+    ('force', 'appendix', 'water'),
+    [
+        (0.08, 0.0662058309, 1.72557276),
+        (0.19, 0.0667953458, 1.5451832),
+        (0.285, 0.0701850904, 1.52495866),
+    ],
+)
+def test_appendix_forces(force, appendix, water):
+    dome = press(LARGE_PAD, 75e3, force * APPENDIX_PI)
+    thesis = meniscus(dome, THESIS_LIQUID, reading='thesis')
+    assert thesis.tangential_force * 1e3 == pytest.approx(appendix, rel=2e-9)
+    liquid = dataclasses.replace(WATER, contact_angle=1.35)
+    assert meniscus(dome, liquid, 'thesis').tangential_force * 1e3 == pytest.approx(
+        water, rel=3e-8
+    )
+
+
+def test_reference_table():
+    tensions = {'appendix': (0.0073, 0.0027), 'water': (0.073, 0.027), 'mixed': (0.073, 0.0027)}
+    table = json.loads(REFERENCE.read_text())['rows']
+    assert len(table) == 117
+    for row in table:
+        b = float(row['b_m'])
+        sphere = b / math.sin(float(row['alpha']))
+        dome = Pressed(math.nan, math.nan, b, sphere, math.nan, 'ok')
+        surface, solid = tensions[row['gammas'].split()[0]]
+        theta = float(row['theta'])
+        ring = meniscus(dome, Liquid(surface, solid, contact_angle=theta), 'thesis')
+        assert ring.height == pytest.approx(float(row['h']), rel=1e-12)
+        assert ring.ring_radius == pytest.approx(float(row['r_i']), rel=1e-12)
+        assert ring.tangential_force == pytest.approx(float(row['F_cap']), rel=1e-12)
+        # h_exact hangs the weight from the solid's tension: give that one to the liquid.
+        exact = meniscus(dome, Liquid(solid, solid, contact_angle=theta))
+        assert exact.height == pytest.approx(float(row['h_exact']), rel=1e-12)
+        # F_cap_exact_h = 2 γ (2 r_i + h) of that ring, in the sign as printed.
+        printed = 2 * surface * (2 * exact.ring_radius + exact.height)
+        assert printed == pytest.approx(float(row['F_cap_exact_h']), rel=1e-12)
+        # F_cap_sign_fixed = 2 γ (2 r_i - h) of the ring as printed.
+        fixed = 2 * surface * (2 * ring.ring_radius - ring.height)
+        assert fixed == pytest.approx(float(row['F_cap_sign_fixed']), rel=1e-12)
+        assert exact.tangential_force == pytest.approx(
+            2 * solid * (2 * exact.ring_radius - exact.height), rel=1e-14
+        )
+
+
+@given(st.floats(5e3, 90e3), st.floats(1e-6, 0.9), st.floats(0.0, 2.0))
+def test_corrected_height_carries_its_weight(pressure, share, theta):
+    force = share * math.pi * 1.5e-3 * (pressure * 1.5e-3 - math.sqrt(2 * 0.006 * 40))
+    dome = press(LARGE_PAD, pressure, force)
+    ring = meniscus(dome, Liquid(0.05, 0.03, 900.0, theta))
+    alpha = math.asin(dome.contact_radius / dome.sphere_radius)
+    cot = 1 / math.tan(alpha)
+    b, h = dome.contact_radius, ring.height
+    weight = 900.0 * 9.81 * cot * h * h * (3 * b + 2 * h * cot)
+    assert weight == pytest.approx(6 * 0.05 * math.sin(theta + alpha) * (b + h * cot), rel=1e-11)
+    assert ring.ring_radius == pytest.approx(b + h * cot, rel=1e-11)
+    # For one and the same tension the printed height is up to 22 % too high, never too low.
+    printed = meniscus(dome, Liquid(0.05, 0.05, 900.0, theta), 'thesis').height
+    assert 1.0 <= printed / h < math.sqrt(1.5) + 1e-9
+
+
+def test_no_contact_has_no_ring():
+    dome = press(LARGE_PAD, 75e3, 0.0, adhesion='none')
+    for reading in ('corrected', 'thesis'):
+        ring = meniscus(dome, WATER, reading)
+        assert dataclasses.astuple(ring) == (0.0, 0.0, 0.0, 'no_contact')
+
+
+def test_arrays_carry_their_statuses():
+    dome = press(LARGE_PAD, [75e3, 75e3, 75e3, 120e3], [0.0, 0.1, 0.6, 0.1], adhesion='none')
+    ring = meniscus(dome, WATER)
+    assert ring.status.tolist() == ['no_contact', 'ok', 'flattened', 'fold_zone']
+    assert ring.height[0] == 0
+    single = meniscus(press(LARGE_PAD, 75e3, 0.1, adhesion='none'), WATER)
+    assert isinstance(single.height, float)
+    assert ring.height[1] == pytest.approx(single.height, rel=1e-13)
+    assert np.isnan(ring.tangential_force).tolist() == [False, False, True, True]
+
+
+def test_contact_angle():
+    # The appendix' theta from its ratio of tensions, in the table's own digits.
+    assert contact_angle(0.0027, 0.0073) == pytest.approx(1.352745229033721205, rel=1e-14)
+    assert WATER.angle == pytest.approx(1.352745229033721205, rel=1e-14)
+    assert THESIS_LIQUID.angle == 1.35
+    assert contact_angle(1.0, 1.0) == 0.0
+    assert contact_angle(0.25, 1.0) == pytest.approx(math.pi / 2, rel=1e-15)
+    angles = contact_angle([0.3, 0.5, 0.9], 1.0)
+    np.testing.assert_allclose(np.cos(angles), 2 * np.sqrt([0.3, 0.5, 0.9]) - 1, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    'tensions',
+    [(0.24, 1.0), (1.01, 1.0), (0.0, 1.0), (-1.0, 1.0), (1.0, 0.0), (math.nan, 1.0), ('a', 1.0)],
+)
+def test_bad_tensions(tensions):
+    with pytest.raises(InvalidInput, match='tension'):
+        contact_angle(*tensions)
+
+
+def test_tensions_that_do_not_broadcast():
+    with pytest.raises(InvalidInput, match='broadcast'):
+        contact_angle([0.5, 0.6], [1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'surface_tension': 0.0},
+        {'surface_tension': math.nan},
+        {'solid_tension': -0.1},
+        {'solid_tension': 0.001},  # no contact angle follows
+        {'density': 0.0},
+        {'contact_angle': -0.1},
+        {'contact_angle': math.pi},
+        {'contact_angle': math.nan},
+    ],
+)
+def test_bad_liquids(change):
+    with pytest.raises(InvalidInput):
+        dataclasses.replace(WATER, **change)
+
+
+def test_bad_calls():
+    dome = press(LARGE_PAD, 75e3, 0.3)
+    with pytest.raises(InvalidInput, match='corrected, thesis'):
+        meniscus(dome, WATER, 'printed')
+    with pytest.raises(InvalidInput, match='contact_angle'):
+        meniscus(dome, Liquid(0.073, 0.027, contact_angle=2.8))
+    with pytest.raises(InvalidInput, match='press'):
+        meniscus(0.001, WATER)

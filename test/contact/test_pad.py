@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import math
+
+import pytest
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import Pad
+from ros_pad.errors import InvalidInput
+
+
+def test_the_thesis_pads():
+    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006)
+    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006)
+
+
+def test_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        LARGE_PAD.radius = 1.0
+
+
+@pytest.mark.parametrize('field', ['radius', 'stiffness', 'adhesion_energy'])
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, '1', None, True, [1.0, 2.0]])
+def test_bad_values_name_the_field(field, value):
+    with pytest.raises(InvalidInput, match=field):
+        dataclasses.replace(LARGE_PAD, **{field: value})
+
+
+def test_only_adhesion_may_be_zero():
+    assert Pad(1e-3, 40.0, 0.0).adhesion_energy == 0
+    for values in [(0.0, 40.0), (1e-3, 0.0)]:
+        with pytest.raises(InvalidInput, match='above 0'):
+            Pad(*values)
