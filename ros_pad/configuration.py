@@ -32,7 +32,7 @@ def shared_folder() -> pathlib.Path:
     installed workspace it is ``share/ros_pad/config`` of the first ament prefix that has it.
     """
     source = pathlib.Path(__file__).resolve().parent.parent / 'config'
-    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) + [sys.prefix]
+    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
     installed = [pathlib.Path(p) / 'share' / 'ros_pad' / 'config' for p in prefixes if p]
     for folder in [source, *installed]:
         if (folder / 'scenes').is_dir():

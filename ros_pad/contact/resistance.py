@@ -222,7 +222,8 @@ def tangential_resistance(
         bad = ~np.isfinite(array) | (array < 0.0) | (array > high)
         if bad.any():
             raise InvalidInput(
-                f'{name} = {array[bad].flat[0]!r} {unit}: must be finite and in [0, {high:g}] {unit}'
+                f'{name} = {array[bad].flat[0]:g} {unit}: must be finite,'
+                f' from 0 to {high:g} {unit}'
             )
         arrays.append(array)
 

@@ -49,15 +49,17 @@ def rung(scene: Scene, fidelity: str = 'auto') -> str:
     own = _RUNG[scene.robot]
     if fidelity not in ('auto', own):
         raise InvalidInput(
-            f'fidelity = {fidelity!r}: scene {scene.name!r} has a {scene.robot}, which {own} models'
+            f'fidelity = {fidelity!r}: scene {scene.name!r} has a {scene.robot},'
+            f' which {own} models'
         )
     return own
 
 
 def build(scene: Scene, floor: Floor, period: float) -> Robot:
     """Return the robot of a scene on a floor, with a step of ``period`` seconds."""
-    model = RailLeg if scene.robot == 'rail_leg' else PlanarHexapod
-    return model(scene, floor, period)
+    if scene.robot == 'rail_leg':
+        return RailLeg(scene, floor, period)
+    return PlanarHexapod(scene, floor, period)
 
 
 def omitted(scene: Scene) -> list[Omission]:

@@ -192,7 +192,7 @@ def _newton(
     free: Twist,
     mass: float,
     inertia: float,
-    active: list[tuple[float, ...]],
+    active: Sequence[tuple[float, ...]],
     dt: float,
     start: Twist,
     law: Callable[[float, float, float, float], tuple[float, float]],

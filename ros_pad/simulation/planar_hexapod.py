@@ -40,7 +40,7 @@ class PlanarHexapod:
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
         gait, foot = scene.gait, scene.foot
-        self.legs = (1, 2, 3, 4, 5, 6)
+        self.legs: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
         self.period = period
         self.time = 0.0
         self.feet = [FootState() for _ in self.legs]
@@ -168,7 +168,7 @@ class PlanarHexapod:
         return heights
 
     def _loads(self) -> list[float]:
-        """Normal loads: least squares weighted with each foot's share, in balance with the body.
+        """Share the weight: least squares weighted with each foot's share, in balance.
 
         N_i = w_i (λ0 + λ1 x_i + λ2 y_i) with ΣN = W, ΣN x = W x_p, ΣN y = W y_p, where the
         pressure point (x_p, y_p) lags behind the centre of mass when the body speeds up. The

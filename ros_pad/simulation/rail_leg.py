@@ -35,7 +35,7 @@ class RailLeg:
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
-        self.legs = (1,)
+        self.legs: tuple[int, ...] = (1,)
         self.period = period
         self.time = 0.0
         self.feet = [FootState()]

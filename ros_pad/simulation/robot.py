@@ -69,7 +69,7 @@ class Robot(Protocol):
     legs: tuple[int, ...]
     period: float
     time: float
-    feet: Sequence[FootState]
+    feet: list[FootState]
     dissipation: float
     verdict: str | None
 

@@ -83,9 +83,8 @@ class ClosedLoop:
         )
         self._now = 0.0
         self.regulators = [simulated_regulator(scene, self._clock) for _ in scene.legs]
-        for regulator, leg in zip(self.regulators, scene.legs, strict=True):
+        for regulator in self.regulators:
             regulator.open()
-            regulator.set_pressure(self.controller.setpoint(leg))
         self.pressures = [0.0] * len(scene.legs)
         self._legs = scene.legs
         self._pace = Pace(CONTROL_PERIOD_NS)
@@ -115,8 +114,7 @@ class ClosedLoop:
             )
         log.sample(now, self.robot.body, readings)
         if due:
-            for index, leg in enumerate(self._legs):
-                self.pressures[index] = self.regulators[index].read().pressure
+            self.pressures = [regulator.read().pressure for regulator in self.regulators]
             for index, leg in enumerate(self._legs):
                 force, position = readings[index]
                 setpoint = controller.update(
