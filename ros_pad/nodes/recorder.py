@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recorder node: writes every topic of every leg into a bag."""
+
+from __future__ import annotations
+
+import datetime
+import struct
+import sys
+import time
+from collections.abc import Callable
+from collections.abc import Mapping
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import InvalidParameterValueException
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from ros_pad.errors import BagError
+from ros_pad.errors import ConfigError
+from ros_pad.nodes import qos
+from ros_pad.nodes import topics
+from ros_pad.trials.bag import BagWriter
+
+_CLOCK_STAMP = struct.Struct('<iI')  # seconds and nanoseconds, behind the CDR header
+_CDR_HEADER_SIZE = 4
+
+
+class RecorderNode(Node):
+    """Writes every topic of `ros_pad.nodes.topics`, latched ones too, into a new bag.
+
+    Messages are taken and written as the bytes they travel in, so that tens of thousands a
+    second pass. Their log time is the node's clock: with ``use_sim_time`` that of the last
+    ``/clock`` message, and 0 for what comes before the first one.
+
+    Parameters are ``legs`` (numbers from 1 to 6, default all), ``folder`` (the bag to create,
+    default named after the time of day) and, read at the start only, ``use_sim_time``.
+
+    Parameters
+    ----------
+    custom_data : mapping of str to str, optional
+        What the bag is to say about the trial.
+    **kwargs
+        Passed on to `rclpy.node.Node`.
+
+    Raises
+    ------
+    BagError
+        When the folder exists or cannot be written. Once recording, a full disk raises it out
+        of the executor.
+    ConfigError
+        When ``legs`` is not a list of legs.
+    """
+
+    def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
+        super().__init__('recorder', **kwargs)
+        try:
+            legs = self.declare_parameter(
+                'legs',
+                list(topics.LEGS),
+                ParameterDescriptor(
+                    description='Legs whose topics are recorded, numbers from 1 to 6.',
+                    read_only=True,
+                ),
+            ).value
+            folder = self.declare_parameter(
+                'folder',
+                f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}',
+                ParameterDescriptor(
+                    description='Folder of the bag. It must not exist.', read_only=True
+                ),
+            ).value
+            recorded = topics.names(legs)
+            self._simulated = self.get_parameter('use_sim_time').value
+            # Called for every message; replaced when the first /clock message is there.
+            self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
+            self._clock_ns = 0
+            self._bag = BagWriter(folder, custom_data)
+        except BaseException:
+            self.destroy_node()
+            raise
+        self._recordings: dict[str, Subscription] = {}
+        # The clock comes first: an executor that finds several messages waiting takes them in
+        # the order of their subscriptions.
+        for name, topic in recorded.items():
+            full_name = self.resolve_topic_name(name)
+            self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
+            self._record(full_name, topic, qos.recording([topic.publish]))
+        self.get_logger().info(f'recording {len(recorded)} topics into {self._bag.folder}')
+
+    @property
+    def message_count(self) -> int:
+        """Number of messages recorded so far."""
+        return self._bag.message_count
+
+    def close(self, custom_data: Mapping[str, str] | None = None) -> None:
+        """Stop recording and close the bag.
+
+        Parameters
+        ----------
+        custom_data : mapping of str to str, optional
+            Added to what the bag says about the trial.
+
+        Raises
+        ------
+        BagError
+            When the disk is full: says how many messages are saved.
+        """
+        for subscription in self._recordings.values():
+            self.destroy_subscription(subscription)
+        self._recordings.clear()
+        self._bag.close(custom_data)
+
+    def _record(self, name: str, topic: topics.Topic, profile: QoSProfile) -> None:
+        """Subscribe to a topic so that each message goes into the bag."""
+
+        def adapt(_event: object) -> None:
+            # A publisher offers less than we ask for, as drivers of sensors do: ask for less.
+            offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
+            self.destroy_subscription(self._recordings.pop(name))
+            self._record(name, topic, qos.recording([topic.publish, *offered]))
+
+        self._recordings[name] = self.create_subscription(
+            topic.message,
+            name,
+            self._clock_writer(name) if topic is topics.CLOCK else self._writer(name),
+            profile,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=adapt),
+            raw=True,
+        )
+
+    def _writer(self, name: str) -> Callable[[bytes], None]:
+        write = self._bag.write
+
+        def callback(data: bytes) -> None:
+            write(name, data, self._now())
+
+        return callback
+
+    def _clock_writer(self, name: str) -> Callable[[bytes], None]:
+        write = self._writer(name)
+
+        def callback(data: bytes) -> None:
+            seconds, nanoseconds = _CLOCK_STAMP.unpack_from(data, _CDR_HEADER_SIZE)
+            self._clock_ns = seconds * 10**9 + nanoseconds
+            if self._simulated:
+                self._now = self._simulated_time
+            write(data)
+
+        return callback
+
+    def _simulated_time(self) -> int:
+        return self._clock_ns
+
+    def _before_clock(self) -> int:
+        self.get_logger().warning(
+            'use_sim_time is on and no /clock has come yet: messages are recorded at time 0',
+            once=True,
+        )
+        return 0
+
+
+def main(args: list[str] | None = None) -> int:
+    """Record until SIGINT or SIGTERM; return the exit status.
+
+    Returns
+    -------
+    int
+        0 when the bag was closed, 1 when it could not be written, 2 for a bad parameter.
+    """
+    rclpy.init(args=args)
+    try:
+        node = RecorderNode()
+        try:
+            # Takes several times as many messages as the default executor, and is safe here, as
+            # nothing in this process publishes from another thread. Its spin() hears no signal.
+            executor = EventsExecutor()
+            executor.add_node(node)
+            while rclpy.ok():
+                executor.spin_once(timeout_sec=0.1)
+        finally:
+            node.close()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except BagError as error:
+        print(f'recorder: {error}', file=sys.stderr)
+        return 1
+    except (ConfigError, InvalidParameterTypeException, InvalidParameterValueException) as error:
+        print(f'recorder: {error}', file=sys.stderr)
+        return 2
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: Apache-2.0
+import re
+import signal
+import subprocess
+import sys
+import time
+import warnings
+
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
+from std_msgs.msg import String
+
+from ros_pad.errors import BagError
+from ros_pad.errors import ConfigError
+from ros_pad.nodes import qos
+from ros_pad.nodes import topics
+from ros_pad.nodes.recorder import RecorderNode
+from ros_pad.trials.bag import BagReader
+from ros_pad.trials.bag import BagWriter
+
+QUIET = {'start_parameter_services': False, 'enable_rosout': False}
+
+
+@pytest.fixture(params=[SingleThreadedExecutor, EventsExecutor], ids=['single', 'events'])
+def executor(request, context):
+    executor = request.param(context=context)
+    yield executor
+    for node in list(executor.get_nodes()):
+        executor.remove_node(node)
+        node.destroy_node()
+    executor.shutdown()
+
+
+@pytest.fixture
+def robot(context, executor):
+    node = Node('robot', context=context, **QUIET)
+    executor.add_node(node)
+    return node
+
+
+@pytest.fixture
+def record(context, executor, tmp_path):
+    def record(**parameters):
+        parameters = {'folder': str(tmp_path / 'trial'), **parameters}
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        node = RecorderNode(context=context, parameter_overrides=overrides, **QUIET)
+        executor.add_node(node)
+        return node
+
+    return record
+
+
+def data_on(folder, topic):
+    return [message.data for _, message, _ in BagReader(folder).messages({topic})]
+
+
+def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path):
+    publishers = {
+        topics.LEG_TOPICS[0].name(leg).replace('pressure', name): publisher
+        for leg in (1, 4)
+        for name, publisher in [
+            (topic.name(leg).split('/')[1], topic.publisher(robot, leg))
+            for topic in topics.LEG_TOPICS
+        ]
+    } | {topic.name().lstrip('/'): topic.publisher(robot) for topic in topics.COMMON_TOPICS}
+    assert len(publishers) == 2 * 10 + 3
+    recorder = record(legs=[1, 4])
+    until(lambda: all(p.get_subscription_count() for p in publishers.values()))
+    for round_number in range(1, 21):
+        for publisher in publishers.values():
+            publisher.publish(publisher.msg_type())
+        until(lambda n=round_number: recorder.message_count == n * len(publishers))
+    recorder.close({'outcome': 'done'})
+    reader = BagReader(tmp_path / 'trial')
+    assert reader.counts == {f'/{name}': 20 for name in publishers}
+    assert reader.custom_data == {'outcome': 'done'}
+    # The table of DESIGN: what each topic of a leg carries.
+    assert {t.removeprefix('/leg_4/'): n for t, n in reader.topics.items() if 'leg_4' in t} == {
+        'pressure': 'sensor_msgs/msg/FluidPressure',
+        'pressure_setpoint': 'sensor_msgs/msg/FluidPressure',
+        'wrench': 'geometry_msgs/msg/WrenchStamped',
+        'position': 'geometry_msgs/msg/PointStamped',
+        'slip': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+        'wetness': 'std_msgs/msg/Float64',
+        'friction': 'std_msgs/msg/Float64',
+        'friction_margin': 'std_msgs/msg/Float64',
+        'slipping': 'std_msgs/msg/Bool',
+        'morphology': 'std_msgs/msg/String',
+    }
+
+
+def test_a_burst_is_recorded_whole_and_in_order(robot, record, until, tmp_path):
+    publisher = robot.create_publisher(Float64, 'leg_2/wetness', qos.RECORD)
+    recorder = record()
+    until(lambda: publisher.get_subscription_count())
+    for number in range(900):
+        publisher.publish(Float64(data=float(number)))
+    until(lambda: recorder.message_count == 900)
+    recorder.close()
+    assert data_on(tmp_path / 'trial', '/leg_2/wetness') == [float(n) for n in range(900)]
+
+
+def test_what_was_latched_before_is_recorded(robot, record, until, tmp_path):
+    topics.MORPHOLOGY.publisher(robot, 3).publish(String(data='dome'))
+    recorder = record()
+    until(lambda: recorder.message_count)
+    recorder.close()
+    assert data_on(tmp_path / 'trial', '/leg_3/morphology') == ['dome']
+
+
+def test_a_best_effort_driver_is_recorded_too(robot, record, until, tmp_path):
+    recorder = record()
+    reliable = topics.WRENCH.publisher(robot, 1)
+    until(lambda: reliable.get_subscription_count())
+    driver = robot.create_publisher(WrenchStamped, 'leg_1/wrench', qos.SENSOR)
+    volatile = robot.create_publisher(String, 'leg_1/morphology', 10)
+    publishers = (reliable, driver, volatile)
+    until(lambda: all(p.get_subscription_count() for p in publishers))
+    for publisher in publishers:
+        publisher.publish(publisher.msg_type())
+    until(lambda: recorder.message_count == 3)
+    recorder.close()
+    assert BagReader(tmp_path / 'trial').counts['/leg_1/wrench'] == 2
+
+
+def test_time_is_that_of_the_machine(robot, record, until, tmp_path):
+    recorder = record()
+    publisher = topics.WETNESS.publisher(robot, 1)
+    until(lambda: publisher.get_subscription_count())
+    before = time.time_ns()
+    publisher.publish(Float64())
+    until(lambda: recorder.message_count)
+    after = time.time_ns()
+    recorder.close()
+    ((_, _, log_time),) = BagReader(tmp_path / 'trial').messages()
+    assert before <= log_time <= after
+
+
+def test_simulated_time_is_that_of_the_clock(robot, record, until, tmp_path):
+    recorder = record(use_sim_time=True)
+    clock = topics.CLOCK.publisher(robot)
+    wetness = topics.WETNESS.publisher(robot, 1)
+    until(lambda: clock.get_subscription_count() and wetness.get_subscription_count())
+
+    def send(publisher, message):
+        count = recorder.message_count
+        publisher.publish(message)
+        until(lambda: recorder.message_count > count)
+
+    def tick(seconds, nanoseconds):
+        message = Clock()
+        message.clock.sec = seconds
+        message.clock.nanosec = nanoseconds
+        send(clock, message)
+
+    send(wetness, Float64())
+    tick(0, 4_000_000)
+    send(wetness, Float64())
+    tick(3_000, 999_999_999)
+    send(wetness, Float64())
+    recorder.close()
+    assert [(t, at) for t, _, at in BagReader(tmp_path / 'trial').messages()] == [
+        ('/leg_1/wetness', 0),
+        ('/clock', 4_000_000),
+        ('/leg_1/wetness', 4_000_000),
+        ('/clock', 3_000_999_999_999),
+        ('/leg_1/wetness', 3_000_999_999_999),
+    ]
+
+
+def test_a_full_disk_is_not_silent(robot, record, until, monkeypatch):
+    def write(*_):
+        raise BagError('7 messages are saved')
+
+    monkeypatch.setattr(BagWriter, 'write', write)
+    recorder = record()
+    publisher = topics.WETNESS.publisher(robot, 1)
+    until(lambda: publisher.get_subscription_count())
+    publisher.publish(Float64())
+    with pytest.raises(BagError, match='7 messages are saved'):
+        until(lambda: False)
+    recorder.close()
+
+
+def test_a_namespace_moves_the_robot_but_not_the_clock(context, tmp_path):
+    folder = Parameter('folder', value=str(tmp_path / 'trial'))
+    node = RecorderNode(
+        context=context, namespace='lab/robot_7', parameter_overrides=[folder], **QUIET
+    )
+    node.close()
+    node.destroy_node()
+    recorded = BagReader(tmp_path / 'trial').topics
+    assert len(recorded) == 6 * 10 + 3
+    assert {'/lab/robot_7/leg_6/wrench', '/lab/robot_7/body/pose', '/clock'} <= set(recorded)
+    assert recorded['/diagnostics'] == 'diagnostic_msgs/msg/DiagnosticArray'
+
+
+@pytest.mark.parametrize('legs', [[0], [7], [1, 1]])
+def test_legs_that_are_none_are_refused(context, tmp_path, legs):
+    overrides = [
+        Parameter('legs', value=legs),
+        Parameter('folder', value=str(tmp_path / 'trial')),
+    ]
+    with pytest.raises(ConfigError, match=re.escape(f'legs = {legs} is not allowed')):
+        RecorderNode(context=context, parameter_overrides=overrides, **QUIET)
+    assert not (tmp_path / 'trial').exists()
+
+
+def start(*parameters):
+    arguments = [word for parameter in parameters for word in ('-p', parameter)]
+    return subprocess.Popen(
+        [sys.executable, '-m', 'ros_pad.nodes.recorder', '--ros-args', *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
+def test_signals_close_the_bag(number, robot, until, tmp_path):
+    publisher = robot.create_publisher(Float64, 'leg_5/friction', qos.RECORD)
+    process = start(f'folder:={tmp_path / "trial"}')
+    try:
+        until(lambda: publisher.get_subscription_count(), timeout=30.0)
+        for value in range(100):
+            publisher.publish(Float64(data=float(value)))
+
+        def recorded():  # to the file, by the flush that a message a second later sets off
+            publisher.publish(Float64(data=100.0))
+            with warnings.catch_warnings():
+                warnings.simplefilter('ignore')
+                try:
+                    return BagReader(tmp_path / 'trial').counts['/leg_5/friction'] > 100
+                except BagError:
+                    return False
+
+        until(recorded)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 0, errors
+    assert 'Traceback' not in errors
+    reader = BagReader(tmp_path / 'trial')
+    assert reader.problem is None
+    recorded_data = data_on(tmp_path / 'trial', '/leg_5/friction')
+    assert recorded_data[:100] == [float(value) for value in range(100)]
+    assert set(recorded_data[100:]) == {100.0}
+
+
+def test_exit_status_says_what_was_wrong(tmp_path):
+    (tmp_path / 'trial').mkdir()
+    for parameter, status, message in [
+        (f'folder:={tmp_path / "trial"}', 1, 'exists, and no bag is overwritten'),
+        ('legs:=[9]', 2, r'legs = \[9\] is not allowed'),
+        ('legs:=all', 2, 'legs'),
+    ]:
+        process = start(parameter, *([] if 'folder' in parameter else ['folder:=/nonexistent/x']))
+        _, errors = process.communicate(timeout=30)
+        assert (process.returncode, bool(re.search(message, errors))) == (status, True), errors
+        assert 'Traceback' not in errors
+
+
+def test_recorded_topics_say_what_their_publishers_offer(robot, until):
+    publishers = [t.publisher(robot, 1) for t in (*topics.LEG_TOPICS, *topics.COMMON_TOPICS)]
+    for publisher in publishers:
+        name = publisher.topic_name
+        until(lambda n=name: robot.get_publishers_info_by_topic(n))
+        (info,) = robot.get_publishers_info_by_topic(name)
+        offered = info.qos_profile
+        (topic,) = [
+            t for t in (*topics.LEG_TOPICS, *topics.COMMON_TOPICS) if t.name(1) in (name, name[1:])
+        ]
+        # What the middleware announces, but for history and depth, which it keeps to itself.
+        for line in qos.offered_profiles(topic.publish).splitlines()[2:]:
+            assert line in qos.offered_profiles(offered).splitlines()
+
+
+def test_recording_hears_the_weakest_publisher():
+    best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    assert qos.recording([]) == qos.RECORD
+    assert qos.recording([qos.SENSOR_PUBLISH]).reliability == ReliabilityPolicy.RELIABLE
+    assert qos.recording([qos.SENSOR_PUBLISH, best_effort]).reliability == (
+        ReliabilityPolicy.BEST_EFFORT
+    )
+    assert qos.recording([qos.STATE]).durability == qos.STATE.durability
+    assert qos.recording([qos.STATE, qos.COMMAND]).durability == qos.COMMAND.durability
+    assert qos.recording([qos.SENSOR_PUBLISH]).depth == 1000
