@@ -12,10 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.exceptions import InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -26,7 +23,17 @@ from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.nodes.parameters import LEGS
+from ros_pad.nodes.parameters import Parameter
+from ros_pad.nodes.parameters import declare
 from ros_pad.trials.bag import BagWriter
+
+PARAMETERS = (
+    LEGS,
+    Parameter(
+        'folder', '', 'Folder of the bag, which must not exist; empty: named after the time.'
+    ),
+)
 
 _CLOCK_STAMP = struct.Struct('<iI')  # seconds and nanoseconds, behind the CDR header
 _CDR_HEADER_SIZE = 4
@@ -39,8 +46,7 @@ class RecorderNode(Node):
     second pass. Their log time is the node's clock: with ``use_sim_time`` that of the last
     ``/clock`` message, and 0 for what comes before the first one.
 
-    Parameters are ``legs`` (numbers from 1 to 6, default all), ``folder`` (the bag to create,
-    default named after the time of day) and, read at the start only, ``use_sim_time``.
+    Its ROS parameters are in :data:`PARAMETERS`; ``use_sim_time`` is read at the start only.
 
     Parameters
     ----------
@@ -55,28 +61,15 @@ class RecorderNode(Node):
         When the folder exists or cannot be written. Once recording, a full disk raises it out
         of the executor.
     ConfigError
-        When ``legs`` is not a list of legs.
+        When a parameter is not as it must be.
     """
 
     def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
         super().__init__('recorder', **kwargs)
         try:
-            legs = self.declare_parameter(
-                'legs',
-                list(topics.LEGS),
-                ParameterDescriptor(
-                    description='Legs whose topics are recorded, numbers from 1 to 6.',
-                    read_only=True,
-                ),
-            ).value
-            folder = self.declare_parameter(
-                'folder',
-                f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}',
-                ParameterDescriptor(
-                    description='Folder of the bag. It must not exist.', read_only=True
-                ),
-            ).value
-            recorded = topics.names(legs)
+            values = declare(self, PARAMETERS)
+            folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
+            recorded = topics.names(values['legs'])
             self._simulated = self.get_parameter('use_sim_time').value
             # Called for every message; replaced when the first /clock message is there.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
@@ -191,7 +184,7 @@ def main(args: list[str] | None = None) -> int:
     except BagError as error:
         print(f'recorder: {error}', file=sys.stderr)
         return 1
-    except (ConfigError, InvalidParameterTypeException, InvalidParameterValueException) as error:
+    except ConfigError as error:
         print(f'recorder: {error}', file=sys.stderr)
         return 2
     finally:
