@@ -40,8 +40,8 @@ class Foot:
 
     Attributes
     ----------
-    name : str
-        What the file that describes it is called.
+    source : str
+        Name of the shipped foot, or path of the file, that describes it.
     pad : Pad
         One pad.
     pads : int
@@ -70,7 +70,7 @@ class Foot:
         Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
     """
 
-    name: str
+    source: str
     pad: Pad
     pads: int
     sole_radius: float
@@ -112,7 +112,7 @@ class Foot:
                 adhesion_energy=pad_table.number('adhesion_energy', 'J/m2', 0.0, 1.0),
             )
         foot = cls(
-            name=path.stem,
+            source=os.fspath(name_or_path),
             pad=pad,
             pads=table.integer('pads', 1, 10000),
             sole_radius=table.number('sole_radius', 'm', 1e-3, 0.2),

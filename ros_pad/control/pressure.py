@@ -31,10 +31,10 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
     try:
         pressure = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
     except NoEquilibrium as error:
-        raise LimitError(f'{load:g} N on {foot.pads} pads of {foot.name}: {error}') from error
+        raise LimitError(f'{load:g} N on {foot.pads} pads of {foot.source}: {error}') from error
     if pressure > foot.ceiling:
         raise LimitError(
-            f'{load:g} N with margin {margin:g} on {foot.pads} pads of {foot.name} needs'
+            f'{load:g} N with margin {margin:g} on {foot.pads} pads of {foot.source} needs'
             f' {pressure:.0f} Pa, above the ceiling of {foot.ceiling:.0f} Pa'
         )
     return RESOLUTION * round(pressure / RESOLUTION)

@@ -166,8 +166,10 @@ class Scene:
 
     Attributes
     ----------
+    source : str
+        Name of the shipped scene, or path of the file, that describes it.
     name, description : str
-        Of the file.
+        Name without folder, and what it says of itself.
     robot : str
         ``hexapod`` or ``rail_leg``.
     body : HexapodBody or RailBody
@@ -192,6 +194,7 @@ class Scene:
         Relative error of the distance that the scene tolerates.
     """
 
+    source: str
     name: str
     description: str
     robot: str
@@ -242,10 +245,10 @@ class Scene:
             value outside its range (names file, key, value and range).
         """
         path = configuration.locate('scenes', name_or_path)
-        return cls.read(Table.load(path), path.stem)
+        return cls.read(Table.load(path), os.fspath(name_or_path), path.stem)
 
     @classmethod
-    def read(cls, table: Table, name: str) -> Scene:
+    def read(cls, table: Table, source: str, name: str) -> Scene:
         """Read a scene from a table; the whole table must be used up."""
         robot = table.choice('robot', ('hexapod', 'rail_leg'))
         description = table.text('description', default='')
@@ -309,6 +312,7 @@ class Scene:
         if 'dome_pressure' in table:
             pressure = table.number('dome_pressure', 'Pa', 1.0, foot.ceiling)
         scene = cls(
+            source=source,
             name=name,
             description=description,
             robot=robot,

@@ -364,18 +364,47 @@ class BagWriter:
             'custom_data': self._custom_data,
             'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
         }
-        # Replaced as a whole, so that a full disk or a kill leaves the earlier one.
-        new = self.folder / 'metadata.yaml.new'
-        new.write_text(
-            yaml.dump(
-                {'rosbag2_bagfile_information': information},
-                Dumper=_NoAliasDumper,
-                sort_keys=False,
-                allow_unicode=True,
-            ),
-            encoding='utf-8',
-        )
-        new.replace(self.folder / 'metadata.yaml')
+        _replace_metadata(self.folder, information)
+
+
+def annotate(folder: str | os.PathLike[str], custom_data: Mapping[str, str]) -> None:
+    """Add to what a closed bag says about its trial.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the bag.
+    custom_data : mapping of str to str
+        Replaces what the bag has under the same keys.
+
+    Raises
+    ------
+    BagError
+        When the folder has no metadata, or it cannot be written.
+    """
+    folder = pathlib.Path(folder)
+    try:
+        metadata = yaml.safe_load((folder / 'metadata.yaml').read_text(encoding='utf-8'))
+        information = metadata['rosbag2_bagfile_information']
+        information['custom_data'] = (information.get('custom_data') or {}) | _texts(custom_data)
+        _replace_metadata(folder, information)
+    except (OSError, KeyError, TypeError, yaml.YAMLError) as error:
+        raise BagError(f'{folder}: metadata.yaml cannot be changed: {error}') from error
+
+
+def _replace_metadata(folder: pathlib.Path, information: dict[str, Any]) -> None:
+    """Write metadata.yaml as a whole, so that a full disk or a kill leaves the earlier one."""
+    new = folder / 'metadata.yaml.new'
+    new.write_text(
+        yaml.dump(
+            {'rosbag2_bagfile_information': information},
+            Dumper=_NoAliasDumper,
+            sort_keys=False,
+            allow_unicode=True,
+        ),
+        encoding='utf-8',
+    )
+    new.replace(folder / 'metadata.yaml')
 
 
 class BagReader:
@@ -630,4 +659,4 @@ class _NoAliasDumper(yaml.SafeDumper):
         return True
 
 
-__all__ = ['BagReader', 'BagWriter', 'message_definition', 'type_hash']
+__all__ = ['BagReader', 'BagWriter', 'annotate', 'message_definition', 'type_hash']

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The controller node: flat or dome for each foot, and the pressure that takes."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Float64
+from std_msgs.msg import String
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.control import POLICIES
+from ros_pad.control import MorphologyController
+from ros_pad.control import policy_named
+from ros_pad.nodes import topics
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE
+from ros_pad.nodes.parameters import EXPECTED_LOAD
+from ros_pad.nodes.parameters import FOOT
+from ros_pad.nodes.parameters import LEGS
+from ros_pad.nodes.parameters import Parameter
+from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.process import run
+from ros_pad.simulation.scene import Scene
+
+PARAMETERS = (
+    LEGS,
+    FOOT,
+    EXPECTED_LOAD,
+    AMBIENT_PRESSURE,
+    Parameter('policy', 'adaptive', 'How shapes are chosen.', choices=POLICIES),
+    Parameter('margin', 1.2, 'Factor on the load, for the pressure of a dome.', '', 1.0, 5.0),
+    Parameter(
+        'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
+        'Pa', 0.0, 1e6,
+    ),
+    Parameter('scene', '', 'Scene whose ground the oracle sees; other policies need none.'),
+    Parameter('seed', 0, 'Of that ground.', '', 0, 2**31 - 1),
+)  # fmt: skip
+
+
+class ControllerNode(Node):
+    """Decides at each lift-off, and sends a set-point with every estimate of wetness.
+
+    Where the estimates stop, so do the set-points, and the regulators vent. Parameters are in
+    :data:`PARAMETERS`.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('controller', **kwargs)
+        values = declare(self, PARAMETERS)
+        legs = values['legs']
+        topics.names(legs)
+        is_wet = None
+        if values['scene']:
+            is_wet = Scene.load(values['scene']).floor.build(values['seed']).wet
+        self.controller = MorphologyController(
+            Foot.load(values['foot']),
+            legs,
+            policy_named(values['policy'], is_wet),
+            values['expected_load'],
+            start='dome' if values['policy'] == 'dome' else 'flat',
+            margin=values['margin'],
+            fixed_pressure=values['dome_pressure'] or None,
+        )
+        self._ambient = values['ambient_pressure']
+        self.wrenches = 0
+        self._message = FluidPressure()
+        for leg in legs:
+            self._serve(leg)
+
+    def _serve(self, leg: int) -> None:
+        load = 0.0
+        position = (math.nan, math.nan)
+        shape = ''
+        setpoints: Publisher = topics.PRESSURE_SETPOINT.publisher(self, leg)
+        shapes: Publisher = topics.MORPHOLOGY.publisher(self, leg)
+        frame = f'leg_{leg}_pad'
+
+        def on_wrench(message: WrenchStamped) -> None:
+            nonlocal load
+            load = message.wrench.force.z
+            self.controller.feel(leg, load)
+            self.wrenches += 1
+
+        def on_position(message: PointStamped) -> None:
+            nonlocal position
+            position = (message.point.x, message.point.y)
+
+        def on_wetness(message: Float64) -> None:
+            nonlocal shape
+            gauge = self.controller.update(leg, load, message.data, position)
+            if self.controller.morphology(leg) != shape:
+                shape = self.controller.morphology(leg)
+                shapes.publish(String(data=shape))
+            self._message.header.stamp = self.get_clock().now().to_msg()
+            self._message.header.frame_id = frame
+            self._message.fluid_pressure = gauge + self._ambient
+            setpoints.publish(self._message)
+
+        topics.WRENCH.subscription(self, on_wrench, leg)
+        topics.POSITION.subscription(self, on_position, leg)
+        topics.WETNESS.subscription(self, on_wetness, leg)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until it is interrupted; return the exit status."""
+    return run(ControllerNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

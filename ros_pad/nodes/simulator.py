@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator node: a robot that only speaks topics, as hardware would."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import FluidPressure
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE
+from ros_pad.nodes.parameters import Parameter
+from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.process import run
+from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import set_stamp
+from ros_pad.simulation import fidelity
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.sensors import Sensors
+
+PARAMETERS = (
+    Parameter('scene', 'hexapod_patches', 'Name of a scene, or path of a YAML file.'),
+    Parameter('seed', 0, 'Of floor and sensor noise.', '', 0, 2**31 - 1),
+    Parameter('rate', 0.0, "Samples a second; 0 takes the scene's.", 'Hz', 0.0, 1000.0),
+    Parameter('publish_clock', False, 'Stamp with simulated time, and publish it on /clock.'),
+    Parameter('free_running', True, 'Step by a timer; otherwise step() is called.'),
+    AMBIENT_PRESSURE,
+)
+
+
+class SimulatorNode(Node):
+    """Publishes wrench and position of each foot, and the body's pose; takes pad pressures.
+
+    Parameters are in :data:`PARAMETERS`. Pads are flat until their pressure is heard.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('simulator', **kwargs)
+        values = declare(self, PARAMETERS)
+        self.scene = Scene.load(values['scene'])
+        self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
+        self.floor = self.scene.floor.build(values['seed'])
+        self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9)
+        self._sensors = Sensors(self.scene.sensors, len(self.scene.legs), values['seed'])
+        self._ambient = values['ambient_pressure']
+        self._pressures = [0.0] * len(self.scene.legs)
+        self.pressure_stamps = [0] * len(self.scene.legs)
+        self._simulated = values['publish_clock']
+        self.time_ns = 0
+        self._clock_publisher = topics.CLOCK.publisher(self) if self._simulated else None
+        self._pose = topics.BODY_POSE.publisher(self)
+        self._wrenches = [topics.WRENCH.publisher(self, leg) for leg in self.scene.legs]
+        self._positions = [topics.POSITION.publisher(self, leg) for leg in self.scene.legs]
+        # Messages are reused: publishing copies them, and making them is slow.
+        self._clock_message = Clock()
+        self._pose_message = PoseStamped()
+        self._pose_message.header.frame_id = 'world'
+        self._wrench_message = WrenchStamped()
+        self._position_message = PointStamped()
+        self._position_message.header.frame_id = 'world'
+        for index, leg in enumerate(self.scene.legs):
+            topics.PRESSURE.subscription(self, self._pressure_callback(index), leg)
+        if values['free_running']:
+            self.create_timer(self.period_ns * 1e-9, self.step)
+
+    def _pressure_callback(self, index: int) -> Any:
+        def callback(message: FluidPressure) -> None:
+            gauge = message.fluid_pressure - self._ambient
+            # A sensor at rest may read a little below ambient; a pad cannot be sucked in.
+            self._pressures[index] = max(0.0, gauge) if math.isfinite(gauge) else 0.0
+            self.pressure_stamps[index] = nanoseconds(message.header.stamp)
+
+        return callback
+
+    def step(self) -> None:
+        """Advance the robot by one sample and publish what its sensors say."""
+        self.robot.step(self._pressures)
+        self.tick()
+        stamp_ns = self.time_ns if self._simulated else self.get_clock().now().nanoseconds
+        readings = self._sensors.read(self.robot)
+        wrench, position = self._wrench_message, self._position_message
+        set_stamp(wrench.header.stamp, stamp_ns)
+        position.header.stamp = wrench.header.stamp
+        force, point = wrench.wrench.force, position.point
+        for index, leg in enumerate(self.scene.legs):
+            (force.x, force.y, force.z), (point.x, point.y, point.z) = readings[index]
+            wrench.header.frame_id = f'leg_{leg}_sole'
+            self._wrenches[index].publish(wrench)
+            self._positions[index].publish(position)
+        pose = self._pose_message
+        pose.header.stamp = wrench.header.stamp
+        pose.pose.position.x, pose.pose.position.y, heading = self.robot.body
+        pose.pose.orientation.z = math.sin(0.5 * heading)
+        pose.pose.orientation.w = math.cos(0.5 * heading)
+        self._pose.publish(pose)
+
+    def tick(self) -> None:
+        """Let simulated time go on by one sample; :meth:`step` does it too."""
+        self.time_ns += self.period_ns
+        if self._clock_publisher is not None:
+            set_stamp(self._clock_message.clock, self.time_ns)
+            self._clock_publisher.publish(self._clock_message)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until it is interrupted; return the exit status."""
+    return run(SimulatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

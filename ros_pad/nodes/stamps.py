@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Time stamps of messages as whole nanoseconds, and a clock tick that works in both times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from builtin_interfaces.msg import Time
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+from ros_pad.nodes import topics
+
+
+def nanoseconds(stamp: Time) -> int:
+    """Return a stamp in ns."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def set_stamp(stamp: Time, time_ns: int) -> None:
+    """Write a time in ns into a stamp."""
+    stamp.sec, stamp.nanosec = divmod(time_ns, 1_000_000_000)
+
+
+def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
+    """Call back with the node's time in ns, every ``period`` seconds or faster.
+
+    In simulated time that is at each ``/clock`` message, with the message's own time, so that
+    what a node does at a time depends on that time alone; otherwise a timer does it.
+    """
+    if node.get_parameter('use_sim_time').value:
+
+        def tick(message: Clock) -> None:
+            callback(nanoseconds(message.clock))
+
+        topics.CLOCK.subscription(node, tick)
+    else:
+        clock = node.get_clock()
+        node.create_timer(period, lambda: callback(clock.now().nanoseconds))

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bag says of the trial in it, under one key of its ``custom_data``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import ros_pad
+from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.trial import Metrics
+
+KEY = 'ros_pad'
+AMBIENT_PRESSURE = 101325.0  # Pa, that simulated trials add to gauge pressures
+
+
+def label(
+    scene: Scene,
+    policy: str,
+    seed: int,
+    fidelity: str,
+    *,
+    interrupted: bool = False,
+    metrics: Metrics | None = None,
+    real_time_factor: float | None = None,
+    comparison: Sequence[dict[str, Any]] = (),
+) -> dict[str, str]:
+    """Return the custom data of a trial's bag.
+
+    Parameters
+    ----------
+    scene, policy, seed, fidelity
+        What was run.
+    interrupted : bool
+        Whether it was cut short.
+    metrics, real_time_factor
+        What came out, once it is known.
+    comparison : sequence of dict
+        Metrics of other policies on the same ground, each with its ``policy``.
+    """
+    return {
+        KEY: json.dumps(
+            {
+                'scene': scene.source,
+                'policy': policy,
+                'seed': seed,
+                'fidelity': fidelity,
+                'ambient_pressure': AMBIENT_PRESSURE,
+                'metrics': metrics.as_dict() if metrics else None,
+                'real_time_factor': real_time_factor,
+                'settings': settings(scene)
+                | {
+                    'interrupted': interrupted,
+                    'comparison': list(comparison),
+                },
+            }
+        )
+    }
+
+
+def settings(scene: Scene) -> dict[str, Any]:
+    """Return what a reader of a trial needs to know of its scene."""
+    return {
+        'expected_load': scene.expected_load,
+        'stride_m': scene.stride,
+        'cycle_s': scene.gait.cycle,
+        'settle_s': scene.settle,
+        'omitted': [asdict(omission) for omission in ladder.omitted(scene)],
+        'version': ros_pad.__version__,
+    }
