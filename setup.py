@@ -42,7 +42,7 @@ setup(
         'pyyaml>=6.0',
         'tqdm>=4.66',
         'mcap>=1.5',
-        'mcap-ros2-support>=0.5.3',
+        'mcap-ros2-support>=0.6',
     ],
     extras_require={
         # ROS 2 Jazzy as wheels; leave this extra out where Jazzy is installed from apt.

@@ -286,6 +286,7 @@ def run(
     robot = trial.simulator.robot
     annotate(bag, label(scene, policy, seed, rung, interrupted=trial.stopped))
     result = recorded.load(bag)
+    result.floor = trial.simulator.floor
     result.metrics = summarise(scene, result, robot, trial.controller.controller)
     result.real_time_factor = robot.time / wall
     annotate(
