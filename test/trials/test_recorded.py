@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='messages are serialized by ROS itself')
+
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import TwistWithCovarianceStamped
+from geometry_msgs.msg import WrenchStamped
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Bool
+from std_msgs.msg import Float64
+from std_msgs.msg import String
+
+from ros_pad.errors import BagError
+from ros_pad.simulation import Scene
+from ros_pad.trials import recorded
+from ros_pad.trials import run
+from ros_pad.trials.bag import BagWriter
+
+MS = 1_000_000
+
+
+class Recording:
+    """A bag that takes messages as objects."""
+
+    def __init__(self, folder, **description):
+        data = {'ros_pad': json.dumps(description)} if description else None
+        self.folder = folder
+        self.writer = BagWriter(folder, data)
+        self.names = set()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.writer.close()
+
+    def add(self, name, message, log_ns, stamp_ns=None):
+        if name not in self.names:
+            self.names.add(name)
+            package = type(message).__module__.split('.')[0]
+            self.writer.add_topic(name, f'{package}/msg/{type(message).__name__}')
+        if stamp_ns is not None:
+            header = message.header
+            header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, 10**9)
+        self.writer.write(name, serialize_message(message), log_ns)
+
+
+def wrench(x, y, z):
+    message = WrenchStamped()
+    message.wrench.force.x, message.wrench.force.y, message.wrench.force.z = x, y, z
+    return message
+
+
+def point(x, y, z):
+    message = PointStamped()
+    message.point.x, message.point.y, message.point.z = x, y, z
+    return message
+
+
+def pose(x, y, heading):
+    message = PoseStamped()
+    message.pose.position.x, message.pose.position.y = x, y
+    message.pose.orientation.z = math.sin(heading / 2.0)
+    message.pose.orientation.w = math.cos(heading / 2.0)
+    return message
+
+
+def slip(x, y):
+    message = TwistWithCovarianceStamped()
+    message.twist.twist.linear.x, message.twist.twist.linear.y = x, y
+    return message
+
+
+def pressure(gauge):
+    return FluidPressure(fluid_pressure=gauge + 101325.0)
+
+
+def record(trial, folder):
+    """Record a trial as the nodes publish it: only what changes is sent about the shape."""
+    shapes = {}
+    slow = {round(time * 1e9): row for row, time in enumerate(trial.slow_time)}
+    description = {
+        'scene': trial.scene,
+        'policy': trial.policy,
+        'seed': trial.seed,
+        'fidelity': trial.fidelity,
+        'ambient_pressure': 101325.0,
+        'metrics': trial.metrics.as_dict(),
+        'real_time_factor': 4.5,
+        'settings': {'expected_load': 6.8, 'omitted': []},
+    }
+    with Recording(folder, **description) as bag:
+        for row, seconds in enumerate(trial.time):
+            now = round(seconds * 1e9)
+            bag.add('/clock', Clock(), now)
+            for column, leg in enumerate(trial.legs):
+                force = wrench(*trial.force[row, column].tolist())
+                bag.add(f'/leg_{leg}/wrench', force, now, now)
+                foot = point(*trial.position[row, column].tolist())
+                bag.add(f'/leg_{leg}/position', foot, now, now)
+            bag.add('/body/pose', pose(*trial.body[row].tolist()), now, now)
+            if now not in slow:
+                continue
+            at = slow[now]
+            for column, leg in enumerate(trial.legs):
+                bag.add(f'/leg_{leg}/pressure', pressure(trial.pressure[at, column]), now, now)
+                setpoint = pressure(trial.setpoint[at, column])
+                bag.add(f'/leg_{leg}/pressure_setpoint', setpoint, now, now)
+                speed = float(trial.slip_speed[at, column])
+                bag.add(f'/leg_{leg}/slip', slip(0.0, -speed), now, now)
+                slipping = Bool(data=bool(trial.slipping[at, column]))
+                bag.add(f'/leg_{leg}/slipping', slipping, now)
+                for topic, values in (
+                    ('friction', trial.friction),
+                    ('friction_margin', trial.margin),
+                    ('wetness', trial.wet_probability),
+                ):
+                    number = Float64(data=float(values[at, column]))
+                    bag.add(f'/leg_{leg}/{topic}', number, now)
+                shape = 'dome' if trial.dome[at, column] else 'flat'
+                if shapes.get(leg) != shape:
+                    bag.add(f'/leg_{leg}/morphology', String(data=shape), now)
+                    shapes[leg] = shape
+    return folder
+
+
+def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
+    scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=20)
+    trial = run(scene, 'adaptive', seed=0)
+    assert trial.dome.any() and not trial.dome.all() and trial.slipping.any()
+    read = recorded.load(record(trial, tmp_path / 'bag'))
+    for name in (
+        *('time', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability'),
+        *('friction', 'margin', 'slip_speed', 'slipping', 'dome'),
+    ):
+        before, after = getattr(trial, name), getattr(read, name)
+        assert before.dtype == after.dtype, name
+        np.testing.assert_array_equal(after, before, err_msg=name)
+    np.testing.assert_array_equal(read.body[:, :2], trial.body[:, :2])
+    np.testing.assert_allclose(read.body[:, 2], trial.body[:, 2], rtol=0.0, atol=1e-15)
+    for name in ('scene', 'policy', 'seed', 'fidelity', 'legs', 'metrics'):
+        assert getattr(read, name) == getattr(trial, name), name
+    assert read.real_time_factor == 4.5
+    assert read.settings['expected_load'] == 6.8
+    np.testing.assert_array_equal(read.floor.wet_map, trial.floor.wet_map)
+    np.testing.assert_array_equal(read.wet(), trial.wet())
+
+
+def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
+    start = 1_750_000_000 * 10**9  # 2025-06-15 15:06:40 UTC
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, 4.0), start, start)
+        # The marker of leg 2 starts late and is slower; that of leg 5 never comes.
+        for k in range(1, 10):
+            bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, float(k)), start, start + k * 10 * MS)
+        bag.add('/spider/leg_2/position', point(1.0, 2.0, 3.0), start, start + 25 * MS)
+        bag.add('/spider/leg_2/position', point(4.0, 5.0, 6.0), start, start + 60 * MS)
+        bag.add('/spider/leg_5/wrench', wrench(0.0, 0.0, 9.0), start, start + 31 * MS)
+        # No estimator: the pressure gives the times.
+        bag.add('/spider/leg_5/pressure', pressure(20000.0), start, start + 15 * MS)
+        bag.add('/spider/leg_5/pressure', pressure(30000.0), start, start + 35 * MS)
+        bag.add('/spider/leg_5/pressure_setpoint', pressure(30000.0), start, start + 15 * MS)
+        bag.add('/spider/leg_2/slip', slip(3e-3, 4e-3), start, start + 15 * MS)
+        bag.add('/spider/leg_5/morphology', String(data='dome'), start + 20 * MS)
+        bag.add('/spider/joint_states', Float64(), start)
+        bag.add('/other/leg_count', Float64(), start)
+    trial = recorded.load(tmp_path / 'bag')
+    nan = math.nan
+    assert trial.legs == (2, 5)
+    np.testing.assert_allclose(trial.time, np.arange(10) * 0.010, atol=1e-12)
+    np.testing.assert_array_equal(trial.force[:4, 0, 2], [4.0, 1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(trial.force[:5, 1, 2], [nan, nan, nan, nan, 9.0])
+    np.testing.assert_array_equal(
+        trial.position[:, 0, 0], [nan, nan, nan, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0]
+    )
+    assert np.isnan(trial.position[:, 1]).all() and np.isnan(trial.body).all()
+    np.testing.assert_allclose(trial.slow_time, [0.015, 0.035], atol=1e-12)
+    np.testing.assert_array_equal(trial.pressure, [[nan, 20000.0], [nan, 30000.0]])
+    np.testing.assert_array_equal(trial.setpoint[:, 1], [30000.0, 30000.0])
+    np.testing.assert_allclose(trial.slip_speed[:, 0], [5e-3, 5e-3], rtol=1e-12)
+    np.testing.assert_array_equal(trial.dome, [[False, False], [False, True]])
+    assert not trial.slipping.any()
+    assert np.isnan(trial.wet_probability).all()
+    assert (trial.floor, trial.metrics, trial.scene, trial.policy) == (None, None, '', '')
+    assert trial.settings['recorded'] == '2025-06-15 15:06:40 UTC'
+
+
+def test_a_leg_that_only_says_one_thing_is_enough(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/leg_1/wetness', Float64(data=0.25), 40 * MS)
+        bag.add('/leg_1/wetness', Float64(data=0.75), 60 * MS)
+    trial = recorded.load(tmp_path / 'bag')
+    np.testing.assert_array_equal(trial.wet_probability, [[0.25], [0.75]])
+    np.testing.assert_allclose(trial.slow_time, [0.04, 0.06])
+    assert trial.time.shape == (0,) and trial.force.shape == (0, 1, 3)
+    assert trial.body.shape == (0, 3)
+
+
+def test_messages_out_of_order_and_without_stamp(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        for log, stamp, load in ((10, 30, 3.0), (11, 10, 1.0), (20, 0, 2.0)):
+            bag.add('/leg_1/wrench', wrench(0.0, 0.0, load), log * MS, stamp * MS)
+    trial = recorded.load(tmp_path / 'bag')
+    np.testing.assert_allclose(trial.time, [0.010, 0.020, 0.030])
+    np.testing.assert_array_equal(trial.force[:, 0, 2], [1.0, 2.0, 3.0])
+
+
+def test_ambient_pressure_comes_from_the_bag(tmp_path):
+    with Recording(tmp_path / 'bag', ambient_pressure=95000.0) as bag:
+        bag.add('/leg_1/pressure', FluidPressure(fluid_pressure=105000.0), 10 * MS, 10 * MS)
+    np.testing.assert_array_equal(recorded.load(tmp_path / 'bag').pressure, [[10000.0]])
+
+
+@pytest.mark.parametrize('heading', [-3.0, -0.1, 0.0, 1.0, 3.0])
+def test_heading_of_a_tilted_body(tmp_path, heading):
+    # Yaw of Rz(heading) Ry(pitch) Rx(roll), the quaternion written out by hand.
+    pitch, roll = 0.2, -0.1
+    message = PoseStamped()
+    cy, sy = math.cos(heading / 2), math.sin(heading / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    q = message.pose.orientation
+    q.w, q.x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    q.y, q.z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/leg_1/wrench', wrench(0.0, 0.0, 1.0), 10 * MS, 10 * MS)
+        bag.add('/body/pose', message, 10 * MS, 10 * MS)
+    assert recorded.load(tmp_path / 'bag').body[0, 2] == pytest.approx(heading, abs=1e-12)
+
+
+def test_two_robots_in_one_bag(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/a/leg_1/wetness', Float64(data=0.1), 10 * MS)
+        bag.add('/b/leg_1/wetness', Float64(data=0.2), 10 * MS)
+    with pytest.raises(BagError, match='legs in /a/, legs in /b/'):
+        recorded.load(tmp_path / 'bag')
+    with pytest.raises(BagError, match='no legs in namespace /c/'):
+        recorded.load(tmp_path / 'bag', namespace='c')
+    for namespace in ('b', '/b', '/b/'):
+        assert recorded.load(tmp_path / 'bag', namespace=namespace).wet_probability == [[0.2]]
+
+
+def test_bags_that_are_no_trial(tmp_path):
+    with pytest.raises(BagError, match='no such bag'):
+        recorded.load(tmp_path / 'nothing')
+    with Recording(tmp_path / 'clock') as bag:
+        bag.add('/clock', Clock(), 1)
+        bag.add('/leg_1/wrenches', wrench(0.0, 0.0, 1.0), 1, 1)
+        bag.add('/body/pose', pose(0.0, 0.0, 0.0), 1, 1)
+    with pytest.raises(BagError, match='no topics of legs'):
+        recorded.load(tmp_path / 'clock')
+    with Recording(tmp_path / 'type') as bag:
+        bag.add('/leg_1/wetness', Bool(data=True), 1)
+    with pytest.raises(BagError, match='/leg_1/wetness is a std_msgs/msg/Bool: std_msgs/msg/F'):
+        recorded.load(tmp_path / 'type')
+    with Recording(tmp_path / 'label', metrics={'distance_m': 1.0}) as bag:
+        bag.add('/leg_1/wetness', Float64(data=0.5), 1)
+    with pytest.raises(BagError, match='does not describe a trial'):
+        recorded.load(tmp_path / 'label')
+
+
+def test_a_bag_that_was_not_closed_says_so(tmp_path):
+    bag = Recording(tmp_path / 'bag')
+    for number in range(1, 20000):
+        bag.add('/leg_1/wetness', Float64(data=number / 20000), number * MS)
+    bag.writer.flush()
+    with pytest.warns(UserWarning, match='was not closed'):
+        trial = recorded.load(tmp_path / 'bag')
+    assert 'was not closed' in trial.settings['problem']
+    assert len(trial.slow_time) > 1000
+    bag.writer.close()
+
+
+def test_progress_ends_at_one(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        for number in range(1, 50001):
+            bag.add('/leg_1/slipping', Bool(data=False), number * MS)
+    shares = []
+    recorded.load(tmp_path / 'bag', progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0 and 3 <= len(shares) <= 10
+
+
+def test_topics_are_those_of_the_nodes():
+    topics = pytest.importorskip('ros_pad.nodes.topics')
+    of_nodes = {
+        topic.pattern.removeprefix('leg_{leg}/'): topic.type_name
+        for topic in (*topics.LEG_TOPICS, topics.BODY_POSE)
+    }
+    assert {kind: entry[0] for kind, entry in recorded._KINDS.items()} == of_nodes
