@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The thesis' walks (5.2 and 5.3) come out in the order that it reports."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.simulation import Scene
+from ros_pad.trials import run
+
+LEG_SCENES = (
+    'leg_dry_flat',
+    'leg_wet_flat',
+    'leg_wet_dome_40',
+    'leg_wet_dome_60',
+    'leg_wet_dome_75',
+)
+SEEDS = (0, 1, 2)
+
+
+def time_to_goal(name: str, seed: int = 0) -> float:
+    """Return the time, s, that the body needs to the end of the rail."""
+    scene = Scene.load(name)
+    trial = run(scene, seed=seed)
+    there = np.flatnonzero(trial.body[:, 0] >= scene.body.goal)
+    assert len(there), f'{name} did not reach {scene.body.goal} m'
+    return float(trial.time[there[0]]) - scene.settle
+
+
+@pytest.fixture(scope='module')
+def goal_times():
+    # A fixed shape on a uniform floor meets no chance: the seed moves sensor noise alone.
+    return {name: time_to_goal(name) for name in LEG_SCENES}
+
+
+def test_flat_on_wet_ground_takes_about_five_times_as_long(goal_times):
+    """Thesis 5.2: "approximately five times longer than in case 5"."""
+    assert 4.0 < goal_times['leg_wet_flat'] / goal_times['leg_wet_dome_75'] < 6.0
+
+
+def test_higher_pressure_walks_faster(goal_times):
+    """Thesis 5.2: "higher pressure notably improved walking performance"."""
+    times = [goal_times[f'leg_wet_dome_{pressure}'] for pressure in (40, 60, 75)]
+    assert times[0] > 1.5 * times[1]
+    assert times[1] > 1.1 * times[2]
+    assert times[0] <= goal_times['leg_wet_flat']
+
+
+def test_dome_on_wet_ground_is_quite_similar_to_flat_on_dry_ground(goal_times):
+    """Thesis 5.2: cases 1 and 5 "were quite similar"."""
+    assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.3
+
+
+def test_seed_does_not_move_the_leg(goal_times):
+    assert time_to_goal('leg_wet_flat', seed=1) == goal_times['leg_wet_flat']
+
+
+def test_dry_leg_advances_by_its_stroke():
+    cycles = 70
+    trial = run('leg_dry_flat')
+    assert trial.metrics.distance_m == pytest.approx(cycles * 0.05, rel=2e-3)
+    assert trial.metrics.slip_path_m[0] < 1e-3
+
+
+def test_slipping_leg_advances_as_its_forces_say():
+    """By hand: the floating foot pushes with 0.12 * 2.5 N, the wheels hold with 0.23 N, 1 kg.
+
+    The body gains speed at (0.30 - 0.23)/1 until the foot, which goes back at (pi S/2T) sin(pi
+    t/T), has become slower than it; from there foot and wheels brake; after lift-off the wheels.
+    """
+    stroke, stance, grip, drag = 0.05, 0.5, 0.30, 0.23
+    times = np.linspace(0.25, stance, 250001)
+    foot = math.pi * stroke / (2.0 * stance) * np.sin(math.pi * times / stance)
+    meets = times[np.argmax(foot < (grip - drag) * times)]
+    speed, rest = (grip - drag) * meets, stance - meets
+    leaves = speed - (grip + drag) * rest
+    way = 0.5 * speed * meets + 0.5 * (speed + leaves) * rest + leaves**2 / (2.0 * drag)
+    assert way == pytest.approx(0.0089, rel=0.01)
+    trial = run('leg_wet_flat')
+    assert trial.metrics.distance_per_cycle_m == pytest.approx(way, rel=0.01)
+
+
+def test_domes_are_overloaded_below_their_force_limit():
+    """Thesis: 0.30 N a pad at 75 kPa, and by the same line 0.10 at 60 and none at 40 kPa."""
+    load_per_pad = 2.5 / 19
+    assert 0.10 < load_per_pad < 0.30
+    stance_time = 70 * 0.5
+    assert run('leg_wet_dome_40').metrics.overload_s[0] > stance_time
+    assert run('leg_wet_dome_60').metrics.overload_s[0] > stance_time
+    assert run('leg_wet_dome_75').metrics.overload_s[0] < 0.1  # only while they fill
+
+
+@pytest.fixture(scope='module')
+def walks():
+    names = ('dry_flat', 'wet_flat', 'wet_dome')
+    return {name: [run(f'hexapod_smooth_{name}', seed=s).metrics for s in SEEDS] for name in names}
+
+
+def test_dry_hexapod_walks_straight_without_slip(walks):
+    """Thesis 5.3: "no signs of slippage"."""
+    for walk in walks['dry_flat']:
+        assert walk.verdict is None
+        assert walk.distance_per_cycle_m == pytest.approx(0.12, rel=0.01)
+        assert max(walk.slip_path_m) / walk.cycles < 1e-3
+        assert abs(walk.lateral_drift_m) < 1e-3
+        assert abs(walk.yaw_drift_rad) < math.radians(0.1)
+
+
+def test_wet_flat_hexapod_slips_and_deviates(walks):
+    """Thesis 5.3: "struggles to maintain a straight trajectory, leading to deviations"."""
+    for walk in walks['wet_flat']:
+        assert walk.verdict is None
+        assert walk.distance_per_cycle_m < 0.8 * 0.12
+        assert min(walk.slip_path_m) / walk.cycles > 0.01
+        assert abs(walk.lateral_drift_m) > 0.02
+
+
+def test_wet_dome_hexapod_is_like_the_dry_one(walks):
+    """Thesis 5.3: its "trajectory on wet surfaces closely resembles its performance on dry"."""
+    for wet, dry in zip(walks['wet_dome'], walks['dry_flat'], strict=True):
+        assert wet.verdict is None
+        assert wet.distance_per_cycle_m == pytest.approx(dry.distance_per_cycle_m, rel=0.01)
+        assert max(wet.slip_path_m) < 0.05 * min(walks['wet_flat'][0].slip_path_m)
+        assert abs(wet.lateral_drift_m) < 1e-3
+        assert max(wet.overload_s) < 0.1 * wet.duration_s
+
+
+def test_a_floor_wet_all_over_slows_but_does_not_turn():
+    """Deviation needs ground that differs from side to side: thesis' liquid spread at random."""
+    scene = Scene.load('hexapod_smooth_wet_flat')
+    floor = dataclasses.replace(scene.floor, kind='wet')
+    walk = run(dataclasses.replace(scene, floor=floor)).metrics
+    assert walk.distance_per_cycle_m < 0.8 * 0.12
+    assert abs(walk.lateral_drift_m) < 1e-3
