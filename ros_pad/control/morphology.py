@@ -221,12 +221,6 @@ class MorphologyController:
         """Gauge pressure wanted for a leg, Pa."""
         return self._legs[leg].setpoint
 
-    def feel(self, leg: int, load: float) -> None:
-        """Take one sample of a leg's normal force, N; call it for every wrench."""
-        state = self._legs[leg]
-        if load > state.touched:
-            state.touched = load
-
     def update(
         self, leg: int, load: float, wet_probability: float, position: Sequence[float]
     ) -> float:
@@ -246,6 +240,7 @@ class MorphologyController:
         state = self._legs[leg]
         if load >= self._gate:
             state.standing = True
+            state.touched = max(state.touched, load)
         elif state.standing:
             state.standing = False
             self._lift_off(leg, wet_probability, position)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from typing import Any
 
@@ -11,6 +10,7 @@ from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64
 from std_msgs.msg import String
@@ -76,26 +76,30 @@ class ControllerNode(Node):
             self._serve(leg)
 
     def _serve(self, leg: int) -> None:
-        load = 0.0
-        position = (math.nan, math.nan)
+        # Wrenches and positions come at the rate of the sensors, and only the last one counts
+        # when an estimate comes: they are kept as they travelled, and read then.
+        wrench = position = b''
         shape = ''
         setpoints: Publisher = topics.PRESSURE_SETPOINT.publisher(self, leg)
         shapes: Publisher = topics.MORPHOLOGY.publisher(self, leg)
         frame = f'leg_{leg}_pad'
 
-        def on_wrench(message: WrenchStamped) -> None:
-            nonlocal load
-            load = message.wrench.force.z
-            self.controller.feel(leg, load)
+        def on_wrench(data: bytes) -> None:
+            nonlocal wrench
+            wrench = data
             self.wrenches += 1
 
-        def on_position(message: PointStamped) -> None:
+        def on_position(data: bytes) -> None:
             nonlocal position
-            position = (message.point.x, message.point.y)
+            position = data
 
         def on_wetness(message: Float64) -> None:
             nonlocal shape
-            gauge = self.controller.update(leg, load, message.data, position)
+            if not wrench or not position:
+                return
+            load = deserialize_message(wrench, WrenchStamped).wrench.force.z
+            point = deserialize_message(position, PointStamped).point
+            gauge = self.controller.update(leg, load, message.data, (point.x, point.y))
             if self.controller.morphology(leg) != shape:
                 shape = self.controller.morphology(leg)
                 shapes.publish(String(data=shape))
@@ -104,8 +108,8 @@ class ControllerNode(Node):
             self._message.fluid_pressure = gauge + self._ambient
             setpoints.publish(self._message)
 
-        topics.WRENCH.subscription(self, on_wrench, leg)
-        topics.POSITION.subscription(self, on_position, leg)
+        topics.WRENCH.subscription(self, on_wrench, leg, raw=True)
+        topics.POSITION.subscription(self, on_position, leg, raw=True)
         topics.WETNESS.subscription(self, on_wetness, leg)
 
 

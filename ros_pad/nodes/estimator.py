@@ -69,7 +69,7 @@ class _Leg:
         self._pressure = 0.0
         self._wrench: WrenchStamped | None = None
         self._position: PointStamped | None = None
-        self.stamp_ns = 0
+        self.samples = 0
         self._slip = topics.SLIP.publisher(node, leg)
         self._slipping = topics.SLIPPING.publisher(node, leg)
         self._friction = topics.FRICTION.publisher(node, leg)
@@ -115,7 +115,7 @@ class _Leg:
         except InvalidInput as error:
             self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
             return
-        self.stamp_ns = stamp_ns
+        self.samples += 1
         if self._pace.due(stamp_ns):
             self._publish(wrench, estimate)
 
@@ -158,9 +158,10 @@ class EstimatorNode(Node):
             for leg in values['legs']
         }
 
-    def updated(self, stamp_ns: int) -> bool:
-        """Whether every leg has been estimated with samples of this time, ns."""
-        return all(leg.stamp_ns >= stamp_ns for leg in self.legs.values())
+    @property
+    def samples(self) -> int:
+        """Number of samples taken so far, of all legs."""
+        return sum(leg.samples for leg in self.legs.values())
 
 
 def main(args: list[str] | None = None) -> int:

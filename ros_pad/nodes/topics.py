@@ -68,10 +68,16 @@ class Topic:
         return node.create_publisher(self.message, self.name(leg), self.publish)
 
     def subscription(
-        self, node: Node, callback: Callable[[Any], None], leg: int | None = None
+        self,
+        node: Node,
+        callback: Callable[[Any], None],
+        leg: int | None = None,
+        raw: bool = False,
     ) -> Subscription:
-        """Create a subscription to this topic in a node."""
-        return node.create_subscription(self.message, self.name(leg), callback, self.subscribe)
+        """Create a subscription to this topic in a node; a raw one hands over bytes (CDR)."""
+        return node.create_subscription(
+            self.message, self.name(leg), callback, self.subscribe, raw=raw
+        )
 
 
 def _measured(pattern: str, message: type) -> Topic:

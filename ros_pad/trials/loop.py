@@ -106,9 +106,8 @@ class ClosedLoop:
         controller = self.controller
         due = self._pace.due(self._stamp_ns)
         estimates = []
-        for index, leg in enumerate(self._legs):
+        for index in range(len(self._legs)):
             force, position = readings[index]
-            controller.feel(leg, force[2])
             estimates.append(
                 self.estimators[index].update(now, force, position, self.pressures[index])
             )
