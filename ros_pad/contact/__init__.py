@@ -5,6 +5,8 @@ from ros_pad.contact.dome import Inflated
 from ros_pad.contact.dome import Pressed
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.dome import press
+from ros_pad.contact.film import Film
+from ros_pad.contact.film import film_thickness
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.meniscus import THESIS_LIQUID
@@ -16,21 +18,27 @@ from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import SMALL_PAD
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import tangential_resistance
 
 __all__ = [
     'LARGE_PAD',
     'SMALL_PAD',
     'THESIS_LIQUID',
     'WATER',
+    'Film',
+    'Foot',
     'Inflated',
     'Liquid',
     'Meniscus',
     'Pad',
     'Pressed',
     'contact_angle',
+    'film_thickness',
     'force_limit',
     'inflate',
     'meniscus',
     'press',
     'pressure_for',
+    'tangential_resistance',
 ]

@@ -1,6 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Leg, hexapod, floor, sensors and pneumatics, simulated; and the scenes made of them."""
 
+from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.pneumatics import Hose
+from ros_pad.simulation.pneumatics import PneumaticChannel
+from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terrain import Floor
 
-__all__ = ['Scene']
+__all__ = [
+    'Floor',
+    'Hose',
+    'PlanarHexapod',
+    'PneumaticChannel',
+    'RailLeg',
+    'RegulatorModel',
+    'Scene',
+]
