@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ``pad`` command as a user types it: output, exit status, and what it says of bad input."""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from ros_pad import cli
+from ros_pad import configuration
+from ros_pad.trials.bag import BagReader
+
+SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'
+
+
+def test_scenes_are_listed(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['scenes']) == 0
+    listed = capsys.readouterr().out
+    for name in configuration.names('scenes'):
+        assert name in listed
+    assert cli.main(['scenes', '--json']) == 0
+    assert sorted(json.loads(capsys.readouterr().out)) == configuration.names('scenes')
+
+
+def test_an_unknown_scene_lists_them_and_the_nearest(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['run', 'hexapod_patch']) == 2
+    said = capsys.readouterr()
+    assert said.out == ''
+    assert "'hexapod_patch'" in said.err
+    assert "Did you mean 'hexapod_patches'?" in said.err
+    for name in configuration.names('scenes'):
+        assert name in said.err
+
+
+def test_a_bad_value_names_file_key_value_and_range(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    scene = tmp_path / 'steep.yaml'
+    scene.write_text(SCENE.read_text().replace('cycle: 1.0 ', 'cycle: -1.0 '))
+    assert cli.main(['run', str(scene)]) == 2
+    said = capsys.readouterr().err
+    for part in (str(scene), 'gait', 'cycle', '-1.0', '0.1 to 60 s'):
+        assert part in said
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'part'),
+    [
+        (['--cycles', '0'], '--cycles 0: from 1'),
+        (['--seed', '-1'], '--seed -1: must be 0 or more'),
+        (['--fidelity', 'L0'], "fidelity = 'L0'"),
+    ],
+)
+def test_bad_options_say_what_is_allowed(
+    arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(['run', 'hexapod_patches', *arguments]) == 2
+    assert part in capsys.readouterr().err
+
+
+def test_unknown_policy_is_bad_usage(capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(['run', 'hexapod_patches', '--policy', 'wobbly'])
+    assert stop.value.code == 2
+    assert 'adaptive' in capsys.readouterr().err
+
+
+def test_a_run_without_ros_writes_report_and_summary(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    out = tmp_path / 'walk'
+    arguments = ['run', 'hexapod_patches', '--no-ros', '--cycles', '3', '--out', str(out)]
+    assert cli.main([*arguments, '--json']) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary['bag'] is None
+    assert summary['cycles'] == pytest.approx(3.0)
+    assert summary['distance_m'] > 0.1
+    assert len(summary['slip_path_m']) == len(summary['switches']) == 6
+    assert {row['policy'] for row in summary['comparison']} == {'flat', 'dome', 'oracle'}
+    assert all(row['term'] and row['reason'] for row in summary['omitted'])
+    assert json.loads((out / 'summary.json').read_text()) == summary
+    assert (out / 'report.html').stat().st_size > 10_000
+    # The same folder again: refused, and nothing in it is touched.
+    before = (out / 'report.html').stat().st_mtime_ns
+    assert cli.main(arguments) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert (out / 'report.html').stat().st_mtime_ns == before
+
+
+def test_without_a_folder_the_next_free_one_is_made(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    arguments = ['run', 'hexapod_patches', '--no-ros', '--no-compare', '--cycles', '1']
+    assert cli.main(arguments) == cli.main(arguments) == 0
+    made = sorted(path.name for path in (tmp_path / 'runs').iterdir())
+    assert made == ['hexapod_patches_adaptive_seed0', 'hexapod_patches_adaptive_seed0_2']
+
+
+def test_contact_prints_the_thesis_height(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['contact', '--pressure', '75e3', '--force', '0.1', '--json']) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values['free']['height_m'] == pytest.approx(1.94126819416e-3, rel=1e-11)
+    assert values['force_limit_n']['measured'] == pytest.approx(0.2833)
+    assert cli.main(['contact', '--pressure', '75e3', '--force', '0.1']) == 0
+    assert '0.00194127' in capsys.readouterr().out
+
+
+def test_contact_outside_the_model_says_so(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['contact', '--pressure', '75e3', '--force', '0.6']) == 1
+    assert 'flattened' in capsys.readouterr().err
+    assert cli.main(['contact', '--pressure', 'nan']) == 2
+    assert 'pressure' in capsys.readouterr().err
+
+
+def test_bag_that_is_not_there(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['bag', 'info', str(tmp_path / 'none')]) == 1
+    assert 'no such bag' in capsys.readouterr().err
+
+
+@pytest.fixture
+def environment() -> dict[str, str]:
+    pytest.importorskip('rclpy', reason='a run on nodes needs ROS 2')
+    return {**os.environ, 'PYTHONPATH': str(SCENE.parent.parent.parent)}
+
+
+def pad(*arguments: str) -> list[str]:
+    return [sys.executable, '-m', 'ros_pad.cli', *arguments]
+
+
+def test_a_run_on_nodes_is_recorded_and_reported(
+    tmp_path: pathlib.Path, environment: dict[str, str]
+):
+    out = tmp_path / 'walk'
+    child = subprocess.run(
+        pad('run', 'hexapod_patches', '--cycles', '4', '--out', str(out)),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=environment,
+    )
+    assert child.returncode == 0, child.stderr
+    for part in ('adaptive', 'flat', 'dome', 'oracle', 'mm/cycle', 'report.html', 'times real'):
+        assert part in child.stdout
+    summary = json.loads((out / 'summary.json').read_text())
+    reader = BagReader(out / 'bag')
+    label = json.loads(reader.custom_data['ros_pad'])
+    assert label['metrics']['distance_m'] == summary['distance_m']
+    assert len(label['settings']['comparison']) == 3
+    # The report of the bag is the report of the run.
+    page = (out / 'report.html').read_text()
+    shutil.move(out / 'report.html', tmp_path / 'first.html')
+    assert cli.main(['report', str(out / 'bag')]) == 0
+    assert (out / 'report.html').read_text() == page
+    assert cli.main(['report', str(out / 'bag')]) == 2
+
+
+def test_ctrl_c_leaves_vented_pads_and_a_readable_bag(
+    tmp_path: pathlib.Path, environment: dict[str, str]
+):
+    out = tmp_path / 'walk'
+    with subprocess.Popen(
+        pad('run', 'hexapod_patches', '--policy', 'dome', '--cycles', '600', '--out', str(out)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    ) as child:
+        try:
+            deadline = time.monotonic() + 60.0
+            mcap = out / 'bag' / 'bag_0.mcap'
+            while not (mcap.exists() and mcap.stat().st_size > 300_000):
+                assert child.poll() is None and time.monotonic() < deadline
+                time.sleep(0.05)
+            child.send_signal(signal.SIGINT)
+            _, said = child.communicate(timeout=30.0)
+        finally:
+            child.kill()
+    assert child.returncode == cli.INTERRUPTED
+    assert 'pads vented, bag closed' in said
+    reader = BagReader(out / 'bag')
+    assert reader.problem is None
+    last = {}
+    highest = 0.0
+    for name, message, _ in reader.messages([f'/leg_{leg}/pressure' for leg in range(1, 7)]):
+        last[name] = message.fluid_pressure - 101325.0
+        highest = max(highest, last[name])
+    assert highest > 60e3
+    assert len(last) == 6 and max(last.values()) < 1000.0
