@@ -125,11 +125,19 @@ class Trial:
         return self.force[:, :, 2] > load_gate
 
     def wet(self) -> np.ndarray:
-        """Whether the true ground below each foot is wet at each control step: (m, legs) bool."""
+        """Whether the true ground below each foot is wet at each control step: (m, legs) bool.
+
+        False where the position of a foot is not known.
+        """
         if self.floor is None:
             raise ValueError('the floor of this trial is not known')
+        if not len(self.time):
+            return np.zeros((len(self.slow_time), len(self.legs)), dtype=bool)
         rows = np.clip(np.searchsorted(self.time, self.slow_time - 1e-9), 0, len(self.time) - 1)
-        return self.floor.wet_along(self.position[rows, :, 0], self.position[rows, :, 1])
+        places = self.position[rows, :, :2]
+        known = np.isfinite(places).all(axis=2)
+        places = np.where(known[:, :, None], places, 0.0)
+        return known & self.floor.wet_along(places[:, :, 0], places[:, :, 1])
 
     def to_json(self) -> str:
         """Return metrics and set-up as JSON text."""
