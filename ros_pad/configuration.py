@@ -71,6 +71,21 @@ def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
     )
 
 
+class _Loader(yaml.SafeLoader):
+    """The safe loader, but a key that is there twice is an error, not the last one's win."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'key {key.value!r} is there twice', key.start_mark
+                )
+            if isinstance(key, yaml.ScalarNode):
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
 class Table:
     """One mapping of a YAML file, read key by key.
 
@@ -97,7 +112,7 @@ class Table:
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f'{os.fspath(path)}: cannot be read: {error}') from error
         try:
-            values = yaml.safe_load(text)
+            values = yaml.load(text, Loader=_Loader)
         except yaml.YAMLError as error:
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
@@ -131,7 +146,7 @@ class Table:
             with suppress(ValueError):
                 value = float(value)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or not low <= value <= high:
+        if not number or not low <= value <= high or math.isinf(value):
             raise ConfigError(
                 f'{self.origin}: {key} = {value!r} is not allowed: '
                 f'a number from {low:g} to {high:g} {unit} is needed'

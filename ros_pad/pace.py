@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from ros_pad.errors import InvalidInput
+
 
 class Pace:
     """Tells at which time stamps a slower task is due: the first stamp in each of its periods.
@@ -12,12 +14,19 @@ class Pace:
     Parameters
     ----------
     period_ns : int
-        Period of the task, ns, > 0.
+        Period of the task, ns, from 1.
+
+    Raises
+    ------
+    InvalidInput
+        When the period is not a whole number from 1.
     """
 
     __slots__ = ('_last', '_period')
 
     def __init__(self, period_ns: int) -> None:
+        if not isinstance(period_ns, int) or period_ns < 1:
+            raise InvalidInput(f'period = {period_ns!r} ns: a whole number from 1 is needed')
         self._period = period_ns
         self._last: int | None = None
 

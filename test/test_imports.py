@@ -15,7 +15,7 @@ SOURCE = pathlib.Path(__file__).resolve().parent.parent / 'ros_pad'
 GROUND = {'errors', 'configuration', 'pace'}
 MAY_IMPORT = {
     'errors': set(),
-    'pace': set(),
+    'pace': {'errors'},
     'configuration': {'errors'},
     'contact': GROUND,
     'estimation': GROUND | {'contact'},

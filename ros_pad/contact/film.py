@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ros_pad.contact.pad import number
+from ros_pad.contact.pad import quantity
 from ros_pad.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -54,33 +56,26 @@ def film_thickness(
     InvalidInput
         When a value is not finite or out of its range.
     """
-    values = {
-        'initial': (initial, 'm', True),
-        'contact_pressure': (contact_pressure, 'Pa', False),
-        'patch_radius': (patch_radius, 'm', True),
-        'time': (time, 's', False),
-        'viscosity': (viscosity, 'Pa s', True),
-    }
-    arrays = []
-    for name, (value, unit, positive) in values.items():
-        array = np.asarray(value, dtype=float)
-        bad = ~np.isfinite(array) | ((array <= 0.0) if positive else (array < 0.0))
-        if bad.any():
-            sign = '> 0' if positive else '>= 0'
-            raise InvalidInput(
-                f'{name} = {array[bad].flat[0]!r} {unit}: must be finite and {sign}'
-            )
-        arrays.append(array)
-    start, pressure, radius, duration, eta = arrays
-    result = 1.0 / np.sqrt(start**-2.0 + 4.0 * pressure * duration / (3.0 * eta * radius**2))
-    return float(result) if result.ndim == 0 else result
+    start = quantity('initial', initial, 'm', above=True)
+    pressure = quantity('contact_pressure', contact_pressure, 'Pa')
+    radius = quantity('patch_radius', patch_radius, 'm', above=True)
+    duration = quantity('time', time, 's')
+    eta = quantity('viscosity', viscosity, 'Pa s', above=True)
+    try:
+        drained = 4.0 * pressure * duration / (3.0 * eta * radius**2)
+        result = start / np.sqrt(1.0 + drained * start**2)
+    except ValueError as error:
+        raise InvalidInput('initial, pressure, radius and time do not broadcast') from error
+    return float(result) if np.ndim(result) == 0 else result
 
 
 class Film:
     """The liquid under one foot through one stance: under its domes and under its flat sole.
 
     The film is squeezed out as the foot stands; it is taken to travel with the foot when the foot
-    slips (no new liquid is dragged in), see docs/assumptions.md.
+    slips (no new liquid is dragged in), see docs/assumptions.md. Domes touch on more ground as
+    their load grows, and what is new under them has not drained yet: 1/h² is then averaged over
+    the area. So a foot that is put down softly gains nothing from the moment when it is light.
 
     Parameters
     ----------
@@ -90,23 +85,36 @@ class Film:
         Dynamic viscosity of the liquid, Pa s.
     """
 
-    __slots__ = ('_area', '_dome_rate', '_dome_state', '_sole_rate', '_sole_state')
+    __slots__ = (
+        '_area', '_dome_area', '_dome_rate', '_dome_state', '_fresh', '_sole_rate', '_sole_state',
+    )  # fmt: skip
 
     def __init__(self, foot: Foot, viscosity: float = WATER_VISCOSITY) -> None:
-        # Domes: p acts on b² = N/(n π p) each, hence d(1/h²)/dt = 4 π n p² / (3 η N).
+        number('viscosity', viscosity, 'Pa s', above=True)
+        # Domes: p acts on b² = A/(n π) each, A = N/p, hence d(1/h²)/dt = 4 π n p / (3 η A).
         self._dome_rate = 4.0 * math.pi * foot.pads / (3.0 * viscosity)
         self._sole_rate = 4.0 / (3.0 * viscosity * foot.sole_radius**2)
         self._area = foot.sole_area
-        self._dome_state = self._sole_state = math.inf
+        self._dome_area = 0.0
+        self._dome_state = self._sole_state = self._fresh = math.inf
 
     def touch_down(self, thickness: float) -> None:
         """Start a stance on a film of this thickness, m; zero means dry ground."""
-        self._dome_state = self._sole_state = thickness**-2 if thickness > 0.0 else math.inf
+        self._fresh = thickness**-2 if thickness > 0.0 else math.inf
+        self._dome_state = self._sole_state = self._fresh
+        self._dome_area = 0.0
 
     def drain(self, dome_load: float, sole_load: float, pressure: float, duration: float) -> None:
         """Squeeze for a duration, s, with the loads, N, that domes and flat sole carry."""
         if dome_load > 0.0:
-            self._dome_state += self._dome_rate * pressure**2 / dome_load * duration
+            area = dome_load / pressure
+            if area > self._dome_area and self._fresh < math.inf:
+                old = self._dome_area / area
+                self._dome_state = self._fresh + old * (self._dome_state - self._fresh)
+            self._dome_area = area
+            self._dome_state += self._dome_rate * pressure / area * duration
+        else:
+            self._dome_area = 0.0
         if sole_load > 0.0:
             self._sole_state += self._sole_rate * sole_load / self._area * duration
 

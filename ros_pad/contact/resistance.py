@@ -20,6 +20,7 @@ import math
 import os
 from dataclasses import dataclass
 from dataclasses import field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,9 +30,28 @@ from ros_pad.configuration import Table
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import choice
+from ros_pad.contact.pad import number
+from ros_pad.contact.pad import quantity
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
 
 FORCE_LIMITS = ('measured', 'max_depth', 'flattening')
+
+# Unit of each number of a foot, and whether it must be above zero.
+_UNITS = (
+    ('sole_radius', 'm', True),
+    ('friction', '(coefficient)', False),
+    ('shear_strength', 'Pa', False),
+    ('conforming_pressure', 'Pa', True),
+    ('boundary_friction', '(coefficient)', False),
+    ('critical_film', 'm', True),
+    ('film_exponent', '(exponent)', True),
+    ('shear_stiffness', 'N/m', True),
+    ('chamber_volume', 'm³', False),
+    ('ceiling', 'Pa', True),
+)
 
 
 @dataclass(frozen=True)
@@ -85,13 +105,25 @@ class Foot:
     ceiling: float
     limit: str = 'measured'
     _limit_table: tuple[float, ...] = field(init=False, repr=False, compare=False)
+    _limit_cell: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # The limit is asked for at every simulated step: tabulate it once, each 0.5 kPa.
-        pressures = np.arange(0.0, self.ceiling + 500.0, 500.0)
-        limits = [0.0]
-        limits += [self.pads * float(force_limit(self.pad, p, self.limit)) for p in pressures[1:]]
-        object.__setattr__(self, '_limit_table', tuple(limits))
+        for name, unit, positive in _UNITS:
+            number(name, getattr(self, name), unit, above=positive)
+        if not isinstance(self.pads, int) or self.pads < 1:
+            raise InvalidInput(f'pads = {self.pads!r} is not allowed: a whole number from 1')
+        choice('limit', self.limit, FORCE_LIMITS)
+        # The limit is asked for at every simulated step: tabulate it once, about each 0.5 kPa.
+        cells = math.ceil(self.ceiling / 500.0)
+        try:
+            force_limit(self.pad, self.ceiling, self.limit)
+        except (NoEquilibrium, InvalidInput) as error:
+            raise InvalidInput(
+                f'no force limit is known up to ceiling = {self.ceiling:g} Pa: {error}'
+            ) from error
+        limits = force_limit(self.pad, np.linspace(0.0, self.ceiling, cells + 1), self.limit)
+        object.__setattr__(self, '_limit_table', tuple((self.pads * limits).tolist()))
+        object.__setattr__(self, '_limit_cell', self.ceiling / cells)
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Foot:
@@ -111,24 +143,25 @@ class Foot:
                 stiffness=pad_table.number('stiffness', 'N/m', 1.0, 1e4),
                 adhesion_energy=pad_table.number('adhesion_energy', 'J/m2', 0.0, 1.0),
             )
-        foot = cls(
-            source=os.fspath(name_or_path),
-            pad=pad,
-            pads=table.integer('pads', 1, 10000),
-            sole_radius=table.number('sole_radius', 'm', 1e-3, 0.2),
-            friction=table.number('friction', '(coefficient)', 0.0, 3.0),
-            shear_strength=table.number('shear_strength', 'Pa', 0.0, 1e6),
-            conforming_pressure=table.number('conforming_pressure', 'Pa', 1.0, 1e7),
-            boundary_friction=table.number('boundary_friction', '(coefficient)', 0.0, 3.0),
-            critical_film=table.number('critical_film', 'm', 1e-9, 1e-3),
-            film_exponent=table.number('film_exponent', '(exponent)', 0.1, 10.0),
-            shear_stiffness=table.number('shear_stiffness', 'N/m', 1.0, 1e7),
-            chamber_volume=table.number('chamber_volume', 'm3', 0.0, 1e-3),
-            ceiling=table.number('ceiling', 'Pa', 1e3, 1e6),
-            limit=table.choice('force_limit', FORCE_LIMITS, default='measured'),
-        )
+        values: dict[str, Any] = {
+            'pads': table.integer('pads', 1, 10000),
+            'sole_radius': table.number('sole_radius', 'm', 1e-3, 0.2),
+            'friction': table.number('friction', '(coefficient)', 0.01, 3.0),
+            'shear_strength': table.number('shear_strength', 'Pa', 0.0, 1e6),
+            'conforming_pressure': table.number('conforming_pressure', 'Pa', 1.0, 1e7),
+            'boundary_friction': table.number('boundary_friction', '(coefficient)', 0.0, 3.0),
+            'critical_film': table.number('critical_film', 'm', 1e-9, 1e-3),
+            'film_exponent': table.number('film_exponent', '(exponent)', 0.1, 10.0),
+            'shear_stiffness': table.number('shear_stiffness', 'N/m', 1.0, 1e7),
+            'chamber_volume': table.number('chamber_volume', 'm3', 0.0, 1e-3),
+            'ceiling': table.number('ceiling', 'Pa', 1e3, 1e6),
+            'limit': table.choice('force_limit', FORCE_LIMITS, default='measured'),
+        }
         table.finish()
-        return foot
+        try:
+            return cls(source=os.fspath(name_or_path), pad=pad, **values)
+        except InvalidInput as error:
+            raise ConfigError(f'{table.origin}: {error}') from error
 
     @property
     def sole_area(self) -> float:
@@ -141,11 +174,14 @@ class Foot:
         return self.chamber_volume + domes
 
     def dome_load(self, load: float, pressure: float) -> float:
-        """Part of the load, N, that the domes carry at a gauge pressure, Pa: up to their limit."""
-        place = pressure / 500.0
-        index = int(place)
+        """Part of the load, N, that the domes carry at a gauge pressure, Pa: up to their limit.
+
+        Made to be fast: nothing is checked. Above the ceiling the limit stays what it is there.
+        """
         if pressure <= 0.0:
             return 0.0
+        place = pressure / self._limit_cell
+        index = int(place)
         table = self._limit_table
         if index >= len(table) - 1:
             limit = table[-1]
@@ -210,26 +246,19 @@ def tangential_resistance(
     InvalidInput
         When a value is not finite or out of its range.
     """
-    ranges = {
-        'load': (load, 'N', math.inf),
-        'pressure': (pressure, 'Pa', foot.ceiling),
-        'dome_film': (dome_film, 'm', math.inf),
-        'sole_film': (sole_film, 'm', math.inf),
-    }
-    arrays = []
-    for name, (value, unit, high) in ranges.items():
-        array = np.asarray(value, dtype=float)
-        bad = ~np.isfinite(array) | (array < 0.0) | (array > high)
-        if bad.any():
-            raise InvalidInput(
-                f'{name} = {array[bad].flat[0]:g} {unit}: must be finite,'
-                f' from 0 to {high:g} {unit}'
-            )
-        arrays.append(array)
+    values = (
+        quantity('load', load, 'N'),
+        quantity('pressure', pressure, 'Pa', high=foot.ceiling),
+        quantity('dome_film', dome_film, 'm'),
+        quantity('sole_film', sole_film, 'm'),
+    )
 
     def one(load: float, pressure: float, dome_film: float, sole_film: float) -> float:
         on_domes = foot.dome_load(load, pressure)
         return foot.resistance_of(on_domes, load - on_domes, pressure, dome_film, sole_film)
 
-    result = np.vectorize(one, otypes=[float])(*arrays)
+    try:
+        result = np.vectorize(one, otypes=[float])(*values)
+    except ValueError as error:
+        raise InvalidInput('load, pressure and films do not broadcast') from error
     return float(result) if result.ndim == 0 else result

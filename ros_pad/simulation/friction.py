@@ -17,9 +17,10 @@ so the twist is unique. What differs is φ, the potential of the foot's friction
     Pseudo-Huber on the slip speed, φ' = c |s| / √(s² + ε²): fast and smooth, creeps at
     about ε; sticking feet share the load in proportion to their caps.
 ``exact_stick``
-    Rigid-plastic, by block Gauss-Seidel on impulses in discs of radius c dt: sticks exactly.
-    The reference. With three or more sticking feet the forces depend on the starting impulses:
-    started from zero, which is the split that is reported.
+    Rigid-plastic, φ' = c, by projected gradient on impulses in discs of radius c dt: feet stick
+    to rounding, and the twist comes with a bound of its error. The reference. The forces of three
+    or more sticking feet are not unique: started from zero and none at its cap, those reported
+    are the smallest (least norm).
 """
 
 from __future__ import annotations
@@ -89,6 +90,11 @@ def elastic(
     -------
     tuple
         Twist at the end of the step.
+
+    Raises
+    ------
+    ArithmeticError
+        When Newton's method does not settle: pads of 1e8 N/m or more.
     """
     active = []
     for contact in contacts:
@@ -147,45 +153,80 @@ def exact_stick(
     inertia: float,
     contacts: Sequence[Contact],
     dt: float,
-    tolerance: float = 1e-13,
+    tolerance: float = 1e-8,
     sweeps: int = 20000,
 ) -> Twist:
-    """Step with rigid-plastic friction, by block Gauss-Seidel; sets each contact's force.
+    """Step with rigid-plastic friction, to a proven accuracy; sets each contact's force.
+
+    Parameters
+    ----------
+    free, mass, inertia, contacts, dt
+        As for :func:`elastic`.
+    tolerance : float
+        Bound on the error of the twist, √(v² + ω² inertia/mass), m/s. Rounding allows about 3e-9.
+    sweeps : int
+        Most sweeps over the contacts.
 
     Raises
     ------
     ArithmeticError
-        When the impulses still change by more than the tolerance (m/s) after all sweeps.
+        When the bound is not met after all sweeps.
+
+    Notes
+    -----
+    Accelerated projected gradient on the impulses, begun anew wherever the last step turns back
+    (Nesterov 1983; O'Donoghue and Candès 2015). The primal function is strongly convex, so the
+    gap Σ (c dt |s| + p·s) between it and its dual bounds the error: ½ mass error² <= gap.
     """
-    vx, vy, omega = free
-    impulses = [(0.0, 0.0)] * len(contacts)
-    # A step along the gradient no longer than the inverse of the stiffest direction of a contact
-    # keeps each block a contraction.
-    gains = [1.0 / (1.0 / mass + (c.lever_x**2 + c.lever_y**2) / inertia) for c in contacts]
+    limits = [contact.cap * dt for contact in contacts]
+    levers = [(contact.lever_x, contact.lever_y) for contact in contacts]
+    # No direction of impulses is stiffer than all contacts together: 1/rate is a safe step.
+    rate = len(levers) / mass + sum(rx * rx + ry * ry for rx, ry in levers) / inertia
+    impulses = ahead = [(0.0, 0.0)] * len(levers)
+
+    def twist_after(pushes: Sequence[tuple[float, float]]) -> Twist:
+        return (
+            free[0] + sum(px for px, _ in pushes) / mass,
+            free[1] + sum(py for _, py in pushes) / mass,
+            free[2]
+            + sum(rx * py - ry * px for (px, py), (rx, ry) in zip(pushes, levers, strict=True))
+            / inertia,
+        )
+
+    age = 1.0
     for _ in range(sweeps):
-        change = 0.0
-        for index, contact in enumerate(contacts):
-            rx, ry, limit = contact.lever_x, contact.lever_y, contact.cap * dt
-            px, py = impulses[index]
-            qx = px - gains[index] * (vx - omega * ry + contact.motion_x)
-            qy = py - gains[index] * (vy + omega * rx + contact.motion_y)
-            size = math.hypot(qx, qy)
+        twist = twist_after(ahead)
+        last, impulses = impulses, []
+        turn = 0.0
+        for contact, limit, (ax, ay), (lx, ly) in zip(contacts, limits, ahead, last, strict=True):
+            sx, sy = contact.slip(twist)
+            px, py = ax - sx / rate, ay - sy / rate
+            size = math.hypot(px, py)
             if size > limit:
-                qx, qy = qx * limit / size, qy * limit / size
-            dx, dy = qx - px, qy - py
-            impulses[index] = (qx, qy)
-            vx += dx / mass
-            vy += dy / mass
-            omega += (rx * dy - ry * dx) / inertia
-            change = max(change, abs(dx), abs(dy))
-        if change <= tolerance * mass:
+                px, py = px * limit / size, py * limit / size
+            impulses.append((px, py))
+            turn += (ax - px) * (px - lx) + (ay - py) * (py - ly)
+        twist = twist_after(impulses)
+        gap = 0.0
+        for contact, limit, (px, py) in zip(contacts, limits, impulses, strict=True):
+            sx, sy = contact.slip(twist)
+            gap += limit * math.hypot(sx, sy) + px * sx + py * sy
+        if gap <= 0.5 * mass * tolerance * tolerance:
             break
+        age, older = (1.0, 1.0) if turn > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
+        pull = (older - 1.0) / age
+        ahead = [
+            (px + pull * (px - lx), py + pull * (py - ly))
+            for (px, py), (lx, ly) in zip(impulses, last, strict=True)
+        ]
     else:
-        raise ArithmeticError(f'impulses still change by {change:g} N s after {sweeps} sweeps')
+        raise ArithmeticError(
+            f'twist is known to {sqrt(2.0 * gap / mass):g} m/s only after {sweeps} sweeps'
+        )
     for contact, (px, py) in zip(contacts, impulses, strict=True):
         contact.force_x, contact.force_y = px / dt, py / dt
-        contact.slid = math.hypot(*contact.slip((vx, vy, omega))) * dt
-    return vx, vy, omega
+        contact.slid = math.hypot(*contact.slip(twist)) * dt
+    return twist
 
 
 def _newton(
@@ -203,7 +244,11 @@ def _newton(
     """
     bx, by, bw = free
     vx, vy, w = start
-    scale = mass * (1e-13 + 1e-12 * (abs(bx) + abs(by)))
+    # What the largest gains make of the rounding of a speed is no reason to go on.
+    scale = mass
+    for contact in active:
+        scale += 0.01 * dt * contact[5]
+    scale *= 1e-13 + 1e-12 * (abs(bx) + abs(by))
     step_x = step_y = step_w = slope = 0.0
     length = 1.0
     for _ in range(200):
@@ -245,7 +290,7 @@ def _newton(
             w += length * step_w
             continue
         if abs(gx) + abs(gy) + 10.0 * abs(gw) < scale:
-            break
+            return vx, vy, w
         # Cholesky of the 3 x 3 Hessian, which the masses keep positive definite.
         lyx, lwx = hxy / hxx, hxw / hxx
         dy = hyy - lyx * hxy
@@ -260,7 +305,10 @@ def _newton(
         vx -= step_x
         vy -= step_y
         w -= step_w
-    return vx, vy, w
+    raise ArithmeticError(
+        f'friction step of {dt:g} s with {len(active)} contacts does not settle: take less stiff'
+        ' pads or a shorter step'
+    )
 
 
 def _shear_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float]:

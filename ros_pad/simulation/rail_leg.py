@@ -93,7 +93,8 @@ class RailLeg:
         force = self._push(cap, back, dt)
         self._x += self._speed * dt
         slip = self._speed - back if stands else 0.0
-        state.position = (self._x + offset, 0.0, height)
+        # What stands on the floor is the contact; the marker is above soft pads, which shear.
+        state.position = (self._x + offset - force / foot.shear_stiffness, 0.0, height)
         state.force = (force, 0.0, self._body.load if stands else 0.0)
         state.standing = stands
         state.grip = cap

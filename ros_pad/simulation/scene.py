@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import pathlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.terrain import FLOORS
 from ros_pad.simulation.terrain import Floor
+from ros_pad.simulation.terrain import patch_lengths
 
 
 @dataclass(frozen=True)
@@ -252,8 +254,11 @@ class Scene:
         """Read a scene from a table; the whole table must be used up."""
         robot = table.choice('robot', ('hexapod', 'rail_leg'))
         description = table.text('description', default='')
+        foot_name = table.text('foot')
+        if foot_name.endswith(('.yaml', '.yml')):  # a file lies beside the scene, not where we are
+            foot_name = os.fspath(pathlib.Path(table.origin).parent / foot_name)
         try:
-            foot = Foot.load(table.text('foot'))
+            foot = Foot.load(foot_name)
         except ConfigError as error:
             raise ConfigError(f'{table.origin}: foot: {error}') from error
         body: HexapodBody | RailBody
@@ -287,15 +292,17 @@ class Scene:
                 )
         with table.table('floor') as part:
             floor = _floor_plan(part)
-        with table.table('tow', default={}) as part:
-            tow = Tow(
-                weight=part.number('weight', 'N', 0.0, 1e4, default=0.0),
-                friction_dry=part.number('friction_dry', '(coefficient)', 0.0, 3.0, default=0.0),
-                friction_wet=part.number('friction_wet', '(coefficient)', 0.0, 3.0, default=0.0),
-                distance=part.number('distance', 'm', 0.0, 10.0, default=0.0),
-                height=part.number('height', 'm', 0.0, 1.0, default=0.0),
-                stiffness=part.number('stiffness', 'N/m', 1.0, 1e7, default=2000.0),
-            )
+        tow = Tow()
+        if 'tow' in table:
+            with table.table('tow') as part:
+                tow = Tow(
+                    weight=part.number('weight', 'N', 0.0, 1e4),
+                    friction_dry=part.number('friction_dry', '(coefficient)', 0.0, 3.0),
+                    friction_wet=part.number('friction_wet', '(coefficient)', 0.0, 3.0),
+                    distance=part.number('distance', 'm', 0.0, 10.0, default=0.0),
+                    height=part.number('height', 'm', 0.0, 1.0, default=0.0),
+                    stiffness=part.number('stiffness', 'N/m', 1.0, 1e7, default=2000.0),
+                )
         with table.table('sensors') as part:
             sensors = SensorNoise(
                 rate=part.number('rate', 'Hz', 50.0, 1000.0),
@@ -357,11 +364,14 @@ def _hexapod_body(part: Table) -> HexapodBody:
 
 def _floor_plan(part: Table) -> FloorPlan:
     kind = part.choice('kind', FLOORS)
-    patches = kind == 'patches'
+    wet_fraction = patch_length = 0.0
+    if kind == 'patches':
+        wet_fraction = part.number('wet_fraction', '(share)', 0.01, 0.99)
+        patch_length = part.number('patch_length', 'm', *patch_lengths(wet_fraction))
     return FloorPlan(
         kind=kind,
         film_thickness=part.number('film_thickness', 'm', 1e-9, 0.01, default=3e-4),
         viscosity=part.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
-        wet_fraction=part.number('wet_fraction', '(share)', 0.01, 0.99) if patches else 0.0,
-        patch_length=part.number('patch_length', 'm', 0.1, 10.0) if patches else 0.0,
+        wet_fraction=wet_fraction,
+        patch_length=patch_length,
     )

@@ -11,7 +11,33 @@ import numpy as np
 from scipy import ndimage
 from scipy import special
 
+from ros_pad.errors import InvalidInput
+
 FLOORS = ('dry', 'wet', 'patches')
+
+# Period of a patchy floor along x and y, and edge of its cells, m.
+LENGTH, WIDTH, CELL = 16.0, 8.0, 0.02
+
+
+def patch_lengths(wet_fraction: float) -> tuple[float, float]:
+    """Return the range of mean patch lengths, m, that a floor can show at this wet fraction.
+
+    The field's smoothing must be no finer than a cell, or patches come out too long, and no
+    coarser than an eighth of the floor's width, or too few fit in to be random.
+    """
+    per_smoothing = 1.0 / _smoothing(wet_fraction, 1.0)
+    return CELL * per_smoothing, WIDTH / 8.0 * per_smoothing
+
+
+def _smoothing(wet_fraction: float, patch_length: float) -> float:
+    """Return the smoothing of the field, m.
+
+    A Gaussian field smoothed with a kernel of standard deviation s crosses the level z upwards
+    exp(-z²/2)/(2 π √2 s) times a metre (Rice 1944), and wet_fraction/patch_length is that rate.
+    """
+    level = float(special.ndtri(wet_fraction))
+    rate = wet_fraction / patch_length
+    return math.exp(-(level**2) / 2.0) / (2.0 * math.pi * math.sqrt(2.0) * rate)
 
 
 @dataclass(frozen=True)
@@ -51,9 +77,6 @@ class Floor:
         patch_length: float,
         film_thickness: float,
         seed: int,
-        length: float = 16.0,
-        width: float = 8.0,
-        cell: float = 0.02,
     ) -> Floor:
         """Return random patches: a smoothed Gaussian field, wet where it is high.
 
@@ -62,30 +85,33 @@ class Floor:
         wet_fraction : float
             Share of the floor that is wet, in (0, 1).
         patch_length : float
-            Mean length of a wet patch along a straight walk, m.
+            Mean length of a wet patch along a straight walk, m, within :func:`patch_lengths`.
         film_thickness : float
             Depth of the liquid, m.
         seed : int
-            The same seed gives the same floor.
-        length, width, cell : float
-            Period of the floor along x and y, and its resolution, m.
+            Whole number from 0; the same seed gives the same floor.
 
-        Notes
-        -----
-        A Gaussian field smoothed with a kernel of standard deviation s crosses the level z
-        upwards exp(-z²/2)/(2 π √2 s) times a metre (Rice 1944), from which s follows.
+        Raises
+        ------
+        InvalidInput
+            When wet fraction, patch length or seed is out of its range.
         """
-        level = -special.ndtri(wet_fraction)
-        smoothing = (
-            patch_length
-            * math.exp(-(level**2) / 2.0)
-            / (2.0 * math.pi * math.sqrt(2.0) * wet_fraction)
-        )
-        shape = (round(width / cell), round(length / cell))
+        if not 0.0 < wet_fraction < 1.0:
+            raise InvalidInput(f'wet_fraction = {wet_fraction!r}: must be between 0 and 1')
+        shortest, longest = patch_lengths(wet_fraction)
+        if not shortest <= patch_length <= longest:
+            raise InvalidInput(
+                f'patch_length = {patch_length!r} m: with a wet fraction of {wet_fraction:g} the'
+                f' floor has room for {shortest:.3g} to {longest:.3g} m'
+            )
+        if not isinstance(seed, int) or seed < 0:
+            raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
+        smoothing = _smoothing(wet_fraction, patch_length) / CELL
+        shape = (round(WIDTH / CELL), round(LENGTH / CELL))
         noise = np.random.default_rng([seed, 1]).normal(size=shape)
-        height = ndimage.gaussian_filter(noise, smoothing / cell, mode='wrap')
+        height = ndimage.gaussian_filter(noise, smoothing, mode='wrap')
         wet = height > np.quantile(height, 1.0 - wet_fraction)
-        return cls(wet, cell, (-1.0, -width / 2.0), film_thickness)
+        return cls(wet, CELL, (-1.0, -WIDTH / 2.0), film_thickness)
 
     def wet(self, x: float, y: float) -> bool:
         """Whether there is liquid at a world position, m."""
@@ -100,6 +126,7 @@ class Floor:
     def wet_along(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return :meth:`wet` for arrays of positions, as booleans of their shape."""
         rows, columns = self.wet_map.shape
-        row = np.floor((np.asarray(y) - self.origin[1]) / self.cell).astype(int) % rows
-        column = np.floor((np.asarray(x) - self.origin[0]) / self.cell).astype(int) % columns
+        # floor_divide is exact, as // is: a rounded quotient takes cell edges for the next cell.
+        row = np.floor_divide(np.asarray(y) - self.origin[1], self.cell).astype(int) % rows
+        column = np.floor_divide(np.asarray(x) - self.origin[0], self.cell).astype(int) % columns
         return self.wet_map[row, column]
