@@ -193,7 +193,7 @@ def _map_extent(view: _View) -> tuple[float, float, float, float]:
     if not len(points):
         return (-0.5, 0.5, -0.5, 0.5)
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    margin = 0.08 + 0.5 * max(0.0, 0.5 - (top - bottom))
+    margin = 0.1 + 0.5 * max(0.0, 0.1 - (top - bottom))
     return left - 0.12, right + 0.12, bottom - margin, top + margin
 
 
@@ -452,8 +452,10 @@ def _window_figure(view: _View, window: tuple[float, float]) -> Figure:
         alarm = trial.slipping[rows, column]
         slip.plot(time[alarm], speed[alarm], '.', color=VERMILION, markersize=5)
         pressure.set_ylabel(f'leg {trial.legs[column]}', fontweight='bold')
-        for ax in (pressure, slip):
-            ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
+    # Where nothing happens, noise shall not look like something.
+    for ax, least in ((axes[0, 0], 20.0), (axes[0, 2], 20.0)):
+        top = max(least, ax.get_ylim()[1])
+        ax.set_ylim(min(-0.04 * top, ax.get_ylim()[0]), top)
     axes[0, 0].set_xlim(*window)
     for ax in axes[-1]:
         ax.set_xlabel('time / s')
@@ -666,10 +668,11 @@ def _result(view: _View) -> str:
         gain = 100.0 * (own.distance_per_cycle_m / advance - 1.0)
         other = _POLICY_NAMES.get(row['policy'], row['policy'])
         other = f'the {other}' if other == 'oracle' else other
-        text += (
-            f'; {abs(gain):.0f} % {"further" if gain >= 0.0 else "less far"} than'
-            f' {other} ({1e3 * advance:.0f} mm)'
-        )
+        if abs(gain) < 0.5:
+            text += f'; as far as {other}'
+        else:
+            text += f'; {abs(gain):.0f} % {"further" if gain > 0.0 else "less far"} than {other}'
+        text += f' ({1e3 * advance:.0f} mm)'
     text += '.'
     if own.verdict:
         text += f' The walk is not valid: {own.verdict}.'
@@ -724,7 +727,7 @@ def _metrics_tables(view: _View) -> str:
 
 def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
     if not omitted:
-        return '<p>Nothing is on record. What a robot recorded leaves nothing out.</p>'
+        return '<p>No simulation is on record for this trial.</p>'
     rows = [
         [
             html.escape(str(each['term'])),
@@ -773,7 +776,8 @@ table {{ border-collapse: collapse; font-size: 0.92em; break-inside: avoid; }}
 th, td {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0;
          border-bottom: 1px solid #e2e2e2; }}
 tbody td:first-child {{ white-space: nowrap; }}
-.number {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
+.number {{ text-align: right; font-variant-numeric: tabular-nums; }}
+td.number {{ white-space: nowrap; }}
 @media print {{
   body {{ font-size: 10pt; margin: 0; max-width: none; }}
   h2, h3 {{ break-after: avoid; }}
@@ -868,9 +872,9 @@ def write(
                 _overview_figure(view, window),
                 'For each leg over the whole trial: believed and true wetness, times as a dome, '
                 'and slip alarms',
-                'Legs of one tripod stand together: 1, 3, 5 and 2, 4, 6. A dome feels wet and '
-                'dry ground alike, so that the belief of a domed foot only fades; the shape is '
-                'chosen by what all feet have felt nearby.',
+                'A dome feels wet and dry ground alike: the belief of a domed foot only fades, '
+                'and its shape is chosen by what all feet have felt nearby.'
+                + (' Legs stand in the order of the tripods.' if len(view.order) > 1 else ''),
             )
             parts.append(f'<h2>From {window[0]:.0f} s to {window[1]:.0f} s</h2>')
             figure(

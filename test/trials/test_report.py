@@ -1,0 +1,375 @@
+# SPDX-License-Identifier: Apache-2.0
+import base64
+import dataclasses
+import html.parser
+import io
+import json
+import re
+import subprocess
+import sys
+import warnings
+import xml.etree.ElementTree as ElementTree
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
+from ros_pad.simulation import Scene
+from ros_pad.simulation.terrain import Floor
+from ros_pad.trials import report
+from ros_pad.trials import run
+from ros_pad.trials.trial import Metrics
+from ros_pad.trials.trial import Trial
+
+VOID = {'meta', 'img', 'br', 'hr', 'link'}
+SLOW = ('slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
+        'slip_speed', 'slipping', 'dome')  # fmt: skip
+FAST = ('time', 'body', 'force', 'position')
+
+
+class Page(html.parser.HTMLParser):
+    """Tags, pictures and text of a page; fails where tags do not match."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.images, self.words = [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        if tag == 'img':
+            self.images.append(dict(attributes))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != 'style':
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r'\s+', ' ', ' '.join(self.words))
+
+    def alt(self, start):
+        return next(image['alt'] for image in self.images if image['alt'].startswith(start))
+
+
+def page(path):
+    return Page(path.read_text(encoding='utf-8'))
+
+
+def metrics(per_cycle, **changes):
+    return dataclasses.replace(
+        Metrics(
+            distance_m=per_cycle * 20,
+            duration_s=21.0,
+            cycles=20.0,
+            distance_per_cycle_m=per_cycle,
+            slip_path_m=[0.25, 0.75],
+            lateral_drift_m=-0.0125,
+            yaw_drift_rad=0.1,
+            dissipation_j=3.5,
+            switches=[3, 4],
+            overload_s=[0.0, 0.5],
+            wet_accuracy=0.875,
+            verdict=None,
+        ),
+        **changes,
+    )
+
+
+def made_up(per_cycle=0.12, policy='adaptive'):
+    """Return 20 s of two legs: each stands in every other second; leg 2 is a dome after 10 s.
+
+    The body moves 0.1 m/s; the floor is wet from x = 1 m on.
+    """
+    time = np.arange(1, 2001) * 0.01
+    slow = time[1::2]
+    ahead = 0.1 * time
+    standing = np.stack([(time % 2.0) < 1.0, (time % 2.0) >= 1.0], axis=1)
+    force = np.zeros((2000, 2, 3))
+    force[:, :, 2] = np.where(standing, 10.0, 0.0)
+    place = np.floor(time)[:, None] * 0.1
+    position = np.stack([
+        np.stack([place[:, 0], np.full(2000, side), np.zeros(2000)], axis=1)
+        for side in (0.1, -0.1)
+    ], axis=1)  # fmt: skip
+    dome = np.stack([np.zeros(1000, dtype=bool), slow > 10.0], axis=1)
+    return Trial(
+        scene='made_up',
+        policy=policy,
+        fidelity='L1',
+        seed=7,
+        legs=(1, 2),
+        time=time,
+        body=np.stack([ahead, 0.0 * time, 0.0 * time], axis=1),
+        force=force,
+        position=position,
+        slow_time=slow,
+        pressure=np.where(dome, 60e3, 0.0),
+        setpoint=np.where(dome, 60e3, 0.0),
+        wet_probability=np.where(slow[:, None] > 10.5, 0.9, 0.1) * np.ones((1, 2)),
+        friction=np.full((1000, 2), 0.5),
+        margin=np.full((1000, 2), 0.2),
+        slip_speed=np.zeros((1000, 2)),
+        slipping=np.zeros((1000, 2), dtype=bool),
+        dome=dome,
+        floor=Floor(np.array([[False, True, True, True]]), 1.0, (0.0, -0.5), 3e-4),
+        metrics=metrics(per_cycle),
+        settings={
+            'expected_load': 10.0,
+            'stride_m': 0.16,
+            'omitted': [
+                {'term': 'wind & weather', 'bound': 0.034, 'reason': 'indoors'},
+                {'term': 'moods', 'bound': None, 'reason': 'nobody asked'},
+            ],
+        },
+    )
+
+
+@pytest.fixture(scope='module')
+def walk():
+    """A short adaptive walk that comes from wet onto dry ground and back."""
+    scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=30)
+    trial = run(scene, 'adaptive', seed=0)
+    assert trial.dome.any() and not trial.dome.all()
+    return trial
+
+
+def test_a_report_needs_no_other_file_and_no_script(walk, tmp_path):
+    path = tmp_path / 'new' / 'report.html'
+    report.write(walk, path, others=[dataclasses.replace(walk, policy='flat')])
+    text = path.read_text(encoding='utf-8')
+    assert len(text) < 4_000_000
+    seen = Page(text)
+    assert not {'script', 'link', 'iframe', 'object'} & set(seen.tags)
+    assert not re.search(r'https?://|@import|url\(', text)
+    assert len(seen.images) == 5
+    for image in seen.images:
+        kind, data = image['src'].split(',', 1)
+        assert kind == 'data:image/svg+xml;base64'
+        drawing = ElementTree.fromstring(base64.b64decode(data))
+        assert drawing.tag == '{http://www.w3.org/2000/svg}svg'
+        references = [
+            value for part in drawing.iter() for name, value in part.items() if 'href' in name
+        ]
+        assert all(value.startswith(('#', 'data:image/png')) for value in references)
+        assert len(image['alt']) > 20
+    for words in ('hexapod_patches', 'seed 0', 'simulation L1', 'What the model leaves out'):
+        assert words in seen.text
+
+
+def test_the_same_trial_gives_the_same_file(tmp_path):
+    report.write(made_up(), tmp_path / 'one.html')
+    report.write(made_up(), tmp_path / 'two.html')
+    assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
+
+
+def test_nothing_is_replaced_unless_forced(tmp_path):
+    path = tmp_path / 'report.html'
+    path.write_text('mine')
+    with pytest.raises(PadError, match=r'report\.html: exists'):
+        report.write(made_up(), path)
+    assert path.read_text() == 'mine'
+    report.write(made_up(), path, force=True)
+    assert 'made_up' in path.read_text(encoding='utf-8')
+    assert [each.name for each in tmp_path.iterdir()] == ['report.html']
+
+
+def test_a_folder_that_is_a_file(tmp_path):
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(PadError, match='cannot be written'):
+        report.write(made_up(), tmp_path / 'file' / 'report.html')
+
+
+def test_metrics_and_comparison_in_words(tmp_path):
+    trial = made_up(0.12)
+    trial.settings['comparison'] = [
+        {'policy': 'flat', **metrics(0.1).as_dict()},
+        {'policy': 'oracle', **metrics(0.15).as_dict()},
+    ]
+    report.write(trial, tmp_path / 'r.html', others=[made_up(0.12, policy='dome')])
+    text = page(tmp_path / 'r.html').text
+    assert (
+        'Adaptive feet: the robot walked 2.40 m in 20 gait cycles, 120 mm a cycle; '
+        '20 % further than always flat (100 mm); as far as always dome (120 mm); '
+        '20 % less far than the oracle (150 mm).'
+    ) in text
+    assert re.search(r'advance per cycle *mm *100\.0 *120\.0 *120\.0 *150\.0', text)
+    assert re.search(r'slip path *m *(0\.50 *){4}', text)
+    assert re.search(r'sideways drift *mm *(−12\.5 *){4}', text)
+    assert re.search(r'heading drift *° *(5\.73 *){4}', text)  # 0.1 rad
+    assert re.search(r'changes of shape *(7 *){4}', text)
+    assert re.search(r'ground judged right *% *(87\.5 *){4}', text)
+    assert re.search(r'slip path *mm *250 *750', text)
+    assert page(tmp_path / 'r.html').alt('Bars: ') == (
+        'Bars: always flat 100 mm per cycle, always dome 120 mm per cycle, '
+        'adaptive 120 mm per cycle, oracle 150 mm per cycle'
+    )
+
+
+def test_a_walk_that_is_not_valid_says_so(tmp_path):
+    trial = made_up()
+    trial.metrics = metrics(0.12, verdict='it fell & lay')
+    trial.settings['interrupted'] = True
+    report.write(trial, tmp_path / 'r.html')
+    text = page(tmp_path / 'r.html').text
+    assert 'The walk is not valid: it fell & lay.' in text
+    assert 'cut short' in text
+
+
+def test_footprints_window_and_omissions(tmp_path):
+    report.write(made_up(), tmp_path / 'r.html')
+    seen = page(tmp_path / 'r.html')
+    # Leg 1 stands from 0, 2, ... 18 s and 20 s, leg 2 from 1, 3, ... 19 s, domed from 11 s on.
+    assert '21 footprints, 5 of them of domes' in seen.alt('Map')
+    # Both legs come onto wet ground, and leg 2 turns into a dome, at 10 s.
+    assert 'From 6 s to 14 s' in seen.text
+    # Flat stances: ten of leg 1, of which five and the last one on wet ground, five of leg 2.
+    assert seen.alt('Reliability') == 'Reliability diagram of 15 flat stances'
+    assert re.search(r'wind & weather *≤ 3\.4 % *indoors', seen.text)
+    assert re.search(r'moods *not known *nobody asked', seen.text)
+
+
+def test_reliability_counts_what_was_wet():
+    view = report._view(made_up(), [])
+    believed, wet = report._beliefs(view)
+    # On the floor of made_up, all stances before 10 s are dry and believed so at 0.1; later ones
+    # are wet and believed so at 0.9.
+    assert sorted(believed.tolist()) == [0.1] * 10 + [0.9] * 5
+    np.testing.assert_array_equal(wet, believed > 0.5)
+
+
+@pytest.mark.parametrize(
+    ('hits', 'count', 'low', 'high'),
+    [(0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662)],
+)
+def test_wilson_intervals_of_the_literature(hits, count, low, high):
+    # 81 of 263: Newcombe (1998), table I, method 3.
+    assert report._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
+
+
+def without(names, trial=None):
+    trial = trial or made_up()
+    return dataclasses.replace(trial, **{name: getattr(trial, name)[:0] for name in names})
+
+
+def all_nan(names):
+    trial = made_up()
+    nan = {name: np.full_like(getattr(trial, name), np.nan) for name in names}
+    return dataclasses.replace(trial, **nan)
+
+
+POOR = {
+    'robot': lambda: dataclasses.replace(
+        made_up(), scene='', policy='', fidelity='', floor=None, metrics=None, settings={}
+    ),
+    'no estimates': lambda: without(SLOW),
+    'no wrenches': lambda: without(FAST),
+    'nothing': lambda: dataclasses.replace(
+        without(SLOW + FAST), metrics=None, floor=None, settings={}
+    ),
+    'all unknown': lambda: dataclasses.replace(
+        all_nan(('body', 'force', 'position', 'pressure', 'setpoint', 'wet_probability',
+                 'slip_speed')), settings={}),
+    'no markers': lambda: all_nan(('position', 'body')),
+    'pressures unknown': lambda: all_nan(('pressure',)),
+    'one sample': lambda: dataclasses.replace(
+        made_up(),
+        **{name: getattr(made_up(), name)[:1] for name in FAST + SLOW},
+    ),
+    'no metrics of wetness': lambda: dataclasses.replace(
+        made_up(), metrics=metrics(0.0, wet_accuracy=None, cycles=0.0)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', POOR)
+def test_what_is_not_known_is_left_out(kind, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        report.write(POOR[kind](), tmp_path / 'r.html')
+    text = page(tmp_path / 'r.html').text
+    assert 'Metrics' in text and 'nan' not in text.lower()
+
+
+def test_a_robot_without_metrics(tmp_path):
+    trial = POOR['robot']()
+    trial.settings = {'recorded': '2025-06-15 15:06:40 UTC', 'problem': 'bag: was not closed'}
+    report.write(trial, tmp_path / 'r.html')
+    seen = page(tmp_path / 'r.html')
+    assert 'the body moved by 2.00 m in 20.0 s' in seen.text
+    assert 'recorded 2025-06-15 15:06:40 UTC' in seen.text
+    assert 'bag: was not closed' in seen.text
+    assert 'Where the ground was wet is not known.' in seen.text
+    # The load gate follows from the forces.
+    assert '21 footprints, 5 of them of domes' in seen.alt('Map')
+
+
+def test_names_cannot_break_the_page(tmp_path):
+    trial = dataclasses.replace(made_up(), scene='<b>"x" & y</b>', policy='<i>')
+    trial.settings['comparison'] = [{'policy': '<u>', **metrics(0.1).as_dict()}]
+    report.write(trial, tmp_path / 'r.html')
+    seen = page(tmp_path / 'r.html')
+    assert '<b>"x" & y</b>' in seen.text
+    assert not {'i', 'u'} & set(seen.tags)
+
+
+def test_progress_runs_from_little_to_all(tmp_path):
+    shares = []
+    report.write(made_up(), tmp_path / 'r.html', progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0 and len(shares) >= 4
+
+
+def test_no_state_of_pyplot(tmp_path):
+    program = (
+        'import sys, matplotlib\n'
+        'from ros_pad.trials import report\n'
+        'assert "matplotlib.pyplot" not in sys.modules\n'
+    )
+    subprocess.run([sys.executable, '-c', program], check=True, timeout=60)
+    before = dict(matplotlib.rcParams)
+    report.write(made_up(), tmp_path / 'r.html')
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_lead_picture(walk, tmp_path):
+    trials = [
+        walk,
+        dataclasses.replace(walk, policy='flat', metrics=dataclasses.replace(walk.metrics)),
+    ]
+    path = tmp_path / 'lead.png'
+    report.lead_picture(trials, path)
+    data = path.read_bytes()
+    assert len(data) < 400_000
+    picture = matplotlib.image.imread(io.BytesIO(data))
+    height, width, _ = picture.shape
+    assert width == 1600 and 300 < height < 1200
+    colours = {tuple(pixel) for pixel in np.round(255 * picture[..., :3]).reshape(-1, 3).tolist()}
+    for colour in (report.WET, report.BLUE, report.VERMILION):
+        assert tuple(float(int(colour[k : k + 2], 16)) for k in (1, 3, 5)) in colours
+    with pytest.raises(PadError, match='exists'):
+        report.lead_picture(trials, path)
+    report.lead_picture(trials, path, force=True)
+    assert path.read_bytes() == data
+
+
+def test_lead_picture_of_trials_that_do_not_belong_together(tmp_path):
+    for trials in ([], [made_up(), dataclasses.replace(made_up(), seed=8)]):
+        with pytest.raises(InvalidInput, match='one scene and seed'):
+            report.lead_picture(trials, tmp_path / 'lead.png')
+
+
+def test_settings_survive_json(tmp_path):
+    # What a bag says comes back from JSON; the report must not depend on anything else.
+    trial = made_up()
+    report.write(trial, tmp_path / 'one.html')
+    trial.settings = json.loads(json.dumps(trial.settings))
+    report.write(trial, tmp_path / 'two.html')
+    assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
