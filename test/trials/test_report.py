@@ -216,12 +216,13 @@ def test_metrics_and_comparison_in_words(tmp_path):
 
 def test_a_walk_that_is_not_valid_says_so(tmp_path):
     trial = made_up()
-    trial.metrics = metrics(0.12, verdict='it fell & lay')
+    trial.metrics = metrics(0.12, verdict='it fell & lay', lateral_drift_m=-1e-6)
     trial.settings['interrupted'] = True
     report.write(trial, tmp_path / 'r.html')
     text = page(tmp_path / 'r.html').text
     assert 'The walk is not valid: it fell & lay.' in text
     assert 'cut short' in text
+    assert re.search(r'sideways drift *mm *0\.0', text)
 
 
 def test_footprints_window_and_omissions(tmp_path):
