@@ -112,6 +112,11 @@ class Foot:
             number(name, getattr(self, name), unit, above=positive)
         if not isinstance(self.pads, int) or self.pads < 1:
             raise InvalidInput(f'pads = {self.pads!r} is not allowed: a whole number from 1')
+        if self.pads * math.pi * self.pad.radius**2 > self.sole_area:
+            raise InvalidInput(
+                f'pads = {self.pads} is not allowed: so many of radius {self.pad.radius:g} m'
+                f' do not fit on a sole of sole_radius = {self.sole_radius:g} m'
+            )
         choice('limit', self.limit, FORCE_LIMITS)
         # The limit is asked for at every simulated step: tabulate it once, about each 0.5 kPa.
         cells = math.ceil(self.ceiling / 500.0)
@@ -198,12 +203,13 @@ class Foot:
         sole_film: float,
     ) -> float:
         """Resistance in newtons for a given share of the load: the kernel, scalars only."""
-        total = 0.0
+        total = under_domes = 0.0
         if dome_load > 0.0:
-            dry = self.friction * dome_load + self.shear_strength * dome_load / pressure
+            under_domes = dome_load / pressure
+            dry = self.friction * dome_load + self.shear_strength * under_domes
             total += self._on_film(dry, dome_load, dome_film)
         if sole_load > 0.0:
-            area = min(self.sole_area, sole_load / self.conforming_pressure)
+            area = min(self.sole_area - under_domes, sole_load / self.conforming_pressure)
             dry = self.friction * sole_load + self.shear_strength * area
             total += self._on_film(dry, sole_load, sole_film)
         return total

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ros_pad.contact.film import Film
+from ros_pad.contact.film import film_thickness
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import InvalidInput
+
+FOOT = Foot.load('large37')
+VISCOSITY = 1.0e-3
+
+
+def squeezed(start, pressure, radius, time, viscosity):
+    """Integrate the Stefan-Reynolds equation dh/dt = -2 p h³/(3 η a²) as it stands."""
+
+    def thinning(_, log_h):
+        return -2.0 * pressure * np.exp(2.0 * log_h) / (3.0 * viscosity * radius**2)
+
+    solution = solve_ivp(
+        thinning, (0.0, time), [math.log(start)], method='LSODA', rtol=1e-11, atol=1e-12
+    )
+    assert solution.success
+    return math.exp(solution.y[0, -1])
+
+
+def dome_limit(load, pads, pressure, time):
+    """Film left under domes by a constant load after a long time."""
+    return math.sqrt(3.0 * VISCOSITY * load / (4.0 * math.pi * pads * time)) / pressure
+
+
+# --- film_thickness ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'start, pressure, radius, time, viscosity',
+    [
+        (3e-4, 7.5e3, 17e-3, 0.5, 1e-3),
+        (3e-4, 75e3, 0.5e-3, 0.3, 1e-3),
+        (1e-6, 75e3, 0.5e-3, 0.02, 1e-3),
+        (5e-3, 1e3, 0.01, 30.0, 1.4),
+        (1e-5, 10.0, 0.05, 1.0, 1e-3),
+    ],
+)
+def test_agrees_with_the_integrated_equation(start, pressure, radius, time, viscosity):
+    expected = squeezed(start, pressure, radius, time, viscosity)
+    assert expected < 0.9999 * start
+    found = film_thickness(start, pressure, radius, time, viscosity)
+    assert found == pytest.approx(expected, rel=1e-7)
+
+
+def test_without_pressure_or_time_nothing_drains():
+    assert film_thickness(3e-4, 0.0, 0.01, 1.0) == 3e-4
+    assert film_thickness(3e-4, 1e5, 0.01, 0.0) == 3e-4
+
+
+def test_broadcasts():
+    found = film_thickness([[1e-4], [2e-4]], [1e3, 2e3, 3e3], 0.01, 0.1)
+    assert found.shape == (2, 3)
+    assert found[1, 2] == film_thickness(2e-4, 3e3, 0.01, 0.1)
+    assert isinstance(film_thickness(1e-4, 1e3, 0.01, 0.1), float)
+
+
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'thick', None, True])
+@pytest.mark.parametrize(
+    'name, unit',
+    [
+        ('initial', 'm'),
+        ('contact_pressure', 'Pa'),
+        ('patch_radius', 'm'),
+        ('time', 's'),
+        ('viscosity', 'Pa s'),
+    ],
+)
+def test_bad_values_are_named(name, unit, value):
+    values = {'initial': 1e-4, 'contact_pressure': 1e3, 'patch_radius': 0.01, 'time': 0.1}
+    with pytest.raises(InvalidInput, match=rf'{name} = .*{unit}'):
+        film_thickness(**(values | {name: value}))
+
+
+@pytest.mark.parametrize('name', ['initial', 'patch_radius', 'viscosity'])
+def test_zero_is_no_length_and_no_viscosity(name):
+    values = {'initial': 1e-4, 'contact_pressure': 1e3, 'patch_radius': 0.01, 'time': 0.1}
+    with pytest.raises(InvalidInput, match='above 0'):
+        film_thickness(**(values | {name: 0.0}))
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InvalidInput, match='broadcast'):
+        film_thickness([1e-4, 1e-4], [1.0, 2.0, 3.0], 0.01, 0.1)
+
+
+# --- Film -------------------------------------------------------------------------------------
+
+
+def stand(film, load_of, pressure, duration, dt, on_domes=True):
+    for step in range(1, round(duration / dt) + 1):
+        load = load_of(step * dt)
+        film.drain(load if on_domes else 0.0, 0.0 if on_domes else load, pressure, dt)
+
+
+@pytest.mark.parametrize('steps', [1, 7, 300])
+def test_constant_load_on_domes_whatever_the_steps(steps):
+    load, pressure, duration = 6.8, 75e3, 0.3
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(3e-4)
+    for _ in range(steps):
+        film.drain(load, 0.0, pressure, duration / steps)
+    radius = math.sqrt(load / (FOOT.pads * math.pi * pressure))
+    expected = squeezed(3e-4, pressure, radius, duration, VISCOSITY)
+    assert film.under_domes == pytest.approx(expected, rel=1e-7)
+    # 0.3 mm is thick: what is left is the closed form without it.
+    assert film.under_domes == pytest.approx(
+        dome_limit(load, FOOT.pads, pressure, duration), rel=1e-5
+    )
+    assert film.under_sole == pytest.approx(3e-4)
+
+
+def test_constant_load_on_the_flat_sole():
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(3e-4)
+    stand(film, lambda _: 6.8, 0.0, 0.5, 0.004, on_domes=False)
+    area = math.pi * 0.017**2
+    expected = squeezed(3e-4, 6.8 / area, 0.017, 0.5, VISCOSITY)
+    assert film.under_sole == pytest.approx(expected, rel=1e-7)
+    assert film.under_domes == pytest.approx(3e-4)
+
+
+def test_drainage_time_goes_as_one_over_pressure_squared():
+    """40 : 60 : 75 kPa need 3.52 : 1.56 : 1 of the time for the same film."""
+    target, load = 2.0e-7, 2.0
+    times = []
+    for pressure in (40e3, 60e3, 75e3):
+        film = Film(FOOT, VISCOSITY)
+        film.touch_down(3e-4)
+        time = 0.0
+        while film.under_domes > target:
+            film.drain(load, 0.0, pressure, 1e-4)
+            time += 1e-4
+        times.append(time)
+    assert times[0] / times[2] == pytest.approx((75 / 40) ** 2, rel=0.01)
+    assert times[1] / times[2] == pytest.approx((75 / 60) ** 2, rel=0.01)
+
+
+def test_dry_ground_stays_dry():
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(0.0)
+    stand(film, lambda time: 20.0 * time, 75e3, 0.3, 0.004)
+    assert film.under_domes == 0.0
+    assert film.under_sole == 0.0
+
+
+def test_touch_down_forgets_the_last_stance():
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(3e-4)
+    stand(film, lambda _: 6.8, 75e3, 0.3, 0.01)
+    film.touch_down(2e-4)
+    assert film.under_domes == pytest.approx(2e-4)
+    film.drain(6.8, 0.0, 75e3, 0.3)
+    expected = squeezed(2e-4, 75e3, math.sqrt(6.8 / (37 * math.pi * 75e3)), 0.3, VISCOSITY)
+    assert film.under_domes == pytest.approx(expected, rel=1e-7)
+
+
+def soft_landing(time):
+    share = min(1.0, time / 0.1)
+    return 6.8 * share * share * (3.0 - 2.0 * share)
+
+
+def test_soft_landing_does_not_depend_on_the_step():
+    """A pad that is put down softly has at first no area at all: ∫ p²/N dt has no limit there."""
+    left = []
+    for dt in (4e-3, 1e-3, 1e-4):
+        film = Film(FOOT, VISCOSITY)
+        film.touch_down(3e-4)
+        stand(film, soft_landing, 75e3, 0.15, dt)
+        left.append(film.under_domes)
+    assert left == pytest.approx([left[-1]] * 3, rel=0.01)
+    # What touched last has drained for 0.05 s, what touched first for 0.15 s.
+    assert left[-1] < dome_limit(6.8, 37, 75e3, 0.05)
+    assert left[-1] > 0.99 * dome_limit(6.8, 37, 75e3, 0.15)
+
+
+def test_growing_contact_averages_over_its_area():
+    """d(A/h²)/dt = A 4p/(3ηb²) + (dA/dt)/h0²: integrate that for a steadily growing load."""
+    pressure, rate, thick = 75e3, 40.0, 2e-6
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(thick)
+    stand(film, lambda time: rate * time, pressure, 0.2, 1e-4)
+
+    def weighted(time, _):
+        area = rate * time / pressure
+        squeeze = 4.0 * pressure / (3.0 * VISCOSITY) * FOOT.pads * math.pi / area
+        return [area * squeeze + rate / pressure / thick**2]
+
+    solution = solve_ivp(weighted, (1e-9, 0.2), [0.0], rtol=1e-9, atol=1e-9)
+    expected = math.sqrt(rate * 0.2 / pressure / solution.y[0, -1])
+    assert film.under_domes == pytest.approx(expected, rel=1e-3)
+
+
+def test_shrinking_contact_keeps_its_film():
+    film = Film(FOOT, VISCOSITY)
+    film.touch_down(3e-4)
+    film.drain(6.8, 0.0, 75e3, 0.3)
+    before = film.under_domes
+    film.drain(3.4, 0.0, 75e3, 1e-9)
+    assert film.under_domes == pytest.approx(before, rel=1e-6)
+    film.drain(6.8, 0.0, 75e3, 1e-9)  # the half that comes back is wet again
+    assert film.under_domes == pytest.approx(math.sqrt(2.0) * before, rel=1e-3)
+
+
+@pytest.mark.parametrize('viscosity', [0.0, -1e-3, math.nan, math.inf])
+def test_viscosity_of_a_film(viscosity):
+    with pytest.raises(InvalidInput, match='viscosity'):
+        Film(FOOT, viscosity)

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import itertools
+import math
+import re
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_pad import configuration
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import tangential_resistance
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+
+FEET = configuration.names('feet')
+THICK = 1.0e-3  # m: nothing drains
+
+
+def bare_foot(**changes):
+    """Return a foot with round numbers, so that expected values can be had by hand."""
+    values = {
+        'source': 'test',
+        'pad': LARGE_PAD,
+        'pads': 20,
+        'sole_radius': 0.01,
+        'friction': 0.4,
+        'shear_strength': 5000.0,
+        'conforming_pressure': 10000.0,
+        'boundary_friction': 0.1,
+        'critical_film': 1e-6,
+        'film_exponent': 2.0,
+        'shear_stiffness': 5000.0,
+        'chamber_volume': 0.0,
+        'ceiling': 90e3,
+        'limit': 'measured',
+    }
+    return Foot(**(values | changes))
+
+
+def drained(foot, load, pressure, time=0.3, viscosity=1e-3, start=3e-4):
+    """Films (domes, sole) after a stance, by the closed form of Stefan and Reynolds."""
+    domes = 0.0
+    if pressure > 0.0:
+        area = load / pressure / (foot.pads * math.pi)
+        domes = (start**-2 + 4.0 * pressure * time / (3.0 * viscosity * area)) ** -0.5
+    mean = load / (math.pi * foot.sole_radius**2)
+    sole = (start**-2 + 4.0 * mean * time / (3.0 * viscosity * foot.sole_radius**2)) ** -0.5
+    return domes, sole
+
+
+# --- by hand ----------------------------------------------------------------------------------
+
+
+def test_flat_on_dry_ground():
+    # The sole of 3.14 cm² touches all over from 3.14 N: above, τA is 5000·3.1416e-4 = 1.5708 N.
+    foot = bare_foot()
+    assert tangential_resistance(foot, 5.0, 0.0) == pytest.approx(0.4 * 5.0 + 1.570796, rel=1e-6)
+    # At 1 N it touches on 1 cm²: 0.5 N of adhesion.
+    assert tangential_resistance(foot, 1.0, 0.0) == pytest.approx(0.9, rel=1e-12)
+
+
+def test_domes_on_dry_ground():
+    # 20 pads at 75 kPa carry 20·0.2833 = 5.67 N; 3 N touch on 3/75000 m², 0.2 N of adhesion.
+    assert tangential_resistance(bare_foot(), 3.0, 75e3) == pytest.approx(1.2 + 0.2, rel=1e-12)
+
+
+def test_domes_past_their_limit():
+    # At 65 kPa a pad carries 0.2833 − 0.125 = 0.1583 N, 20 of them 3.166 N; the sole has 1.834 N.
+    expected = 0.4 * 5.0 + 5000.0 * (3.166 / 65e3 + 1.834 / 10e3)
+    assert tangential_resistance(bare_foot(), 5.0, 65e3) == pytest.approx(expected, rel=1e-12)
+    # At 20 N the sole touches wherever the domes do not: together no more than the sole.
+    expected = 0.4 * 20.0 + 5000.0 * math.pi * 1e-4
+    assert tangential_resistance(bare_foot(), 20.0, 65e3) == pytest.approx(expected, rel=1e-12)
+
+
+def test_film_leaves_a_share_of_dry_contact():
+    # A film of critical thickness leaves 1/e of (2 + 1.5708) N; the rest has 0.1·5 N.
+    share = math.exp(-1.0)
+    expected = share * (2.0 + 1.5707963) + (1.0 - share) * 0.5
+    found = tangential_resistance(bare_foot(), 5.0, 0.0, sole_film=1e-6)
+    assert found == pytest.approx(expected, rel=1e-7)
+    # What lies under the domes does not matter to a flat foot.
+    assert tangential_resistance(bare_foot(), 5.0, 0.0, THICK, 1e-6) == found
+
+
+def test_no_load_no_resistance():
+    assert tangential_resistance(bare_foot(), 0.0, 75e3) == 0.0
+    assert tangential_resistance(bare_foot(), 0.0, 0.0, THICK, THICK) == 0.0
+
+
+# --- the four states, as the thesis orders them -----------------------------------------------
+
+
+@pytest.mark.parametrize('name', FEET)
+@pytest.mark.parametrize('per_pad', [0.08, 0.12, 0.2])
+def test_the_four_states(name, per_pad):
+    foot = Foot.load(name)
+    load = per_pad * foot.pads
+    domes, sole = drained(foot, load, 75e3)
+    flat_dry = tangential_resistance(foot, load, 0.0)
+    dome_dry = tangential_resistance(foot, load, 75e3)
+    dome_wet = tangential_resistance(foot, load, 75e3, domes, sole)
+    flat_wet = tangential_resistance(foot, load, 0.0, domes, sole)
+    assert flat_dry > 1.3 * dome_dry  # dry: flat holds more
+    assert dome_wet > 0.75 * dome_dry  # domes hold about the same, wet and dry
+    assert dome_wet <= dome_dry
+    assert flat_wet < 0.4 * dome_wet  # wet: flat collapses
+
+
+@pytest.mark.parametrize('name', FEET)
+def test_on_wet_ground_pressure_helps(name):
+    """Thesis 5.2: 40 < 60 < 75 kPa. At 40 kPa the measured limit is zero: the sole floats."""
+    foot = Foot.load(name)
+    load = 0.12 * foot.pads
+    found = []
+    for pressure in (40e3, 60e3, 75e3):
+        on_domes = foot.dome_load(load, pressure)
+        films = drained(foot, max(on_domes, 1e-9), pressure)[0], drained(foot, load, 0.0)[1]
+        found.append(tangential_resistance(foot, load, pressure, *films) / load)
+    flat = tangential_resistance(foot, load, 0.0, 0.0, drained(foot, load, 0.0)[1]) / load
+    assert flat == pytest.approx(found[0], rel=1e-9)
+    assert found[0] < 0.8 * found[1]
+    assert found[1] < 0.9 * found[2]
+
+
+def test_illustrative_set_of_friction_coefficients():
+    """Load 2 N, 19 pads, stance 0.3 s: μ at flat wet, 40, 60, 75 kPa is 0.12/0.247/0.469/0.586.
+
+    The set knows neither adhesion nor a force limit: τ = 0, and the mildest limit there is. By
+    the measured limit 19 pads carry nothing at 40 kPa, and 0.247 would be 0.12.
+    """
+    foot = bare_foot(
+        pads=19,
+        sole_radius=0.010,
+        friction=0.9,
+        shear_strength=0.0,
+        boundary_friction=0.12,
+        critical_film=0.17e-6,
+        limit='flattening',
+    )
+    found = [
+        tangential_resistance(foot, 2.0, pressure, *drained(foot, 2.0, pressure)) / 2.0
+        for pressure in (0.0, 40e3, 60e3, 75e3)
+    ]
+    assert found == pytest.approx([0.12, 0.247, 0.469, 0.586], abs=6e-4)
+    measured = dataclasses.replace(foot, limit='measured')
+    films = drained(foot, 2.0, 40e3)
+    assert tangential_resistance(measured, 2.0, 40e3, *films) / 2.0 == pytest.approx(0.12)
+
+
+# --- sharing of the load ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('limit', ['measured', 'max_depth', 'flattening'])
+@pytest.mark.parametrize('films', [(0.0, 0.0), (2e-7, 2e-5)])
+def test_continuous_in_load_and_pressure(limit, films):
+    foot = bare_foot(limit=limit)
+    loads = np.linspace(0.0, 15.0, 30001)
+    for pressure in (1e3, 45e3, 53e3, 75e3, 90e3):
+        found = tangential_resistance(foot, loads, pressure, *films)
+        steepest = 0.4 + 5000.0 / min(pressure, 10e3)  # μ + τ dA/dN
+        assert np.abs(np.diff(found)).max() <= 1.01 * steepest * (loads[1] - loads[0])
+    pressures = np.linspace(0.0, 90e3, 30001)
+    # From flat to the lowest pressure, too, if the films under domes and sole are the same there.
+    same = films[0], films[0]
+    found = tangential_resistance(foot, 4.0, pressures[1:], *same)
+    assert found[0] == pytest.approx(tangential_resistance(foot, 4.0, 0.0, *same), rel=1e-4)
+    assert np.abs(np.diff(found)).max() < 5e-3
+
+
+def test_limit_of_the_domes():
+    """0.2833 + 0.0125 (p/kPa − 75) N a pad, to what a table of 0.5 kPa can do at its kink."""
+    foot = bare_foot()
+    for kilopascal in (10.0, 52.0, 53.0, 60.1, 65.0, 75.0, 81.23, 90.0):
+        expected = 20 * max(0.0, 0.2833 + 0.0125 * (kilopascal - 75.0))
+        assert foot.dome_load(100.0, kilopascal * 1e3) == pytest.approx(expected, abs=1e-9)
+    assert foot.dome_load(100.0, 52.4e3) == pytest.approx(20 * 0.0008, abs=20 * 0.0032)
+    assert foot.dome_load(0.3, 75e3) == 0.3
+
+
+@pytest.mark.parametrize('ceiling', [90e3, 91.2e3, 60123.4, 300.0])
+def test_ceilings_between_the_cells_of_the_table(ceiling):
+    foot = bare_foot(ceiling=ceiling, limit='flattening')
+    # The contact of a pad spans it at about p π r², adhesion helping.
+    bound = 20 * ceiling * math.pi * 1.5e-3**2
+    assert foot.dome_load(1e3, ceiling) <= bound
+    if ceiling > 1e4:
+        assert foot.dome_load(1e3, ceiling) > 0.85 * bound
+
+
+@given(
+    load=st.floats(0.0, 50.0),
+    pressure=st.floats(0.0, 90e3),
+    dome_film=st.floats(0.0, 1e-3),
+    sole_film=st.floats(0.0, 1e-3),
+)
+def test_bounds(load, pressure, dome_film, sole_film):
+    foot = bare_foot()
+    found = tangential_resistance(foot, load, pressure, dome_film, sole_film)
+    dry = tangential_resistance(foot, load, pressure)
+    assert 0.1 * load * (1 - 1e-12) <= found <= dry * (1 + 1e-12)
+    # Adhesion acts on no more than the sole and the contact of the domes.
+    assert dry <= 0.4 * load + 5000.0 * math.pi * 1e-4 + 1e-12
+
+
+def test_broadcasts():
+    foot = bare_foot()
+    found = tangential_resistance(foot, [[1.0], [2.0]], [0.0, 60e3, 75e3])
+    assert found.shape == (2, 3)
+    for (i, load), (j, pressure) in itertools.product(
+        enumerate((1.0, 2.0)), enumerate((0.0, 60e3, 75e3))
+    ):
+        assert found[i, j] == tangential_resistance(foot, load, pressure)
+    assert isinstance(tangential_resistance(foot, 1.0, 0.0), float)
+
+
+# --- bad input --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'much', None, True])
+@pytest.mark.parametrize(
+    'name, unit', [('load', 'N'), ('pressure', 'Pa'), ('dome_film', 'm'), ('sole_film', 'm')]
+)
+def test_bad_values_are_named(name, unit, value):
+    values = {'load': 1.0, 'pressure': 75e3, 'dome_film': 0.0, 'sole_film': 0.0}
+    with pytest.raises(InvalidInput, match=rf'{name} = .*{unit}'):
+        tangential_resistance(bare_foot(), **(values | {name: value}))
+
+
+def test_pressure_above_the_ceiling():
+    with pytest.raises(InvalidInput, match=r'pressure = 90001 Pa.* 90000 Pa'):
+        tangential_resistance(bare_foot(), 1.0, 90001.0)
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InvalidInput, match='broadcast'):
+        tangential_resistance(bare_foot(), [1.0, 2.0], [0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize('field', [f.name for f in dataclasses.fields(Foot) if f.type == 'float'])
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf])
+def test_a_foot_refuses_bad_numbers(field, value):
+    if field.startswith('_'):
+        return
+    with pytest.raises(InvalidInput, match=field):
+        bare_foot(**{field: value})
+
+
+@pytest.mark.parametrize('change', [{'pads': 0}, {'pads': 1.5}, {'pads': 45}, {'limit': 'guess'}])
+def test_a_foot_refuses_other_nonsense(change):
+    with pytest.raises(InvalidInput, match=next(iter(change))):
+        bare_foot(**change)
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', FEET)
+def test_shipped_feet(name):
+    foot = Foot.load(name)
+    assert foot.source == name
+    # The pads fit side by side in hexagonal cells of 2√3·2.25 r² (3.84, corrected).
+    assert foot.pads * 2.0 * math.sqrt(3.0) * 2.25 * foot.pad.radius**2 <= foot.sole_area
+    # At 55 kPa a large pad is a cap 1.37540981938 mm high: π c (3r² + c²)/6.
+    assert foot.pad == LARGE_PAD
+    cap = math.pi * 1.37540981938e-3 * (3.0 * 1.5e-3**2 + 1.37540981938e-3**2) / 6.0
+    assert foot.air_volume(55e3) - foot.chamber_volume == pytest.approx(foot.pads * cap, rel=1e-9)
+    assert foot.air_volume(0.0) == foot.chamber_volume
+
+
+def written(tmp_path, change):
+    values = yaml.safe_load((configuration.shared_folder() / 'feet/large37.yaml').read_text())
+    change(values)
+    path = tmp_path / 'mine.yaml'
+    path.write_text(yaml.safe_dump(values))
+    return path
+
+
+@pytest.mark.parametrize(
+    'key, value, message',
+    [
+        ('pads', 0, 'a whole number from 1 to 10000'),
+        ('sole_radius', '17 mm', "sole_radius = '17 mm' is not allowed: a number from 0.001"),
+        ('friction', 'nan', 'friction = nan is not allowed'),
+        ('shear_stiffness', 0, 'N/m'),
+        ('film_exponent', True, 'film_exponent = True'),
+        ('force_limit', 'felt', 'one of measured, max_depth, flattening'),
+        ('ceiling', 100e3, 'up to ceiling = 100000 Pa'),
+        ('ceiling', 2e6, 'from 1000 to 1e+06 Pa'),
+        ('colour', 'red', "unknown key 'colour'"),
+    ],
+)
+def test_bad_files(tmp_path, key, value, message):
+    path = written(tmp_path, lambda values: values.update({key: value}))
+    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+        Foot.load(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    'key, value', [('radius', 0), ('stiffness', -40), ('adhesion_energy', 0.9), ('Radius', 1)]
+)
+def test_bad_pads_in_files(tmp_path, key, value):
+    path = written(tmp_path, lambda values: values['pad'].update({key: value}))
+    with pytest.raises(ConfigError, match=key) as caught:
+        Foot.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_unknown_foot():
+    with pytest.raises(ConfigError, match=r"no foot named 'large73'.* Did you mean 'large37'"):
+        Foot.load('large73')
