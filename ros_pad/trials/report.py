@@ -23,6 +23,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -369,6 +370,15 @@ def _comparison_figure(view: _View) -> Figure:
     return figure
 
 
+def _legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+    """Add a legend above all axes, where it hides no data."""
+    figure.legend(handles=handles, loc='upper left', ncols=columns)
+    layout = figure.get_layout_engine()
+    assert isinstance(layout, ConstrainedLayoutEngine)
+    # In inches, because matplotlib before 3.7 cannot place a legend outside by itself.
+    layout.set(rect=(0.0, 0.0, 1.0, 1.0 - 0.36 / figure.get_figheight()))
+
+
 def _overview_figure(view: _View, window: tuple[float, float]) -> Figure:
     """Draw belief, truth, shape and alarms of each leg over the whole trial."""
     trial = view.trial
@@ -400,7 +410,7 @@ def _overview_figure(view: _View, window: tuple[float, float]) -> Figure:
         Line2D([], [], linestyle='', marker='|', color=BLACK, markersize=8, label='slip alarm'),
         Patch(facecolor='none', edgecolor=PALE, linestyle=':', label='drawn large below'),
     ]
-    figure.legend(handles=handles, loc='outside upper left', ncols=5)
+    _legend(figure, handles, columns=5)
     return figure
 
 
@@ -471,7 +481,7 @@ def _window_figure(view: _View, window: tuple[float, float]) -> Figure:
         Line2D([], [], color=GREEN, label='slip'),
         Line2D([], [], linestyle='', marker='.', color=VERMILION, markersize=9, label='alarm'),
     ]
-    figure.legend(handles=handles, loc='outside upper left', ncols=6)
+    _legend(figure, handles, columns=6)
     figure.align_ylabels(axes[:, 0])
     return figure
 
@@ -537,7 +547,7 @@ def _reliability_figure(believed: np.ndarray, wet: np.ndarray) -> Figure:
         Line2D([], [], color=BLUE, marker='o', label='stances, with their number'),
         Line2D([], [], color=PALE, linestyle='--', label='belief as it should be'),
     ]
-    figure.legend(handles=handles, loc='outside upper left', ncols=2)
+    _legend(figure, handles, columns=2)
     return figure
 
 
