@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextlib import suppress
 from typing import Any
 
 import rclpy
@@ -183,8 +184,11 @@ class ComposedTrial:
                     progress(self.simulator.robot.time)
                 if self.simulator.robot.verdict or self.stopped:
                     break
-        finally:
-            self._vent()
+        except BaseException:
+            with suppress(PadError):  # what went wrong first is what is told
+                self._vent()
+            raise
+        self._vent()
 
     def _vent(self) -> None:
         """Deactivate the regulators, and let time pass until the pads are flat."""

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import sys
 from typing import Any
 
@@ -15,15 +17,16 @@ from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64
 from std_msgs.msg import String
 
-from ros_pad.contact.resistance import Foot
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
 from ros_pad.control import policy_named
+from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
 from ros_pad.nodes.parameters import LEGS
+from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
@@ -40,8 +43,11 @@ PARAMETERS = (
         'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
         'Pa', 0.0, 1e6,
     ),
-    Parameter('scene', '', 'Scene whose ground the oracle sees; other policies need none.'),
-    Parameter('seed', 0, 'Of that ground.', '', 0, 2**31 - 1),
+    Parameter(
+        'scene', '', 'Scene whose ground the oracle sees; other policies need none.',
+        read=lambda name: Scene.load(name) if name else None,
+    ),
+    dataclasses.replace(SEED, description='Of that ground.'),
 )  # fmt: skip
 
 
@@ -53,15 +59,21 @@ class ControllerNode(Node):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__('controller', **kwargs)
+        super().__init__(
+            'controller', automatically_declare_parameters_from_overrides=True, **kwargs
+        )
         values = declare(self, PARAMETERS)
         legs = values['legs']
-        topics.names(legs)
         is_wet = None
         if values['scene']:
-            is_wet = Scene.load(values['scene']).floor.build(values['seed']).wet
+            is_wet = values['scene'].floor.build(values['seed']).wet
+        elif values['policy'] == 'oracle':
+            raise ConfigError(
+                f"node {self.get_name()}: parameter scene = '' is not allowed:"
+                ' policy oracle needs the scene whose ground it sees'
+            )
         self.controller = MorphologyController(
-            Foot.load(values['foot']),
+            values['foot'],
             legs,
             policy_named(values['policy'], is_wet),
             values['expected_load'],
@@ -99,6 +111,10 @@ class ControllerNode(Node):
                 return
             load = deserialize_message(wrench, WrenchStamped).wrench.force.z
             point = deserialize_message(position, PointStamped).point
+            if not math.isfinite(load + message.data + point.x + point.y):
+                # A load that is no number is no lift-off. No set-point follows from it either:
+                # if it stays so, the regulators vent.
+                return
             gauge = self.controller.update(leg, load, message.data, (point.x, point.y))
             if self.controller.morphology(leg) != shape:
                 shape = self.controller.morphology(leg)

@@ -137,10 +137,11 @@ class EstimatorNode(Node):
     """Serves the legs in the parameter ``legs``; parameters are in :data:`PARAMETERS`."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__('estimator', **kwargs)
+        super().__init__(
+            'estimator', automatically_declare_parameters_from_overrides=True, **kwargs
+        )
         values = declare(self, PARAMETERS)
-        topics.names(values['legs'])
-        foot = Foot.load(values['foot'])
+        foot: Foot = values['foot']
         tuning = Tuning(
             position_noise=values['position_noise'],
             force_noise=values['force_noise'],

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+from array import array
+from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +14,18 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 
+from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import PadError
+from ros_pad.nodes import topics
+from ros_pad.simulation.scene import Scene
+
+BACKEND_OPTIONS = 'backend_options'
+"""Prefix of the regulator's parameters that are options of its backend, whatever they are."""
+
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
 @dataclass(frozen=True)
@@ -35,6 +45,8 @@ class Parameter:
         Allowed range of a number.
     choices : tuple of str
         Allowed words; empty for any.
+    read : callable or None
+        Makes of the value what the node works with; raises `PadError` where it cannot.
     """
 
     name: str
@@ -44,15 +56,55 @@ class Parameter:
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    read: Callable[[Any], Any] | None = None
+
+    @property
+    def kind(self) -> str:
+        """The type as ROS tools call it."""
+        kinds = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
+        return kinds.get(type(self.default), 'integer array')
 
     @property
     def allowed(self) -> str:
         """The allowed values in words."""
         if self.choices:
             return f'one of {", ".join(self.choices)}'
-        if math.isfinite(self.low) or math.isfinite(self.high):
-            return f'{self.low:g} to {self.high:g} {self.unit}'.rstrip()
-        return f'any {type(self.default).__name__}'
+        if isinstance(self.default, list):
+            return f'a list of different whole numbers from {self.low:g} to {self.high:g}'
+        if isinstance(self.default, (int, float)) and not isinstance(self.default, bool):
+            whole = 'a whole number' if isinstance(self.default, int) else 'a number'
+            return f'{whole} from {self.low:.10g} to {self.high:.10g} {self.unit}'.rstrip()
+        return 'true or false' if isinstance(self.default, bool) else 'text'
+
+    def accept(self, value: Any) -> Any:
+        """Return a value as this parameter's type; a whole number is taken for a double too.
+
+        Raises
+        ------
+        ValueError
+            When it has another type, or is not among what is allowed.
+        """
+
+        def whole(number: Any) -> bool:
+            integer = isinstance(number, int) and not isinstance(number, bool)
+            return integer and self.low <= number <= self.high
+
+        match self.default:
+            case bool():
+                good = isinstance(value, bool)
+            case int():
+                good = whole(value)
+            case float():
+                good = isinstance(value, float) and self.low <= value <= self.high
+                good = good or whole(value)
+            case str():
+                good = isinstance(value, str) and (not self.choices or value in self.choices)
+            case _:
+                value = list(value) if isinstance(value, (array, list)) else []
+                good = all(map(whole, value)) and len(set(value)) == len(value) > 0
+        if not good:
+            raise ValueError
+        return float(value) if isinstance(self.default, float) else value
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what ROS tools show of it."""
@@ -73,8 +125,14 @@ class Parameter:
         return descriptor
 
 
-LEGS = Parameter('legs', [1, 2, 3, 4, 5, 6], 'Legs that are served, numbers from 1 to 6.')
-FOOT = Parameter('foot', 'large37', 'Name of a foot in config/feet, or path of a YAML file.')
+LEGS = Parameter('legs', list(topics.LEGS), 'Legs that are served.', '', 1, 6)
+FOOT = Parameter(
+    'foot', 'large37', 'Name of a foot in config/feet, or path of a YAML file.', read=Foot.load
+)
+SCENE = Parameter(
+    'scene', 'hexapod_patches', 'Name of a scene, or path of a YAML file.', read=Scene.load
+)
+SEED = Parameter('seed', 0, 'Of floor and sensor noise.', '', 0, 2**31 - 1)
 EXPECTED_LOAD = Parameter(
     'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',
     'N', 0.01, 1000.0,
@@ -88,6 +146,9 @@ AMBIENT_PRESSURE = Parameter(
 def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
+    A node that is made with ``automatically_declare_parameters_from_overrides`` is also told of
+    parameters that it does not have: a misspelt one would have no effect.
+
     Raises
     ------
     ConfigError
@@ -95,22 +156,32 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
     """
     values = {}
     for parameter in table:
-        given: Any = None
+        name = parameter.name
+        # ROS's own words for a wrong type or range name neither node nor unit: take whatever
+        # was given, and judge it here.
+        if not node.has_parameter(name):
+            node.declare_parameter(
+                name, parameter.default, ParameterDescriptor(dynamic_typing=True)
+            )
+        given = node.get_parameter(name).value
+        node.undeclare_parameter(name)
+        where = f'node {node.get_name()}: parameter {name} = '
         try:
-            if node.has_parameter(parameter.name):  # declared from overrides already
-                given = node.get_parameter(parameter.name).value
-                node.undeclare_parameter(parameter.name)
-            value = node.declare_parameter(
-                parameter.name, parameter.default, parameter.descriptor()
-            ).value
-            if parameter.choices and value not in parameter.choices:
-                given = value
-                raise InvalidParameterValueException(parameter.name, value, 'not a choice')
-        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            shown = repr(given) if given is not None else str(error)
+            value = parameter.accept(given)
+        except ValueError:
+            shown = given.tolist() if isinstance(given, array) else given
             raise ConfigError(
-                f'node {node.get_name()}: parameter {parameter.name} = {shown} is not allowed:'
-                f' {parameter.allowed} is needed'
-            ) from error
-        values[parameter.name] = list(value) if isinstance(parameter.default, list) else value
+                f'{where}{shown!r} is not allowed: {parameter.allowed} is needed'
+            ) from None
+        node.declare_parameter(name, value, parameter.descriptor(), ignore_override=True)
+        try:
+            values[name] = parameter.read(value) if parameter.read else value
+        except PadError as error:
+            raise ConfigError(f'{where}{value!r} is not allowed: {error}') from error
+    known = [parameter.name for parameter in table]
+    for name in node.get_parameters_by_prefix(''):
+        if name not in (*known, *_OF_ROS) and '.' not in name:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f' Did you mean {near[0]!r}?' if near else ''
+            node.get_logger().warning(f'parameter {name!r} is not known here.{hint}')
     return values

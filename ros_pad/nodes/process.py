@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 
 
@@ -27,23 +31,43 @@ def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
     Returns
     -------
     int
-        0 after an interrupt, 2 when parameters or files are not as they must be.
+        0 after a signal, 1 after a failure, 2 when parameters or files are not as they must be.
     """
-    # Signals end the spin, not the context: a node that vents in destroy_node can still say so.
-    rclpy.init(args=args)
+    stopped = False
+
+    def stop(number: int, frame: Any) -> None:
+        nonlocal stopped
+        stopped = True
+        signal.signal(number, before[number])  # a second signal is not waited for
+
+    # Signals end the spin, not the context: what a node does in destroy_node, such as venting,
+    # is done whole and can be heard of. rclpy's own handlers would take the context away.
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     node = None
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        while not stopped:
+            executor.spin_once(timeout_sec=0.1)
+    except (ConfigError, InvalidInput) as error:
+        return _complain(error, 2)
     except PadError as error:
-        print(f'ros_pad: {error}', file=sys.stderr)
-        return 2
+        return _complain(error, 1)
+    except RuntimeError as error:
+        if rclpy.ok():
+            raise
+        return _complain(error, 2)  # rclpy cannot read its arguments or their file
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return 0
+
+
+def _complain(error: Exception, status: int) -> int:
+    print(f'ros_pad: {error}', file=sys.stderr)
+    return status

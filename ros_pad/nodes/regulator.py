@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,9 +18,12 @@ from std_srvs.srv import Trigger
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
 from ros_pad.errors import PadError
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
+from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import FOOT
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
@@ -74,7 +78,9 @@ class RegulatorNode(LifecycleNode):
     *configure* opens the devices, *activate* accepts set-points, *deactivate* vents, *cleanup*
     closes. Set-points that are stale, from the future, not finite, or above the ceiling are
     refused and reported on ``/diagnostics``; when none comes for ``command_timeout`` the pad is
-    vented. ``~/vent`` vents all pads. Options of the backend are parameters ``backend_options.*``.
+    vented. ``~/vent`` deactivates: the pads are vented and stay so until somebody activates the
+    node again, whatever the controller sends. Options of the backend are parameters
+    ``backend_options.*``.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -82,7 +88,13 @@ class RegulatorNode(LifecycleNode):
             'regulator', automatically_declare_parameters_from_overrides=True, **kwargs
         )
         self._values = declare(self, PARAMETERS)
-        topics.names(self._values['legs'])
+        self._simulated_time: bool = self.get_parameter('use_sim_time').value
+        if self._simulated_time and self._values['backend'] != 'simulated':
+            raise ConfigError(
+                f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
+                f' backend {self._values["backend"]}: where /clock stopped, its pads would stay'
+                ' under pressure'
+            )
         self._ambient = self._values['ambient_pressure']
         self._timeout_ns = round(self._values['command_timeout'] * 1e9)
         self._pace = Pace(round(1e9 / self._values['publish_rate']))
@@ -90,7 +102,9 @@ class RegulatorNode(LifecycleNode):
         self.channels: dict[int, _Channel] = {}
         self._active = False
         self._now_ns = 0
-        self._foot = Foot.load(self._values['foot'])
+        self._starting: bool = self._values['autostart']
+        self._problem: Exception | None = None  # why it was not configured
+        self._foot: Foot = self._values['foot']
         if self._values['ceiling'] > self._foot.ceiling:
             raise ConfigError(
                 f'node {self.get_name()}: parameter ceiling = {self._values["ceiling"]:g} Pa is'
@@ -105,33 +119,44 @@ class RegulatorNode(LifecycleNode):
             self._listen(leg)
         self.create_service(Trigger, '~/vent', self._on_vent)
         on_tick(self, 0.5 / self._values['publish_rate'], self._tick)
-        if self._values['autostart']:
+        if self._starting:
             self.trigger_configure()
+            if self._problem:
+                raise self._problem
             self.trigger_activate()
+            self._starting = False
 
-    def _seconds(self) -> float:
-        """Time for the simulated backend: that of the last tick in simulated time."""
-        if self.get_parameter('use_sim_time').value:
-            return self._now_ns * 1e-9
-        return self.get_clock().now().nanoseconds * 1e-9
+    def _last_tick(self) -> float:
+        """Time of the last tick, s: the clock of the simulated backend in simulated time."""
+        return self._now_ns * 1e-9
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the devices."""
-        options: dict[str, Any] = {
-            name: parameter.value
-            for name, parameter in self.get_parameters_by_prefix('backend_options').items()
-        }
-        options['ceiling'] = self._values['ceiling']
-        if self._values['backend'] == 'simulated':
-            options |= {'clock': self._seconds, 'pad_volume': self._foot.air_volume}
+        """Open the devices and vent them: nobody knows who left them at what."""
+        backend = self._values['backend']
+        options: dict[str, Any] = {}
+        if backend == 'simulated':
+            clock = self._last_tick if self._simulated_time else time.monotonic
+            options = {'clock': clock, 'pad_volume': self._foot.air_volume}
+        for name, parameter in self.get_parameters_by_prefix(BACKEND_OPTIONS).items():
+            options[name] = parameter.value
+        self._problem = None
         try:
+            if 'ceiling' in options:
+                raise ConfigError(
+                    f'parameter {BACKEND_OPTIONS}.ceiling = {options["ceiling"]!r} is not'
+                    ' allowed: set the parameter ceiling'
+                )
             for leg in self._values['legs']:
-                regulator = create(self._values['backend'], **options)
+                regulator = create(backend, ceiling=self._values['ceiling'], **options)
                 regulator.open()
                 self.channels[leg] = _Channel(leg, regulator, self._pressure_publishers[leg])
-        except PadError as error:
-            self.get_logger().error(f'backend {self._values["backend"]}: {error}')
+                regulator.vent()
+        except Exception as error:  # rclpy would swallow it without a word
             self._close()
+            error.args = (f'node {self.get_name()}: {error}',)
+            self._problem = error
+            if not self._starting:
+                self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
 
@@ -157,10 +182,19 @@ class RegulatorNode(LifecycleNode):
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Vent every pad and close the devices, after what no transition foresaw."""
+        self._active = False
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
     def _close(self) -> None:
         self.vent('closing')
         for channel in self.channels.values():
-            channel.regulator.close()
+            try:
+                channel.regulator.close()
+            except Exception as error:
+                self.get_logger().error(f'leg {channel.leg}: cannot close: {error}')
         self.channels.clear()
 
     @property
@@ -176,8 +210,11 @@ class RegulatorNode(LifecycleNode):
     def _vent(self, channel: _Channel, reason: str) -> None:
         try:
             channel.regulator.vent()
-        except PadError as error:
-            self.get_logger().error(f'leg {channel.leg}: cannot vent: {error}')
+        except Exception as error:  # whatever one device does, the other pads must be vented
+            channel.vented = False
+            self.get_logger().error(
+                f'leg {channel.leg}: cannot vent: {error}', throttle_duration_sec=1.0
+            )
             return
         if not channel.vented:
             self.get_logger().info(f'leg {channel.leg}: vented: {reason}')
@@ -190,9 +227,18 @@ class RegulatorNode(LifecycleNode):
         super().destroy_node()
 
     def _on_vent(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.vent('asked to on ~/vent')
-        response.success = all(channel.vented for channel in self.channels.values())
-        response.message = f'{len(self.channels)} pads told to vent'
+        # Only to vent would last until the controller's next set-point, a moment later.
+        if self._active:
+            self.trigger_deactivate()
+        else:
+            self.vent('asked to on ~/vent')
+        held = [str(leg) for leg, channel in self.channels.items() if not channel.vented]
+        response.success = not held
+        response.message = (
+            f'cannot vent leg {", ".join(held)}'
+            if held
+            else f'{len(self.channels)} pads told to vent; activate to accept set-points again'
+        )
         return response
 
     def _listen(self, leg: int) -> None:
@@ -205,15 +251,18 @@ class RegulatorNode(LifecycleNode):
             age = (now_ns - stamp_ns) * 1e-9
             try:
                 if abs(now_ns - stamp_ns) > self._timeout_ns:
-                    raise PadError(
+                    raise LimitError(
                         f'set-point is {age:.3f} s old: at most'
                         f' {self._values["command_timeout"]:g} s either way is accepted'
                     )
-                gauge = message.fluid_pressure - self._ambient
+                # Added and subtracted, an ambient pressure leaves rounding errors: below 1 uPa.
+                gauge = round(message.fluid_pressure - self._ambient, 6)
                 channel.regulator.set_pressure(gauge)
             except PadError as error:
                 channel.refusals += 1
                 channel.refusal = str(error)
+                if not isinstance(error, (InvalidInput, LimitError)):
+                    channel.vented = False  # the device may have taken it all the same
                 self.get_logger().warning(
                     f'leg {leg}: set-point refused: {error}', throttle_duration_sec=1.0
                 )
@@ -227,12 +276,13 @@ class RegulatorNode(LifecycleNode):
     def _tick(self, now_ns: int) -> None:
         self._now_ns = now_ns
         for channel in self.channels.values():
-            if channel.commanded_ns is None or now_ns - channel.commanded_ns <= self._timeout_ns:
-                continue
-            if not channel.vented:
-                self._vent(channel, f'no set-point for {self._values["command_timeout"]:g} s')
-            if channel.vented:  # else it is tried again at the next tick
+            # Time may also have been set back, and then nobody knows how old the command is.
+            age_ns = abs(now_ns - (channel.commanded_ns or 0))
+            if channel.commanded_ns is not None and age_ns > self._timeout_ns:
                 channel.commanded_ns = None
+            if not channel.vented and channel.commanded_ns is None:
+                # Tried again at each tick, until the device obeys.
+                self._vent(channel, f'no set-point for {self._values["command_timeout"]:g} s')
         if self._pace.due(now_ns):
             for channel in self.channels.values():
                 self._publish(channel, now_ns)
@@ -266,6 +316,8 @@ class RegulatorNode(LifecycleNode):
             )
             if channel.commanded_ns is None and self._active:
                 status.level, status.message = DiagnosticStatus.STALE, 'no set-points: vented'
+            if channel.commanded_ns is None and not channel.vented:
+                status.level, status.message = DiagnosticStatus.ERROR, 'cannot be vented'
             if channel.refusal:
                 status.level, status.message = DiagnosticStatus.WARN, channel.refusal
                 channel.refusal = ''

@@ -10,12 +10,17 @@ from typing import Any
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import WrenchStamped
+from rclpy.clock import Clock as NodeClock
+from rclpy.clock import ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
+from ros_pad.nodes.parameters import SCENE
+from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
@@ -26,13 +31,17 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import Sensors
 
 PARAMETERS = (
-    Parameter('scene', 'hexapod_patches', 'Name of a scene, or path of a YAML file.'),
-    Parameter('seed', 0, 'Of floor and sensor noise.', '', 0, 2**31 - 1),
-    Parameter('rate', 0.0, "Samples a second; 0 takes the scene's.", 'Hz', 0.0, 1000.0),
+    SCENE,
+    SEED,
+    Parameter(
+        'rate', 0.0, "Samples a second, at least 50; 0 takes the scene's.", 'Hz', 0.0, 1000.0
+    ),
     Parameter('publish_clock', False, 'Stamp with simulated time, and publish it on /clock.'),
     Parameter('free_running', True, 'Step by a timer; otherwise step() is called.'),
     AMBIENT_PRESSURE,
 )
+
+_SLOWEST = 50.0  # Hz: what scenes allow
 
 
 class SimulatorNode(Node):
@@ -42,9 +51,16 @@ class SimulatorNode(Node):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__('simulator', **kwargs)
+        super().__init__(
+            'simulator', automatically_declare_parameters_from_overrides=True, **kwargs
+        )
         values = declare(self, PARAMETERS)
-        self.scene = Scene.load(values['scene'])
+        if 0.0 < values['rate'] < _SLOWEST:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter rate = {values["rate"]:g} is not allowed:'
+                f' 0, or a number from {_SLOWEST:g} to 1000 Hz is needed'
+            )
+        self.scene: Scene = values['scene']
         self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
         self.floor = self.scene.floor.build(values['seed'])
         self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9)
@@ -68,13 +84,17 @@ class SimulatorNode(Node):
         for index, leg in enumerate(self.scene.legs):
             topics.PRESSURE.subscription(self, self._pressure_callback(index), leg)
         if values['free_running']:
-            self.create_timer(self.period_ns * 1e-9, self.step)
+            # Its own timer cannot wait for the clock that it publishes itself.
+            steady = NodeClock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(self.period_ns * 1e-9, self.step, clock=steady)
 
     def _pressure_callback(self, index: int) -> Any:
         def callback(message: FluidPressure) -> None:
             gauge = message.fluid_pressure - self._ambient
+            if not math.isfinite(gauge):
+                return
             # A sensor at rest may read a little below ambient; a pad cannot be sucked in.
-            self._pressures[index] = max(0.0, gauge) if math.isfinite(gauge) else 0.0
+            self._pressures[index] = max(0.0, gauge)
             self.pressure_stamps[index] = nanoseconds(message.header.stamp)
 
         return callback

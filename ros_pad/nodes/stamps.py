@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
+from rclpy.clock import Clock as NodeClock
+from rclpy.clock import ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
@@ -26,7 +28,8 @@ def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
     """Call back with the node's time in ns, every ``period`` seconds or faster.
 
     In simulated time that is at each ``/clock`` message, with the message's own time, so that
-    what a node does at a time depends on that time alone; otherwise a timer does it.
+    what a node does at a time depends on that time alone; otherwise a timer does it, which goes
+    on whatever happens to the time of day.
     """
     if node.get_parameter('use_sim_time').value:
 
@@ -36,4 +39,5 @@ def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
         topics.CLOCK.subscription(node, tick)
     else:
         clock = node.get_clock()
-        node.create_timer(period, lambda: callback(clock.now().nanoseconds))
+        steady = NodeClock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(period, lambda: callback(clock.now().nanoseconds), clock=steady)
