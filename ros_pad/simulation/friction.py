@@ -163,7 +163,8 @@ def exact_stick(
     free, mass, inertia, contacts, dt
         As for :func:`elastic`.
     tolerance : float
-        Bound on the error of the twist, √(v² + ω² inertia/mass), m/s. Rounding allows about 3e-9.
+        Bound on the error of the twist, √(v² + ω² inertia/mass), m/s. Rounding adds up to
+        3e-8 √(Σ c dt |s|/mass), which is less for bodies of a kilogram.
     sweeps : int
         Most sweeps over the contacts.
 
@@ -207,11 +208,13 @@ def exact_stick(
             impulses.append((px, py))
             turn += (ax - px) * (px - lx) + (ay - py) * (py - ly)
         twist = twist_after(impulses)
-        gap = 0.0
+        gap = lost = 0.0
         for contact, limit, (px, py) in zip(contacts, limits, impulses, strict=True):
             sx, sy = contact.slip(twist)
-            gap += limit * math.hypot(sx, sy) + px * sx + py * sy
-        if gap <= 0.5 * mass * tolerance * tolerance:
+            loss = limit * math.hypot(sx, sy)
+            lost += loss
+            gap += loss + px * sx + py * sy
+        if gap <= 0.5 * mass * tolerance * tolerance + 4e-16 * lost:
             break
         age, older = (1.0, 1.0) if turn > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
         pull = (older - 1.0) / age

@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+import random
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from ros_pad.simulation.friction import Contact
+from ros_pad.simulation.friction import creeping
+from ros_pad.simulation.friction import elastic
+from ros_pad.simulation.friction import exact_stick
+
+MASS, INERTIA, GRAVITY = 2.0, 0.03, 9.81
+STILL = (0.0, 0.0, 0.0)
+STEPS = {
+    'elastic': elastic,
+    'creeping': creeping,
+    'exact_stick': lambda free, mass, inertia, contacts, dt, start: exact_stick(
+        free, mass, inertia, contacts, dt
+    ),
+}
+
+
+def contact(cap, lever=(0.0, 0.0), motion=(0.0, 0.0), stiffness=1e6):
+    foot = Contact(stiffness)
+    foot.cap = cap
+    foot.lever_x, foot.lever_y = lever
+    foot.motion_x, foot.motion_y = motion
+    return foot
+
+
+def random_step(rng, stiffness=1e7):
+    """One to six feet, some idle; slow and fast motions; a body at rest or not; short steps."""
+    feet = []
+    for _ in range(rng.randint(1, 6)):
+        cap = 0.0 if rng.random() < 0.07 else rng.uniform(0.05, 8.0)
+        speed = rng.choice([0.0, 1e-3, 0.1, 0.5])
+        feet.append(
+            contact(
+                cap,
+                (rng.uniform(-0.25, 0.25), rng.uniform(-0.25, 0.25)),
+                (speed * rng.uniform(-1, 1), speed * rng.uniform(-1, 1)),
+                stiffness,
+            )
+        )
+    scale = rng.choice([0.0, 0.01, 1.0])
+    free = (
+        scale * rng.uniform(-0.4, 0.4),
+        scale * rng.uniform(-0.4, 0.4),
+        scale * rng.uniform(-2.0, 2.0),
+    )
+    return free, feet, rng.choice([1e-4, 1e-3, 4e-3])
+
+
+def distance(one, other):
+    """Return √(v² + ω² I/m) of the difference of two twists, m/s."""
+    dx, dy, dw = (a - b for a, b in zip(one, other, strict=True))
+    return math.sqrt(dx * dx + dy * dy + dw * dw * INERTIA / MASS)
+
+
+def rigid_plastic(twist, free, feet, dt):
+    """Return the convex function of a rigid-plastic step, J: written out anew, with NumPy."""
+    twist = np.asarray(twist)
+    change = twist - free
+    levers = np.array([(f.lever_x, f.lever_y) for f in feet])
+    motions = np.array([(f.motion_x, f.motion_y) for f in feet])
+    turn = twist[2] * np.column_stack([-levers[:, 1], levers[:, 0]])
+    slip = np.linalg.norm(twist[:2] + turn + motions, axis=1)
+    caps = np.array([f.cap for f in feet])
+    return 0.5 * (MASS * change[:2] @ change[:2] + INERTIA * change[2] ** 2) + dt * caps @ slip
+
+
+# --- one contact, by hand ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', STEPS)
+@pytest.mark.parametrize('dt', [1e-2, 1e-3, 1e-4])
+def test_spin_up(name, dt):
+    """A foot that goes back at V drags the body along: v = min(V, μ g t), first order in dt."""
+    friction, speed, duration = 0.1, 0.2, 0.3
+    foot = contact(friction * MASS * GRAVITY, motion=(-speed, 0.0), stiffness=1e8)
+    twist, x, worst = STILL, 0.0, 0.0
+    for step in range(1, round(duration / dt) + 1):
+        twist = STEPS[name](twist, MASS, INERTIA, [foot], dt, twist)
+        x += twist[0] * dt
+        expected = min(speed, friction * GRAVITY * step * dt)
+        worst = max(worst, abs(twist[0] - expected))
+    # Creep is 1e-5 m/s at the cap's half; rigid feet are exact, but for the step of the kink.
+    assert worst < 5e-3 * speed + friction * GRAVITY * dt * 0.5
+    spin_up = speed / (friction * GRAVITY)
+    exact = speed * duration - 0.5 * speed * spin_up
+    # By hand: implicit Euler gains V dt/2, half a step of speed.
+    assert x - exact == pytest.approx(0.5 * speed * dt, rel=0.2, abs=2e-5)
+
+
+@pytest.mark.parametrize('name', STEPS)
+def test_push_over_the_limit(name):
+    """A push of 1.2 μ W for 1 s, μ = 0.1: 0.5 · 0.2 μ g · 1 s² = 98.1 mm, first order in dt."""
+    weight = MASS * GRAVITY
+    errors = []
+    for dt in (2e-3, 1e-3):
+        # A pad that is let go at once reaches its cap at up to c √(1.4/(k m)): a stiff one.
+        foot = contact(0.1 * weight, stiffness=1e11)
+        twist, x = STILL, 0.0
+        for _ in range(round(1.0 / dt)):
+            free = (twist[0] - 1.2 * 0.1 * weight / MASS * dt, 0.0, 0.0)
+            twist = STEPS[name](free, MASS, INERTIA, [foot], dt, twist)
+            x += twist[0] * dt
+        errors.append(x + 0.0981)
+    # Implicit Euler runs ahead by a t dt/2.
+    assert errors[1] == pytest.approx(-0.5 * 0.1962 * 1e-3, rel=0.1)
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+
+
+def held(name, dt, share, duration=4.0):
+    """Push one foot, harder and harder for 1 s, then steadily; return positions over time, m."""
+    foot = contact(2.0, stiffness=5000.0)
+    twist, x, path = STILL, 0.0, []
+    for step in range(1, round(duration / dt) + 1):
+        free = (twist[0] + min(1.0, step * dt) * share * 2.0 / MASS * dt, 0.0, 0.0)
+        twist = STEPS[name](free, MASS, INERTIA, [foot], dt, twist)
+        x += twist[0] * dt
+        path.append(x)
+    return np.array(path), foot
+
+
+@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
+def test_elastic_does_not_creep(dt):
+    path, foot = held('elastic', dt, 0.8)
+    sheared = 0.8 * 2.0 / 5000.0
+    assert path[-1] == pytest.approx(sheared, rel=1e-2)
+    assert path.max() <= 1.05 * sheared
+    late = path[len(path) // 2 :]
+    assert np.ptp(late) < 0.01 * sheared
+    assert foot.force_x == pytest.approx(-1.6, rel=1e-2)
+
+
+@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
+def test_creeping_creeps_at_any_step(dt):
+    # c s/√(s² + ε²) = 0.8 c at s = 4/3 ε.
+    path, _ = held('creeping', dt, 0.8)
+    speed = (path[-1] - path[len(path) // 2]) / (dt * (len(path) - 1 - len(path) // 2))
+    assert speed == pytest.approx(4.0 / 3.0 * 1e-5, rel=1e-3)
+
+
+@pytest.mark.parametrize('dt', [1e-2, 4e-3, 1e-3])
+def test_exact_stick_sticks(dt):
+    path, foot = held('exact_stick', dt, 0.8)
+    assert abs(path[-1]) < 1e-8
+    assert foot.force_x == pytest.approx(-1.6, rel=1e-6)
+
+
+# --- several contacts -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('count', [1, 3, 5])
+@pytest.mark.parametrize('name', STEPS)
+def test_body_speed_is_the_median_of_contact_speeds(count, name):
+    """Equal Coulomb contacts on a line, without inertia to speak of (arXiv 2501.09746)."""
+    rng = random.Random(count)
+    for _ in range(20):
+        speeds = [rng.uniform(-0.5, 0.5) for _ in range(count)]
+        feet = [contact(1.0, motion=(-speed, 0.0), stiffness=1e6) for speed in speeds]
+        twist = STILL
+        for _ in range(3):
+            twist = STEPS[name](twist, 1e-3, 1e-3, feet, 1e-3, twist)
+        tolerance = {'elastic': 2e-3, 'creeping': 2e-5, 'exact_stick': 1e-7}[name]
+        assert twist[0] == pytest.approx(sorted(speeds)[count // 2], abs=tolerance)
+        assert twist[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_three_formulations_agree():
+    """Twists of 2000 random steps against exact_stick, each with the error its feet allow.
+
+    A stiff pad gives way by cap/(k dt) before it slips, m/s, here 8e-3 at worst at 1e7 N/m and
+    0.1 ms; a creeping one moves at about ε. Levers make more of it: a factor 40.
+    """
+    rng = random.Random(20)
+    sticking = sliding = 0
+    for _ in range(2000):
+        free, feet, dt = random_step(rng)
+        exact = exact_stick(free, MASS, INERTIA, feet, dt)
+        for foot in feet:
+            speed = math.hypot(*foot.slip(exact))
+            sticking += foot.cap > 0.0 and speed < 1e-7
+            sliding += foot.cap > 0.0 and speed > 1e-3
+            assert math.hypot(foot.force_x, foot.force_y) <= foot.cap * (1 + 1e-12)
+        give = max(foot.cap for foot in feet) / (1e7 * dt)
+        assert distance(elastic(free, MASS, INERTIA, feet, dt, free), exact) < 40 * give + 1e-7
+        assert distance(creeping(free, MASS, INERTIA, feet, dt, free), exact) < 40 * 1e-5
+        for foot in feet:
+            assert math.hypot(foot.force_x, foot.force_y) <= foot.cap * (1 + 1e-12)
+    assert sticking > 500 and sliding > 1000
+
+
+def test_creep_vanishes_with_its_speed():
+    worst = []
+    for creep in (1e-3, 1e-4, 1e-5):
+        rng = random.Random(21)
+        worst.append(0.0)
+        for _ in range(200):
+            free, feet, dt = random_step(rng)
+            exact = exact_stick(free, MASS, INERTIA, feet, dt)
+            twist = creeping(free, MASS, INERTIA, feet, dt, free, creep=creep)
+            worst[-1] = max(worst[-1], distance(twist, exact))
+    assert worst[1] < 0.2 * worst[0]
+    assert worst[2] < 0.2 * worst[1]
+
+
+def test_against_a_general_minimiser():
+    """No twist that scipy.optimize finds is better than ours by more than the bound allows."""
+    rng = random.Random(22)
+    for _ in range(25):
+        free, feet, dt = random_step(rng)
+        twist = exact_stick(free, MASS, INERTIA, feet, dt)
+        scale = np.array([1.0, 1.0, math.sqrt(MASS / INERTIA)])
+        found = minimize(
+            lambda q, free=free, feet=feet, dt=dt, scale=scale: (
+                1e3 * rigid_plastic(q * scale, free, feet, dt)
+            ),
+            np.array(free) / scale,
+            method='Nelder-Mead',
+            options={'xatol': 1e-10, 'fatol': 1e-17, 'maxiter': 4000, 'adaptive': True},
+        )
+        ours = rigid_plastic(twist, free, feet, dt)
+        assert ours <= found.fun / 1e3 + 1e-15
+        # Strong convexity: ½ m distance² <= difference.
+        allowed = math.sqrt(2.0 * max(found.fun / 1e3 - ours, 0.0) / MASS)
+        assert distance(found.x * scale, twist) <= allowed + 2e-8
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_exact_stick_keeps_its_bound(seed):
+    """A tenth of the tolerance gives the same twist, to the looser tolerance."""
+    rng = random.Random(seed)
+    for _ in range(100):
+        free, feet, dt = random_step(rng)
+        rough = exact_stick(free, MASS, INERTIA, feet, dt, tolerance=1e-5)
+        fine = exact_stick(free, MASS, INERTIA, feet, dt, tolerance=1e-8)
+        assert distance(rough, fine) <= 1e-5 + 1e-8
+
+
+def test_exact_stick_says_when_it_gives_up():
+    feet = [contact(1.0, (0.2, 0.1)), contact(1.0, (-0.2, 0.1)), contact(1.0, (0.0, -0.2))]
+    with pytest.raises(ArithmeticError, match=r'm/s only after 1 sweeps'):
+        exact_stick((1e-4, 2e-4, 3e-3), MASS, INERTIA, feet, 0.004, sweeps=1)
+
+
+def test_steps_without_contacts():
+    for step in STEPS.values():
+        assert step((1.0, 2.0, 3.0), MASS, INERTIA, [], 0.004, STILL) == pytest.approx((1, 2, 3))
+
+
+# --- forces -----------------------------------------------------------------------------------
+
+TRIANGLE = ((0.2, 0.1), (-0.2, 0.1), (0.0, -0.2))
+
+
+def test_three_sticking_feet_have_one_twist_and_forces_by_stiffness():
+    """Six forces, three equations: a slow push 0.6 N on feet of 1, 2 and 3 kN/m, by hand.
+
+    To shear springs at levers r by a displacement (x, y, φ), the sum of their forces must be the
+    push and the sum of their moments zero: a linear system of three equations.
+    """
+    stiffness = np.array([1000.0, 2000.0, 3000.0])
+    levers = np.array(TRIANGLE)
+    # Displacement of foot i is B_i (x, y, φ).
+    maps = [np.array([[1.0, 0.0, -ry], [0.0, 1.0, rx]]) for rx, ry in levers]
+    total = sum(k * b.T @ b for k, b in zip(stiffness, maps, strict=True))
+    displaced = np.linalg.solve(total, [0.6, 0.0, 0.0])
+    expected = np.array([-k * b @ displaced for k, b in zip(stiffness, maps, strict=True)])
+
+    feet = [contact(5.0, r, stiffness=k) for r, k in zip(TRIANGLE, stiffness, strict=True)]
+    twist = STILL
+    for _ in range(2000):
+        free = (twist[0] + 0.6 / MASS * 0.004, twist[1], twist[2])
+        twist = elastic(free, MASS, INERTIA, feet, 0.004, twist)
+    assert max(map(abs, twist)) < 1e-9
+    assert np.array([(f.force_x, f.force_y) for f in feet]) == pytest.approx(expected, abs=1e-6)
+
+    # Rigid feet: the same twist, none, and the least forces that balance push and moment.
+    rigid = [contact(5.0, r) for r in TRIANGLE]
+    still = exact_stick((0.6 / MASS * 0.004, 0.0, 0.0), MASS, INERTIA, rigid, 0.004)
+    assert distance(still, STILL) < 1e-8
+    balance = np.hstack([b.T for b in maps])
+    least = np.linalg.pinv(balance) @ [-0.6, 0.0, 0.0]
+    found = [value for f in rigid for value in (f.force_x, f.force_y)]
+    assert found == pytest.approx(least, abs=1e-4)
+    assert np.abs(np.array(found) - expected.ravel()).max() > 0.02  # another split
+
+
+@pytest.mark.parametrize('name', STEPS)
+def test_newton_and_euler_laws(name):
+    """Change of momentum and of spin are the impulses of the forces that are reported."""
+    rng = random.Random(23)
+    for _ in range(300):
+        free, feet, dt = random_step(rng)
+        x, y, turn = STEPS[name](free, MASS, INERTIA, feet, dt, free)
+        fx = sum(f.force_x for f in feet)
+        fy = sum(f.force_y for f in feet)
+        moment = sum(f.lever_x * f.force_y - f.lever_y * f.force_x for f in feet)
+        small = 1e-10
+        assert pytest.approx(free[0] + dt * fx / MASS, abs=small) == x
+        assert pytest.approx(free[1] + dt * fy / MASS, abs=small) == y
+        assert pytest.approx(free[2] + dt * moment / INERTIA, abs=10 * small) == turn
+
+
+def test_power_balance():
+    """What the gait's motions put in goes into speed, pads and slip; the step loses the rest.
+
+    Against the feet's motions u the forces on the body do work -F·u. The loss of implicit Euler
+    is never negative, and falls with dt.
+    """
+    losses = []
+    for dt in (1e-3, 2.5e-4, 6.25e-5):
+        feet = [contact(1.5, r, stiffness=3000.0) for r in TRIANGLE]
+        twist, put_in, slipped = STILL, 0.0, 0.0
+        for step in range(round(0.5 / dt)):
+            time = step * dt
+            for index, foot in enumerate(feet):
+                foot.motion_x = -0.3 * math.sin(2.0 * math.pi * time + index)
+                foot.motion_y = 0.05 * index
+            twist = elastic(twist, MASS, INERTIA, feet, dt, twist)
+            for foot in feet:
+                put_in -= dt * (foot.force_x * foot.motion_x + foot.force_y * foot.motion_y)
+                slipped += foot.cap * foot.slid
+        moving = 0.5 * MASS * (twist[0] ** 2 + twist[1] ** 2) + 0.5 * INERTIA * twist[2] ** 2
+        sheared = sum(1500.0 * (f.shear_x**2 + f.shear_y**2) for f in feet)
+        losses.append(put_in - moving - sheared - slipped)
+        assert slipped > 0.05
+    assert all(loss > 0.0 for loss in losses)
+    assert losses[2] < 0.5 * losses[1] < 0.25 * losses[0]
+    assert losses[2] < 0.01 * slipped
+
+
+def test_lifted_foot_forgets_its_shear():
+    foot = contact(2.0, motion=(-0.1, 0.0), stiffness=1000.0)
+    elastic(STILL, MASS, INERTIA, [foot], 0.004, STILL)
+    assert foot.shear_x != 0.0 and foot.force_x != 0.0
+    foot.cap = 0.0
+    assert elastic(STILL, MASS, INERTIA, [foot], 0.004, STILL) == STILL
+    assert (foot.shear_x, foot.shear_y, foot.force_x, foot.force_y, foot.slid) == (0,) * 5
+
+
+def test_settles_at_every_stiffness_that_files_allow():
+    """Light and heavy bodies, pads to 1e7 N/m, steps to 20 ms, sheared at the start: no error."""
+    rng = random.Random(24)
+    for _ in range(2000):
+        stiffness = 10.0 ** rng.uniform(0.0, 7.0)
+        free, feet, dt = random_step(rng, stiffness)
+        for foot in feet:
+            foot.shear_x = rng.uniform(-0.7, 0.7) * foot.cap / stiffness
+            foot.shear_y = rng.uniform(-0.7, 0.7) * foot.cap / stiffness
+        mass, inertia = rng.choice([(0.05, 1e-5), (2.0, 0.03), (200.0, 100.0)])
+        twist = elastic(free, mass, inertia, feet, rng.choice([dt, 0.02]), free)
+        assert all(map(math.isfinite, twist))
+
+
+def test_what_does_not_settle_is_an_error():
+    rng = random.Random(25)
+    refused = 0
+    for _ in range(300):
+        free, feet, dt = random_step(rng, 1e13)
+        try:
+            elastic(free, 0.05, 1e-5, feet, dt, free)
+        except ArithmeticError as error:
+            refused += 1
+            assert 'does not settle' in str(error)
+    assert refused
