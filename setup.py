@@ -49,6 +49,7 @@ setup(
         'ros': [
             'ros-jazzy-rclpy[fastrtps]',
             'ros-jazzy-ament-index-python',
+            'ros-jazzy-builtin-interfaces',
             'ros-jazzy-diagnostic-msgs',
             'ros-jazzy-geometry-msgs',
             'ros-jazzy-lifecycle-msgs',

@@ -186,7 +186,6 @@ def _run(options: argparse.Namespace) -> int:
             if other != policy
         ]
     assert trial.metrics is not None
-    trial.settings |= labels.settings(scene)
     trial.settings['comparison'] = [
         {'policy': other.policy, **other.metrics.as_dict()}
         for other in others

@@ -48,6 +48,7 @@ def label(
                 'policy': policy,
                 'seed': seed,
                 'fidelity': fidelity,
+                'floor': asdict(scene.floor),
                 'ambient_pressure': AMBIENT_PRESSURE,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,

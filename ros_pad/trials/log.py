@@ -15,6 +15,7 @@ from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.trials.label import settings
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.trial import Trial
 
@@ -105,6 +106,7 @@ class TrialLog:
             slipping=slow[:, :, 6].astype(bool),
             dome=slow[:, :, 7].astype(bool),
             floor=floor,
+            settings=settings(self._scene),
             real_time_factor=real_time_factor,
         )
         trial.metrics = summarise(self._scene, trial, robot, controller)

@@ -23,9 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad import configuration
 from ros_pad.errors import BagError
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
@@ -199,15 +198,13 @@ def _described(bag: BagReader) -> dict[str, Any]:
         said = json.loads(bag.custom_data.get(KEY, '{}'))
         source = str(said.get('scene') or '')
         seed = int(said.get('seed') or 0)
-        # A scene of the user's own may have changed since; the shipped ones are what they were.
-        shipped = source in configuration.names('scenes')
         ambient = float(said.get('ambient_pressure', AMBIENT_PRESSURE))
         return {
-            'scene': source if shipped else pathlib.PurePath(source).stem,
+            'scene': pathlib.PurePath(source).stem,
             'policy': str(said.get('policy') or ''),
             'fidelity': str(said.get('fidelity') or ''),
             'seed': seed,
-            'floor': Scene.load(source).floor.build(seed) if shipped else None,
+            'floor': FloorPlan(**said['floor']).build(seed) if said.get('floor') else None,
             'metrics': Metrics(**said['metrics']) if said.get('metrics') else None,
             'settings': (said.get('settings') or {}) | {'ambient_pressure': ambient},
             'real_time_factor': said.get('real_time_factor'),

@@ -27,12 +27,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ros_pad import configuration
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials import label
 from ros_pad.trials.metrics import LOAD_GATE
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.trial import Trial
@@ -104,8 +101,6 @@ class _View:
 
 def _view(trial: Trial, others: Iterable[Trial]) -> _View:
     settings = dict(trial.settings)
-    if 'expected_load' not in settings and trial.scene in configuration.names('scenes'):
-        settings = label.settings(Scene.load(trial.scene)) | settings
     gate = _load_gate(trial, settings)
     own = [(trial.policy, trial.metrics.as_dict())] if trial.metrics else []
     compared = [(row['policy'], row) for row in settings.get('comparison', [])]

@@ -90,6 +90,7 @@ def record(trial, folder):
     slow = {round(time * 1e9): row for row, time in enumerate(trial.slow_time)}
     description = {
         'scene': trial.scene,
+        'floor': dataclasses.asdict(Scene.load(trial.scene).floor),
         'policy': trial.policy,
         'seed': trial.seed,
         'fidelity': trial.fidelity,
