@@ -77,12 +77,13 @@ class _Loader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f'key {key.value!r} is there twice', key.start_mark
                 )
-            if isinstance(key, yaml.ScalarNode):
-                seen.add(key.value)
+            seen.add(key.value)
         return super().construct_mapping(node, deep)
 
 
@@ -146,7 +147,9 @@ class Table:
             with suppress(ValueError):
                 value = float(value)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not low <= value <= high or math.isinf(value):
+        # The largest float rather than infinity: a whole number of YAML can be larger than it.
+        largest = sys.float_info.max
+        if not number or not max(low, -largest) <= value <= min(high, largest):
             raise ConfigError(
                 f'{self.origin}: {key} = {value!r} is not allowed: '
                 f'a number from {low:g} to {high:g} {unit} is needed'

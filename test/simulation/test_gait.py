@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from ros_pad.simulation.gait import TRIPODS
+from ros_pad.simulation.gait import TripodGait
+
+GAIT = TripodGait(cycle=1.2, stride=0.16, duty=0.6, lift=0.03)
+LEGS = range(1, 7)
+DUTIES = (0.51, 0.6, 0.75, 0.9)
+
+
+def gait_of(duty):
+    return TripodGait(cycle=1.2, stride=0.16, duty=duty, lift=0.03)
+
+
+@pytest.mark.parametrize('time', [0.05, 0.3, 1.0, 1.2, 7.7])
+def test_advance_is_the_integral_of_speed(time):
+    expected, _ = quad(GAIT.body_speed, 0.0, time, limit=200)
+    assert GAIT.body_advance(time) == pytest.approx(expected, abs=1e-10)
+
+
+def test_a_stride_a_cycle():
+    for start in (0.0, 0.17, 5.0):
+        advance = GAIT.body_advance(start + 1.2) - GAIT.body_advance(start)
+        assert advance == pytest.approx(0.16)
+
+
+def test_speed_is_zero_where_tripods_change_and_never_negative():
+    times = np.linspace(0.0, 1.2, 1201)
+    speeds = np.array([GAIT.body_speed(time) for time in times])
+    assert speeds.min() > -1e-12
+    assert speeds[[0, 600, 1200]] == pytest.approx(0.0, abs=1e-12)
+    found = np.abs(np.gradient(speeds, times)).max()
+    assert GAIT.peak_acceleration == pytest.approx(found, rel=1e-3)
+
+
+@pytest.mark.parametrize('duty', DUTIES)
+def test_stance_is_centred_on_the_push(duty):
+    gait = gait_of(duty)
+    times = np.linspace(0.0, 1.2, 24001)[:-1]
+    pushes = {leg: 0.25 * 1.2 if leg in TRIPODS[0] else 0.75 * 1.2 for leg in LEGS}
+    for leg in LEGS:
+        standing = np.array([gait.phase(leg, time) < duty for time in times])
+        assert standing.mean() == pytest.approx(duty, abs=2e-4)
+        away = (times[standing] - pushes[leg] + 0.6) % 1.2 - 0.6
+        assert away.mean() == pytest.approx(0.0, abs=1e-3)
+        assert np.abs(away).max() == pytest.approx(0.5 * duty * 1.2, abs=1e-3)
+
+
+@pytest.mark.parametrize('duty', DUTIES)
+def test_shares_of_the_two_tripods_make_one(duty):
+    gait = gait_of(duty)
+    for time in np.linspace(0.0, 2.4, 997):
+        shares = [gait.load_share(gait.phase(tripod[0], time)) for tripod in TRIPODS]
+        assert all(0.0 <= share <= 1.0 for share in shares)
+        assert sum(shares) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('duty', DUTIES)
+def test_share_comes_and_goes_softly(duty):
+    gait = gait_of(duty)
+    phases = np.linspace(0.0, 1.0, 20001)
+    shares = np.array([gait.load_share(phase) for phase in phases])
+    assert gait.load_share(duty) == gait.load_share(0.999) == 0.0
+    steepest = 1.5 / (duty - 0.5)  # of a smooth step
+    assert np.abs(np.diff(shares)).max() < 1.01 * steepest * (phases[1] - phases[0])
+
+
+def test_tripods():
+    assert sorted(TRIPODS[0] + TRIPODS[1]) == list(LEGS)
+    for tripod in TRIPODS:
+        assert len({GAIT.phase(leg, 0.37) for leg in tripod}) == 1
+    shift = (GAIT.phase(1, 0.37) - GAIT.phase(2, 0.37)) % 1.0
+    assert shift == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize('duty', DUTIES)
+def test_foot_reaches_as_far_ahead_as_it_is_left_behind(duty):
+    gait = gait_of(duty)
+    half = 0.5 * duty * 1.2
+    for middle in (0.3, 0.9):  # of either tripod's stance
+        under, _ = quad(gait.body_speed, middle - half, middle + half)
+        assert gait.reach() == pytest.approx(0.5 * under, abs=1e-9)
+
+
+def test_swing():
+    start, middle, end = (GAIT.swing(phase) for phase in (0.6, 0.8, 1.0))
+    assert start == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert middle == pytest.approx((0.5, 0.03))
+    assert end == pytest.approx((1.0, 0.0), abs=1e-12)
+    # It leaves and meets the floor without speed: no scuffing.
+    for phase in (0.6, 1.0):
+        one, other = GAIT.swing(phase), GAIT.swing(phase + math.copysign(1e-5, 0.8 - phase))
+        assert one == pytest.approx(other, abs=1e-8)

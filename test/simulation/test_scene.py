@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+import copy
+import pathlib
+import re
+import shutil
+
+import pytest
+import yaml
+
+from ros_pad import configuration
+from ros_pad.errors import ConfigError
+from ros_pad.simulation import Scene
+from ros_pad.simulation.gait import TripodGait
+
+FOLDER = configuration.shared_folder() / 'scenes'
+HEXAPOD = yaml.safe_load((FOLDER / 'hexapod_patches.yaml').read_text())
+LEG = yaml.safe_load((FOLDER / 'leg_wet_dome_60.yaml').read_text())
+
+
+def written(tmp_path, source, *changes):
+    """Write a scene with changes (path of keys, value); a value of ... takes the key away."""
+    values = copy.deepcopy(source)
+    for path, value in changes:
+        *parts, last = path.split('.')
+        table = values
+        for part in parts:
+            table = table[part]
+        if value is ...:
+            del table[last]
+        else:
+            table[last] = value
+    file = tmp_path / 'mine.yaml'
+    file.write_text(yaml.safe_dump(values))
+    return file
+
+
+@pytest.mark.parametrize('name', configuration.names('scenes'))
+def test_shipped_scenes(name):
+    scene = Scene.load(name)
+    assert scene.source == scene.name == name
+    assert scene.description
+    assert scene.legs == ((1, 2, 3, 4, 5, 6) if scene.robot == 'hexapod' else (1,))
+    assert scene.duration == scene.settle + scene.cycles * scene.gait.cycle
+    assert scene.expected_load > 0.0
+    assert scene.dome_pressure is None or scene.dome_pressure <= scene.foot.ceiling
+    floor = scene.floor.build(0)
+    assert floor.wet_map.any() == (scene.floor.kind != 'dry')
+    assert floor.wet_map.all() == (scene.floor.kind == 'wet')
+    # The feet reach the floor beside the body's centre, and the gait keeps them apart.
+    if isinstance(scene.gait, TripodGait):
+        assert 2.0 * scene.gait.reach() < 1.3 * scene.body.homes[0][0]
+
+
+def test_values_come_where_they_belong():
+    scene = Scene.load('hexapod_patches')
+    assert scene.body.mass == HEXAPOD['body']['mass']
+    assert scene.expected_load == pytest.approx(2.09 * 9.81 / 3.0)
+    assert scene.stride == scene.gait.stride == 0.16
+    assert scene.tow.friction_dry == 0.55 and scene.tow.friction_wet == 0.12
+    assert scene.sensors.rate == 250.0 and scene.sensors.position == 1.5e-4
+    assert scene.settle == 1.0
+    leg = Scene.load('leg_wet_dome_60')
+    assert leg.dome_pressure == 60e3
+    assert leg.stride == 0.05 and leg.expected_load == 2.5 and leg.heading_gain == 0.0
+    assert leg.tow.weight == 0.0
+
+
+def test_legs_are_numbered_as_in_the_thesis():
+    homes = Scene.load('hexapod_patches').body.homes
+    left, right = homes[:3], homes[3:]
+    assert all(y > 0.0 for _, y in left) and all(y < 0.0 for _, y in right)
+    assert [x > 0.0 for x, _ in (homes[0], homes[5])] == [True, True]
+    assert homes[1][0] == homes[4][0] == 0.0  # 2 and 5 are the middle legs
+    # Each tripod has the centre of mass inside: balance of the three feet, all positive.
+    for tripod in ((0, 2, 4), (1, 3, 5)):
+        (ax, ay), (bx, by), (cx, cy) = (homes[index] for index in tripod)
+        areas = [ax * by - bx * ay, bx * cy - cx * by, cx * ay - ax * cy]
+        assert all(area > 0.0 for area in areas) or all(area < 0.0 for area in areas)
+
+
+BAD = [
+    (HEXAPOD, 'robot', 'biped', "robot = 'biped' is not allowed: one of hexapod, rail_leg"),
+    (HEXAPOD, 'foot', 'large73', "foot: no foot named 'large73'. Did you mean 'large37'?"),
+    (HEXAPOD, 'foot', 37, 'foot = 37 is not allowed: text is needed'),
+    (HEXAPOD, 'policy', 'brave', 'one of flat, dome, adaptive, oracle is needed'),
+    (HEXAPOD, 'cycles', 0, 'cycles = 0 is not allowed: a whole number from 1 to 100000'),
+    (HEXAPOD, 'cycles', 1.5, 'cycles = 1.5'),
+    (HEXAPOD, 'accuracy', 0, 'accuracy = 0 is not allowed: a number from 0.0001 to 1'),
+    (HEXAPOD, 'settle', -1, 'settle = -1 is not allowed: a number from 0 to 60 s'),
+    (HEXAPOD, 'dome_pressure', 95e3, 'dome_pressure = 95000.0 is not allowed: a number from 1'),
+    (HEXAPOD, 'body.mass', '2 kg', "body: mass = '2 kg' is not allowed: a number from 0.05"),
+    (HEXAPOD, 'body.mass', ..., "body: key 'mass' is missing"),
+    (HEXAPOD, 'body.height', float('nan'), 'body: height = nan is not allowed'),
+    (HEXAPOD, 'body', 3, 'body: expected a table of keys, found 3'),
+    (HEXAPOD, 'gait.duty', 0.5, 'gait: duty = 0.5 is not allowed: a number from 0.51 to 0.9'),
+    (HEXAPOD, 'gait.stroke', 0.1, "gait: unknown key 'stroke'. Did you mean 'stride'?"),
+    (HEXAPOD, 'gait.heading_gain', True, 'gait: heading_gain = True is not allowed'),
+    (HEXAPOD, 'floor.kind', 'ice', 'floor: kind = '),
+    (HEXAPOD, 'floor.wet_fraction', 1.0, 'floor: wet_fraction = 1.0 is not allowed'),
+    (HEXAPOD, 'floor.patch_length', 6.0, 'floor: patch_length = 6.0 is not allowed: a number'),
+    (HEXAPOD, 'floor.film_thickness', 3, 'floor: film_thickness = 3 is not allowed'),
+    (HEXAPOD, 'floor.viscosity', 0, 'floor: viscosity = 0 is not allowed'),
+    (HEXAPOD, 'tow.friction_dry', ..., "tow: key 'friction_dry' is missing"),
+    (HEXAPOD, 'tow.weight', float('inf'), 'tow: weight = inf is not allowed'),
+    (HEXAPOD, 'sensors.rate', 5, 'sensors: rate = 5 is not allowed: a number from 50 to 1000 Hz'),
+    (HEXAPOD, 'sensors', ..., "key 'sensors' is missing"),
+    (HEXAPOD, 'regulator.hose_length', 0, 'regulator: hose_length = 0 is not allowed'),
+    (HEXAPOD, 'colour', 'red', "unknown key 'colour'"),
+    (LEG, 'gait.stride', 0.1, "gait: unknown key 'stride'"),
+    (LEG, 'gait.swing', 0.0, 'gait: swing = 0.0 is not allowed: a number from 0.05 to 60 s'),
+    (LEG, 'body.rolling_drag', -1, 'body: rolling_drag = -1 is not allowed'),
+    (LEG, 'floor.wet_fraction', 0.4, "floor: unknown key 'wet_fraction'"),
+]
+
+
+@pytest.mark.parametrize('source, path, value, message', BAD, ids=[str(b[1:3]) for b in BAD])
+def test_bad_scenes(tmp_path, source, path, value, message):
+    file = written(tmp_path, source, (path, value))
+    with pytest.raises(ConfigError, match=re.escape(message)) as caught:
+        Scene.load(file)
+    assert str(caught.value).startswith(str(file))
+
+
+@pytest.mark.parametrize(
+    'source, path, text, value',
+    [
+        (LEG, 'dome_pressure', '75e3', 75e3),
+        (HEXAPOD, 'tow.weight', '1e1', 10.0),
+        (HEXAPOD, 'floor.film_thickness', '3e-4', 3e-4),
+    ],
+)
+def test_numbers_that_are_text_to_pyyaml(tmp_path, source, path, text, value):
+    file = written(tmp_path, source, (path, text))
+    found = Scene.load(file)
+    for part in path.split('.'):
+        found = getattr(found, part)
+    assert found == value
+
+
+def test_scene_of_ones_own(tmp_path, monkeypatch):
+    """Names itself after its file; a foot's path is taken from the scene's folder."""
+    shutil.copy(configuration.shared_folder() / 'feet/large37.yaml', tmp_path / 'my_foot.yaml')
+    file = written(tmp_path, HEXAPOD, ('foot', 'my_foot.yaml'))
+    monkeypatch.chdir('/')
+    scene = Scene.load(file)
+    assert scene.name == 'mine' and scene.source == str(file)
+    assert scene.foot.pads == 37
+    assert pathlib.Path(scene.foot.source) == tmp_path / 'my_foot.yaml'
+
+
+def test_bad_foot_of_ones_own_names_both_files(tmp_path):
+    (tmp_path / 'my_foot.yaml').write_text('pads: 3\n')
+    file = written(tmp_path, HEXAPOD, ('foot', 'my_foot.yaml'))
+    with pytest.raises(ConfigError, match=r"mine\.yaml: foot: .*my_foot\.yaml: key 'pad' is miss"):
+        Scene.load(file)
+
+
+def test_unknown_scene():
+    with pytest.raises(ConfigError) as caught:
+        Scene.load('hexapod_patchs')
+    assert "Did you mean 'hexapod_patches'?" in str(caught.value)
+    assert 'leg_dry_flat' in str(caught.value)
+
+
+def test_without_a_tow(tmp_path):
+    scene = Scene.load(written(tmp_path, HEXAPOD, ('tow', ...)))
+    assert scene.tow.weight == 0.0
+
+
+def test_floor_of_a_scene_depends_on_the_seed():
+    plan = Scene.load('hexapod_patches').floor
+    assert (plan.build(1).wet_map != plan.build(2).wet_map).any()
+    assert plan.build(1).film_thickness == 3e-4

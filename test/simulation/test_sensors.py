@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.scene import SensorNoise
+from ros_pad.simulation.sensors import Sensors
+
+NOISE = SensorNoise(rate=250.0, force=0.03, position=1.5e-4)
+
+
+class Statue:
+    """Two feet that never move."""
+
+    def __init__(self):
+        self.feet = [FootState(), FootState()]
+        self.feet[0].force = (1.0, -2.0, 7.0)
+        self.feet[1].position = (0.1, 0.2, 0.3)
+
+
+def read(noise=NOISE, seed=0, count=5000):
+    sensors, statue = Sensors(noise, 2, seed), Statue()
+    return np.array([sensors.read(statue) for _ in range(count)])  # (sample, foot, what, axis)
+
+
+def test_noise_is_white_and_as_wide_as_asked_for():
+    samples = read()
+    means, sds = samples.mean(axis=0), samples.std(axis=0)
+    # Means to 5 standard errors, standard deviations to 5 %.
+    assert means[0, 0] == pytest.approx([1.0, -2.0, 7.0], abs=5 * 0.03 / 5000**0.5)
+    assert means[1, 1] == pytest.approx([0.1, 0.2, 0.3], abs=5 * 1.5e-4 / 5000**0.5)
+    assert sds[:, 0] == pytest.approx(np.full((2, 3), 0.03), rel=0.05)
+    assert sds[:, 1] == pytest.approx(np.full((2, 3), 1.5e-4), rel=0.05)
+    flat = (samples - means).reshape(len(samples), -1) / sds.reshape(-1)
+    across = flat.T @ flat / len(flat)
+    assert np.abs(across - np.eye(12)).max() < 0.08
+    assert np.abs((flat[1:] * flat[:-1]).mean(axis=0)).max() < 0.08
+    # Numbers are drawn in blocks: no block comes twice.
+    assert np.abs((flat[1000:] * flat[:-1000]).mean(axis=0)).max() < 0.08
+
+
+def test_seeds():
+    assert np.array_equal(read(seed=5, count=50), read(seed=5, count=50))
+    assert not np.array_equal(read(seed=5, count=50), read(seed=6, count=50))
+
+
+def test_without_noise_the_truth():
+    samples = read(SensorNoise(250.0, 0.0, 0.0), count=3)
+    assert (samples[:, 0, 0] == [1.0, -2.0, 7.0]).all()
+    assert (samples[:, 1, 1] == [0.1, 0.2, 0.3]).all()
+
+
+def test_readings_are_plain_floats():
+    force, position = Sensors(NOISE, 2, 0).read(Statue())[0]
+    assert all(type(value) is float for value in (*force, *position))

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation.terrain import Floor
+from ros_pad.simulation.terrain import patch_lengths
+
+FILM = 3e-4
+SEEDS = range(8)
+
+
+def mean_chord(floor):
+    """Mean length of wet ground along straight lines in x, m: counted, run by run."""
+    lengths = []
+    for row in floor.wet_map:
+        edges = np.flatnonzero(np.diff(row.astype(int)))
+        starts = [e for e in edges if not row[e]]
+        if not starts:
+            continue
+        turned = np.roll(row, -starts[0] - 1)  # begins with a wet run: none is cut in two
+        run = 0
+        for wet in [*turned.tolist(), False]:
+            if wet:
+                run += 1
+            elif run:
+                lengths.append(run)
+                run = 0
+    return float(np.mean(lengths)) * floor.cell
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+@pytest.mark.parametrize('fraction', [0.1, 0.45, 0.8])
+def test_wet_fraction(fraction, seed):
+    floor = Floor.patches(fraction, 0.9 * patch_lengths(fraction)[1] / 3.0, FILM, seed)
+    assert floor.wet_map.mean() == pytest.approx(fraction, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    'fraction, length, tolerance',
+    [
+        (0.45, 0.1, 0.05), (0.45, 0.5, 0.04), (0.45, 1.5, 0.08), (0.45, 3.0, 0.15),
+        (0.1, 0.2, 0.05), (0.1, 0.8, 0.1), (0.8, 1.0, 0.05), (0.95, 3.0, 0.06),
+    ],
+)  # fmt: skip
+def test_mean_length_of_patches(fraction, length, tolerance):
+    found = [mean_chord(Floor.patches(fraction, length, FILM, seed)) for seed in SEEDS]
+    assert np.mean(found) == pytest.approx(length, rel=tolerance)
+
+
+def test_patches_are_as_long_in_both_directions():
+    along, across = [], []
+    for seed in SEEDS:
+        floor = Floor.patches(0.45, 0.6, FILM, seed)
+        along.append(mean_chord(floor))
+        across.append(mean_chord(Floor(floor.wet_map.T, floor.cell, floor.origin, FILM)))
+    assert np.mean(across) == pytest.approx(np.mean(along), rel=0.06)
+
+
+def test_seeds():
+    one = Floor.patches(0.4, 1.0, FILM, 3)
+    assert np.array_equal(one.wet_map, Floor.patches(0.4, 1.0, FILM, 3).wet_map)
+    assert not np.array_equal(one.wet_map, Floor.patches(0.4, 1.0, FILM, 4).wet_map)
+
+
+def test_floor_repeats_itself_without_a_seam():
+    floor = Floor.patches(0.45, 1.0, FILM, 0)
+    rows, columns = floor.wet_map.shape
+    width, length = rows * floor.cell, columns * floor.cell
+    rng = np.random.default_rng(0)
+    for x, y in rng.uniform(-20.0, 20.0, (500, 2)):
+        assert floor.wet(x, y) == floor.wet(x + length, y) == floor.wet(x, y - width)
+    # Across the seam the ground changes no more often than elsewhere.
+    seam = np.mean(floor.wet_map[:, 0] != floor.wet_map[:, -1])
+    assert seam < 0.1
+
+
+def test_cells_are_where_the_origin_says():
+    floor = Floor(np.array([[True, False, False], [False, False, True]]), 0.5, (-1.0, 2.0), FILM)
+    assert floor.wet(-0.9, 2.1) and floor.wet(-0.51, 2.49)
+    assert not floor.wet(-0.49, 2.1) and not floor.wet(-0.9, 2.51)
+    assert floor.wet(0.1, 2.6)
+    assert floor.wet(-0.9 - 1.5, 2.1 + 1.0)
+    assert floor.depth(-0.9, 2.1) == FILM
+    assert floor.depth(0.1, 2.1) == 0.0
+
+
+def test_wet_along_is_wet():
+    """Also on the edges of cells, where a quotient that is rounded falls into the next cell."""
+    floor = Floor.patches(0.45, 0.2, FILM, 1)
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(-30.0, 30.0, (2, 2000))
+    edges = floor.origin[0] + floor.cell * np.arange(-3000, 3000)
+    x = np.concatenate([x, edges, np.arange(-500, 500) * 0.02])
+    y = np.resize(np.concatenate([y, edges]), x.shape)
+    expected = [floor.wet(*place) for place in zip(x.tolist(), y.tolist(), strict=True)]
+    found = floor.wet_along(x, y)
+    assert found.dtype == bool
+    assert found.tolist() == expected
+    assert floor.wet_along(x.reshape(2, -1), y.reshape(2, -1)).shape == (2, len(x) // 2)
+
+
+@pytest.mark.parametrize('wet', [True, False])
+def test_uniform(wet):
+    floor = Floor.uniform(wet, FILM)
+    assert floor.wet(-17.3, 1e3) is wet
+    assert floor.depth(0.0, 0.0) == (FILM if wet else 0.0)
+    assert floor.wet_along(np.zeros(3), np.ones(3)).tolist() == [wet] * 3
+
+
+@pytest.mark.parametrize('fraction', [0.0, 1.0, -0.1, 1.1, math.nan])
+def test_bad_wet_fraction(fraction):
+    with pytest.raises(InvalidInput, match='wet_fraction'):
+        Floor.patches(fraction, 1.0, FILM, 0)
+
+
+@pytest.mark.parametrize('fraction', [0.1, 0.45, 0.95])
+def test_patch_lengths_that_no_floor_can_show(fraction):
+    shortest, longest = patch_lengths(fraction)
+    for length in (0.99 * shortest, 1.01 * longest, math.nan, 0.0):
+        with pytest.raises(InvalidInput, match=r'patch_length = .* m: .*has room for'):
+            Floor.patches(fraction, length, FILM, 0)
+    for length in (shortest, longest):
+        assert Floor.patches(fraction, length, FILM, 0).wet_map.any()
+
+
+@pytest.mark.parametrize('seed', [-1, 0.5, None])
+def test_bad_seed(seed):
+    with pytest.raises(InvalidInput, match='seed'):
+        Floor.patches(0.4, 1.0, FILM, seed)

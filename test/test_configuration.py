@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+import re
+
+import pytest
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.errors import ConfigError
+
+
+def table(text, tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text(text, encoding='utf-8')
+    return Table.load(path)
+
+
+# --- numbers ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'written, value',
+    [
+        ('90e3', 90000.0),  # text for PyYAML
+        ('90e+3', 90000.0),
+        ('90.0e+3', 90000.0),
+        ('1e-6', 1e-6),
+        ('.5', 0.5),
+        ('7', 7.0),
+        ('-0.0', 0.0),
+        ("'12'", 12.0),
+    ],
+)
+def test_numbers(tmp_path, written, value):
+    found = table(f'key: {written}', tmp_path).number('key', 'Pa')
+    assert found == value
+    assert isinstance(found, float)
+
+
+@pytest.mark.parametrize(
+    'written',
+    [
+        '.nan', 'nan', "'nan'", '.inf', '-.inf', 'inf', 'Infinity', 'true', 'yes', 'null', '~', '',
+        '[1]', '{a: 1}', 'fast', '12 Pa', '1' + 400 * '0', '1e999', '2026-01-01',
+    ],
+)  # fmt: skip
+def test_what_is_no_finite_number(tmp_path, written):
+    with pytest.raises(ConfigError, match=r'some\.yaml: key = .* is not allowed: a number') as e:
+        table(f'key: {written}', tmp_path).number('key', 'Pa')
+    assert 'Pa is needed' in str(e.value)
+
+
+@pytest.mark.parametrize('written', ['0.9', '5.1', '-3'])
+def test_range_and_unit_of_numbers(tmp_path, written):
+    message = f'some.yaml: key = {float(written)} is not allowed: a number from 1 to 5 N'
+    with pytest.raises(ConfigError) as caught:
+        table(f'key: {float(written)}', tmp_path).number('key', 'N', 1.0, 5.0)
+    assert message in str(caught.value)
+
+
+def test_ends_of_a_range_are_inside(tmp_path):
+    values = table('low: 1\nhigh: 5.0', tmp_path)
+    assert values.number('low', 'N', 1.0, 5.0) == 1.0
+    assert values.number('high', 'N', 1.0, 5.0) == 5.0
+
+
+def test_defaults(tmp_path):
+    values = table('other: 1', tmp_path)
+    assert values.number('key', 'N', default=3.0) == 3.0
+    assert values.text('name', default='x') == 'x'
+    assert values.integer('count', 0, 9, default=2) == 2
+    assert values.choice('kind', ('a', 'b'), default='b') == 'b'
+    assert 'other' in values and 'key' not in values
+
+
+def test_missing_key(tmp_path):
+    with pytest.raises(ConfigError, match=r"some\.yaml: key 'key' is missing"):
+        table('other: 1', tmp_path).number('key', 'N')
+
+
+# --- other kinds ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('written', ['0', '11', '1.5', '3.0', 'true', 'three', '~', '1e3'])
+def test_bad_integers(tmp_path, written):
+    with pytest.raises(ConfigError, match='key = .*: a whole number from 1 to 10 is needed'):
+        table(f'key: {written}', tmp_path).integer('key', 1, 10)
+
+
+@pytest.mark.parametrize('written', ['c', 'A', '1', '[a]', 'null', 'no'])
+def test_bad_choices(tmp_path, written):
+    with pytest.raises(ConfigError, match=r'key = .* is not allowed: one of a, b is needed'):
+        table(f'key: {written}', tmp_path).choice('key', ('a', 'b'))
+
+
+@pytest.mark.parametrize('written', ['1', 'true', '~', '[a]', '2026-01-01'])
+def test_bad_texts(tmp_path, written):
+    with pytest.raises(ConfigError, match=r'key = .* is not allowed: text is needed'):
+        table(f'key: {written}', tmp_path).text('key')
+
+
+def test_nested_tables_say_where(tmp_path):
+    values = table('outer:\n  inner:\n    key: -1', tmp_path)
+    with (
+        pytest.raises(ConfigError, match=r'some\.yaml: outer: inner: key = -1'),
+        values.table('outer') as outer,
+        outer.table('inner') as inner,
+    ):
+        inner.number('key', 'm', 0.0)
+
+
+@pytest.mark.parametrize('written', ['5', '~', '[1, 2]', 'word'])
+def test_nested_table_that_is_none(tmp_path, written):
+    with (
+        pytest.raises(ConfigError, match=r'some\.yaml: part: expected a table of keys'),
+        table(f'part: {written}', tmp_path).table('part'),
+    ):
+        pass
+
+
+def test_unknown_key_and_the_nearest(tmp_path):
+    values = table('frictoin: 1', tmp_path)
+    values.number('friction', '', default=0.0)
+    values.number('pads', '', default=0.0)
+    with pytest.raises(ConfigError) as caught:
+        values.finish()
+    message = str(caught.value)
+    assert "unknown key 'frictoin'. Did you mean 'friction'? Allowed: friction, pads" in message
+
+
+def test_unknown_key_in_a_nested_table(tmp_path):
+    values = table('part: {a: 1, 7: 2}', tmp_path)
+    with (
+        pytest.raises(ConfigError, match=r'part: unknown key 7\. *Allowed: a'),
+        values.table('part') as part,
+    ):
+        part.number('a', '')
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'text, message',
+    [
+        ('a: [1, 2', 'not valid YAML'),
+        ('a: 1\n b: 2', 'line 2, column 3: not valid YAML'),
+        ('a: 1\na: 2', r"line 2, column 1: not valid YAML: key 'a' is there twice"),
+        ('a:\n  b: 1\n  b: 2', r"line 3, column 3.*'b' is there twice"),
+        ('a: !!python/object/apply:os.system [ls]', 'not valid YAML'),
+        ('{[1]: 2}', 'not valid YAML'),
+        ('a: \x01', 'not valid YAML'),
+        ('', 'expected a table of keys, found None'),
+        ('- 1\n- 2', 'expected a table of keys'),
+        ('word', 'expected a table of keys'),
+    ],
+)
+def test_bad_yaml(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        table(text, tmp_path)
+    assert 'some.yaml' in str(caught.value)
+
+
+def test_unreadable_files(tmp_path):
+    path = tmp_path / 'latin.yaml'
+    path.write_bytes(b'name: caf\xe9')
+    for where in (path, tmp_path, tmp_path / 'none.yaml'):
+        with pytest.raises(ConfigError, match=re.escape(f'{where}: cannot be read')):
+            Table.load(where)
+
+
+@pytest.mark.parametrize('kind', ['feet', 'scenes'])
+def test_shipped_names(kind):
+    names = configuration.names(kind)
+    assert names == sorted(names) and names
+    for name in names:
+        path = configuration.locate(kind, name)
+        assert path.is_file() and path.stem == name
+        assert configuration.locate(kind, str(path)) == path
+        assert configuration.locate(kind, path) == path
+
+
+def test_unknown_names():
+    with pytest.raises(ConfigError) as caught:
+        configuration.locate('scenes', 'hexapod_patch')
+    message = str(caught.value)
+    assert "no scene named 'hexapod_patch'. Did you mean 'hexapod_patches'?" in message
+    assert ', '.join(configuration.names('scenes')) in message
+    with pytest.raises(ConfigError, match="no foot named 'qqq'. There are: "):
+        configuration.locate('feet', 'qqq')
+    with pytest.raises(ConfigError, match=r'nowhere/my\.yaml: no such file'):
+        configuration.locate('scenes', 'nowhere/my.yaml')
+
+
+def test_shared_folder_of_an_installed_package(tmp_path, monkeypatch):
+    share = tmp_path / 'share' / 'ros_pad' / 'config'
+    (share / 'scenes').mkdir(parents=True)
+    (tmp_path / 'lib' / 'ros_pad').mkdir(parents=True)
+    monkeypatch.setattr(configuration, '__file__', str(tmp_path / 'lib/ros_pad/configuration.py'))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path}')
+    assert configuration.shared_folder() == share
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '')
+    monkeypatch.setattr(configuration.sys, 'prefix', '/nowhere')
+    with pytest.raises(ConfigError, match='no config folder of ros_pad found; looked in'):
+        configuration.shared_folder()
+
+
+def test_nothing_is_infinite_by_default(tmp_path):
+    """Without a range any finite number is allowed, and no other."""
+    assert table('key: -1.0e+308', tmp_path).number('key', '') == -1e308
+    assert not math.isinf(table('key: 1.7e+308', tmp_path).number('key', ''))
