@@ -47,7 +47,7 @@ PARAMETERS = (
         'scene', '', 'Scene whose ground the oracle sees; other policies need none.',
         read=lambda name: Scene.load(name) if name else None,
     ),
-    dataclasses.replace(SEED, description='Of that ground.'),
+    dataclasses.replace(SEED, description='Seed of that ground.'),
 )  # fmt: skip
 
 

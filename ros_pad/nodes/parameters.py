@@ -132,7 +132,7 @@ FOOT = Parameter(
 SCENE = Parameter(
     'scene', 'hexapod_patches', 'Name of a scene, or path of a YAML file.', read=Scene.load
 )
-SEED = Parameter('seed', 0, 'Of floor and sensor noise.', '', 0, 2**31 - 1)
+SEED = Parameter('seed', 0, 'Seed of the floor and of the sensor noise.', '', 0, 2**31 - 1)
 EXPECTED_LOAD = Parameter(
     'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',
     'N', 0.01, 1000.0,
