@@ -83,7 +83,7 @@ def test_missing_key(tmp_path):
 
 @pytest.mark.parametrize('written', ['0', '11', '1.5', '3.0', 'true', 'three', '~', '1e3'])
 def test_bad_integers(tmp_path, written):
-    with pytest.raises(ConfigError, match='key = .*: a whole number from 1 to 10 is needed'):
+    with pytest.raises(ConfigError, match=r'key = .*: a whole number from 1 to 10 is needed'):
         table(f'key: {written}', tmp_path).integer('key', 1, 10)
 
 
@@ -186,7 +186,7 @@ def test_unknown_names():
     message = str(caught.value)
     assert "no scene named 'hexapod_patch'. Did you mean 'hexapod_patches'?" in message
     assert ', '.join(configuration.names('scenes')) in message
-    with pytest.raises(ConfigError, match="no foot named 'qqq'. There are: "):
+    with pytest.raises(ConfigError, match=r"no foot named 'qqq'\. There are: "):
         configuration.locate('feet', 'qqq')
     with pytest.raises(ConfigError, match=r'nowhere/my\.yaml: no such file'):
         configuration.locate('scenes', 'nowhere/my.yaml')

@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.simulation import Scene
+from ros_pad.simulation.gait import TRIPODS
+from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.scene import FloorPlan
+from ros_pad.simulation.scene import Tow
+from ros_pad.simulation.terrain import Floor
+
+SHIPPED = Scene.load('hexapod_patches')
+BODY, GAIT = SHIPPED.body, SHIPPED.gait
+WEIGHT = BODY.mass * 9.81
+FLAT = [0.0] * 6
+DRY, WET = Floor.uniform(False, 3e-4), Floor.uniform(True, 3e-4)
+RIGHT_WET = Floor(np.array([[True], [False]]), 50.0, (0.0, -50.0), 3e-4)
+LEFT_WET = Floor(np.array([[False], [True]]), 50.0, (0.0, -50.0), 3e-4)
+
+
+def scene_of(friction=None, **changes):
+    """Return the main scene with other parts; ``friction`` makes dry feet plain Coulomb ones."""
+    values = {'settle': 0.0, 'heading_gain': 0.0, 'tow': Tow()} | changes
+    if friction is not None:
+        values['foot'] = dataclasses.replace(
+            SHIPPED.foot, friction=friction, shear_strength=0.0, boundary_friction=0.1
+        )
+    return dataclasses.replace(SHIPPED, **values)
+
+
+def robot_of(scene, floor=DRY, period=0.004):
+    return PlanarHexapod(scene, floor, period)
+
+
+def walk(robot, cycles, each=lambda: None, pressures=FLAT):
+    for _ in range(round(cycles * GAIT.cycle / robot.period)):
+        robot.step(pressures)
+        each()
+    return robot.body
+
+
+# --- loads ------------------------------------------------------------------------------------
+
+
+def moments(robot):
+    """Return ΣN, and ΣN x and ΣN y about the body's centre in its own axes."""
+    x, y, heading = robot.body
+    cosine, sine = math.cos(heading), math.sin(heading)
+    total = np.zeros(3)
+    for foot in robot.feet:
+        dx, dy = foot.position[0] - x, foot.position[1] - y
+        ahead, left = cosine * dx + sine * dy, cosine * dy - sine * dx
+        total += foot.force[2] * np.array([1.0, ahead, left])
+    return total
+
+
+def test_loads_of_a_robot_at_rest():
+    robot = robot_of(scene_of(settle=1.0))
+    for _ in range(200):
+        robot.step(FLAT)
+        assert moments(robot) == pytest.approx([WEIGHT, 0.0, 0.0], abs=1e-9)
+    # Six feet, a tripod's worth of share each half: all stand.
+    assert all(foot.standing for foot in robot.feet)
+    assert robot.body == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize('tow', [Tow(), SHIPPED.tow])
+def test_loads_balance_weight_and_moments_in_a_walk(tow):
+    """ΣN x = -H ΣF + (h - H) D, D the tow's force: from Newton's law of the body's path."""
+    robot = robot_of(scene_of(tow=tow))
+    period, path, forces, loads = robot.period, [robot.body], [], []
+
+    def note():
+        path.append(robot.body)
+        forces.append(sum(foot.force[0] for foot in robot.feet))
+        loads.append(moments(robot))
+
+    walk(robot, 2.0, note)
+    assert robot.verdict is None
+    loads, forces = np.array(loads), np.array(forces)
+    assert loads[:, 0] == pytest.approx(np.full(len(loads), WEIGHT), rel=1e-12)
+    speed = np.diff([place[0] for place in path]) / period
+    acceleration = np.diff(speed, prepend=0.0) / period
+    pull = BODY.mass * acceleration - forces
+    expected = -BODY.height * forces + (tow.height - BODY.height) * pull
+    # The loads of a step are those of the forces of the step before.
+    assert loads[1:, 1] == pytest.approx(expected[:-1], abs=0.02 * np.abs(expected).max())
+    assert np.abs(expected).max() > 0.1
+
+
+def test_speeding_up_loads_the_hind_feet():
+    robot = robot_of(scene_of(friction=2.0))
+    for _ in range(round(1.0 * GAIT.cycle / robot.period)):
+        robot.step(FLAT)
+        push = sum(foot.force[0] for foot in robot.feet)
+        if push > 2.0:
+            break
+    before = push
+    robot.step(FLAT)
+    assert before > 2.0
+    assert moments(robot)[1] < -0.5 * BODY.height * before
+
+
+@pytest.mark.parametrize('height', [0.12, 1.2])
+def test_tip_over(height):
+    """At 4π S/T² = 2.0 m/s² a body tips about the feet some 0.1 m behind its centre at 0.5 m."""
+    body = dataclasses.replace(BODY, height=height)
+    robot = robot_of(scene_of(friction=2.0, body=body))
+    walk(robot, 1.0)
+    if height < 0.5:
+        assert robot.verdict is None
+    else:
+        assert 'tip-over at 0.' in robot.verdict
+        assert 'would have to pull' in robot.verdict
+    assert all(foot.force[2] >= 0.0 for foot in robot.feet)
+
+
+# --- walking ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('period', [0.001, 0.004])
+def test_dry_level_walk_advances_a_stride_a_cycle(period):
+    robot = robot_of(scene_of(friction=0.8), period=period)
+    x, y, heading = walk(robot, 5.0)
+    assert x == pytest.approx(5 * GAIT.stride, rel=5e-3)
+    assert abs(y) < 1e-3 and abs(heading) < 2e-3
+    assert robot.verdict is None
+    assert max(foot.slip_path for foot in robot.feet) < 5 * 2e-3
+
+
+def test_symmetric_walk_does_not_drift():
+    """The tripods mirror each other half a cycle apart: sway, but no way aside in the long run."""
+    robot = robot_of(scene_of(friction=0.15, tow=SHIPPED.tow))
+    ends = []
+    for _ in range(8):
+        ends.append(walk(robot, 1.0))
+    ends = np.array(ends)
+    # It slips a good deal of each stride, so that this is no walk on rails.
+    assert ends[-1, 0] < 0.9 * 8 * GAIT.stride
+    drift = (ends[-1] - ends[1]) / 6.0
+    assert abs(drift[1]) < 1e-3
+    assert abs(drift[2]) < math.radians(0.2)
+
+
+def test_friction_coefficient_that_a_level_walk_needs():
+    """μ g must exceed the peak acceleration 4π S/T² = 2.01 m/s²: μ = 0.205."""
+    slip = {}
+    for friction in (0.15, 0.19, 0.25, 0.3):
+        robot = robot_of(scene_of(friction=friction))
+        walk(robot, 3.0)
+        slip[friction] = sum(foot.slip_path for foot in robot.feet)
+    assert GAIT.peak_acceleration == pytest.approx(2.0106, rel=1e-4)
+    assert slip[0.15] > slip[0.19] > 5.0 * slip[0.3]
+    # Low friction alone hardly slows a level walk: what a foot loses at first it gains later.
+    x, _, _ = walk(robot_of(scene_of(friction=0.1)), 5.0)
+    assert x > 0.9 * 5 * GAIT.stride
+
+
+@pytest.mark.parametrize('floor, side', [(RIGHT_WET, -1.0), (LEFT_WET, 1.0)])
+def test_wet_on_one_side_turns_the_robot_to_it(floor, side):
+    """Feet on the dry side push more: the body turns towards the wet one."""
+    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
+    robot = robot_of(scene_of(tow=tow), floor)
+    _, y, heading = walk(robot, 4.0)
+    assert side * heading > math.radians(1.0)
+    assert side * y > 0.0
+
+
+def test_mirrored_robot_on_a_mirrored_floor():
+    """Each leg on the other side: the same walk, mirrored. Nothing in the model is handed."""
+    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
+    mirrored = dataclasses.replace(BODY, homes=tuple((x, -y) for x, y in BODY.homes))
+    one = walk(robot_of(scene_of(tow=tow), RIGHT_WET), 6.0)
+    other = walk(robot_of(scene_of(tow=tow, body=mirrored), LEFT_WET), 6.0)
+    assert abs(one[2]) > math.radians(1.0)
+    assert other == pytest.approx((one[0], -one[1], -one[2]), abs=1e-6)
+
+
+def test_heading_hold_steers_back():
+    tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
+    free = walk(robot_of(scene_of(tow=tow), RIGHT_WET), 6.0)
+    held = walk(robot_of(scene_of(tow=tow, heading_gain=1.0), RIGHT_WET), 6.0)
+    assert abs(held[2]) < 0.5 * abs(free[2])
+    # On grip, a heading decays as exp(-gain t): 0.2 rad, gain 0.5/s, 4 s.
+    robot = robot_of(scene_of(friction=2.0, heading_gain=0.5))
+    robot._heading = 0.2
+    _, _, heading = walk(robot, 4.0)
+    assert heading == pytest.approx(0.2 * math.exp(-2.0), rel=0.05)
+
+
+def test_turned_robot_walks_where_it_points():
+    straight = robot_of(scene_of(friction=0.5))
+    turned = robot_of(scene_of(friction=0.5))
+    turned._heading = 0.7
+    for robot in (straight, turned):
+        walk(robot, 2.0)
+    x, y, heading = turned.body
+    ahead, aside, _ = straight.body
+    assert heading == pytest.approx(0.7 + straight.body[2], abs=1e-9)
+    assert x == pytest.approx(ahead * math.cos(0.7) - aside * math.sin(0.7), abs=1e-9)
+    assert y == pytest.approx(ahead * math.sin(0.7) + aside * math.cos(0.7), abs=1e-9)
+
+
+def test_tow_drag():
+    """In the mean over cycles the feet push as hard as the load drags: 12 N · 0.3 = 3.6 N."""
+    tow = Tow(weight=12.0, friction_dry=0.3, friction_wet=0.1, height=0.03)
+    pushes = []
+    robot = robot_of(scene_of(friction=0.8, tow=tow))
+    walk(robot, 2.0)
+    walk(robot, 4.0, lambda: pushes.append(sum(foot.force[0] for foot in robot.feet)))
+    # At the change of tripods the body stands for a moment, and the line gives a little.
+    assert np.mean(pushes) == pytest.approx(3.6, rel=0.05)
+    reached = [
+        walk(robot_of(scene_of(friction=0.25, tow=dataclasses.replace(tow, weight=w))), 4.0)[0]
+        for w in (0.0, 6.0, 12.0)
+    ]
+    assert reached[0] > reached[1] > reached[2]
+    # 12 N · 0.3 and nothing for speeding up: more than 0.17 · 20.5 N of grip cannot give.
+    stuck = walk(robot_of(scene_of(friction=0.15, tow=tow)), 4.0)[0]
+    assert stuck < 0.1 * 4 * GAIT.stride
+
+
+def test_tow_feels_the_ground_behind_the_robot():
+    floor = Floor(np.array([[True, False]]), 50.0, (0.0, -1.0), 3e-4)  # wet from x = 0 to 50
+    tow = Tow(weight=12.0, friction_dry=0.5, friction_wet=0.0, distance=0.3, height=0.03)
+    scene = scene_of(tow=tow, friction=0.8)
+    foot = dataclasses.replace(scene.foot, boundary_friction=0.8)  # the feet do not mind water
+    robot = robot_of(dataclasses.replace(scene, foot=foot), floor)
+    caps = []
+    walk(robot, 4.0, lambda: caps.append((robot.body[0] - 0.3, robot._sled.cap)))
+    last = 0.0
+    for behind, cap in caps:
+        if abs(behind) > 1e-2:
+            assert cap == (0.0 if behind > 0.0 else 6.0)
+            last = max(last, behind)
+    assert last > 0.05
+
+
+# --- feet -------------------------------------------------------------------------------------
+
+
+def test_standing_feet_stay_where_they_are():
+    """With grip to spare a marker moves by no more than its pads shear: 2 N / 5000 N/m."""
+    robot = robot_of(scene_of(friction=2.0, heading_gain=1.0))
+    robot._heading = 0.1
+    tracks = [[] for _ in range(6)]
+
+    def note():
+        for track, foot in zip(tracks, robot.feet, strict=True):
+            track.append(foot.position if foot.standing else None)
+
+    walk(robot, 4.0, note)
+    stances = [
+        np.array(list(group))
+        for track in tracks
+        for stands, group in itertools.groupby(track, lambda place: place is not None)
+        if stands
+    ]
+    assert len(stances) >= 6 * 4
+    for places in stances[6:]:
+        assert np.ptp(places[:, :2], axis=0).max() < 1.5e-3
+        assert (places[:, 2] == 0.0).all()
+    assert max(foot.position[2] for foot in robot.feet) <= GAIT.lift
+
+
+def test_forces_and_grip():
+    robot = robot_of(scene_of(tow=SHIPPED.tow), WET)
+    slipped = 0
+
+    def check():
+        nonlocal slipped
+        for foot in robot.feet:
+            pull = math.hypot(*foot.force[:2])
+            assert foot.standing == (foot.force[2] > 0.0)
+            assert pull <= foot.grip + 1e-12
+            if foot.slip_speed > 0.0:
+                slipped += 1
+                assert pull == pytest.approx(foot.grip, rel=1e-9)
+            if foot.standing:
+                assert foot.wet
+
+    walk(robot, 2.0, check)
+    assert slipped > 100
+
+
+def test_only_one_tripod_is_down_at_mid_stance():
+    robot = robot_of(scene_of())
+    walk(robot, 0.25)
+    assert tuple(leg for leg, foot in zip(robot.legs, robot.feet, strict=True)
+                 if foot.standing) == TRIPODS[0]  # fmt: skip
+    walk(robot, 0.5)
+    assert tuple(leg for leg, foot in zip(robot.legs, robot.feet, strict=True)
+                 if foot.standing) == TRIPODS[1]  # fmt: skip
+
+
+def test_pressures_reach_the_feet():
+    """On wet ground domes hold and flat feet float; 60 kPa is past the limit of 37 pads."""
+    grips, overloads = {}, {}
+    for pressure in (0.0, 60e3, 75e3):
+        robot = robot_of(scene_of(), WET)
+        walk(robot, 0.3, pressures=[pressure] * 6)
+        grips[pressure] = robot.feet[0].grip / robot.feet[0].force[2]
+        overloads[pressure] = robot.feet[0].overload_time
+    assert grips[0.0] == pytest.approx(0.12, rel=1e-3)
+    assert grips[0.0] < 0.8 * grips[60e3] < 0.8 * grips[75e3]
+    assert overloads[0.0] == overloads[75e3] == 0.0
+    assert overloads[60e3] > 0.1
+
+
+def test_dissipation():
+    """Slipping feet lose their grip times their way; a walk with grip to spare loses nothing."""
+    robot = robot_of(scene_of(tow=SHIPPED.tow), WET)
+    lost = [0.0]
+
+    def note():
+        lost[0] += sum(foot.grip * foot.slip_speed * robot.period for foot in robot.feet)
+
+    walk(robot, 2.0, note)
+    assert robot.dissipation == pytest.approx(lost[0], rel=1e-9)
+    assert robot.dissipation > 0.1
+    path = sum(foot.slip_path for foot in robot.feet)
+    assert robot.dissipation < path * 0.12 * WEIGHT / 2.0
+    grip = robot_of(scene_of(friction=2.0))
+    walk(grip, 2.0)
+    assert grip.dissipation < 1e-3
+
+
+def test_result_does_not_hang_on_the_step():
+    """Distance on a slippery floor, domes and all, at 4, 2 and 1 ms: it converges."""
+    ends = []
+    for period in (0.004, 0.002, 0.001):
+        robot = robot_of(scene_of(tow=SHIPPED.tow), WET, period)
+        ends.append(walk(robot, 4.0, pressures=[70e3] * 6)[0])
+    assert ends[0] == pytest.approx(ends[2], rel=0.02)
+    assert abs(ends[1] - ends[2]) < abs(ends[0] - ends[2])
+
+
+def test_the_same_twice():
+    one, other = (robot_of(scene_of(tow=SHIPPED.tow), WET) for _ in range(2))
+    assert walk(one, 2.0) == walk(other, 2.0)
+    assert [f.force for f in one.feet] == [f.force for f in other.feet]
+
+
+def test_floor_of_the_scene_is_not_needed():
+    """A robot walks on the floor that it is given, whatever its scene says."""
+    plan = FloorPlan('wet', 3e-4, 1e-3)
+    robot = robot_of(scene_of(floor=plan), DRY)
+    walk(robot, 1.0)
+    assert not any(foot.wet for foot in robot.feet)

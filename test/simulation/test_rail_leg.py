@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+
+from ros_pad.estimation import FootEstimator
+from ros_pad.simulation import Scene
+from ros_pad.simulation.rail_leg import RailLeg
+from ros_pad.simulation.scene import FloorPlan
+from ros_pad.simulation.scene import RailBody
+from ros_pad.simulation.scene import RailGait
+
+SHIPPED = Scene.load('leg_dry_flat')
+MASS, DRAG, LOAD = 1.0, 0.5, 2.0
+STROKE, STANCE, SWING = 0.05, 0.5, 0.5
+
+
+def scene_of(cap, drag=DRAG, settle=0.0, **gait):
+    """Return a scene on dry ground whose flat foot holds exactly ``cap`` newtons."""
+    foot = dataclasses.replace(SHIPPED.foot, friction=cap / LOAD, shear_strength=0.0)
+    values = {'stroke': STROKE, 'stance': STANCE, 'swing': SWING, 'lift': 0.02} | gait
+    return dataclasses.replace(
+        SHIPPED,
+        body=RailBody(mass=MASS, rolling_drag=drag, load=LOAD, goal=1.0),
+        gait=RailGait(**values),
+        foot=foot,
+        floor=FloorPlan('dry', 3e-4, 1e-3),
+        settle=settle,
+    )
+
+
+def leg_of(scene, period=1e-3, kind=RailLeg):
+    return kind(scene, scene.floor.build(0), period)
+
+
+def walk(leg, cycles, each=lambda: None):
+    for _ in range(round(cycles * (STANCE + SWING) / leg.period)):
+        leg.step([0.0])
+        each()
+    return leg.body[0]
+
+
+class SteadyLeg(RailLeg):
+    """A foot that goes back at constant speed in stance, as the closed form wants it."""
+
+    def _plan(self, time):
+        stands, offset, height = super()._plan(time)
+        since = time % (STANCE + SWING)
+        if stands:
+            offset = STROKE * (0.5 - since / STANCE)
+        return stands, offset, height
+
+
+def test_closed_form_of_a_slipping_foot():
+    """At constant foot speed: d = ½ a Ts² (1 + a M/F), a = (c - F)/M.
+
+    The body gains a Ts while it is pushed, and coasts v²/(2 F/M) further in the swing. It holds
+    while a Ts is less than the speed of the foot, 0.1 m/s, and the coasting shorter than a swing.
+    """
+    for cap in (0.51, 0.55, 0.65):
+        a = (cap - DRAG) / MASS
+        assert a * STANCE < STROKE / STANCE and a * STANCE * MASS / DRAG < SWING
+        expected = 0.5 * a * STANCE**2 * (1.0 + a * MASS / DRAG)
+        errors = []
+        for period in (2e-3, 1e-3, 5e-4):
+            leg = leg_of(scene_of(cap), period, SteadyLeg)
+            errors.append(walk(leg, 1.0) / expected - 1.0)
+        assert abs(errors[1]) < 0.01
+        assert abs(errors[2]) < 0.6 * abs(errors[1]) < 0.36 * abs(errors[0]) * 1.05
+
+
+def smooth_cycle(cap, drag, cycles):
+    """Integrate M v' = c tanh((u - v)/w) - F tanh(v/w) with LSODA: another way, w = 10 um/s."""
+    width = 1e-5
+
+    def motion(time, state):
+        since = time % (STANCE + SWING)
+        speed = state[1]
+        force = -drag * math.tanh(speed / width)
+        if since < STANCE:
+            back = 0.5 * math.pi * STROKE / STANCE * math.sin(math.pi * since / STANCE)
+            force += cap * math.tanh((back - speed) / width)
+        return [speed, force / MASS]
+
+    state = [0.0, 0.0]
+    for cycle in range(cycles):
+        for start, end in ((0.0, STANCE), (STANCE, STANCE + SWING)):
+            solution = solve_ivp(
+                motion,
+                (cycle * (STANCE + SWING) + start, cycle * (STANCE + SWING) + end - 1e-12),
+                state,
+                method='LSODA',
+                rtol=1e-8,
+                atol=1e-10,
+                max_step=2e-3,
+            )
+            assert solution.success
+            state = solution.y[:, -1]
+    return state[0]
+
+
+@pytest.mark.parametrize('cap', [0.4, 0.53, 0.6, 0.75, 1.2, 3.0])
+def test_half_cosine_stroke_against_smooth_friction(cap):
+    """The foot's own speed is a half sine: pushed, overtaken and braked, as the cap allows."""
+    expected = smooth_cycle(cap, DRAG, 2)
+    assert walk(leg_of(scene_of(cap), 2.5e-4), 2.0) == pytest.approx(expected, rel=3e-3, abs=3e-5)
+
+
+def test_strong_foot_takes_the_body_along():
+    """No slip on any part of the stroke needs c > M π² S/(2 Ts²) + F = 1.49 N."""
+    leg = leg_of(scene_of(1.6))
+    moved = walk(leg, 10.0)
+    assert moved == pytest.approx(10 * STROKE, rel=2e-3)
+    assert leg.feet[0].slip_path < 1e-3 * moved
+    assert leg.dissipation < 1e-3
+    weak = leg_of(scene_of(1.3))
+    walk(weak, 10.0)
+    assert weak.feet[0].slip_path > 1e-3
+
+
+@pytest.mark.parametrize('cap', [0.0, 0.3, 0.499])
+def test_threshold(cap):
+    """A foot that holds less than the wheels does not move the body at all, and slips."""
+    leg = leg_of(scene_of(cap))
+    assert walk(leg, 3.0) == 0.0
+    assert leg.feet[0].slip_path == pytest.approx(3 * STROKE, rel=1e-2)
+    assert leg.dissipation == pytest.approx(3 * STROKE * cap, rel=1e-2)
+
+
+def test_near_the_threshold_one_per_cent_of_friction_is_worth_many():
+    """d ln d/d ln c = c/(c - F) (1 + a/(a + F/M)) by the closed form: 19 at c = 1.06 F."""
+    cap = 1.06 * DRAG
+    one, more = (
+        walk(leg_of(scene_of(c), 5e-4, SteadyLeg), 1.0) for c in (cap * 0.995, cap * 1.005)
+    )
+    gain = math.log(more / one) / 0.01
+    assert gain == pytest.approx(1.06 / 0.06 * (1.0 + 0.06 / 1.06), rel=0.02)
+
+
+def test_momentum_and_both_stick():
+    """M dv/dt = force - drag: where the body rolls, the drag is F; at rest it is at most F."""
+    leg = leg_of(scene_of(0.7))
+    speeds, forces, caps = [0.0], [], []
+    last = [0.0]
+
+    def note():
+        speeds.append((leg.body[0] - last[0]) / leg.period)
+        last[0] = leg.body[0]
+        forces.append(leg.feet[0].force[0])
+        caps.append(leg.feet[0].grip)
+
+    walk(leg, 3.0, note)
+    speeds, forces, caps = map(np.array, (speeds, forces, caps))
+    drag = forces - MASS * np.diff(speeds) / leg.period
+    rolling = np.abs(speeds[1:]) > 1e-12
+    assert rolling.any() and not rolling.all()
+    assert drag[rolling] == pytest.approx(DRAG * np.sign(speeds[1:][rolling]), abs=1e-9)
+    assert np.abs(drag[~rolling]).max() <= DRAG + 1e-9
+    assert (np.abs(forces) <= caps + 1e-9).all()
+    # While it settles neither foot nor wheels move.
+    still = leg_of(scene_of(0.7, settle=1.0))
+    walk(still, 0.99)
+    assert still.body == (0.0, 0.0, 0.0)
+    assert still.feet[0].force == (0.0, 0.0, LOAD)
+    assert still.feet[0].standing
+
+
+def test_step_is_the_minimum_of_its_convex_function():
+    """½ (v - v0)² + (dt/M) (c |v - u| + F |v|), minimised by golden section."""
+    leg = leg_of(scene_of(1.0))
+    rng = np.random.default_rng(0)
+    seen = set()
+    for _ in range(300):
+        before, back = rng.uniform(-0.2, 0.2, 2)
+        cap = rng.choice([0.0, rng.uniform(0.0, 3.0)])
+        dt = rng.choice([1e-3, 0.05, 0.2])
+
+        def function(v, before=before, back=back, cap=cap, dt=dt):
+            return 0.5 * (v - before) ** 2 + dt / MASS * (cap * abs(v - back) + DRAG * abs(v))
+
+        found = minimize_scalar(
+            function, bounds=(-0.5, 0.5), method='bounded', options={'xatol': 1e-12}
+        ).x
+        leg._speed = before
+        force = leg._push(cap, back, dt)
+        assert leg._speed == pytest.approx(found, abs=2e-7)
+        assert function(leg._speed) <= function(found) + 1e-15
+        assert abs(force) <= cap + 1e-12
+        seen.add('rest' if leg._speed == 0.0 else 'stick' if leg._speed == back else 'slip')
+    assert seen == {'rest', 'stick', 'slip'}
+
+
+def test_dissipation_is_the_work_of_the_slipping_foot():
+    """Work that the foot's drive puts in = slip + wheels + kinetic energy."""
+    leg = leg_of(scene_of(0.6), 2e-4)
+    put_in, rolled = [0.0], [0.0]
+    last = [0.0, leg.feet[0].position[0]]
+
+    def note():
+        x = leg.body[0]
+        rolled[0] += DRAG * abs(x - last[0])
+        foot = x + leg._offset
+        back = (x - last[0]) - (foot - last[1])  # of the body over the foot
+        put_in[0] += leg.feet[0].force[0] * back
+        last[:] = [x, foot]
+
+    last[1] = leg._offset
+    walk(leg, 2.3, note)
+    kinetic = 0.5 * MASS * leg._speed**2
+    assert put_in[0] == pytest.approx(leg.dissipation + rolled[0] + kinetic, rel=5e-3)
+    assert leg.dissipation > 0.1 * rolled[0]
+
+
+def test_marker_rides_on_soft_pads():
+    """An estimator that takes the pads' shear off sees a foot that stands as one that stands."""
+    scene = dataclasses.replace(
+        scene_of(1.6), foot=dataclasses.replace(scene_of(1.6).foot, shear_stiffness=500.0)
+    )
+    leg = leg_of(scene, 0.004)
+    estimator = FootEstimator(scene.foot, LOAD)
+    fastest = slips = 0.0
+    standing = 0
+    for step in range(1, 2000):
+        leg.step([0.0])
+        foot = leg.feet[0]
+        estimate = estimator.update(step * 0.004, foot.force, foot.position, 0.0)
+        if foot.standing and foot.slip_speed < 1e-9:
+            standing += 1
+            fastest = max(fastest, abs(estimate.slip_speed))
+        slips += estimate.slipping
+    assert standing > 500
+    assert fastest < 2e-3
+    assert slips == 0
+
+
+def test_plan_of_the_foot():
+    leg = leg_of(scene_of(1.6, settle=0.25), 1e-3)
+    heights, standing = [], []
+    walk(leg, 2.25, lambda: (heights.append(leg.feet[0].position[2]), standing.append(
+        leg.feet[0].standing)))  # fmt: skip
+    heights, standing = np.array(heights), np.array(standing)
+    assert heights.max() == pytest.approx(0.02, rel=1e-4)
+    assert (heights[standing] == 0.0).all()
+    assert standing[:250].all()
+    assert standing[250:].mean() == pytest.approx(0.5, abs=2e-3)
+
+
+def test_wet_domes_and_their_limit():
+    """Pressures reach the foot: film, load sharing and overload are the foot's own."""
+    wet = dataclasses.replace(SHIPPED, floor=FloorPlan('wet', 3e-4, 1e-3), settle=0.0)
+    grips = {}
+    for pressure in (0.0, 60e3, 75e3):
+        leg = leg_of(wet, 0.004)
+        for _ in range(120):
+            leg.step([pressure])
+        grips[pressure] = leg.feet[0].grip
+        assert leg.feet[0].wet
+        # 19 pads at 60 kPa carry 1.82 N of the 2.5 N, at 75 kPa all of it.
+        assert (leg.feet[0].overload_time > 0.0) == (pressure == 60e3)
+    assert grips[0.0] == pytest.approx(0.12 * 2.5, rel=1e-3)
+    assert grips[0.0] < grips[60e3] < grips[75e3]
