@@ -8,8 +8,8 @@ over the better of the two fixed shapes. Writes docs/charts/assumptions.json and
 Constants of the world (friction, floor, towed load, noise) change in the simulated world alone:
 estimator and controller go on believing the shipped files, as they would if the files were wrong.
 What an owner knows of a robot (mass, pads, sole, sensor rate) changes for both.
-Probabilities change in their odds, counts are rounded, and of the margin the part above one is
-halved or doubled.
+Probabilities change in their odds, counts are rounded, the sole grows with its pads, and of the
+margin the part above one is halved or doubled.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import argparse
 import datetime
 import inspect
 import json
+import math
 import multiprocessing
 import os
 import pathlib
@@ -68,6 +69,7 @@ class Setup:
     world: Scene
     told: Scene
     tuning: Tuning = field(default_factory=Tuning)
+    limit_error: float = 1.0  # factor on the force limit of pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
     prior: dict[str, Any] = field(default_factory=lambda: defaults(FrictionPrior.of, 'spread'))
     ground: dict[str, Any] = field(
@@ -100,7 +102,13 @@ class Assumption:
     @property
     def only_adaptive(self) -> bool:
         """Whether fixed shapes cannot feel it, for it is about beliefs."""
-        return self.path.split('.')[0] not in ('world', 'both', 'controller', 'load_error')
+        return self.path.split('.')[0] not in (
+            'world',
+            'both',
+            'controller',
+            'limit_error',
+            'load_error',
+        )
 
 
 FOOT = 'feet/large37.yaml: '
@@ -114,8 +122,8 @@ PRINTS = 'control/footprints.py: Footprints.'
 
 # fmt: off
 ASSUMPTIONS = (
-    Assumption(FOOT + 'pads', 'both.foot.pads', 'pads', '', 'whole'),
-    Assumption(FOOT + 'sole_radius', 'both.foot.sole_radius', 'sole radius', 'm'),
+    Assumption(FOOT + 'pads', 'both.foot.pads', 'pads', '', 'pads'),
+    Assumption('contact/limits.py: force_limit', 'limit_error', 'force limit of a pad', ''),
     Assumption(FOOT + 'friction', 'world.foot.friction', 'foot friction', ''),
     Assumption(FOOT + 'shear_strength', 'world.foot.shear_strength', 'shear strength', 'Pa'),
     Assumption(FOOT + 'conforming_pressure',
@@ -161,13 +169,14 @@ ASSUMPTIONS = (
     Assumption(MODEL + 'dead_time', 'world.regulator.dead_time', 'regulator dead time', 's'),
     Assumption(MODEL + 'dead_band', 'world.regulator.dead_band', 'regulator dead band', ''),
     Assumption(MODEL + 'quantum', 'world.regulator.quantum', 'regulator quantum', 'Pa'),
-    Assumption('expected load', 'load_error', 'expected load', ''),
+    Assumption('simulation/scene.py: Scene.expected_load', 'load_error', 'expected load', ''),
     Assumption(TUNING + 'load_gate', 'tuning.load_gate', 'load gate, estimator', ''),
     Assumption(TUNING + 'smoothing', 'tuning.smoothing', 'smoothing of speed', 's'),
     Assumption(TUNING + 'filter_period', 'tuning.filter_period', 'filter period', 's'),
     Assumption(TUNING + 'wet_prior', 'tuning.wet_prior', 'wet prior, estimator', '', 'odds'),
     Assumption(TUNING + 'patch_length', 'tuning.patch_length', 'patch length believed', 'm'),
     Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
+    Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
     Assumption(FILTER + 'FrictionPrior.spread', 'prior.spread', 'spread of friction', ''),
     Assumption(FILTER + 'GroundFilter.forgetting_time',
                'ground.forgetting_time', 'forgetting time', 's'),
@@ -203,7 +212,7 @@ def value_at(thing: Any, path: str) -> float:
     return thing
 
 
-def changed(thing: Any, path: str, value: float) -> Any:
+def changed(thing: Any, path: str, value: Any) -> Any:
     """Return a copy with another number at a dotted path."""
     name, _, rest = path.partition('.')
     if rest:
@@ -219,7 +228,7 @@ def scaled(value: float, factor: float, rule: str) -> float:
         return odds / (1.0 + odds)
     if rule == 'excess':
         return 1.0 + factor * (value - 1.0)
-    return max(1, int(factor * value)) if rule == 'whole' else factor * value
+    return max(1, int(factor * value)) if rule in ('whole', 'pads') else factor * value
 
 
 def baseline(setup: Setup, assumption: Assumption) -> float:
@@ -231,6 +240,10 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
     """Return a setup with one number wrong by a factor."""
     value = scaled(baseline(setup, assumption), factor, assumption.rule)
     place, _, rest = assumption.path.partition('.')
+    if assumption.rule == 'pads':  # each pad needs its room on the sole
+        foot = setup.world.foot
+        radius = foot.sole_radius * math.sqrt(value / foot.pads)
+        rest, value = 'foot', replace(foot, pads=value, sole_radius=radius)
     if place == 'both':
         setup = changed(setup, f'told.{rest}', value)
         return changed(setup, f'world.{rest}', value)
@@ -240,6 +253,12 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
 def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     """Return the advance a cycle, m, and the verdict on the walk."""
     world, told = setup.world, setup.told
+    if setup.limit_error != 1.0:
+        # A foot knows its limit by a table, which is scaled in a copy that the world alone has.
+        foot = replace(world.foot)
+        table = tuple(setup.limit_error * limit for limit in foot._limit_table)
+        object.__setattr__(foot, '_limit_table', table)
+        world = replace(world, foot=foot)
     loop = ClosedLoop(world, policy, seed)
     load = told.expected_load * setup.load_error
     tuning = replace(
@@ -307,8 +326,8 @@ def setups() -> dict[str, Setup]:
 _SETUPS: dict[str, Setup] = {}
 
 
-def _start_worker() -> None:
-    _SETUPS.update(setups())
+def _start_worker(named: dict[str, Setup]) -> None:
+    _SETUPS.update(named)
 
 
 def _run(job: Job) -> tuple[Job, tuple[float, str | None]]:
@@ -330,7 +349,7 @@ def measure(processes: int) -> dict[str, Any]:
     started = time.perf_counter()
     todo = jobs()
     walked: dict[Job, tuple[float, str | None]] = {}
-    with multiprocessing.Pool(processes, _start_worker) as pool:
+    with multiprocessing.Pool(processes, _start_worker, (setups(),)) as pool:
         runs: Iterable[Any] = pool.imap_unordered(_run, todo)
         walked.update(tqdm(runs, total=len(todo), unit='walk', file=sys.stderr))
 
