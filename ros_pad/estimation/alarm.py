@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from ros_pad.contact.pad import number
+
 
 class SlipAlarm:
     """Raises when the evidence for slip at a given speed has piled up.
@@ -13,13 +15,19 @@ class SlipAlarm:
     Parameters
     ----------
     noise : float
-        Standard deviation of the speed while the foot sticks, m/s.
+        Standard deviation of the speed while the foot sticks, m/s, above 0.
     correlation_time : float
         Over which the noise of the speed is correlated, s: samples closer than this count less.
     speed : float
-        Slip speed v1 worth an alarm, m/s.
+        Slip speed v1 worth an alarm, m/s, above 0.
     threshold : float
-        Of the statistic; e^-threshold bounds how often noise alone gets there.
+        Of the statistic, above 0. With independent noise at least e^threshold samples pass between
+        false alarms on average, whatever the noise (Lorden 1971); mostly far more.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the value that is outside its range.
     """
 
     __slots__ = ('_correlation_time', '_noise', '_speed', '_threshold', 'statistic')
@@ -31,10 +39,10 @@ class SlipAlarm:
         speed: float = 0.03,
         threshold: float = 4.0,
     ) -> None:
-        self._noise = noise
-        self._correlation_time = correlation_time
-        self._speed = speed
-        self._threshold = threshold
+        self._noise = number('noise', noise, 'm/s', above=True)
+        self._correlation_time = number('correlation_time', correlation_time, 's')
+        self._speed = number('speed', speed, 'm/s', above=True)
+        self._threshold = number('threshold', threshold, '(nats)', above=True)
         self.statistic = 0.0
 
     def reset(self) -> None:

@@ -8,11 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+
+LONGEST_GAP = 0.15
+"""Between samples of one stance, s: after a longer silence the foot may have stepped."""
 
 
 @dataclass(frozen=True)
@@ -22,21 +26,29 @@ class Tuning:
     Attributes
     ----------
     position_noise : float
-        Standard deviation of a marker coordinate, m.
+        Standard deviation of a marker coordinate, m, 0 or more.
     force_noise : float
-        Standard deviation of a force component, N.
+        Standard deviation of a force component, N, 0 or more.
     load_gate : float
-        Share of the expected load above which a foot stands.
+        Share of the expected load above which a foot stands, above 0 up to 1.
     smoothing : float
-        Time constant of the speed, s.
+        Time constant of the speed, s, above 0.
     filter_period : float
-        Between updates of the wetness and friction filter, s.
+        Between updates of the wetness and friction filter, s, above 0.
     wet_prior : float
-        Probability of wet ground where nothing is known.
+        Probability of wet ground where nothing is known, 0.01 to 0.99.
     patch_length : float
-        Way over which wet and dry ground change, m.
+        Way over which wet and dry ground change, m, above 0.
     ratio_noise : float
-        Model error of T/N, added to the sensors'.
+        Model error of T/N, added to the sensors', above 0.
+    speed_noise : float
+        Model error of the slip speed, m/s, added to the sensors', above 0: feet also roll and
+        bend.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the value that is outside its range.
     """
 
     position_noise: float = 1.5e-4
@@ -47,6 +59,18 @@ class Tuning:
     wet_prior: float = 0.5
     patch_length: float = 1.5
     ratio_noise: float = 0.03
+    speed_noise: float = 2e-3
+
+    def __post_init__(self) -> None:
+        number('position_noise', self.position_noise, 'm')
+        number('force_noise', self.force_noise, 'N')
+        number('load_gate', self.load_gate, '(share)', high=1.0, above=True)
+        number('smoothing', self.smoothing, 's', above=True)
+        number('filter_period', self.filter_period, 's', above=True)
+        number('wet_prior', self.wet_prior, '(probability)', 0.01, 0.99)
+        number('patch_length', self.patch_length, 'm', above=True)
+        number('ratio_noise', self.ratio_noise, '(ratio)', above=True)
+        number('speed_noise', self.speed_noise, 'm/s', above=True)
 
 
 class Estimate(NamedTuple):
@@ -100,17 +124,22 @@ class FootEstimator:
         Normal force in stance, N, > 0.
     tuning : Tuning
         Noise and ground.
+
+    Raises
+    ------
+    InvalidInput
+        When the expected load is not a number above 0.
     """
 
     def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
-        if not (math.isfinite(expected_load) and expected_load > 0.0):
-            raise InvalidInput(f'expected_load = {expected_load!r} N: must be finite and > 0 N')
+        expected_load = number('expected_load', expected_load, 'N', above=True)
         self._tuning = tuning = tuning or Tuning()
         self._foot = foot
         self._expected_load = expected_load
         self._gate = tuning.load_gate * expected_load
         noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
-        self._speed_noise = noise / tuning.smoothing
+        self._contact_noise = noise
+        self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
         self._alarm = SlipAlarm(self._speed_noise, tuning.smoothing)
         self._ground = GroundFilter(
             FrictionPrior.of(foot, expected_load),
@@ -122,6 +151,7 @@ class FootEstimator:
         self._smooth_x = self._smooth_y = 0.0
         self._footprint: tuple[float, float] | None = None
         self._window_start = 0.0
+        self._first_window = True
         self._samples = 0
         self._sum_load = self._sum_tangential = self._sum_speed = 0.0
         mean, sd = self._ground.friction
@@ -160,13 +190,17 @@ class FootEstimator:
         InvalidInput
             When a value is not finite, or time does not advance.
         """
-        fx, fy, fz = force
-        x, y, _ = position
-        if not math.isfinite(time + fx + fy + fz + x + y + pressure):
+        try:
+            fx, fy, fz = force
+            x, y, z = position
+            finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure)
+        except (TypeError, ValueError) as error:
             raise InvalidInput(
-                f'sample at {time!r} s: force {tuple(force)} N, position {tuple(position)} m,'
-                f' pressure {pressure!r} Pa: all must be finite'
-            )
+                f'sample at {time!r} s: force = {force!r}, position = {position!r}, pressure ='
+                f' {pressure!r}: three numbers each, and one, are needed'
+            ) from error
+        if not finite:
+            raise _not_finite(time, force, position, pressure)
         if time <= self._time:
             raise InvalidInput(f'time = {time!r} s: must be later than the last, {self._time!r} s')
         dt, self._time = time - self._time, time
@@ -175,8 +209,8 @@ class FootEstimator:
         # The marker rides on a soft pad: take its shear off to see the contact itself.
         contact_x = x + fx / self._foot.shear_stiffness
         contact_y = y + fy / self._foot.shear_stiffness
-        if not self._standing:
-            self._touch_down(time, contact_x, contact_y, fz, pressure)
+        if not self._standing or dt > LONGEST_GAP:
+            self._touch_down(time, contact_x, contact_y, pressure)
             dt = self._tuning.smoothing / 10.0 if math.isinf(dt) else dt
         smoothing = self._tuning.smoothing
         share = dt / (smoothing + dt)
@@ -222,7 +256,7 @@ class FootEstimator:
         )  # fmt: skip
         return self.estimate
 
-    def _touch_down(self, time: float, x: float, y: float, load: float, pressure: float) -> None:
+    def _touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
         self._standing = True
         self._alarm.reset()
         self._smooth_x, self._smooth_y = x, y
@@ -232,6 +266,7 @@ class FootEstimator:
         self._ground.touch_down(math.dist(before, (x, y)), domed)
         self._quantile = self._ground.quantile(0.05)
         self._window_start = time
+        self._first_window = True
         self._clear_window()
 
     def _clear_window(self) -> None:
@@ -246,5 +281,29 @@ class FootEstimator:
         noise = math.hypot(
             tuning.ratio_noise, tuning.force_noise * math.sqrt((1.0 + ratio**2) / count) / load
         )
-        self._ground.update(ratio, noise, self._sum_speed / count, self._speed_noise, duration)
+        # The mean speed is the way of the smoothed contact over the window. The smoother starts
+        # a stance from one sample, and averages later.
+        spread = 2.0 * duration / (2.0 * tuning.smoothing * count + duration)
+        if self._first_window:
+            spread = 0.5 * spread + 1.0
+            self._first_window = False
+        speed_noise = math.hypot(
+            tuning.speed_noise, self._contact_noise * math.sqrt(spread) / duration
+        )
+        self._ground.update(ratio, noise, self._sum_speed / count, speed_noise, duration)
         self._clear_window()
+
+
+def _not_finite(
+    time: float, force: Sequence[float], position: Sequence[float], pressure: float
+) -> InvalidInput:
+    """Return the error that says which values of a sample are no numbers."""
+    values = [('time', time, 's'), ('pressure', pressure, 'Pa')]
+    values += [(f'force {axis}', value, 'N') for axis, value in zip('xyz', force, strict=True)]
+    values += [
+        (f'position {axis}', value, 'm') for axis, value in zip('xyz', position, strict=True)
+    ]
+    wrong = [
+        f'{name} = {value!r} {unit}' for name, value, unit in values if not math.isfinite(value)
+    ]
+    return InvalidInput(f'sample at {time!r} s: {", ".join(wrong)}: must be finite')

@@ -3,7 +3,9 @@
 
 A Bayes filter on {dry, wet} x a grid of friction coefficients. A foot that sticks at T/N only
 says that friction is larger (censored evidence); a foot that slips shows it. Whether it sticks is
-itself uncertain, so each sample is a mixture of both, weighed by the slip speed.
+itself uncertain, so each sample is a mixture of both, weighed by the slip speed. Ground changes
+with the way that the foot steps or slides, not with time: a foot that stands still knows what it
+knows.
 """
 
 from __future__ import annotations
@@ -19,8 +21,19 @@ from ros_pad.contact.resistance import tangential_resistance
 
 GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
+_UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
 _ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
 _THICK_FILM = 1.0e-3  # m: does not drain within a stance under a flat sole
+_ROOT_2_PI = math.sqrt(2.0 * math.pi)
+_SELDOM = 1e-3  # the least probability of either ground
+
+DEMAND = 0.3
+"""Mean T/N that gaits ask for, taken to be exponential."""
+
+SLIP_SPEED = 0.1
+"""Mean speed of slips, m/s, taken to be exponential."""
+
+_UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
 
 @dataclass(frozen=True)
@@ -75,7 +88,7 @@ class GroundFilter:
     patch_length : float
         Way over which wet and dry ground typically change, m.
     forgetting_time : float
-        Over which friction may change within a stance, s.
+        Over which friction under domes may change within a stance, s.
     temper : float
         Weight of a sample, in (0, 1]: successive samples are not independent.
     """
@@ -88,51 +101,78 @@ class GroundFilter:
         forgetting_time: float = 1.0,
         temper: float = 0.8,
     ) -> None:
-        self._tables = {False: prior.table(dome=False), True: prior.table(dome=True)}
-        self._wet_prior = wet_prior
+        self._tables = {dome: prior.table(dome) for dome in (False, True)}
+        self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
-        self._friction = self._tables[False].copy()  # p(μ | ground)
-        self._table = self._tables[False]
-        self.wet_probability = wet_prior
-        self._marginalise()
+        self._dome = False
+        self._settle(self._grounds * self._tables[False])
 
     def touch_down(self, distance: float, dome: bool) -> None:
         """Begin a stance, some metres from the last one, flat or domed."""
-        change = 1.0 - math.exp(-distance / self._patch_length)
-        self.wet_probability += change * (self._wet_prior - self.wet_probability)
-        table = self._tables[dome]
-        # Friction learnt on this kind of ground with this shape is worth as much as the ground
-        # is still the same; with another shape it says nothing.
-        keep = (1.0 - change) if table is self._table else 0.0
-        self._friction = keep * self._friction + (1.0 - keep) * table
-        self._table = table
-        self._marginalise()
+        if dome != self._dome:
+            # Friction of one shape says nothing of the other's; what stays is wet or dry.
+            self._dome = dome
+            self._belief = self._grounds_known() * self._tables[dome]
+        self._move(distance)
+        self._settle(self._belief)
 
     def update(
         self, ratio: float, ratio_noise: float, speed: float, speed_noise: float, dt: float
     ) -> None:
-        """Take one sample of T/N and of slip speed, m/s, with their standard deviations."""
-        away = (GRID - ratio) / ratio_noise
-        stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (2.5066 * speed_noise)
-        slip = math.exp(-speed / 0.1) / 0.1 if speed > 0.0 else 0.0
-        # Stick: any demand below μ, spread over the range of T/N. Slip: T/N is μ.
-        likelihood = stick * special.ndtr(away) / GRID[-1]
-        likelihood += slip / (2.5066 * ratio_noise) * np.exp(-0.5 * away * away)
-        likelihood = (likelihood + 1e-6) ** self._temper
-        joint = self._friction * likelihood
-        evidence = joint @ _ONES
-        dry, wet = (1.0 - self.wet_probability) * evidence[0], self.wet_probability * evidence[1]
-        # Never certain: one sample in a thousand comes from ground that has just changed.
-        self.wet_probability = 0.001 + 0.998 * float(wet / (dry + wet))
-        forget = 1.0 - math.exp(-dt / self._forgetting_time)
-        self._friction = (1.0 - forget) * joint / evidence[:, None] + forget * self._table
-        self._marginalise()
+        """Take one sample of T/N and of slip speed.
 
-    def _marginalise(self) -> None:
-        wet = self.wet_probability
-        self._marginal = (1.0 - wet) * self._friction[0] + wet * self._friction[1]
+        Parameters
+        ----------
+        ratio, ratio_noise : float
+            T/N and its standard deviation, > 0.
+        speed, speed_noise : float
+            Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
+        dt : float
+            Time that the sample stands for, s.
+        """
+        away = (GRID - ratio) / ratio_noise
+        stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
+        slip = math.exp(-speed / SLIP_SPEED) / SLIP_SPEED if speed > 0.0 else 0.0
+        # Stick: T/N is what the gait demands, and μ is above it. Slip: more is demanded than μ,
+        # and T/N shows μ.
+        likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
+        likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * np.exp(-0.5 * away * away)
+        self._belief = self._belief * (likelihood + 1e-6) ** self._temper
+        self._belief /= self._belief.sum()
+        if speed > 0.0:
+            self._move(speed * dt)
+        if self._dome:
+            # The film under domes drains as they stand: their friction rises on the same ground.
+            keep = math.exp(-dt / self._forgetting_time)
+            self._belief = keep * self._belief + (1.0 - keep) * (
+                self._grounds_known() * self._tables[True]
+            )
+        self._settle(self._belief)
+
+    def _move(self, distance: float) -> None:
+        """Go some metres: perhaps onto other ground, of which nothing is known."""
+        stay = math.exp(-distance / self._patch_length)
+        self._belief = stay * self._belief + (1.0 - stay) * (
+            self._grounds * self._tables[self._dome]
+        )
+
+    def _grounds_known(self) -> np.ndarray:
+        return self._belief.sum(axis=1, keepdims=True)
+
+    def _settle(self, belief: np.ndarray) -> None:
+        dry, wet = (belief @ _ONES).tolist()
+        for ground, share in enumerate((dry, wet)):
+            if share < _SELDOM * (dry + wet):
+                # Certainty could never be undone. What is held for impossible, one knows nothing
+                # of: should it be so after all, its friction is as expected.
+                belief = belief * ((1.0 - _SELDOM) / (dry + wet - share))
+                belief[ground] = _SELDOM * self._tables[self._dome][ground]
+                dry, wet = (belief @ _ONES).tolist()
+        self._belief = belief
+        self.wet_probability = wet / (dry + wet)
+        self._marginal = (belief[0] + belief[1]) / (dry + wet)
 
     @property
     def friction(self) -> tuple[float, float]:
@@ -141,5 +181,5 @@ class GroundFilter:
         return mean, math.sqrt(max(float(self._marginal @ _SQUARES) - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
-        """Friction coefficient that is larger with probability 1 - share."""
-        return float(GRID[np.searchsorted(np.cumsum(self._marginal), share)])
+        """Friction coefficient that is larger with probability 1 - share, share in [0, 1]."""
+        return float(np.interp(share, np.cumsum(self._marginal), _UPPER_EDGES))
