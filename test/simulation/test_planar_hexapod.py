@@ -105,6 +105,26 @@ def test_speeding_up_loads_the_hind_feet():
     assert moments(robot)[1] < -0.5 * BODY.height * before
 
 
+def test_braking_sideways_loads_the_feet_in_front_of_the_motion():
+    """A body thrown to the left presses its left feet: ΣN y = -H ΣF_y, also when it is turned."""
+    for heading in (0.0, 0.7):
+        robot = robot_of(scene_of(settle=1.0))
+        robot._heading = heading
+        robot._twist = (-0.2 * math.sin(heading), 0.2 * math.cos(heading), 0.0)
+        last = 0.0
+        for _ in range(10):
+            robot.step(FLAT)
+            _, ahead, left = moments(robot)
+            assert left == pytest.approx(-BODY.height * last, rel=1e-2, abs=2e-4)
+            assert abs(ahead) < 0.05 * abs(left) + 1e-3
+            last = sum(
+                math.cos(heading) * foot.force[1] - math.sin(heading) * foot.force[0]
+                for foot in robot.feet
+            )
+            assert last < 0.0 or robot.time > 0.02
+        assert robot.verdict is None
+
+
 @pytest.mark.parametrize('height', [0.12, 1.2])
 def test_tip_over(height):
     """At 4π S/T² = 2.0 m/s² a body tips about the feet some 0.1 m behind its centre at 0.5 m."""
