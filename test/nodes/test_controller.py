@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+from itertools import pairwise
+
+import pytest
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.controller import ControllerNode
+from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import set_stamp
+
+AMBIENT = 101325.0
+LOAD = 6.83
+LEGS = (1, 2)
+INPUTS = (topics.WRENCH, topics.POSITION, topics.WETNESS)
+TIME_NS = 5_000_000_000
+
+
+class Robot:
+    """Legs, their estimates, and the clock; keeps set-points and shapes."""
+
+    def __init__(self, context, executor, until):
+        self.node = Node('robot', context=context)
+        executor.add_node(self.node)
+        self._context, self._executor, self.until = context, executor, until
+        self._in = {t.name(leg): t.publisher(self.node, leg) for leg in LEGS for t in INPUTS}
+        self._clock = topics.CLOCK.publisher(self.node)
+        self.setpoints = {leg: [] for leg in LEGS}
+        self.shapes = {leg: [] for leg in LEGS}
+        for leg in LEGS:
+            topics.PRESSURE_SETPOINT.subscription(self.node, self.setpoints[leg].append, leg)
+            topics.MORPHOLOGY.subscription(
+                self.node, lambda m, leg=leg: self.shapes[leg].append(m.data), leg
+            )
+        self.controller = None
+        self.position = 0.0
+
+    def start(self, **parameters):
+        parameters = {'legs': list(LEGS), 'use_sim_time': True, **parameters}
+        self.controller = ControllerNode(
+            context=self._context,
+            parameter_overrides=[Parameter(name, value=v) for name, v in parameters.items()],
+        )
+        self._executor.add_node(self.controller)
+        self.until(
+            lambda: (
+                all(p.get_subscription_count() for p in (*self._in.values(), self._clock))
+                and all(
+                    self.node.count_publishers(topic.name(leg))
+                    for topic in (topics.PRESSURE_SETPOINT, topics.MORPHOLOGY)
+                    for leg in LEGS
+                )
+            )
+        )
+        message = topics.CLOCK.message()
+        set_stamp(message.clock, TIME_NS)
+        self._clock.publish(message)
+        self.until(lambda: self.controller.get_clock().now().nanoseconds == TIME_NS)
+        return self.controller
+
+    def sense(self, load, position=None, leg=1):
+        """Wrench and position of a leg, waited for."""
+        before = self.controller.wrenches
+        point = PointStamped()
+        point.point.x = self.position if position is None else position
+        self._in[topics.POSITION.name(leg)].publish(point)
+        wrench = WrenchStamped()
+        wrench.wrench.force.z = load
+        self._in[topics.WRENCH.name(leg)].publish(wrench)
+        self.until(lambda: self.controller.wrenches > before)
+
+    def estimate(self, wet, leg=1):
+        """An estimate of wetness, and the set-point that answers to it."""
+        count = len(self.setpoints[leg])
+        self._in[topics.WETNESS.name(leg)].publish(Float64(data=wet))
+        self.until(lambda: len(self.setpoints[leg]) > count, what='a set-point')
+        return self.setpoints[leg][-1]
+
+    def unanswered(self, wet, leg=1):
+        """An estimate on one leg, and a good one on another that is answered after it."""
+        count = len(self.setpoints[leg])
+        self._in[topics.WETNESS.name(leg)].publish(Float64(data=wet))
+        other = 3 - leg
+        self.sense(LOAD, leg=other)
+        self.estimate(0.5, leg=other)
+        assert len(self.setpoints[leg]) == count
+
+    def step(self, wet, leg=1):
+        """A stance and the swing after it; return the gauge pressure wanted then."""
+        self.position += 0.08
+        self.sense(LOAD, leg=leg)
+        self.estimate(wet, leg)
+        self.sense(0.0, leg=leg)
+        return self.estimate(wet, leg).fluid_pressure - AMBIENT
+
+
+@pytest.fixture
+def robot(context, executor, until):
+    return Robot(context, executor, until)
+
+
+def test_every_estimate_is_answered_by_a_setpoint(robot):
+    robot.start()
+    robot.sense(LOAD)
+    for number in range(1, 6):
+        setpoint = robot.estimate(0.5)
+        assert len(robot.setpoints[1]) == number
+        assert setpoint.header.frame_id == 'leg_1_pad'
+        assert nanoseconds(setpoint.header.stamp) == TIME_NS
+        assert setpoint.fluid_pressure == AMBIENT  # flat: absolute, not gauge
+    assert robot.setpoints[2] == []
+    robot.sense(LOAD, leg=2)
+    assert robot.estimate(0.5, leg=2).header.frame_id == 'leg_2_pad'
+
+
+def test_when_the_estimates_stop_so_do_the_setpoints(robot):
+    robot.start()
+    robot.sense(LOAD)
+    robot.estimate(0.5)
+    for _ in range(50):
+        robot.sense(LOAD)
+    assert len(robot.setpoints[1]) == 1
+
+
+def test_without_sensors_there_is_no_setpoint(robot):
+    robot.start()
+    robot.unanswered(0.9)
+
+
+def test_dome_on_wet_ground_and_flat_again_on_dry(robot):
+    robot.start(policy='adaptive')
+    shapes = []
+    for wet in 8 * [0.98] + 20 * [0.02]:
+        gauge = robot.step(wet)
+        shapes.append('dome' if gauge > 0.0 else 'flat')
+    assert 'dome' in shapes[:8]
+    assert shapes[7] == 'dome'
+    assert shapes[-1] == 'flat'
+    assert robot.shapes[1][0] == 'flat'
+    assert 'dome' in robot.shapes[1]
+    # Latched: told of once for each change.
+    assert all(old != new for old, new in pairwise(robot.shapes[1]))
+
+
+def test_a_heavier_robot_gets_more_pressure(robot):
+    gauges = []
+    for load in (3.0, LOAD):
+        controller = robot.start(policy='dome', expected_load=load)
+        robot.sense(LOAD)
+        gauges.append(robot.estimate(0.5).fluid_pressure - AMBIENT)
+        controller.destroy_node()
+    assert 0.0 < gauges[0] < gauges[1] <= 90e3
+
+
+def test_a_fixed_pressure_is_taken_as_it_is(robot):
+    robot.start(policy='dome', dome_pressure=40e3, ambient_pressure=90000.0)
+    robot.sense(LOAD)
+    assert robot.estimate(0.5).fluid_pressure == 130e3
+
+
+@pytest.mark.parametrize('policy', ['flat', 'dome'])
+def test_the_simple_policies_never_change(robot, policy):
+    robot.start(policy=policy)
+    for wet in (0.02, 0.98, 0.98, 0.98, 0.02):
+        assert (robot.step(wet) > 0.0) is (policy == 'dome')
+    assert robot.shapes[1] == [policy]
+
+
+@pytest.mark.parametrize('ground', ['wet', 'dry'])
+def test_the_oracle_sees_the_ground(robot, ground):
+    robot.start(policy='oracle', scene=f'hexapod_smooth_{ground}_flat')
+    assert (robot.step(0.5) > 0.0) is (ground == 'wet')
+
+
+def test_the_shape_reaches_who_comes_late(robot, context, executor):
+    robot.start(policy='dome')
+    robot.sense(LOAD)
+    robot.estimate(0.5)
+    late = Node('late', context=context)
+    executor.add_node(late)
+    heard = []
+    topics.MORPHOLOGY.subscription(late, lambda message: heard.append(message.data), 1)
+    robot.until(lambda: heard, what='the latched shape')
+    assert heard == ['dome']
+
+
+BAD = {
+    'load': ((math.nan, 0.0), 0.98),
+    'infinite load': ((-math.inf, 0.0), 0.98),
+    'position': ((LOAD, math.nan), 0.98),
+    'wetness': ((LOAD, 0.0), math.nan),
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+def test_what_is_no_number_moves_no_foot(robot, case):
+    """A broken force sensor is no lift-off: a foot must not change its shape while it stands."""
+    (load, position), wet = BAD[case]
+    robot.start()
+    for _ in range(3):
+        robot.step(0.5)
+    robot.sense(LOAD)
+    before = robot.estimate(0.98).fluid_pressure
+    switches = dict(robot.controller.controller.switches)
+    robot.sense(load, position)
+    robot.unanswered(wet)  # if it stays so, the regulator vents
+    robot.sense(LOAD)
+    assert robot.estimate(0.98).fluid_pressure == before
+    assert robot.controller.controller.switches == switches
+    assert robot.shapes[1] == ['flat']

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import pytest
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import FluidPressure
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import set_stamp
+
+ESTIMATES = (
+    topics.SLIP, topics.SLIPPING, topics.FRICTION, topics.FRICTION_MARGIN, topics.WETNESS,
+)  # fmt: skip
+LOAD = 6.83
+AMBIENT = 101325.0
+
+
+class Robot:
+    """Sends what the sensors of legs 1 and 2 say, and keeps what is estimated."""
+
+    def __init__(self, context, executor, until):
+        self.node = Node('robot', context=context)
+        executor.add_node(self.node)
+        self._context, self._executor, self.until = context, executor, until
+        self.heard = {}
+        for leg in (1, 2):
+            for topic in ESTIMATES:
+                self.heard[topic.name(leg)] = []
+                topic.subscription(self.node, self.heard[topic.name(leg)].append, leg)
+        self._publishers = {
+            topic.name(leg): topic.publisher(self.node, leg)
+            for leg in (1, 2)
+            for topic in (topics.WRENCH, topics.POSITION, topics.PRESSURE)
+        }
+        self.estimator = None
+
+    def start(self, **parameters):
+        parameters = {'legs': [1, 2], 'publish_rate': 1000.0, **parameters}
+        self.estimator = EstimatorNode(
+            context=self._context,
+            parameter_overrides=[Parameter(name, value=v) for name, v in parameters.items()],
+        )
+        self._executor.add_node(self.estimator)
+        self.until(
+            lambda: (
+                all(p.get_subscription_count() for p in self._publishers.values())
+                and all(self.node.count_publishers(name) for name in self.heard)
+            )
+        )
+        return self.estimator
+
+    def wrench(self, seconds, force=(0.0, 0.0, LOAD), leg=1):
+        message = WrenchStamped()
+        set_stamp(message.header.stamp, round(seconds * 1e9))
+        f = message.wrench.force
+        f.x, f.y, f.z = map(float, force)
+        self._send(topics.WRENCH, message, leg)
+
+    def position(self, seconds, point=(0.0, 0.0, 0.0), leg=1):
+        message = PointStamped()
+        set_stamp(message.header.stamp, round(seconds * 1e9))
+        p = message.point
+        p.x, p.y, p.z = map(float, point)
+        self._send(topics.POSITION, message, leg)
+
+    def pressure(self, gauge, leg=1):
+        self._send(topics.PRESSURE, FluidPressure(fluid_pressure=AMBIENT + gauge), leg)
+
+    def _send(self, topic, message, leg):
+        """Publish a message and wait until the estimator has dealt with it."""
+        taken = []
+        subscription = topic.subscription(self.estimator, taken.append, leg)
+        publisher = self._publishers[topic.name(leg)]
+        self.until(lambda: publisher.get_subscription_count() == 2)
+        publisher.publish(message)
+        self.until(lambda: taken)
+        self.estimator.destroy_subscription(subscription)
+        self.until(lambda: publisher.get_subscription_count() == 1)
+
+    def sample(self, seconds, force=(0.0, 0.0, LOAD), point=(0.0, 0.0, 0.0), leg=1):
+        """Wrench and position at a time, waited for."""
+        message = WrenchStamped()
+        before = self.estimator.samples
+        set_stamp(message.header.stamp, round(seconds * 1e9))
+        f = message.wrench.force
+        f.x, f.y, f.z = map(float, force)
+        self._publishers[topics.WRENCH.name(leg)].publish(message)
+        place = PointStamped(header=message.header)
+        p = place.point
+        p.x, p.y, p.z = map(float, point)
+        self._publishers[topics.POSITION.name(leg)].publish(place)
+        self.until(lambda: self.estimator.samples == before + 1)
+
+
+@pytest.fixture
+def robot(context, executor, until):
+    return Robot(context, executor, until)
+
+
+def test_an_estimate_is_one_message_of_each_kind(robot):
+    robot.start()
+    robot.sample(1.0)
+    robot.until(lambda: all(robot.heard[topic.name(1)] for topic in ESTIMATES))
+    assert all(len(robot.heard[topic.name(1)]) == 1 for topic in ESTIMATES)
+    assert not any(robot.heard[topic.name(2)] for topic in ESTIMATES)
+    (slip,) = robot.heard['leg_1/slip']
+    assert nanoseconds(slip.header.stamp) == 10**9
+    assert slip.header.frame_id == 'world'
+    assert slip.twist.twist.linear.z == 0.0
+    covariance = list(slip.twist.covariance)
+    assert covariance[0] == covariance[7] > 0.0
+    assert sum(map(abs, covariance)) == 2 * covariance[0]
+    assert robot.heard['leg_1/slipping'][0].data is False
+    assert robot.heard['leg_1/wetness'][0].data == pytest.approx(0.5)
+    assert 0.1 < robot.heard['leg_1/friction'][0].data < 1.0
+    assert -1.0 < robot.heard['leg_1/friction_margin'][0].data < 1.0
+
+
+@pytest.mark.parametrize('first', ['wrench', 'position'])
+def test_either_may_come_first(robot, first):
+    node = robot.start()
+    other = {'wrench': 'position', 'position': 'wrench'}[first]
+    for number in range(1, 6):
+        getattr(robot, first)(0.004 * number)
+        assert node.samples == number - 1
+        getattr(robot, other)(0.004 * number)
+        robot.until(lambda n=number: node.samples == n)
+
+
+def test_a_missing_position_costs_no_wrench(robot):
+    node = robot.start()
+    robot.wrench(0.004)
+    robot.position(0.004)
+    for number in (2, 3, 4):  # the marker is out of sight
+        robot.wrench(0.004 * number)
+    robot.wrench(0.020)
+    robot.position(0.020)
+    assert node.samples == 5
+    robot.until(lambda: len(robot.heard['leg_1/slip']) == 5)
+    stamps = [nanoseconds(slip.header.stamp) for slip in robot.heard['leg_1/slip']]
+    assert stamps == [4_000_000, 8_000_000, 12_000_000, 16_000_000, 20_000_000]
+
+
+def test_a_marker_slower_than_the_force_costs_no_wrench(robot):
+    node = robot.start()
+    for number in range(1, 21):
+        if number % 4 == 1:
+            robot.position(0.004 * number)
+        robot.wrench(0.004 * number)
+    assert node.samples in (19, 20)  # the last one may still wait for its position
+
+
+def test_without_any_position_nothing_is_said(robot):
+    node = robot.start()
+    for number in (1, 2, 3):
+        robot.wrench(0.004 * number)
+    assert node.samples == 0
+    assert not any(robot.heard.values())
+
+
+def test_legs_do_not_mix(robot):
+    node = robot.start()
+    robot.wrench(0.004, leg=1)
+    robot.position(0.004, leg=2)
+    assert node.samples == 0
+    robot.position(0.004, leg=1)
+    assert (node.legs[1].samples, node.legs[2].samples) == (1, 0)
+
+
+BAD = {
+    'force x': {'force': (math.nan, 0.0, LOAD)},
+    'load': {'force': (0.0, 0.0, math.nan)},
+    'infinite load': {'force': (0.0, 0.0, math.inf)},
+    'position': {'point': (0.0, math.nan, 0.0)},
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+def test_a_sample_that_is_no_number_is_ignored_with_a_warning(robot, case, capfd):
+    node = robot.start()
+    robot.sample(0.004)
+    bad = BAD[case]
+    robot.wrench(0.008, bad.get('force', (0.0, 0.0, LOAD)))
+    robot.position(0.008, bad.get('point', (0.0, 0.0, 0.0)))
+    assert node.samples == 1
+    warning = capfd.readouterr().err
+    assert 'sample ignored' in warning
+    assert 'must be finite' in warning
+    robot.sample(0.012)
+    robot.until(lambda: len(robot.heard['leg_1/wetness']) == 2)
+    for topic in (topics.WETNESS, topics.FRICTION, topics.FRICTION_MARGIN):
+        assert all(math.isfinite(m.data) for m in robot.heard[topic.name(1)])
+
+
+def test_a_sample_that_comes_twice_counts_once(robot):
+    node = robot.start()
+    robot.sample(0.004)
+    robot.wrench(0.004)
+    robot.position(0.004)
+    assert node.samples == 1
+
+
+def test_estimates_come_at_their_rate(robot):
+    robot.start(publish_rate=50.0)
+    for number in range(1, 251):
+        robot.sample(0.004 * number)
+    robot.until(lambda: len(robot.heard['leg_1/wetness']) >= 51)
+    assert len(robot.heard['leg_1/wetness']) == 51  # 0.004, 0.020, 0.040 ... 1.000 s
+
+
+def stance(robot, ratio, speed, seconds=1.0, start=0.0, foot_at=0.0):
+    """A foot that stands under its load, pulled by ratio times it, sliding at a speed."""
+    for number in range(1, round(seconds / 0.004) + 1):
+        time = start + 0.004 * number
+        robot.sample(time, (-ratio * LOAD, 0.0, LOAD), (foot_at + speed * 0.004 * number, 0, 0))
+    robot.until(lambda: robot.heard['leg_1/slip'] and robot.heard['leg_1/wetness'])
+
+
+def test_a_foot_that_holds_a_strong_pull_stands_on_dry_ground(robot):
+    robot.start()
+    stance(robot, ratio=0.6, speed=0.0)
+    assert robot.heard['leg_1/wetness'][-1].data < 0.2
+    assert robot.heard['leg_1/friction'][-1].data > 0.6
+    assert not any(each.data for each in robot.heard['leg_1/slipping'])
+
+
+def test_a_foot_that_slides_under_a_weak_pull_stands_on_wet_ground(robot):
+    robot.start()
+    stance(robot, ratio=0.2, speed=0.1)
+    assert robot.heard['leg_1/wetness'][-1].data > 0.8
+    assert robot.heard['leg_1/friction'][-1].data == pytest.approx(0.2, abs=0.1)
+    assert robot.heard['leg_1/slipping'][-1].data
+    last = robot.heard['leg_1/slip'][-1].twist.twist.linear
+    assert last.x == pytest.approx(0.1, rel=0.1)
+    assert last.y == 0.0
+
+
+def test_what_a_pull_says_depends_on_the_shape(robot):
+    """A dome holds as well on wet ground as on dry: the pressure, less ambient, tells of it."""
+    robot.start()
+    robot.pressure(75e3)
+    stance(robot, ratio=0.3, speed=0.0)
+    domed = robot.heard['leg_1/wetness'][-1].data
+    robot.pressure(0.0)
+    robot.sample(1.5, (0.0, 0.0, 0.0))  # a step of 10 m, with the pads flat now
+    stance(robot, ratio=0.3, speed=0.0, start=1.6, foot_at=10.0)
+    flat = robot.heard['leg_1/wetness'][-1].data
+    assert abs(domed - 0.5) < 0.2
+    assert flat < 0.2
+
+
+def test_every_wrench_changes_the_estimator(robot):
+    """Each sample is a state of its own, also between two messages."""
+    node = robot.start(publish_rate=1.0)
+    estimator = node.legs[1]._estimator
+    states = []
+    for number in range(1, 11):
+        robot.sample(0.004 * number, (0.1 * number, 0.0, LOAD), (1e-5 * number, 0.0, 0.0))
+        states.append((estimator.estimate.time, estimator.estimate.slip_speed))
+    assert len(set(states)) == 10
+    assert [time for time, _ in states] == pytest.approx([0.004 * n for n in range(1, 11)])

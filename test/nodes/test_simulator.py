@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+import time
+
+import numpy as np
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import FluidPressure
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import set_stamp
+
+AMBIENT = 101325.0
+LEGS = (1, 2, 3, 4, 5, 6)
+
+
+@pytest.fixture
+def start(context, executor):
+    def start(**parameters):
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        node = SimulatorNode(context=context, parameter_overrides=overrides)
+        executor.add_node(node)
+        return node
+
+    return start
+
+
+@pytest.fixture
+def observer(context, executor):
+    """A node that keeps what it hears: ``heard[topic]`` is a list of messages."""
+    node = Node('observer', context=context)
+    node.heard = {}
+    for topic in (topics.WRENCH, topics.POSITION):
+        for leg in LEGS:
+            node.heard[topic.name(leg)] = []
+            topic.subscription(node, node.heard[topic.name(leg)].append, leg)
+    for topic in (topics.BODY_POSE, topics.CLOCK):
+        node.heard[topic.name()] = []
+        topic.subscription(node, node.heard[topic.name()].append)
+    executor.add_node(node)
+    return node
+
+
+def found(observer, clock):
+    return lambda: all(
+        observer.count_publishers(name) for name in observer.heard if clock or name != '/clock'
+    )
+
+
+def test_a_step_is_one_message_of_everything(start, observer, until):
+    node = start(free_running=False, publish_clock=True, rate=100.0)
+    until(found(observer, clock=True))
+    for number in range(1, 6):
+        node.step()
+        until(lambda n=number: all(len(each) == n for each in observer.heard.values()))
+    for name, messages in observer.heard.items():
+        stamps = [nanoseconds(m.clock if name == '/clock' else m.header.stamp) for m in messages]
+        assert stamps == [10_000_000, 20_000_000, 30_000_000, 40_000_000, 50_000_000], name
+    assert observer.heard['leg_3/wrench'][0].header.frame_id == 'leg_3_sole'
+    assert observer.heard['leg_3/position'][0].header.frame_id == 'world'
+    assert observer.heard['body/pose'][0].header.frame_id == 'world'
+    # It stands on six legs: 2.09 kg on them, the floor pushing up. Noise is 0.03 N a leg.
+    load = sum(observer.heard[f'leg_{leg}/wrench'][0].wrench.force.z for leg in LEGS)
+    assert load == pytest.approx(2.09 * 9.81, abs=0.5)
+    q = observer.heard['body/pose'][0].pose.orientation
+    assert (q.x, q.y, math.hypot(q.z, q.w)) == (0.0, 0.0, pytest.approx(1.0))
+    # Thesis: legs 1 to 3 are on the left, the front ones ahead.
+    points = {leg: observer.heard[f'leg_{leg}/position'][0].point for leg in LEGS}
+    assert [leg for leg in LEGS if points[leg].y > 0.0] == [1, 2, 3]
+    assert [leg for leg in LEGS if points[leg].x > 0.1] == [1, 6]
+
+
+def test_free_running_keeps_its_rate_and_the_time_of_day(start, observer, until):
+    start(rate=100.0)
+    until(found(observer, clock=False))
+    heard = observer.heard['leg_1/wrench']
+    until(lambda: heard)
+    first, count = time.monotonic(), len(heard)
+    until(lambda: time.monotonic() > first + 1.0)
+    assert 90 <= len(heard) - count <= 103
+    assert abs(nanoseconds(heard[-1].header.stamp) - time.time_ns()) < 200_000_000
+    assert not observer.heard['/clock']
+    assert not observer.count_publishers('/clock')
+
+
+def test_it_does_not_wait_for_its_own_clock(start, observer, until):
+    start(rate=100.0, publish_clock=True, use_sim_time=True)
+    until(lambda: len(observer.heard['/clock']) > 5 and len(observer.heard['leg_1/wrench']) > 5)
+
+
+def test_the_scene_gives_rate_and_legs(start, observer, until):
+    node = start(scene='leg_wet_flat', free_running=False)
+    assert node.period_ns == 4_000_000  # 250 Hz
+    assert observer.count_publishers('leg_1/wrench') == 1
+    assert observer.count_publishers('leg_2/wrench') == 0
+
+
+def walk(node, robot, until, gauge, ambient=AMBIENT, seconds=4.0):
+    """Walk with a pressure in all pads, and return how far the robot got, m."""
+    publishers = [topics.PRESSURE.publisher(robot, leg) for leg in LEGS]
+    until(lambda: all(p.get_subscription_count() for p in publishers))
+    for publisher in publishers:
+        message = FluidPressure(fluid_pressure=gauge + ambient)
+        set_stamp(message.header.stamp, 1)
+        publisher.publish(message)
+    until(lambda: node.pressure_stamps == [1] * 6, what='the pressures')
+    for _ in range(round(seconds / 0.004)):
+        node.step()
+    return node.robot.body[0]
+
+
+@pytest.fixture
+def robot(context, executor):
+    node = Node('robot', context=context)
+    executor.add_node(node)
+    return node
+
+
+def test_domes_walk_further_on_wet_ground(start, robot, until):
+    """What the whole package is about; the pressure only comes by its topic."""
+    flat = start(scene='hexapod_smooth_wet_flat', free_running=False)
+    flat_way = walk(flat, robot, until, 0.0)
+    flat.destroy_node()
+    dome = start(scene='hexapod_smooth_wet_flat', free_running=False)
+    dome_way = walk(dome, robot, until, 75e3)
+    assert dome_way > 1.2 * flat_way > 0.0
+
+
+def test_pressures_are_absolute(start, robot, until):
+    """At another height the same gauge pressure is another absolute one, and the same walk."""
+    sea = start(free_running=False)
+    way = walk(sea, robot, until, 60e3)
+    sea.destroy_node()
+    mountain = start(free_running=False, ambient_pressure=80000.0)
+    assert walk(mountain, robot, until, 60e3, ambient=80000.0) == way
+
+
+def test_a_pressure_that_is_none_changes_nothing(start, robot, until):
+    node = start(free_running=False)
+    heard = []
+    topics.PRESSURE.subscription(node, heard.append, 2)  # after the node's own
+    publisher = topics.PRESSURE.publisher(robot, 2)
+    until(lambda: publisher.get_subscription_count() == 2)
+    taken = []
+    for absolute in (AMBIENT + 50e3, math.nan, math.inf, -math.inf, AMBIENT - 3.0):
+        heard.clear()
+        publisher.publish(FluidPressure(fluid_pressure=absolute))
+        until(lambda: heard)
+        taken.append(node._pressures[1])
+    # A sensor at rest reads a little below ambient: that is flat.
+    assert taken == [50e3, 50e3, 50e3, 50e3, 0.0]
+
+
+def test_the_same_seed_is_the_same_walk(start):
+    def steps(seed):
+        node = start(free_running=False, seed=seed)
+        seen = []
+        for _ in range(100):
+            node.step()
+            seen.append([foot.force for foot in node.robot.feet])
+        readings = node._sensors.read(node.robot)
+        node.destroy_node()
+        return np.array(seen), readings
+
+    assert np.array_equal(steps(3)[0], steps(3)[0])
+    assert steps(3)[1] == steps(3)[1]
+    assert steps(3)[1] != steps(4)[1]

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+import pytest
+from builtin_interfaces.msg import Time
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import on_tick
+from ros_pad.nodes.stamps import set_stamp
+
+
+@pytest.mark.parametrize(
+    ('time_ns', 'sec', 'nanosec'),
+    [
+        (0, 0, 0),
+        (4_000_000, 0, 4_000_000),
+        (999_999_999, 0, 999_999_999),
+        (1_000_000_000, 1, 0),
+        (1_795_236_777_513_191_887, 1_795_236_777, 513_191_887),
+        (-1, -1, 999_999_999),
+    ],
+)
+def test_stamps_are_whole_nanoseconds(time_ns, sec, nanosec):
+    stamp = Time()
+    set_stamp(stamp, time_ns)
+    assert (stamp.sec, stamp.nanosec) == (sec, nanosec)
+    assert nanoseconds(stamp) == time_ns
+
+
+def test_in_simulated_time_each_clock_message_is_a_tick(context, executor, until):
+    node = Node(
+        'probe', context=context, parameter_overrides=[Parameter('use_sim_time', value=True)]
+    )
+    executor.add_node(node)
+    ticks = []
+    on_tick(node, 0.001, ticks.append)
+    clock = topics.CLOCK.publisher(node)
+    until(lambda: clock.get_subscription_count() == 2)  # the node's clock and its ticks
+    for time_ns in (7, 1_000_000_000, 3_000_000_004):
+        message = topics.CLOCK.message()
+        set_stamp(message.clock, time_ns)
+        clock.publish(message)
+        until(lambda t=time_ns: ticks and ticks[-1] == t)
+    assert ticks == [7, 1_000_000_000, 3_000_000_004]
+
+
+def test_in_real_time_a_timer_ticks(context, executor, until):
+    node = Node('probe', context=context)
+    executor.add_node(node)
+    ticks = []
+    on_tick(node, 0.01, ticks.append)
+    before = node.get_clock().now().nanoseconds
+    until(lambda: len(ticks) == 5)
+    assert ticks[0] > before
+    assert ticks[-1] - ticks[0] == pytest.approx(40_000_000, abs=30_000_000)
