@@ -12,6 +12,8 @@ from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ros_pad.contact.pad import choice as one_of
+from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
 from ros_pad.control.pressure import dome_pressure
@@ -20,6 +22,9 @@ from ros_pad.errors import LimitError
 
 FLAT = 'flat'
 DOME = 'dome'
+
+TOUCH_DOWN = 1.5
+"""Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +96,17 @@ def adaptive(
         and dry ground alike, so what is known only fades, and without probes feet that were once
         on wet ground would stay domed for ever. One leg probes at a time.
     dwell : int
-        Steps that a shape is kept at least.
+        Steps that a shape is kept at least; a probe is exempt.
+
+    Raises
+    ------
+    InvalidInput
+        For what is no probability, ``dry_below`` above ``wet_above``, or a dwell below 1.
     """
+    number('wet_above', wet_above, '(probability)', high=1.0)
+    number('dry_below', dry_below, '(probability)', high=wet_above)
+    number('probe_below', probe_below, '(probability)', high=1.0)
+    number('dwell', dwell, 'steps', low=1.0)
 
     def choose(step: LiftOff) -> Choice:
         if step.morphology == FLAT:
@@ -149,7 +163,8 @@ class _Leg:
     """Memory of the controller about one leg."""
 
     __slots__ = (
-        'footprint', 'morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps', 'touched',
+        'decided', 'footprint', 'morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps',
+        'touched',
     )  # fmt: skip
 
     def __init__(self, morphology: str, peak: float) -> None:
@@ -157,6 +172,7 @@ class _Leg:
         self.steps = 0
         self.probing = False
         self.standing = False
+        self.decided = 0
         self.peak = peak
         self.touched = 0.0
         self.setpoint = 0.0
@@ -175,15 +191,31 @@ class MorphologyController:
     policy : callable
         Chooses at each lift-off, see :func:`adaptive`.
     expected_load : float
-        Normal force in stance, N.
+        Normal force in stance, N, above 0.
     start : str
         Shape before the first lift-off.
     margin : float
-        On the load, for the pressure of a dome.
+        Factor on the load, for the pressure of a dome, above 0.
     fixed_pressure : float or None
-        Gauge pressure of every dome, Pa; None chooses it from the load.
+        Gauge pressure of every dome, Pa, above 0 up to the foot's ceiling; None chooses it from
+        the load.
     load_gate : float
-        Share of the expected load above which a foot stands.
+        Share of the expected load below which a foot has lifted off, above 0 up to 0.6. It stands
+        again at 1.5 times that.
+
+    Attributes
+    ----------
+    refusals : dict
+        For each leg that wanted to be a dome and may not, why.
+    switches : dict
+        For each leg, how often its shape has changed.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the value that is outside its range.
+    LimitError
+        When the fixed pressure is above the foot's ceiling.
     """
 
     def __init__(
@@ -197,16 +229,24 @@ class MorphologyController:
         fixed_pressure: float | None = None,
         load_gate: float = 0.3,
     ) -> None:
-        if not (math.isfinite(expected_load) and expected_load > 0.0):
-            raise InvalidInput(f'expected_load = {expected_load!r} N: must be finite and > 0 N')
-        if start not in (FLAT, DOME):
-            raise InvalidInput(f'start = {start!r}: must be {FLAT!r} or {DOME!r}')
+        number('expected_load', expected_load, 'N', above=True)
+        one_of('start', start, (FLAT, DOME))
+        number('margin', margin, '(factor)', above=True)
+        number('load_gate', load_gate, '(share)', high=0.6, above=True)
+        if fixed_pressure is not None:
+            number('fixed_pressure', fixed_pressure, 'Pa', above=True)
+            if fixed_pressure > foot.ceiling:
+                raise LimitError(
+                    f'fixed_pressure = {fixed_pressure:g} Pa is above the ceiling of'
+                    f' {foot.ceiling:g} Pa of {foot.source}'
+                )
         self._foot = foot
         self._policy = policy
         self._margin = margin
         self._fixed_pressure = fixed_pressure
         self._gate = load_gate * expected_load
         self._footprints = Footprints()
+        self._decisions = 0
         self._legs = {leg: _Leg(start, 1.5 * expected_load) for leg in legs}
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
@@ -235,11 +275,28 @@ class MorphologyController:
         wet_probability : float
             Belief about the ground below it, 0 to 1.
         position : sequence of float
-            Of the foot, m.
+            Of the foot, x and y, m.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled, a probability outside 0 to 1, or a value that is not
+            finite. Nothing has changed then.
         """
-        state = self._legs[leg]
+        state = self._legs.get(leg)
+        if state is None:
+            raise InvalidInput(
+                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
+            )
+        # A load that is no number is below no gate: it must not pass for a lift-off.
+        if not (math.isfinite(load + position[0] + position[1]) and 0.0 <= wet_probability <= 1.0):
+            raise InvalidInput(
+                f'leg {leg}: load = {load!r} N, position = {tuple(position)!r} m: must be finite;'
+                f' wet_probability = {wet_probability!r}: must be from 0 to 1'
+            )
         if load >= self._gate:
-            state.standing = True
+            if load >= TOUCH_DOWN * self._gate:
+                state.standing = True
             state.touched = max(state.touched, load)
         elif state.standing:
             state.standing = False
@@ -259,6 +316,8 @@ class MorphologyController:
         before_x, before_y = state.footprint or (x, y)
         state.footprint = (x, y)
         ahead = (2.0 * x - before_x, 2.0 * y - before_y)
+        self._decisions += 1
+        state.decided = self._decisions
         step = LiftOff(
             leg=leg,
             morphology=state.morphology,
@@ -266,11 +325,21 @@ class MorphologyController:
             probing=state.probing,
             wet_ahead=self._footprints.wet_probability(*ahead),
             next_position=ahead,
-            others_probing=any(
-                other.probing for number, other in self._legs.items() if number != leg
-            ),
+            others_probing=self._others_probing(leg),
         )
         self._apply(leg, self._policy(step))
+        if state.morphology != step.morphology:
+            self.switches[leg] += 1
+            state.steps = 0
+
+    def _others_probing(self, leg: int) -> bool:
+        # A leg that is held up since the others have long stepped again keeps nobody waiting.
+        recent = self._decisions - 2 * len(self._legs)
+        return any(
+            other.probing and other.decided > recent
+            for name, other in self._legs.items()
+            if name != leg
+        )
 
     def _apply(self, leg: int, choice: Choice) -> None:
         state = self._legs[leg]
@@ -286,9 +355,6 @@ class MorphologyController:
                 # Domes that cannot carry the foot are worse than none.
                 self.refusals[leg] = str(error)
                 morphology = FLAT
-        if morphology != state.morphology:
-            self.switches[leg] += 1
-            state.steps = 0
-            state.morphology = morphology
+        state.morphology = morphology
         state.probing = choice.probe
         state.setpoint = setpoint

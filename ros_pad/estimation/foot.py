@@ -154,7 +154,8 @@ class FootEstimator:
         self._first_window = True
         self._samples = 0
         self._sum_load = self._sum_tangential = self._sum_speed = 0.0
-        mean, sd = self._ground.friction
+        mean, spread = self._ground.friction
+        sd = math.hypot(spread, tuning.ratio_noise)
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
             self._ground.wet_probability, mean, sd, self._ground.quantile(0.05), True,
@@ -233,7 +234,10 @@ class FootEstimator:
         if fresh:
             self._filter(time - self._window_start)
             self._window_start = time
-            friction_mean, friction_sd = self._ground.friction
+            friction_mean, spread = self._ground.friction
+            # The error of the model of T/N is the same in every sample: no number of them
+            # averages it out.
+            friction_sd = math.hypot(spread, self._tuning.ratio_noise)
             wet = self._ground.wet_probability
             quantile = self._ground.quantile(0.05)
             self._quantile = quantile
