@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 from ros_pad.control import MorphologyController
 from ros_pad.control import policy_named
+from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.pace import Pace
@@ -61,10 +62,17 @@ class ClosedLoop:
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
     seed : int
-        Of floor and noise.
+        Of floor and noise, 0 or more.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown policy, or a seed that is no whole number from 0.
     """
 
     def __init__(self, scene: Scene, policy: str, seed: int) -> None:
+        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+            raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
         self.period_ns = sample_period_ns(scene)
         self.floor = scene.floor.build(seed)
         self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9)
@@ -145,7 +153,7 @@ def run(
     policy : str or None
         ``flat``, ``dome``, ``adaptive`` or ``oracle``; None takes the scene's own.
     seed : int
-        Of floor and noise; the same seed gives the same trial.
+        Of floor and noise, 0 or more; the same seed gives the same trial.
     fidelity : str
         ``auto`` or a rung of the ladder.
     progress : callable or None
@@ -159,22 +167,24 @@ def run(
     Raises
     ------
     ConfigError, InvalidInput
-        Naming what is wrong with scene, policy or fidelity.
+        Naming what is wrong with scene, policy, seed or fidelity.
     """
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
-    policy = policy or scene.policy
+    policy = scene.policy if policy is None else policy
     rung = ladder.rung(scene, fidelity)
     loop = ClosedLoop(scene, policy, seed)
     log = TrialLog(scene, policy, seed, rung)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns
-    for sample in range(samples):
-        loop.tick(log)
-        if progress and sample % 250 == 0:
-            progress(loop.robot.time)
-        if loop.robot.verdict:
-            break
+    try:
+        for sample in range(samples):
+            loop.tick(log)
+            if progress and sample % 250 == 0:
+                progress(loop.robot.time)
+            if loop.robot.verdict:
+                break
+    finally:
+        loop.close()
     wall = time.perf_counter() - started
-    loop.close()
     return log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
