@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: Apache-2.0
+import contextlib
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from mcap.reader import make_reader
+from rclpy.signals import SignalHandlerOptions
+
+from ros_pad import trials
+from ros_pad.errors import BagError
+from ros_pad.errors import PadError
+from ros_pad.nodes import composed
+from ros_pad.nodes.composed import ComposedTrial
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.bag import BagReader
+from ros_pad.trials.bag import BagWriter
+
+AMBIENT = 101325.0
+LEGS = (1, 2, 3, 4, 5, 6)
+SERIES = (
+    'time', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability',
+    'friction', 'margin', 'slip_speed', 'slipping', 'dome',
+)  # fmt: skip
+
+
+def scene_of(name, cycles):
+    return dataclasses.replace(Scene.load(name), cycles=cycles)
+
+
+@contextlib.contextmanager
+def trial_of(scene, policy, seed, bag):
+    """Yield the nodes of a trial, connected and at their first step."""
+    context = rclpy.Context()
+    rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        trial = ComposedTrial(scene, policy, seed, bag, context)
+        try:
+            yield trial
+        finally:
+            trial.close()
+    finally:
+        rclpy.shutdown(context=context)
+
+
+def messages_of(bag):
+    """Return the messages in a bag, by topic."""
+    found = {}
+    for topic, message, _ in BagReader(bag).messages():
+        found.setdefault(topic, []).append(message)
+    return found
+
+
+def gauges(messages):
+    return [message.fluid_pressure - AMBIENT for message in messages]
+
+
+@pytest.mark.parametrize(
+    ('name', 'policy', 'cycles', 'moves'),
+    [
+        ('hexapod_patches', 'adaptive', 8, 1),
+        ('hexapod_patches', 'oracle', 3, 1),
+        ('hexapod_patches', 'dome', 3, 0),
+        ('leg_wet_dome_60', 'dome', 2, 0),
+    ],
+)
+def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves, tmp_path):
+    scene = scene_of(name, cycles)
+    on_nodes = composed.run(scene, policy, seed=3, bag=tmp_path / 'bag')
+    without = trials.run(scene, policy, seed=3)
+    assert len(on_nodes.time) == round(scene.duration * 250)
+    for series in SERIES:
+        assert np.array_equal(getattr(on_nodes, series), getattr(without, series)), series
+    assert np.array_equal(on_nodes.body[:, :2], without.body[:, :2])
+    # The heading is sent as a quaternion: sine and back, 1e-15 rad.
+    assert np.max(np.abs(on_nodes.body[:, 2] - without.body[:, 2])) < 1e-15
+    assert on_nodes.metrics == without.metrics
+    assert not on_nodes.settings['interrupted']
+    # There is something to agree on.
+    assert np.max(on_nodes.pressure) > 30e3
+    assert sum(on_nodes.metrics.switches) >= moves
+    assert on_nodes.metrics.distance_m > 0.0
+
+
+def test_every_message_arrives(tmp_path):
+    """What one node sends is what the next one is called with: number for number, in order."""
+    scene = scene_of('hexapod_patches', 3)
+    felt = {leg: [] for leg in LEGS}
+    commanded = {leg: [] for leg in LEGS}
+    stepped = []
+    with trial_of(scene, 'oracle', 3, tmp_path / 'bag') as trial:
+
+        def watch(thing, name, see):
+            method = getattr(thing, name)
+
+            def watched(*arguments):
+                see(*arguments)
+                return method(*arguments)
+
+            setattr(thing, name, watched)
+
+        for leg in LEGS:
+            watch(
+                trial.estimator.legs[leg]._estimator,
+                'update',
+                lambda *arguments, leg=leg: felt[leg].append(arguments),
+            )
+            watch(trial.regulator.channels[leg].regulator, 'set_pressure', commanded[leg].append)
+        watch(trial.simulator.robot, 'step', lambda p: stepped.append(tuple(p)))
+        trial.walk()
+        samples = trial.estimator.samples
+    heard = messages_of(tmp_path / 'bag')
+    steps = round(scene.duration * 250)
+    assert samples == 6 * steps
+    assert len(stepped) == steps
+    for index, leg in enumerate(LEGS):
+        wrenches, positions = heard[f'/leg_{leg}/wrench'], heard[f'/leg_{leg}/position']
+        assert len(wrenches) == len(positions) == len(felt[leg]) == steps
+        for (at, force, place, _), wrench, position in zip(
+            felt[leg], wrenches, positions, strict=True
+        ):
+            stamp, f, p = wrench.header.stamp, wrench.wrench.force, position.point
+            assert at == (stamp.sec * 10**9 + stamp.nanosec) * 1e-9
+            assert force == (f.x, f.y, f.z)
+            assert place == (p.x, p.y, p.z)
+        assert len({at for at, *_ in felt[leg]}) == steps
+        setpoints = gauges(heard[f'/leg_{leg}/pressure_setpoint'])
+        # At each control step; at the end the regulator vents of itself.
+        assert setpoints == commanded[leg][: len(setpoints)]
+        assert set(commanded[leg][len(setpoints) :]) <= {0.0}
+        assert len(heard[f'/leg_{leg}/wetness']) == len(setpoints) == 201
+        # A pressure reaches robot and estimator in time for the next sample.
+        pressures = heard[f'/leg_{leg}/pressure']
+        by_time = {
+            m.header.stamp.sec * 10**9 + m.header.stamp.nanosec: m.fluid_pressure - AMBIENT
+            for m in pressures
+        }
+        expected, last = [], 0.0
+        for number in range(1, steps + 1):
+            expected.append(last)
+            last = by_time.get(number * 4_000_000, last)
+        assert [row[index] for row in stepped] == expected
+        assert [each[3] for each in felt[leg]] == expected
+    assert any(max(row) > 30e3 for row in stepped)
+
+
+def raw_messages(bag):
+    (file,) = bag.glob('*.mcap')
+    found = {}
+    with file.open('rb') as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            found.setdefault(channel.topic, []).append((message.log_time, message.data))
+    return found
+
+
+def test_the_same_seed_gives_the_same_messages(tmp_path):
+    scene = scene_of('hexapod_patches', 3)
+    first, second, other = (
+        (composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name), tmp_path / name)
+        for name, seed in [('first', 5), ('second', 5), ('other', 6)]
+    )
+    one, two, three = (raw_messages(bag) for _, bag in (first, second, other))
+    assert set(one) == set(two)
+    assert len(one) == 6 * 10 + 3
+    for topic in set(one) - {'/diagnostics'}:
+        assert one[topic] == two[topic], topic
+    assert one['/leg_1/wrench'] != three['/leg_1/wrench']
+
+
+def check_vented(bag):
+    """The pads were under pressure, and are flat at the end of a bag that is whole."""
+    assert BagReader(bag).problem is None
+    heard = messages_of(bag)
+    for leg in LEGS:
+        pressures = gauges(heard[f'/leg_{leg}/pressure'])
+        assert max(pressures) > 30e3
+        assert pressures[-1] < 1000.0
+    return heard
+
+
+def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
+    with trial_of(scene_of('hexapod_patches', 30), 'dome', 0, tmp_path / 'bag') as trial:
+
+        def progress(at):
+            trial.stopped = at > 2.5
+
+        trial.walk(progress)
+        assert 2.5 < trial.simulator.robot.time < 2.7
+    heard = check_vented(tmp_path / 'bag')
+    assert len(heard['/leg_1/wrench']) == round(trial.simulator.robot.time * 250)
+
+
+def test_a_trial_that_comes_to_its_end_leaves_the_pads_flat(tmp_path):
+    composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
+    check_vented(tmp_path / 'bag')
+
+
+def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
+    before = signal.getsignal(signal.SIGTERM)
+    sent = []
+
+    def once(at):
+        if at > 2.5 and not sent:
+            sent.append(at)
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    trial = composed.run(
+        scene_of('hexapod_patches', 30), 'dome', bag=tmp_path / 'bag', progress=once
+    )
+    assert trial.settings['interrupted']
+    assert 2.5 < trial.metrics.duration_s < 2.8
+    assert signal.getsignal(signal.SIGTERM) is before
+    check_vented(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
+    arguments = ['run', 'hexapod_patches', '--cycles', '30', '--policy', 'dome']
+    out = tmp_path / 'out'
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ros_pad.cli', *arguments, '--out', str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        deadline = time.monotonic() + 30.0
+
+        def recorded():
+            return sum(file.stat().st_size for file in out.glob('bag/*.mcap'))
+
+        while recorded() < 1_000_000 and process.poll() is None:
+            assert time.monotonic() < deadline, 'no bag is growing'
+            time.sleep(0.05)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 130, errors
+    assert 'pads vented, bag closed' in errors
+    assert 'Traceback' not in errors
+    check_vented(out / 'bag')
+
+
+@pytest.mark.parametrize('deaf', ['controller', 'estimator', 'regulator', 'simulator'])
+def test_a_node_that_does_not_answer_is_told_of_soon(deaf, monkeypatch, tmp_path):
+    monkeypatch.setattr(composed, '_PATIENCE', 0.3)
+    started = time.monotonic()
+    with (
+        trial_of(scene_of('hexapod_patches', 2), 'dome', 0, tmp_path / 'bag') as trial,
+        pytest.raises(PadError, match=r'waited 0\.3 s in vain for the nodes to answer to 0\.5'),
+    ):
+
+        def progress(at):
+            if at > 0.49:
+                trial._executor.remove_node(getattr(trial, deaf))
+
+        trial.walk(progress)
+    assert time.monotonic() - started < 10.0
+    assert BagReader(tmp_path / 'bag').problem is None
+    assert len(messages_of(tmp_path / 'bag')['/leg_1/wrench']) > 120
+
+
+def test_a_full_disk_ends_the_trial_with_its_own_words(monkeypatch, tmp_path):
+    write = BagWriter.write
+    count = 0
+
+    def until_full(self, *arguments):
+        nonlocal count
+        count += 1
+        if count > 5000:
+            raise BagError('no space left: 5000 messages are saved')
+        write(self, *arguments)
+
+    monkeypatch.setattr(BagWriter, 'write', until_full)
+    with pytest.raises(BagError, match='5000 messages are saved'):
+        composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
+
+
+def test_a_bag_that_exists_is_not_overwritten(tmp_path):
+    (tmp_path / 'bag').mkdir()
+    with pytest.raises(BagError, match='exists'):
+        composed.run(scene_of('hexapod_patches', 1), 'flat', bag=tmp_path / 'bag')
+    assert list((tmp_path / 'bag').iterdir()) == []
+
+
+def test_it_runs_in_a_thread_too(tmp_path):
+    """Signals are the main thread's; elsewhere a trial does not ask for them."""
+    found = []
+
+    def walk():
+        found.append(composed.run(scene_of('leg_wet_flat', 1), bag=tmp_path / 'bag'))
+
+    thread = threading.Thread(target=walk)
+    thread.start()
+    thread.join(timeout=30)
+    assert found[0].metrics.duration_s == pytest.approx(scene_of('leg_wet_flat', 1).duration)
