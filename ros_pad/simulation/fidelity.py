@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from ros_pad.contact import WATER
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation.gait import TripodGait
-from ros_pad.simulation.planar_hexapod import GRAVITY
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import Robot
@@ -93,13 +91,4 @@ def omitted(scene: Scene) -> list[Omission]:
                 'the body is one rigid mass',
             ),
         ]
-    if scene.tow.weight > 0.0 and isinstance(scene.gait, TripodGait):
-        inertia = scene.tow.weight / GRAVITY * scene.gait.peak_acceleration
-        terms.append(
-            Omission(
-                'inertia of the towed load',
-                inertia / (3.0 * foot.friction * load),
-                'mass of the load at the peak acceleration of the gait, shared by three feet',
-            )
-        )
     return terms

@@ -59,6 +59,7 @@ class PlanarHexapod:
         self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
         self._contacts = [Contact(foot.shear_stiffness) for _ in self.legs]
         self._sled = Contact(scene.tow.stiffness)
+        self._pull = (0.0, 0.0)
         self._reach = gait.reach()
         self._motions = [(0.0, 0.0)] * 6
         # Where each foot is in the body now, relative to home, and where it left the ground.
@@ -179,8 +180,9 @@ class PlanarHexapod:
         cosine, sine = math.cos(self._heading), math.sin(self._heading)
         push_x = sum(contact.force_x for contact in self._contacts)
         push_y = sum(contact.force_y for contact in self._contacts)
-        lean_x = -body.height * push_x + (self._tow.height - body.height) * self._sled.force_x
-        lean_y = -body.height * push_y + (self._tow.height - body.height) * self._sled.force_y
+        pull_x, pull_y = self._pull
+        lean_x = -body.height * push_x + (self._tow.height - body.height) * pull_x
+        lean_y = -body.height * push_y + (self._tow.height - body.height) * pull_y
         moment_x = cosine * lean_x + sine * lean_y
         moment_y = -sine * lean_x + cosine * lean_y
         s = sx = sy = sxx = sxy = syy = 0.0
@@ -219,8 +221,13 @@ class PlanarHexapod:
         sled.cap = tow.weight * (
             tow.friction_wet if self._floor.wet(behind_x, behind_y) else tow.friction_dry
         )
-        twist = elastic(
-            self._twist, body.mass, body.inertia, [*self._contacts, sled], dt, self._twist
+        towed = tow.weight / GRAVITY
+        last = self._twist
+        twist = elastic(last, body.mass + towed, body.inertia, [*self._contacts, sled], dt, last)
+        # What the line does to the body: the load's friction, and its inertia.
+        self._pull = (
+            sled.force_x - towed * (twist[0] - last[0]) / dt,
+            sled.force_y - towed * (twist[1] - last[1]) / dt,
         )
         self._twist = twist
         self._x += twist[0] * dt

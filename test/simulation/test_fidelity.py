@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import dataclasses
 
 import pytest
 
@@ -9,7 +8,6 @@ from ros_pad.simulation import Scene
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import Tow
 
 HEXAPOD, LEG = Scene.load('hexapod_patches'), Scene.load('leg_wet_flat')
 
@@ -50,9 +48,3 @@ def bound(scene, word):
 def test_bound_of_the_capillary_force():
     # By hand: 37 pads, 2 · 0.073 N/m · 3 mm each, against 0.35 · 6.834 N.
     assert bound(HEXAPOD, 'capillary') == pytest.approx(37 * 0.000438 / 2.392, rel=1e-3)
-
-
-def test_bound_of_the_towed_mass():
-    # By hand: 12 N are 1.223 kg; 4π · 0.16 m/(1 s)² = 2.011 m/s²; three feet of 2.392 N.
-    assert bound(HEXAPOD, 'towed') == pytest.approx(1.2232 * 2.0106 / (3 * 2.392), rel=1e-3)
-    assert bound(dataclasses.replace(HEXAPOD, tow=Tow()), 'towed') is None

@@ -167,14 +167,14 @@ def test_symmetric_walk_does_not_drift():
 
 
 def test_friction_coefficient_that_a_level_walk_needs():
-    """μ g must exceed the peak acceleration 4π S/T² = 2.01 m/s²: μ = 0.205."""
+    """μ g must exceed the peak acceleration 4π S/T² = 1.76 m/s²: μ = 0.179."""
     slip = {}
-    for friction in (0.15, 0.19, 0.25, 0.3):
+    for friction in (0.13, 0.165, 0.22, 0.27):
         robot = robot_of(scene_of(friction=friction))
         walk(robot, 3.0)
         slip[friction] = sum(foot.slip_path for foot in robot.feet)
-    assert GAIT.peak_acceleration == pytest.approx(2.0106, rel=1e-4)
-    assert slip[0.15] > slip[0.19] > 5.0 * slip[0.3]
+    assert GAIT.peak_acceleration == pytest.approx(1.7593, rel=1e-4)
+    assert slip[0.13] > slip[0.165] > 5.0 * slip[0.27]
     # Low friction alone hardly slows a level walk: what a foot loses at first it gains later.
     x, _, _ = walk(robot_of(scene_of(friction=0.1)), 5.0)
     assert x > 0.9 * 5 * GAIT.stride
@@ -371,3 +371,20 @@ def test_floor_of_the_scene_is_not_needed():
     robot = robot_of(scene_of(floor=plan), DRY)
     walk(robot, 1.0)
     assert not any(foot.wet for foot in robot.feet)
+
+
+def test_a_towed_mass_slows_the_start():
+    """Feet that slip at F = μ W push body and load: a = (F - D)/(m + m_tow), by Newton."""
+    tow = Tow(weight=12.0, friction_dry=0.05, friction_wet=0.05, height=BODY.height)
+    robot = robot_of(scene_of(friction=0.05, tow=tow))
+    speeds, pushes = [], []
+    last = 0.0
+    for _ in range(50):
+        robot.step([0.0] * 6)
+        speeds.append((robot.body[0] - last) / robot.period)
+        last = robot.body[0]
+        pushes.append(sum(foot.force[0] for foot in robot.feet))
+    gained = speeds[-1] - speeds[-11]
+    wanted = (np.mean(pushes[-10:]) - 0.6) / (BODY.mass + 12.0 / 9.81) * 10 * robot.period
+    assert gained > 0.0
+    assert gained == pytest.approx(wanted, rel=1e-6)

@@ -55,8 +55,8 @@ def test_values_come_where_they_belong():
     scene = Scene.load('hexapod_patches')
     assert scene.body.mass == HEXAPOD['body']['mass']
     assert scene.expected_load == pytest.approx(2.09 * 9.81 / 3.0)
-    assert scene.stride == scene.gait.stride == 0.16
-    assert scene.tow.friction_dry == 0.55 and scene.tow.friction_wet == 0.12
+    assert scene.stride == scene.gait.stride == 0.14
+    assert scene.tow.friction_dry == 0.5 and scene.tow.friction_wet == 0.12
     assert scene.sensors.rate == 250.0 and scene.sensors.position == 1.5e-4
     assert scene.settle == 1.0
     leg = Scene.load('leg_wet_dome_60')

@@ -110,11 +110,12 @@ def test_dry_hexapod_walks_straight_without_slip(walks):
 
 def test_wet_flat_hexapod_slips_and_deviates(walks):
     """Thesis 5.3: "struggles to maintain a straight trajectory, leading to deviations"."""
+    straight = max(abs(walk.lateral_drift_m) for walk in walks['dry_flat'] + walks['wet_dome'])
     for walk in walks['wet_flat']:
         assert walk.verdict is None
         assert walk.distance_per_cycle_m < 0.8 * 0.12
         assert min(walk.slip_path_m) / walk.cycles > 0.01
-        assert abs(walk.lateral_drift_m) > 0.02
+        assert abs(walk.lateral_drift_m) > 20.0 * straight
 
 
 def test_wet_dome_hexapod_is_like_the_dry_one(walks):
