@@ -30,8 +30,9 @@ _SELDOM = 1e-3  # the least probability of either ground
 DEMAND = 0.3
 """Mean T/N that gaits ask for, taken to be exponential."""
 
-SLIP_SPEED = 0.1
-"""Mean speed of slips, m/s, taken to be exponential."""
+SLIP_SPEED = 0.04
+"""Most frequent speed v of slips, m/s; their density is taken to go as x exp(-x), x = speed / v.
+It starts at zero, so that the noise of a foot at rest does not add up to slow slip."""
 
 _UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
@@ -134,7 +135,8 @@ class GroundFilter:
         """
         away = (GRID - ratio) / ratio_noise
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
-        slip = math.exp(-speed / SLIP_SPEED) / SLIP_SPEED if speed > 0.0 else 0.0
+        swift = max(speed, 0.0) / SLIP_SPEED
+        slip = swift * math.exp(-swift) / SLIP_SPEED
         # Stick: T/N is what the gait demands, and μ is above it. Slip: more is demanded than μ,
         # and T/N shows μ.
         likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
@@ -154,9 +156,14 @@ class GroundFilter:
     def _move(self, distance: float) -> None:
         """Go some metres: perhaps onto other ground, of which nothing is known."""
         stay = math.exp(-distance / self._patch_length)
-        self._belief = stay * self._belief + (1.0 - stay) * (
-            self._grounds * self._tables[self._dome]
-        )
+        table = self._tables[self._dome]
+        if self._dome:
+            # Grounds that feel alike must not be told apart by when each was last thought of.
+            grounds = stay * self._grounds_known() + (1.0 - stay) * self._grounds
+            friction = self._belief[0] + self._belief[1]
+            self._belief = grounds * (stay * friction + (1.0 - stay) * table[0])
+        else:
+            self._belief = stay * self._belief + (1.0 - stay) * (self._grounds * table)
 
     def _grounds_known(self) -> np.ndarray:
         return self._belief.sum(axis=1, keepdims=True)

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation.alarm import SlipAlarm
+
+NEVER = 1e6  # nats: a threshold that leaves the statistic alone
+
+
+@pytest.mark.parametrize(('tau', 'dt', 'weight'), [(0.0, 0.004, 1.0), (0.02, 0.004, 5.0)])
+def test_the_statistic_is_the_largest_log_likelihood_ratio_of_any_onset(tau, dt, weight):
+    """Page's recursion against the definition: all onsets, normal densities from SciPy."""
+    noise, v1 = 0.012, 0.03
+    speeds = np.random.default_rng(3).normal(0.01, 0.02, size=120)
+    wide = noise * math.sqrt(weight)
+    ratios = stats.norm.logpdf(speeds, v1, wide) - stats.norm.logpdf(speeds, 0.0, wide)
+    alarm = SlipAlarm(noise, tau, speed=v1, threshold=NEVER)
+    found, expected = [], []
+    for n, speed in enumerate(speeds, start=1):
+        assert alarm.update(float(speed), dt) is False
+        found.append(alarm.statistic)
+        expected.append(max(0.0, *(ratios[onset:n].sum() for onset in range(n))))
+    assert max(expected) > 3.0 and min(expected) == 0.0
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def run_length(shift, generator):
+    """Samples to the alarm with unit noise, v1 of one standard deviation, threshold 4."""
+    alarm = SlipAlarm(0.03, 0.0, speed=0.03, threshold=4.0)
+    count = 0
+    while True:
+        for speed in generator.normal(0.03 * shift, 0.03, size=200).tolist():
+            count += 1
+            if alarm.update(speed, 0.004):
+                return count
+
+
+# Average run lengths of the one-sided CUSUM with reference value 1/2 and decision interval 4, in
+# standard deviations (Montgomery, Introduction to Statistical Quality Control: 168 for the
+# two-sided chart at no shift, hence 336; 26.6 and 8.38 at shifts of 1/2 and 1).
+@pytest.mark.parametrize(
+    ('shift', 'expected', 'runs'), [(0.0, 336.0, 2000), (0.5, 26.6, 1500), (1.0, 8.38, 1500)]
+)
+def test_average_run_lengths_are_those_of_the_tables(shift, expected, runs):
+    generator = np.random.default_rng(11)
+    lengths = [run_length(shift, generator) for _ in range(runs)]
+    error = np.std(lengths) / math.sqrt(runs)
+    assert error < 0.03 * expected
+    assert np.mean(lengths) == pytest.approx(expected, abs=3.0 * error + 0.01 * expected)
+
+
+def test_between_false_alarms_pass_at_least_exp_threshold_samples():
+    """Lorden's bound, for noise of any size; 5.5 minutes of each at 250 Hz."""
+    rates = {}
+    for noise in (0.01, 0.03, 0.1):
+        alarm = SlipAlarm(noise, 0.0)
+        alarms = 0
+        for speed in np.random.default_rng(5).normal(0.0, noise, size=80_000).tolist():
+            if alarm.update(speed, 0.004):
+                alarms += 1
+                alarm.reset()
+        rates[noise] = alarms / 80_000
+    assert rates[0.03] > 0.0  # not vacuous: noise of the size of v1 does raise it
+    assert max(rates.values()) < math.exp(-4.0)
+
+
+def test_a_slip_of_50_mm_a_second_takes_8_ms_without_noise():
+    alarm = SlipAlarm(0.0075, 0.02)
+    # σ'² = 5 · 7.5² mm²/s²; each sample adds 30/281 · (50 - 15) = 3.7 nats, two are above 4.
+    assert [alarm.update(0.05, 0.004) for _ in range(3)] == [False, True, True]
+    assert alarm.statistic == 8.0  # no higher than twice the threshold
+
+
+def test_it_ends_soon_after_the_slip():
+    alarm = SlipAlarm(0.0075, 0.02)
+    for _ in range(10_000):
+        assert alarm.update(0.3, 0.004) or alarm.statistic < 4.0
+    # Each sample at rest takes 30/281 · 15 = 1.6 nats off 8.
+    assert [alarm.update(0.0, 0.004) for _ in range(4)] == [True, True, False, False]
+
+
+def test_it_hears_no_creep_below_half_the_speed():
+    alarm = SlipAlarm(0.0075, 0.02)
+    assert not any(alarm.update(0.0149, 0.004) for _ in range(10_000))
+    assert any(alarm.update(0.0151, 0.004) for _ in range(10_000))
+
+
+def test_reset_forgets():
+    alarm = SlipAlarm(0.0075, 0.02)
+    assert not alarm.update(0.05, 0.004)
+    alarm.reset()
+    assert alarm.statistic == 0.0
+    assert not alarm.update(0.05, 0.004)
+
+
+@pytest.mark.parametrize('name', ['noise', 'correlation_time', 'speed', 'threshold'])
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, 'much', None])
+def test_bad_values_are_named(name, value):
+    with pytest.raises(InvalidInput, match=name):
+        SlipAlarm(**({'noise': 0.01, 'correlation_time': 0.02} | {name: value}))
+
+
+def test_noise_may_not_be_zero():
+    with pytest.raises(InvalidInput, match='noise = 0 m/s'):
+        SlipAlarm(0.0, 0.02)

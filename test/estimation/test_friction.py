@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.estimation.friction import GRID
+from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.friction import GroundFilter
+
+PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
+STILL = 0.0  # m/s
+DT = 0.04
+
+
+def flat(**options):
+    ground = GroundFilter(PRIOR, **options)
+    ground.touch_down(0.0, dome=False)
+    return ground
+
+
+def stick(ground, ratio, count=1, noise=0.03):
+    for _ in range(count):
+        ground.update(ratio, noise, STILL, 0.003, DT)
+    return ground
+
+
+def slip(ground, ratio, count=5, speed=0.1):
+    for _ in range(count):
+        ground.update(ratio, 0.03, speed, 0.003, DT)
+    return ground
+
+
+def test_the_prior_is_the_contact_model_of_the_foot():
+    """Dry 0.8 flat and 0.41 domed, wet 0.12 flat: what the foot's file says it is made for."""
+    prior = FrictionPrior.of(Foot.load('large19'), 2.0)
+    assert prior.flat_dry == pytest.approx(0.8, abs=0.005)
+    assert prior.flat_wet == pytest.approx(0.12, abs=1e-6)
+    assert prior.dome == pytest.approx(0.41, abs=0.01)
+
+
+def test_prior_tables_are_probabilities_with_heavy_tails():
+    for dome in (False, True):
+        table = PRIOR.table(dome)
+        assert table.shape == (2, len(GRID))
+        assert table.sum(axis=1) == pytest.approx([1.0, 1.0], abs=1e-12)
+        assert table.min() > 1e-5
+    dry, wet = PRIOR.table(dome=False)
+    assert GRID[dry.argmax()] == pytest.approx(0.8, abs=0.02)
+    assert GRID[wet.argmax()] == pytest.approx(0.12, abs=0.02)
+    on_dry, on_wet = PRIOR.table(dome=True)
+    assert np.array_equal(on_dry, on_wet)
+
+
+def test_nothing_felt_is_the_prior():
+    ground = GroundFilter(PRIOR, wet_prior=0.3)
+    dry, wet = PRIOR.table(dome=False)
+    marginal = 0.7 * dry + 0.3 * wet
+    mean = marginal @ GRID
+    assert ground.wet_probability == pytest.approx(0.3, abs=1e-12)
+    assert ground.friction == pytest.approx(
+        (mean, math.sqrt(marginal @ (GRID - mean) ** 2)), abs=1e-12
+    )
+
+
+@pytest.mark.parametrize('ratio', [0.1, 0.3, 0.6])
+def test_stick_excludes_friction_below_and_says_nothing_else(ratio):
+    """Censored: the prior cut off by Φ((μ - ρ)/σ) and normalised, by SciPy's normal."""
+    ground = stick(flat(wet_prior=0.4, temper=1.0), ratio, noise=0.02)
+    dry, wet = PRIOR.table(dome=False)
+    cut = stats.norm.cdf(GRID, ratio, 0.02)
+    on_dry, on_wet = 0.6 * dry * cut, 0.4 * wet * cut
+    total = on_dry.sum() + on_wet.sum()
+    marginal = (on_dry + on_wet) / total
+    assert ground.wet_probability == pytest.approx(on_wet.sum() / total, abs=1e-4)
+    mean = marginal @ GRID
+    assert ground.friction == pytest.approx(
+        (mean, math.sqrt(marginal @ (GRID - mean) ** 2)), abs=1e-4
+    )
+    for share in (0.01, 0.05, 0.5, 0.95):
+        cell = np.searchsorted(np.cumsum(marginal), share)
+        assert abs(ground.quantile(share) - GRID[cell]) <= 0.0101
+
+
+def test_stick_twice_as_long_says_no_more():
+    once, often = stick(flat(), 0.3, 5), stick(flat(), 0.3, 200)
+    assert often.friction[0] == pytest.approx(once.friction[0], abs=0.03)
+    assert often.quantile(0.95) == pytest.approx(once.quantile(0.95), abs=0.03)
+
+
+@pytest.mark.parametrize('ratio', [0.06, 0.12, 0.3, 0.6, 0.9, 1.2])
+def test_slip_pulls_friction_to_the_ratio(ratio):
+    mean, sd = slip(flat(), ratio).friction
+    assert mean == pytest.approx(ratio, abs=0.03)
+    assert sd < 0.12
+
+
+def test_a_later_slip_wins_over_an_earlier_one():
+    """The ground has changed below the sliding foot."""
+    ground = slip(flat(), 0.8, 5, speed=0.2)
+    assert ground.wet_probability < 0.05
+    slip(ground, 0.12, 8, speed=0.2)
+    assert ground.wet_probability > 0.95
+    assert ground.friction[0] == pytest.approx(0.12, abs=0.02)
+
+
+def test_flat_slip_at_0_12_is_wet_and_stick_at_0_6_is_dry():
+    assert slip(flat(), 0.12, 3).wet_probability > 0.95
+    assert stick(flat(), 0.6, 3).wet_probability < 0.05
+
+
+def test_between_the_expected_frictions_a_slip_says_little():
+    """Five standard deviations above what wet ground should give, three below dry ground."""
+    assert 0.1 < slip(flat(), 0.33, 1).wet_probability < 0.9
+
+
+@pytest.mark.parametrize('wet_prior', [0.1, 0.5, 0.9])
+@pytest.mark.parametrize('speed', [0.0, 0.003, 0.004])
+def test_low_excitation_tells_nothing(wet_prior, speed):
+    """Half a minute at T/N = 0.02, also with noise of a third more than is assumed."""
+    ground = flat(wet_prior=wet_prior)
+    for sample in range(750):
+        ground.update(0.02, 0.03, speed * (-1.0) ** sample, 0.003, DT)
+    odds = ground.wet_probability / (1.0 - ground.wet_probability)
+    assert abs(math.log(odds * (1.0 - wet_prior) / wet_prior)) < 0.6
+
+
+def test_a_stance_of_low_excitation_tells_less_than_one_that_pulls():
+    quiet, loud = stick(flat(), 0.02, 15), stick(flat(), 0.6, 15)
+    assert abs(quiet.wet_probability - 0.5) < 0.05
+    assert loud.wet_probability < 0.01
+
+
+stream = st.lists(
+    st.tuples(
+        st.floats(0.0, 3.0),  # ratio
+        st.floats(1e-3, 0.5),  # its noise
+        st.floats(-1.0, 1.0),  # speed
+        st.floats(1e-3, 0.1),  # its noise
+        st.floats(1e-3, 1.0),  # duration
+        st.booleans(),  # touch down first
+        st.booleans(),  # with the other shape
+        st.floats(0.0, 5.0),  # this far
+    ),
+    min_size=1,
+    max_size=30,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(stream)
+def test_beliefs_stay_probabilities(samples):
+    ground = flat()
+    dome = False
+    for ratio, ratio_noise, speed, speed_noise, dt, new, other, distance in samples:
+        if new:
+            dome ^= other
+            ground.touch_down(distance, dome)
+        ground.update(ratio, ratio_noise, speed, speed_noise, dt)
+        assert 0.0 < ground.wet_probability < 1.0
+        mean, sd = ground.friction
+        assert 0.0 <= sd <= 0.8
+        assert GRID[0] - 1e-9 <= mean <= GRID[-1] + 1e-9
+        quantiles = [ground.quantile(share) for share in (0.0, 0.05, 0.5, 0.95, 1.0)]
+        assert quantiles == sorted(quantiles)
+        assert quantiles[0] >= 0.0 and quantiles[-1] <= 1.6 + 1e-9
+        # Conditional on each ground and over both, the whole is one.
+        assert ground._belief.sum() == pytest.approx(1.0, abs=1e-9)
+        assert ground._belief.min() >= 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(-0.5, 0.0)), min_size=1, max_size=40))
+def test_a_dome_that_holds_learns_nothing_of_wetness(samples):
+    ground = slip(flat(), 0.12)
+    before = ground.wet_probability
+    assert before > 0.95
+    ground.touch_down(0.0, dome=True)
+    for ratio, speed in samples:
+        ground.update(ratio, 0.03, speed, 0.003, DT)
+    assert ground.wet_probability == pytest.approx(before, abs=1e-9)
+
+
+def test_a_dome_only_fades_with_the_way_it_steps_and_slides():
+    ground = slip(flat(wet_prior=0.3, patch_length=1.5), 0.12)
+    before = ground.wet_probability
+    ground.touch_down(0.16, dome=True)
+    slip(ground, 0.41, 10, speed=0.05)  # 20 mm
+    faded = 0.3 + (before - 0.3) * math.exp(-(0.16 + 10 * 0.05 * DT) / 1.5)
+    assert ground.wet_probability == pytest.approx(faded, abs=1e-9)
+
+
+def test_fading_over_many_steps_ends_at_the_prior():
+    ground = slip(flat(wet_prior=0.3), 0.12)
+    for _ in range(100):
+        ground.touch_down(0.16, dome=False)
+    assert ground.wet_probability == pytest.approx(0.3, abs=1e-3)
+
+
+def test_friction_of_one_shape_says_nothing_of_the_other():
+    ground = slip(flat(), 0.12)
+    ground.touch_down(0.0, dome=True)
+    table = PRIOR.table(dome=True)[0]
+    assert ground.friction[0] == pytest.approx(table @ GRID, abs=1e-6)
+
+
+def test_friction_felt_is_kept_on_the_same_ground_by_the_same_shape():
+    ground = slip(flat(), 0.2)
+    ground.touch_down(0.0, dome=False)
+    assert ground.friction[0] == pytest.approx(0.2, abs=0.03)
+    ground.touch_down(20.0, dome=False)
+    assert ground.friction[0] == pytest.approx(flat().friction[0], abs=1e-3)
+
+
+def test_it_is_never_certain():
+    ground = stick(flat(), 0.7, 2000)
+    assert 5e-4 < ground.wet_probability < 0.02
+    ground = slip(flat(), 0.12, 2000)
+    assert 0.98 < ground.wet_probability <= 0.9991
+
+
+def test_forgetting_under_domes_follows_a_film_that_drains():
+    """A dome slips at 0.2, then holds 0.4 without sliding: half a second later it may know."""
+    ground = GroundFilter(PRIOR)
+    ground.touch_down(0.0, dome=True)
+    slip(ground, 0.2, 5)
+    assert ground.friction[0] < 0.25
+    stick(ground, 0.4, 12)
+    assert ground.friction[0] > 0.4
+
+
+@pytest.mark.parametrize('ratio', [0.0, 5.0, 1e6])
+@pytest.mark.parametrize('speed', [-10.0, 0.0, 10.0])
+def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
+    ground = flat()
+    for _ in range(50):
+        ground.update(ratio, 0.03, speed, 0.003, DT)
+    assert math.isfinite(sum(ground.friction)) and 0.0 < ground.wet_probability < 1.0
+    # And it recovers.
+    slip(ground, 0.12, 40)
+    assert ground.friction[0] == pytest.approx(0.12, abs=0.03)
