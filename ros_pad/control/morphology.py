@@ -26,6 +26,8 @@ DOME = 'dome'
 TOUCH_DOWN = 1.5
 """Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
 
+_SINCE_EVER = 1_000_000  # steps: the shape that a foot starts with is nobody's recent choice
+
 
 @dataclass(frozen=True)
 class LiftOff:
@@ -38,7 +40,8 @@ class LiftOff:
     morphology : str
         Shape of the step that ends, ``flat`` or ``dome``.
     steps : int
-        Steps taken in that shape, this one counted.
+        Steps taken since that shape was chosen, this one counted; a million and more where it is
+        the one that the foot started with.
     probing : bool
         Whether that step was a probe.
     wet_ahead : float
@@ -169,7 +172,7 @@ class _Leg:
 
     def __init__(self, morphology: str, peak: float) -> None:
         self.morphology = morphology
-        self.steps = 0
+        self.steps = _SINCE_EVER
         self.probing = False
         self.standing = False
         self.decided = 0
