@@ -25,7 +25,6 @@ _UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
 _ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
 _THICK_FILM = 1.0e-3  # m: does not drain within a stance under a flat sole
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
-_SELDOM = 1e-3  # the least probability of either ground
 
 DEMAND = 0.3
 """Mean T/N that gaits ask for, taken to be exponential."""
@@ -71,7 +70,8 @@ class FrictionPrior:
         rows = []
         for mean in means:
             spread = self.spread * mean + 0.03
-            # Heavy tails: the foot may have met ground that nobody expected.
+            # Heavy tails: the foot may have met ground that nobody expected. They also keep wet or
+            # dry from ever being certain.
             row = np.exp(-0.5 * ((GRID - mean) / spread) ** 2) / spread + 0.01
             rows.append(row / row.sum())
         return np.array(rows)
@@ -170,13 +170,6 @@ class GroundFilter:
 
     def _settle(self, belief: np.ndarray) -> None:
         dry, wet = (belief @ _ONES).tolist()
-        for ground, share in enumerate((dry, wet)):
-            if share < _SELDOM * (dry + wet):
-                # Certainty could never be undone. What is held for impossible, one knows nothing
-                # of: should it be so after all, its friction is as expected.
-                belief = belief * ((1.0 - _SELDOM) / (dry + wet - share))
-                belief[ground] = _SELDOM * self._tables[self._dome][ground]
-                dry, wet = (belief @ _ONES).tolist()
         self._belief = belief
         self.wet_probability = wet / (dry + wet)
         self._marginal = (belief[0] + belief[1]) / (dry + wet)
