@@ -193,3 +193,11 @@ def test_ctrl_c_leaves_vented_pads_and_a_readable_bag(
         highest = max(highest, last[name])
     assert highest > 60e3
     assert len(last) == 6 and max(last.values()) < 1000.0
+
+
+def test_readme_names_every_scene_and_command():
+    readme = (SCENE.parent.parent.parent / 'README.md').read_text(encoding='utf-8')
+    for name in configuration.names('scenes'):
+        assert f'`{name}`' in readme
+    for command in ('run', 'scenes', 'report', 'bag info', 'contact'):
+        assert f'`pad {command}' in readme
