@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import itertools
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.control import POLICIES
+from ros_pad.control import Choice
+from ros_pad.control import LiftOff
+from ros_pad.control import MorphologyController
+from ros_pad.control import adaptive
+from ros_pad.control import dome
+from ros_pad.control import flat
+from ros_pad.control import oracle
+from ros_pad.control import policy_named
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
+from ros_pad.errors import PadError
+
+FOOT = Foot.load('large37')
+LOAD = 6.8  # N
+STRIDE = 0.16  # m
+
+
+def lift_off(**changes):
+    step = LiftOff(
+        leg=1, morphology='flat', steps=5, probing=False, wet_ahead=0.5,
+        next_position=(1.0, 0.0), others_probing=False,
+    )  # fmt: skip
+    return dataclasses.replace(step, **changes)
+
+
+# --- policies ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('wet_ahead', [0.0, 0.5, 1.0])
+@pytest.mark.parametrize('morphology', ['flat', 'dome'])
+def test_fixed_policies_are_fixed(wet_ahead, morphology):
+    step = lift_off(wet_ahead=wet_ahead, morphology=morphology)
+    assert flat(step) == Choice('flat')
+    assert dome(step) == Choice('dome')
+
+
+@pytest.mark.parametrize(
+    ('step', 'expected'),
+    [
+        # A flat foot turns where it is likely wet, and not before.
+        ({'wet_ahead': 0.66}, Choice('dome')),
+        ({'wet_ahead': 0.64}, Choice('flat')),
+        ({'wet_ahead': 0.0}, Choice('flat')),
+        # It keeps its shape for two steps.
+        ({'wet_ahead': 0.99, 'steps': 1}, Choice('flat')),
+        ({'wet_ahead': 0.99, 'steps': 2}, Choice('dome')),
+        # A domed foot goes back where it is likely dry.
+        ({'morphology': 'dome', 'wet_ahead': 0.34}, Choice('flat')),
+        ({'morphology': 'dome', 'wet_ahead': 0.34, 'steps': 1}, Choice('dome')),
+        # Where it does not know, it asks, one leg at a time.
+        ({'morphology': 'dome', 'wet_ahead': 0.36}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'wet_ahead': 0.74}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'wet_ahead': 0.76}, Choice('dome')),
+        ({'morphology': 'dome', 'wet_ahead': 0.5, 'others_probing': True}, Choice('dome')),
+        ({'morphology': 'dome', 'wet_ahead': 0.34, 'others_probing': True}, Choice('flat')),
+        ({'morphology': 'dome', 'wet_ahead': 0.5, 'steps': 1}, Choice('dome')),
+        # After a probe it need not dwell: back when wet, flat when dry.
+        ({'probing': True, 'steps': 1, 'wet_ahead': 0.9}, Choice('dome')),
+        ({'probing': True, 'steps': 1, 'wet_ahead': 0.1}, Choice('flat')),
+        ({'probing': True, 'steps': 1, 'wet_ahead': 0.5}, Choice('flat')),
+    ],
+)
+def test_adaptive_step_by_step(step, expected):
+    assert adaptive()(lift_off(**step)) == expected
+
+
+def test_between_the_thresholds_each_shape_stays():
+    """Hysteresis: without probes a belief between 0.35 and 0.65 changes nothing."""
+    policy = adaptive(probe_below=0.0)
+    for wet_ahead in (0.36, 0.5, 0.64):
+        for shape in ('flat', 'dome'):
+            assert policy(lift_off(morphology=shape, wet_ahead=wet_ahead)) == Choice(shape)
+
+
+@pytest.mark.parametrize(
+    'bad',
+    [
+        {'wet_above': 1.1},
+        {'dry_below': -0.1},
+        {'dry_below': 0.7},
+        {'probe_below': math.nan},
+        {'dwell': 0},
+    ],
+)
+def test_bad_thresholds_are_named(bad):
+    with pytest.raises(InvalidInput, match=next(iter(bad))):
+        adaptive(**bad)
+
+
+def test_the_oracle_sees_the_ground_ahead():
+    policy = oracle(lambda x, y: x > 2.0)
+    assert policy(lift_off(next_position=(2.1, 0.0), wet_ahead=0.0)) == Choice('dome')
+    assert policy(lift_off(next_position=(1.9, 0.0), wet_ahead=1.0)) == Choice('flat')
+
+
+def test_policies_by_name():
+    for name in POLICIES:
+        assert callable(policy_named(name, lambda x, y: True))
+    assert policy_named('flat') is flat
+    with pytest.raises(InvalidInput, match=r"'oracle': needs a floor"):
+        policy_named('oracle')
+    with pytest.raises(InvalidInput, match="'brave': one of flat, dome, adaptive, oracle"):
+        policy_named('brave')
+
+
+# --- the controller ------------------------------------------------------------------------------
+
+
+class Walk:
+    """Legs that step one after the other along x, on ground of which flat feet tell the truth."""
+
+    def __init__(self, policy, legs=(1,), is_wet=lambda x: False, told=(0.03, 0.97), **options):
+        self.controller = MorphologyController(FOOT, legs, policy, LOAD, **options)
+        self.legs, self.is_wet, self.told = legs, is_wet, told
+        self.x = dict.fromkeys(legs, 0.0)
+        self.belief = dict.fromkeys(legs, 0.5)
+
+    def step(self, leg, load=LOAD):
+        """Stand, then lift off; the shape chosen for the next step is returned."""
+        controller, x = self.controller, self.x[leg]
+        if controller.morphology(leg) == 'flat':
+            self.belief[leg] = self.told[self.is_wet(x)]
+        before = controller.setpoint(leg)
+        for share in (0.1, 0.5, 1.0, 1.0, 0.5):
+            assert controller.update(leg, share * load, self.belief[leg], (x, 0.0)) == before
+        controller.update(leg, 0.0, self.belief[leg], (x, 0.0))
+        self.x[leg] = x + STRIDE
+        return controller.morphology(leg)
+
+
+def test_a_flat_foot_turns_to_dome_on_wet_ground():
+    walk = Walk(adaptive(), is_wet=lambda x: x > 0.5)
+    shapes = [walk.step(1) for _ in range(7)]
+    # The fifth footprint, at 0.64 m, is the first one that is wet.
+    assert shapes == ['flat'] * 4 + ['dome'] * 3
+    assert walk.controller.setpoint(1) > 52e3
+    assert walk.controller.switches == {1: 1}
+
+
+def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
+    walk = Walk(adaptive(), is_wet=lambda x: True)
+    shapes = [walk.step(1) for _ in range(40)]
+    probes = [k for k in range(1, 40) if shapes[k] == 'flat' and shapes[k - 1] == 'dome']
+    assert len(probes) >= 4
+    assert all(shapes[k + 1] == 'dome' for k in probes if k < 39)  # one step each
+    # What it knew, 0.97, has faded to 0.75 after ln(0.47/0.25) = 0.63 m: four strides.
+    assert {b - a for a, b in itertools.pairwise(probes)} == {4}
+
+
+def test_a_probe_that_finds_dry_ground_stays_flat():
+    walk = Walk(adaptive(), is_wet=lambda x: x < 1.0)
+    shapes = [walk.step(1) for _ in range(30)]
+    assert 'dome' in shapes[:5]
+    # It knows after the next probe, at most five strides past the edge at 1 m.
+    assert shapes[6 + 5 :] == ['flat'] * (30 - 11)
+
+
+def test_the_information_trap():
+    """Without probes a foot that was once on wet ground never returns: a dome feels no dry."""
+    trapped = Walk(adaptive(probe_below=0.0), is_wet=lambda x: x < 1.0)
+    shapes = [trapped.step(1) for _ in range(300)]
+    assert shapes[1:] == ['dome'] * 299
+    assert trapped.x[1] > 45.0
+
+
+def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
+    legs = (1, 2, 3, 4, 5, 6)
+    walk = Walk(adaptive(), legs=legs, is_wet=lambda x: True)
+    flats = []
+    for _ in range(40):
+        for leg in legs:
+            walk.step(leg)
+            flats.append([n for n in legs if walk.controller.morphology(n) == 'flat'])
+    settled = flats[3 * len(legs) :]
+    assert max(map(len, settled)) == 1
+    # Six legs together ask hardly more often than one alone does, every fourth stride.
+    probes = sum(bool(now) and now != before for before, now in itertools.pairwise(settled))
+    assert 5 <= probes <= 12
+
+
+def test_a_leg_that_is_held_up_keeps_no_other_from_probing():
+    walk = Walk(adaptive(), legs=(1, 2), is_wet=lambda x: True)
+    for _ in range(3):
+        walk.step(1)
+        walk.step(2)
+    # Leg 1 walks alone until it probes; then it is lost.
+    while walk.step(1) == 'dome':
+        pass
+    shapes = [walk.step(2) for _ in range(20)]
+    assert 'flat' in shapes
+
+
+def test_the_next_step_is_taken_to_be_as_long_as_the_last():
+    seen = []
+
+    def spy(step):
+        seen.append(step.next_position)
+        return Choice('flat')
+
+    controller = MorphologyController(FOOT, (1,), spy, LOAD)
+    for x, y in ((0.0, 1.0), (0.2, 1.1), (0.3, 1.1)):
+        controller.update(1, LOAD, 0.5, (x, y, 0.0))
+        controller.update(1, 0.0, 0.5, (x, y, 0.0))
+    assert seen == [(0.0, 1.0), pytest.approx((0.4, 1.2)), pytest.approx((0.4, 1.1))]
+
+
+def test_steps_and_probes_are_counted_for_the_policy():
+    seen = []
+    script = iter(['dome', 'dome', 'dome', 'probe', 'dome', 'flat', 'flat', 'flat'])
+
+    def spy(step):
+        seen.append((step.morphology, step.steps if step.steps < 1000 else 'ever', step.probing))
+        word = next(script)
+        return Choice('flat', probe=True) if word == 'probe' else Choice(word)
+
+    walk = Walk(spy)
+    for _ in range(8):
+        walk.step(1)
+    assert seen == [
+        ('flat', 'ever', False),
+        ('dome', 1, False),
+        ('dome', 2, False),
+        ('dome', 3, False),
+        ('flat', 1, True),
+        ('dome', 1, False),
+        ('flat', 1, False),
+        ('flat', 2, False),
+    ]
+    assert walk.controller.switches == {1: 4}
+
+
+def test_pressure_follows_the_heaviest_recent_step():
+    walk = Walk(dome)
+    walk.step(1, load=10.0)
+    # By hand: the larger of the peak felt, 10 N, and of the 10.2 N it began with, fading.
+    expected = 75e3 + (1.2 * 10.18 / 37 - 0.2833) / 1.25e-5
+    assert walk.controller.setpoint(1) == pytest.approx(expected, abs=10.0)
+    walk.step(1, load=12.0)
+    assert walk.controller.setpoint(1) == pytest.approx(
+        75e3 + (1.2 * 12.0 / 37 - 0.2833) / 1.25e-5, abs=10.0
+    )
+    for _ in range(60):
+        walk.step(1, load=5.0)
+    assert walk.controller.setpoint(1) == pytest.approx(
+        75e3 + (1.2 * 5.0 / 37 - 0.2833) / 1.25e-5, abs=50.0
+    )
+
+
+def test_a_foot_too_heavy_for_domes_stays_flat_and_says_why():
+    walk = Walk(dome)
+    assert walk.step(1, load=LOAD) == 'dome'
+    assert walk.step(1, load=20.0) == 'flat'
+    assert walk.controller.setpoint(1) == 0.0
+    assert walk.controller.refusals[1].startswith('20 N on 37 pads of large37')
+    for _ in range(40):
+        walk.step(1, load=LOAD)
+    assert walk.controller.morphology(1) == 'dome'
+    assert walk.controller.refusals == {}
+
+
+def test_a_robot_too_heavy_from_the_start_is_flat_without_a_switch():
+    controller = MorphologyController(FOOT, (1, 2), dome, 30.0, start='dome')
+    assert [controller.morphology(leg) for leg in (1, 2)] == ['flat', 'flat']
+    assert set(controller.refusals) == {1, 2}
+    assert controller.switches == {1: 0, 2: 0}
+    assert controller.setpoint(1) == 0.0
+
+
+def test_a_fixed_pressure_is_taken_as_it_is():
+    walk = Walk(dome, start='dome', fixed_pressure=60e3)
+    assert walk.controller.setpoint(1) == 60e3
+    walk.step(1, load=30.0)
+    assert walk.controller.setpoint(1) == 60e3
+
+
+def test_a_fixed_pressure_above_the_ceiling_is_refused_before_anything_moves():
+    with pytest.raises(LimitError, match=r'95000 Pa is above the ceiling of 90000 Pa of large37'):
+        MorphologyController(FOOT, (1,), dome, LOAD, fixed_pressure=95e3)
+
+
+streams = st.lists(
+    st.tuples(
+        st.sampled_from((1, 2, 3)),
+        st.floats(-1.0, 25.0),
+        st.floats(0.0, 1.0),
+        st.tuples(st.floats(-5, 5), st.floats(-5, 5)),
+    ),
+    max_size=150,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(streams, st.sampled_from(POLICIES))
+def test_never_a_change_in_stance(stream, name):
+    """Whatever comes: set-points move only when a foot that stood is below the gate."""
+    policy = policy_named(name, lambda x, y: x + y > 0.0)
+    controller = MorphologyController(FOOT, (1, 2, 3), policy, LOAD)
+    stood = dict.fromkeys((1, 2, 3), False)
+    switches = dict.fromkeys((1, 2, 3), 0)
+    for leg, load, belief, position in stream:
+        before = {n: (controller.setpoint(n), controller.morphology(n)) for n in stood}
+        returned = controller.update(leg, load, belief, position)
+        after = {n: (controller.setpoint(n), controller.morphology(n)) for n in stood}
+        assert returned == after[leg][0]
+        lifted = stood[leg] and load < 0.3 * LOAD
+        for n in stood:
+            if n != leg or not lifted:
+                assert after[n] == before[n]
+        switches[leg] += after[leg][1] != before[leg][1]
+        if load >= 0.45 * LOAD:
+            stood[leg] = True
+        elif load < 0.3 * LOAD:
+            stood[leg] = False
+        assert (after[leg][0] > 0.0) == (after[leg][1] == 'dome')
+        assert after[leg][0] <= FOOT.ceiling
+    assert controller.switches == switches
+
+
+def test_noise_at_the_gate_is_no_step():
+    """Load that rises with jitter: one stance, and one decision when it ends."""
+    decisions = []
+
+    def spy(step):
+        decisions.append(step)
+        return Choice('dome')
+
+    controller = MorphologyController(FOOT, (1,), spy, LOAD)
+    gate = 0.3 * LOAD
+    for load in (0.0, gate - 0.1, gate + 0.1, gate - 0.1, gate + 0.05, gate - 0.2, LOAD, LOAD):
+        assert controller.update(1, load, 0.9, (0.0, 0.0)) == 0.0
+    assert decisions == []
+    for load in (gate + 0.1, gate - 0.1, gate + 0.1, gate - 0.1, 0.0):
+        controller.update(1, load, 0.9, (0.0, 0.0))
+    assert len(decisions) == 1
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize('place', ['load', 'wet_probability', 'x', 'y'])
+def test_values_that_are_no_numbers_change_nothing(bad, place):
+    controller = MorphologyController(FOOT, (1,), dome, LOAD)
+    controller.update(1, LOAD, 0.5, (0.0, 0.0))
+    values = {'load': 0.0, 'wet_probability': 0.5, 'x': 0.0, 'y': 0.0} | {place: bad}
+    with pytest.raises(InvalidInput, match='leg 1: '):
+        controller.update(1, values['load'], values['wet_probability'], (values['x'], values['y']))
+    assert controller.setpoint(1) == 0.0
+    # The lift-off is still to come.
+    assert controller.update(1, 0.0, 0.5, (0.0, 0.0)) > 0.0
+
+
+@pytest.mark.parametrize('belief', [-0.01, 1.01])
+def test_beliefs_are_probabilities(belief):
+    controller = MorphologyController(FOOT, (1,), dome, LOAD)
+    with pytest.raises(InvalidInput, match='from 0 to 1'):
+        controller.update(1, LOAD, belief, (0.0, 0.0))
+
+
+def test_unknown_legs_are_refused():
+    controller = MorphologyController(FOOT, (1, 2), dome, LOAD)
+    with pytest.raises(InvalidInput, match='leg = 3: one of 1, 2'):
+        controller.update(3, LOAD, 0.5, (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [
+        ('expected_load', 0.0),
+        ('expected_load', math.nan),
+        ('start', 'round'),
+        ('margin', 0.0),
+        ('margin', math.inf),
+        ('fixed_pressure', 0.0),
+        ('fixed_pressure', -5.0),
+        ('load_gate', 0.0),
+        ('load_gate', 0.7),
+    ],
+)
+def test_bad_options_are_named(name, value):
+    options = {'expected_load': LOAD} | {name: value}
+    with pytest.raises(PadError, match=name):
+        MorphologyController(FOOT, (1,), dome, **options)

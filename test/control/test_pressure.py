@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import math
+
+import pytest
+from hypothesis import assume
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_pad.contact import force_limit
+from ros_pad.contact.resistance import Foot
+from ros_pad.control import dome_pressure
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
+
+FOOT = Foot.load('large37')
+
+
+@given(load=st.floats(0.0, 12.0), margin=st.floats(1.0, 1.4))
+def test_there_and_back_with_the_margin(load, margin):
+    """At the pressure chosen the pads carry the load with its margin, and 10 Pa less do not."""
+    assume(load * margin < 17.4)  # 37 pads carry 17.42 N at the ceiling of 90 kPa
+    pressure = dome_pressure(FOOT, load, margin)
+    assert pressure <= FOOT.ceiling
+    assert FOOT.pads * force_limit(FOOT.pad, pressure, 'measured') >= load * margin - 1e-6
+    if load > 0.0:
+        assert FOOT.pads * force_limit(FOOT.pad, pressure - 10.1, 'measured') < load * margin
+
+
+# By hand: 75 kPa + (1.2 · load / 37 - 0.2833 N) / (0.0125 N/kPa).
+@pytest.mark.parametrize(('load', 'kilopascals'), [(4.0, 62.714), (6.8, 69.979), (10.0, 78.282)])
+def test_the_line_of_the_measurements(load, kilopascals):
+    assert dome_pressure(FOOT, load, 1.2) == pytest.approx(1000.0 * kilopascals, abs=10.0)
+
+
+def test_it_is_what_regulators_take():
+    pressure = dome_pressure(FOOT, 6.7, 1.2)
+    assert pressure % 10.0 == 0.0
+    assert (pressure + 101325.0) - 101325.0 == pressure
+
+
+def test_more_load_than_the_ceiling_allows():
+    with pytest.raises(LimitError) as caught:
+        dome_pressure(FOOT, 14.6, 1.2)
+    message = str(caught.value)
+    for part in ('14.6 N', 'margin 1.2', '37 pads', 'large37', 'Pa', '90000 Pa'):
+        assert part in message
+
+
+def test_more_load_than_any_pressure_carries():
+    with pytest.raises(LimitError, match=r'70 N on 37 pads of large37: .*more than any pressure'):
+        dome_pressure(FOOT, 70.0, 1.2)
+
+
+def test_rounding_up_never_passes_the_ceiling():
+    """74 998 Pa are needed and allowed, but the next step of 10 Pa is not."""
+    load = FOOT.pads * force_limit(FOOT.pad, 74_996.0, 'measured')
+    narrow = dataclasses.replace(FOOT, ceiling=74_998.0)
+    with pytest.raises(LimitError, match='above the ceiling of 74998 Pa'):
+        dome_pressure(narrow, load, 1.0)
+    assert dome_pressure(dataclasses.replace(FOOT, ceiling=75e3), load, 1.0) == 75e3
+
+
+@pytest.mark.parametrize('criterion', ['measured', 'max_depth', 'flattening'])
+def test_each_criterion_has_its_pressure(criterion):
+    foot = dataclasses.replace(FOOT, limit=criterion)
+    pressure = dome_pressure(foot, 6.8, 1.2)
+    assert FOOT.pads * force_limit(foot.pad, pressure, criterion) == pytest.approx(8.16, rel=1e-3)
+
+
+@pytest.mark.parametrize('load', [-1.0, math.nan, math.inf])
+def test_bad_loads_are_refused(load):
+    with pytest.raises(InvalidInput, match='force'):
+        dome_pressure(FOOT, load, 1.2)
+
+
+@pytest.mark.parametrize('margin', [-1.0, 0.0, math.nan, math.inf])
+def test_bad_margins_are_refused(margin):
+    with pytest.raises(InvalidInput, match='margin'):
+        dome_pressure(FOOT, 6.8, margin)
