@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+import signal
+
+import pytest
+import rclpy
+from rclpy.node import Node
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import TransportError
+from ros_pad.nodes.process import run
+
+
+class Probe(Node):
+    """Does something at its first tick, and notes how it was ended."""
+
+    def __init__(self, deed, ends):
+        super().__init__('probe', start_parameter_services=False)
+        self._deed = deed
+        self._ends = ends
+        self.create_timer(0.001, self._tick)
+
+    def _tick(self):
+        deed, self._deed = self._deed, lambda: None
+        deed()
+
+    def destroy_node(self):
+        # A context that is still there can carry the last word of a node.
+        self._ends.append('in order' if rclpy.ok() else 'cut off')
+        super().destroy_node()
+
+
+def fail(error):
+    raise error
+
+
+def perform(deed):
+    ends = []
+    try:
+        return run(lambda: Probe(deed, ends), []), ends
+    finally:
+        assert not rclpy.ok()
+        assert ends == ['in order']
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_an_orderly_end(number, capfd):
+    before = signal.getsignal(number)
+    status, _ = perform(lambda: signal.raise_signal(number))
+    assert status == 0
+    assert signal.getsignal(number) is before
+    assert 'Traceback' not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('error', 'status'),
+    [(TransportError('the line broke'), 1), (InvalidInput('no'), 2), (ConfigError('no'), 2)],
+)
+def test_an_error_of_ours_is_one_line(error, status, capfd):
+    assert perform(lambda: fail(error)) == (status, ['in order'])
+    assert capfd.readouterr().err == f'ros_pad: {error}\n'
+
+
+def test_any_other_error_is_shown_whole_and_the_node_ended_all_the_same():
+    with pytest.raises(ZeroDivisionError):
+        perform(lambda: 1 / 0)
+
+
+def test_a_runtime_error_of_a_node_is_not_taken_for_bad_arguments():
+    with pytest.raises(RuntimeError, match='of its own'):
+        perform(lambda: fail(RuntimeError('of its own')))
+
+
+def test_a_node_that_cannot_be_made(capfd):
+    assert run(lambda: fail(ConfigError('no such foot')), []) == 2
+    assert capfd.readouterr().err == 'ros_pad: no such foot\n'
+    assert not rclpy.ok()
+
+
+def test_arguments_that_ros_cannot_read(capfd):
+    assert run(lambda: fail(AssertionError), ['probe', '--ros-args', '-p', 'rubbish']) == 2
+    assert 'rubbish' in capfd.readouterr().err

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Five processes in real time, as on a robot; this test is the sixth, and only listens.
+
+One walk of five seconds is shared by the tests of it. Its processes are always ended.
+"""
+
+import itertools
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import FluidPressure
+
+from ros_pad.nodes import qos
+from ros_pad.nodes import topics
+from ros_pad.trials.bag import BagReader
+
+LEGS = (1, 2, 3, 4, 5, 6)
+AMBIENT = 101325.0
+RATE = 100.0  # Hz
+SECONDS = 5.0
+TOPICS = (topics.WRENCH, topics.WETNESS, topics.PRESSURE_SETPOINT, topics.PRESSURE)
+PARAMETERS = {
+    'simulator': (f'rate:={RATE}', 'scene:=hexapod_smooth_wet_dome'),
+    'estimator': (f'publish_rate:={RATE}',),
+    'controller': ('policy:=dome', 'dome_pressure:=60000.0'),
+    'regulator': (f'publish_rate:={RATE}',),
+}
+
+
+def start(name, *parameters):
+    arguments = [word for parameter in parameters for word in ('-p', parameter)]
+    return subprocess.Popen(
+        [sys.executable, '-m', f'ros_pad.nodes.{name}', '--ros-args', *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+class Observer:
+    """Listens to the topics of every leg and keeps when each message came, and the last one."""
+
+    def __init__(self):
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        # Thousands of messages a second; nothing here publishes from another thread.
+        self._executor = EventsExecutor(context=self._context)
+        self.node = Node('observer', context=self._context)
+        self.times = {topic.name(leg): [] for topic in TOPICS for leg in LEGS}
+        self.last = {}
+        for topic, leg in itertools.product(TOPICS, LEGS):
+            self._listen(topic, leg)
+        self._executor.add_node(self.node)
+
+    def _listen(self, topic, leg):
+        name = topic.name(leg)
+        times = self.times[name]
+
+        def callback(data):
+            times.append(time.monotonic())
+            self.last[name] = data
+
+        self.node.create_subscription(topic.message, name, callback, qos.RECORD, raw=True)
+
+    def until(self, predicate, seconds, what):
+        deadline = time.monotonic() + seconds
+        while not predicate():
+            if time.monotonic() > deadline:
+                pytest.fail(f'{what} did not come true within {seconds:g} s')
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def wait(self, seconds):
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def gauge(self, leg):
+        message = deserialize_message(self.last[topics.PRESSURE.name(leg)], FluidPressure)
+        return message.fluid_pressure - AMBIENT
+
+    def close(self):
+        self._executor.remove_node(self.node)
+        self.node.destroy_node()
+        self._executor.shutdown()
+        rclpy.shutdown(context=self._context)
+
+
+@pytest.fixture(scope='module')
+def walk(tmp_path_factory):
+    """Run the five processes, count for five seconds, then end them one by one."""
+    bag = tmp_path_factory.mktemp('walk') / 'bag'
+    observer = Observer()
+    processes = {}
+    result = SimpleNamespace(bag=bag, errors={}, status={}, rates={}, longest={})
+
+    def end(name, number):
+        processes[name].send_signal(number)
+        _, result.errors[name] = processes[name].communicate(timeout=15)
+        result.status[name] = processes[name].returncode
+
+    try:
+        processes['recorder'] = start('recorder', f'folder:={bag}')
+        for name, parameters in PARAMETERS.items():
+            processes[name] = start(name, *parameters)
+        # Python takes its time to start; finding one another is what is limited.
+        observer.until(
+            lambda: all(observer.node.count_publishers(name) for name in observer.times),
+            30.0,
+            'every topic',
+        )
+        up = time.monotonic()
+        observer.until(lambda: all(observer.times.values()), 10.0, 'a message on every topic')
+        result.discovery = time.monotonic() - up
+        observer.until(lambda: bag.exists(), 10.0, 'the bag')
+        observer.until(
+            lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 10.0, 'pads under pressure'
+        )
+        from_, to = time.monotonic(), time.monotonic() + SECONDS
+        observer.wait(SECONDS)
+        for name, times in observer.times.items():
+            counted = [at for at in times if from_ <= at < to]
+            result.rates[name] = len(counted) / SECONDS
+            gaps = [b - a for a, b in itertools.pairwise([from_, *counted, to])]
+            result.longest[name] = max(gaps)
+        # The controller goes, and with it the set-points; the regulator vents by itself.
+        end('controller', signal.SIGTERM)
+        gone = time.monotonic()
+        observer.until(
+            lambda: max(observer.gauge(leg) for leg in LEGS) < 1000.0, 5.0, 'vented pads'
+        )
+        result.vented_after = time.monotonic() - gone
+        # Pads are under pressure again when the regulator is told to go.
+        processes['controller'] = start('controller', *PARAMETERS['controller'])
+        observer.until(
+            lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 15.0, 'pads under pressure'
+        )
+        for name, number in [
+            ('regulator', signal.SIGINT),
+            ('simulator', signal.SIGINT),
+            ('estimator', signal.SIGTERM),
+            ('controller', signal.SIGINT),
+            ('recorder', signal.SIGINT),
+        ]:
+            end(name, number)
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.wait()
+        observer.close()
+    return result
+
+
+def test_they_find_one_another(walk):
+    assert walk.discovery < 10.0
+
+
+@pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.pattern.split('/')[1])
+def test_they_keep_100_hz(walk, topic):
+    """The mean of five seconds on every leg; none is silent for longer than a set-point lives."""
+    rates = {leg: walk.rates[topic.name(leg)] for leg in LEGS}
+    assert all(rate >= 0.95 * RATE for rate in rates.values()), rates
+    assert all(rate <= 1.05 * RATE for rate in rates.values()), rates
+    assert max(walk.longest[topic.name(leg)] for leg in LEGS) < 0.5
+
+
+def test_pads_are_vented_when_the_controller_dies(walk):
+    assert walk.vented_after < 2.0  # 0.5 s of patience, and the air in the hose
+
+
+def test_they_end_as_they_should(walk):
+    assert walk.status == dict.fromkeys((*PARAMETERS, 'recorder'), 0), walk.errors
+    for name, errors in walk.errors.items():
+        assert 'Traceback' not in errors, name
+        assert 'ERROR' not in errors, name
+
+
+def test_the_regulator_says_that_it_vents_as_it_goes(walk):
+    for leg in LEGS:
+        assert f'leg {leg}: vented: closing' in walk.errors['regulator']
+
+
+def test_the_bag_has_the_walk(walk):
+    reader = BagReader(walk.bag)
+    assert reader.problem is None
+    for topic, leg in itertools.product(TOPICS, LEGS):
+        assert reader.counts[f'/{topic.name(leg)}'] >= 0.95 * RATE * SECONDS, topic.name(leg)
+    assert reader.counts['/body/pose'] >= 0.95 * RATE * SECONDS
+    assert reader.counts['/diagnostics'] >= 4
+    shapes = [message.data for _, message, _ in reader.messages({'/leg_3/morphology'})]
+    assert set(shapes) == {'dome'}
+    highest = max(m.fluid_pressure for _, m, _ in reader.messages({'/leg_3/pressure'})) - AMBIENT
+    assert 55e3 < highest < 61e3
