@@ -433,7 +433,7 @@ def cell(part: dict[str, Any]) -> str:
     return f'{part["adaptive_mm_change"]:+.1f} / {part["gain_mm_change"]:+.1f}'
 
 
-def draw(document: dict[str, Any], path: pathlib.Path, least: float = 1.0) -> None:
+def draw(document: dict[str, Any], path: pathlib.Path, least: float = 2.0) -> None:
     """Draw a tornado chart of the rows that change anything by ``least`` millimetres a cycle."""
     import matplotlib
 
