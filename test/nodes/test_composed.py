@@ -161,17 +161,15 @@ def raw_messages(bag):
 
 
 def test_the_same_seed_gives_the_same_messages(tmp_path):
-    scene = scene_of('hexapod_patches', 3)
-    first, second, other = (
-        (composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name), tmp_path / name)
-        for name, seed in [('first', 5), ('second', 5), ('other', 6)]
-    )
-    one, two, three = (raw_messages(bag) for _, bag in (first, second, other))
+    for name, cycles, seed in [('first', 3, 5), ('second', 3, 5), ('other', 1, 6)]:
+        scene = scene_of('hexapod_patches', cycles)
+        composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name)
+    one, two, other = (raw_messages(tmp_path / name) for name in ('first', 'second', 'other'))
     assert set(one) == set(two)
     assert len(one) == 6 * 10 + 3
     for topic in set(one) - {'/diagnostics'}:
         assert one[topic] == two[topic], topic
-    assert one['/leg_1/wrench'] != three['/leg_1/wrench']
+    assert one['/leg_1/wrench'][:250] != other['/leg_1/wrench'][:250]
 
 
 def check_vented(bag):
