@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import json
+import types
+
+import numpy as np
+import pytest
+
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terrain import Floor
+from ros_pad.trials import Trial
+from ros_pad.trials import run
+from ros_pad.trials.metrics import stance_ends
+from ros_pad.trials.metrics import summarise
+from ros_pad.trials.metrics import wet_accuracy
+
+SCENE = Scene.load('hexapod_patches')
+GATE = 2.0  # N
+
+
+def written(load, x, wet_probability, pressure=None, floor=None):
+    """Return a trial from series that are written down: a control step every second sample.
+
+    ``load`` and ``x`` have a row for each sample, the others one for each control step; columns
+    are legs.
+    """
+    load, x = np.array(load, dtype=float), np.array(x, dtype=float)
+    samples, legs = load.shape
+    belief = np.array(wet_probability, dtype=float)
+    steps = len(belief)
+    assert steps == (samples + 1) // 2
+    zeros = np.zeros((steps, legs))
+    force, position = np.zeros((samples, legs, 3)), np.zeros((samples, legs, 3))
+    force[:, :, 2], position[:, :, 0] = load, x
+    return Trial(
+        scene='written', policy='flat', fidelity='L1', seed=0, legs=tuple(range(1, legs + 1)),
+        time=0.01 * np.arange(1, samples + 1), body=np.zeros((samples, 3)),
+        force=force, position=position, slow_time=0.01 * np.arange(1, samples + 1, 2),
+        pressure=zeros if pressure is None else np.array(pressure, dtype=float),
+        setpoint=zeros, wet_probability=belief, friction=zeros, margin=zeros, slip_speed=zeros,
+        slipping=zeros > 1.0, dome=zeros > 1.0, floor=floor,
+    )  # fmt: skip
+
+
+# Wet where x is below 1 m, dry to 2 m, and again.
+STRIPES = Floor(np.array([[True, False]]), 1.0, (0.0, 0.0), 3e-4)
+#        sample 1  2  3  4  5  6  7  8  9 10
+LOADS = [[9, 9, 9, 9, 0, 0, 9, 9, 9, 0]]
+WAY = [[0.5] * 5 + [1.5] * 5]
+
+
+def one_leg(belief, pressure=None, floor=STRIPES):
+    return written(
+        np.transpose(LOADS), np.transpose(WAY), np.transpose([belief]),
+        None if pressure is None else np.transpose([pressure]), floor,
+    )  # fmt: skip
+
+
+def test_stances_end_at_the_first_control_step_after_the_last_loaded_sample():
+    trial = one_leg([0.5] * 5)
+    # Control steps at samples 1, 3, 5, 7, 9. The first stance ends with sample 4: row 2 is the
+    # next. The second ends with sample 9, after which there is none.
+    assert [rows.tolist() for rows in stance_ends(trial, GATE)] == [[2]]
+
+
+def test_a_stance_that_is_cut_off_by_the_end_does_not_count():
+    trial = written([[9.0]] * 5, [[0.5]] * 5, [[0.9]] * 3, floor=STRIPES)
+    assert [rows.tolist() for rows in stance_ends(trial, GATE)] == [[]]
+    assert wet_accuracy(trial, GATE) is None
+
+
+@pytest.mark.parametrize(('at_end', 'expected'), [(0.9, 1.0), (0.1, 0.0), (0.5, 0.0)])
+def test_belief_at_the_end_of_a_stance_against_the_ground_it_stood_on(at_end, expected):
+    """It stood at 0.5 m, on wet ground; beliefs before and after that stance do not matter."""
+    assert wet_accuracy(one_leg([0.0, 0.0, at_end, 0.0, 0.0]), GATE) == expected
+
+
+def test_domed_stances_do_not_count():
+    assert wet_accuracy(one_leg([0.9] * 5, pressure=[75e3, 75e3, 0.0, 0.0, 0.0]), GATE) is None
+    assert wet_accuracy(one_leg([0.9] * 5, pressure=[0.0, 0.0, 75e3, 75e3, 0.0]), GATE) == 1.0
+
+
+def test_accuracy_is_over_all_legs_and_stances():
+    load = [[9, 9, 0], [9, 9, 9], [0, 9, 9], [9, 0, 9], [9, 9, 9], [9, 9, 0], [0, 9, 0]]
+    x = [[0.5, 1.5, 0.5]] * 7
+    belief = [[0.9, 0.9, 0.5]] * 4
+    # Wet, right, twice; dry, taken for wet, once; the third leg stood on wet ground unsure.
+    trial = written(load, x, np.array(belief) - [[0.0, 0.0, 0.2]], floor=STRIPES)
+    assert [len(rows) for rows in stance_ends(trial, GATE)] == [2, 1, 1]
+    assert wet_accuracy(trial, GATE) == 2 / 4
+
+
+def test_without_a_known_floor_there_is_no_accuracy():
+    assert wet_accuracy(one_leg([0.9] * 5, floor=None), GATE) is None
+
+
+def test_a_summary_is_what_the_robot_says():
+    trial = one_leg([0.9] * 5)
+    feet = [types.SimpleNamespace(slip_path=0.25, overload_time=0.5)]
+    robot = types.SimpleNamespace(
+        body=(3.0, -0.2, 0.1), time=SCENE.settle + 20.0 * SCENE.gait.cycle, feet=feet,
+        dissipation=7.0, verdict=None,
+    )  # fmt: skip
+    controller = types.SimpleNamespace(switches={1: 4})
+    metrics = summarise(SCENE, trial, robot, controller)
+    assert metrics.distance_m == 3.0
+    assert metrics.cycles == pytest.approx(20.0)
+    assert metrics.distance_per_cycle_m == pytest.approx(0.15)
+    assert (metrics.lateral_drift_m, metrics.yaw_drift_rad) == (-0.2, 0.1)
+    assert metrics.slip_path_m == [0.25]
+    assert metrics.overload_s == [0.5]
+    assert metrics.switches == [4]
+    assert metrics.dissipation_j == 7.0
+    assert metrics.verdict is None
+    assert json.loads(json.dumps(metrics.as_dict()))['switches'] == [4]
+
+
+def test_a_walk_that_ends_while_it_settles_has_no_cycles():
+    robot = types.SimpleNamespace(
+        body=(0.0, 0.0, 0.0), time=0.5 * SCENE.settle, feet=[], dissipation=0.0, verdict='tip-over'
+    )
+    metrics = summarise(SCENE, one_leg([0.9] * 5), robot, types.SimpleNamespace(switches={1: 0}))
+    assert (metrics.cycles, metrics.distance_per_cycle_m) == (0.0, 0.0)
+
+
+def test_metrics_agree_with_the_series():
+    scene = dataclasses.replace(SCENE, cycles=8)
+    trial = run(scene, 'adaptive', seed=1)
+    metrics = trial.metrics
+    assert metrics.distance_m == trial.body[-1, 0]
+    assert metrics.lateral_drift_m == trial.body[-1, 1]
+    assert metrics.yaw_drift_rad == trial.body[-1, 2]
+    assert metrics.duration_s == pytest.approx(scene.duration)
+    assert metrics.cycles == pytest.approx(8.0)
+    changes = np.sum(trial.dome[1:] != trial.dome[:-1], axis=0)
+    assert metrics.switches == changes.tolist()
+    assert sum(metrics.switches) > 0
+    # Contacts slide at least as far as markers advance while loaded, but for the shear of pads.
+    loaded = trial.force[:, :, 2] > 0.5 * scene.expected_load
+    moved = np.where(loaded[1:] & loaded[:-1], np.diff(trial.position[:, :, 0], axis=0), 0.0)
+    assert all(
+        path > abs(way) - 0.02
+        for path, way in zip(metrics.slip_path_m, moved.sum(axis=0), strict=True)
+    )
+    assert sum(metrics.slip_path_m) > 0.01
+    assert metrics.dissipation_j > 0.0
+    assert 0.9 <= metrics.wet_accuracy <= 1.0
+
+
+def test_a_trial_as_json():
+    trial = run(dataclasses.replace(SCENE, cycles=1), 'flat')
+    said = json.loads(trial.to_json())
+    assert said['scene'] == 'hexapod_patches'
+    assert said['policy'] == 'flat'
+    assert said['legs'] == [1, 2, 3, 4, 5, 6]
+    assert said['metrics']['switches'] == [0] * 6
+    assert said['metrics']['distance_m'] == trial.metrics.distance_m
+
+
+def test_wet_ground_below_the_feet_is_that_of_the_floor():
+    trial = one_leg([0.5] * 5)
+    # x is 0.5 m to sample 5, 1.5 m after it; control steps are samples 1, 3, 5, 7, 9.
+    assert trial.wet()[:, 0].tolist() == [True, True, True, False, False]
+    with pytest.raises(ValueError, match='not known'):
+        dataclasses.replace(trial, floor=None).wet()
