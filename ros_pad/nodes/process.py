@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -18,7 +19,11 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 
 
-def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
+def run(
+    make: Callable[[], Node],
+    args: list[str] | None = None,
+    executor_type: Callable[[], Executor] = EventsExecutor,
+) -> int:
     """Spin a node until SIGINT or SIGTERM.
 
     Parameters
@@ -27,6 +32,9 @@ def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
         Makes the node, once ROS is initialised.
     args : list of str or None
         Command line; None takes the process's.
+    executor_type : callable
+        Makes the executor. The default one takes a third of the time of the others, and is safe
+        where nothing in the process publishes from another thread.
 
     Returns
     -------
@@ -47,7 +55,7 @@ def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
-        executor = SingleThreadedExecutor()
+        executor = executor_type()
         executor.add_node(node)
         while not stopped:
             executor.spin_once(timeout_sec=0.1)

@@ -10,6 +10,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -336,7 +337,9 @@ class RegulatorNode(LifecycleNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until it is interrupted; pads are vented then. Return the exit status."""
-    return run(RegulatorNode, args)
+    # A driver may bring threads of its own, and this node must vent whatever they do: it takes
+    # the executor that is slower and has been in use for longer.
+    return run(RegulatorNode, args, SingleThreadedExecutor)
 
 
 if __name__ == '__main__':
