@@ -18,6 +18,12 @@ from ros_pad.estimation.friction import GroundFilter
 LONGEST_GAP = 0.15
 """Between samples of one stance, s: after a longer silence the foot may have stepped."""
 
+AIRBORNE = 0.01
+"""Height above its last stance from which a foot surely touches nothing, m."""
+
+TARE_TIME = 0.5
+"""Over which the force of a foot in the air is averaged, s."""
+
 
 @dataclass(frozen=True)
 class Tuning:
@@ -116,6 +122,8 @@ class Estimate(NamedTuple):
 class FootEstimator:
     """Estimates slip, wetness and friction of one foot from its force, marker and pressure.
 
+    What the force sensor reads while the foot is in the air is its offset, and is taken off.
+
     Parameters
     ----------
     foot : Foot
@@ -148,6 +156,8 @@ class FootEstimator:
         )
         self._time = -math.inf
         self._standing = False
+        self._height = math.inf
+        self._offset_x = self._offset_y = self._offset_z = 0.0
         self._smooth_x = self._smooth_y = 0.0
         self._footprint: tuple[float, float] | None = None
         self._window_start = 0.0
@@ -205,8 +215,12 @@ class FootEstimator:
         if time <= self._time:
             raise InvalidInput(f'time = {time!r} s: must be later than the last, {self._time!r} s')
         dt, self._time = time - self._time, time
-        if fz < self._gate:
+        if fz - self._offset_z < self._gate:
+            if z > self._height + AIRBORNE:
+                self._tare(dt, fx, fy, fz)
             return self._swing(time)
+        self._height = z
+        fx, fy, fz = fx - self._offset_x, fy - self._offset_y, fz - self._offset_z
         # The marker rides on a soft pad: take its shear off to see the contact itself.
         contact_x = x + fx / self._foot.shear_stiffness
         contact_y = y + fy / self._foot.shear_stiffness
@@ -249,6 +263,12 @@ class FootEstimator:
             wet, friction_mean, friction_sd, quantile - tangential / fz, fresh,
         )  # fmt: skip
         return self.estimate
+
+    def _tare(self, dt: float, fx: float, fy: float, fz: float) -> None:
+        share = dt / (TARE_TIME + dt)
+        self._offset_x += share * (fx - self._offset_x)
+        self._offset_y += share * (fy - self._offset_y)
+        self._offset_z += share * (fz - self._offset_z)
 
     def _swing(self, time: float) -> Estimate:
         last = self.estimate
