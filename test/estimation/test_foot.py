@@ -265,6 +265,9 @@ def test_ten_times_heavier_without_retuning(seed):
 # --- a sensor that is off ----------------------------------------------------------------------
 
 
+GROUND = 0.5  # m: the floor need not be at zero
+
+
 class Offset:
     """An estimator whose force sensor is off."""
 
@@ -283,7 +286,7 @@ class Offset:
             x += slip * PERIOD
             felt = [f + o for f, o in zip(force, self.offset, strict=True)]
             marker = x - force[0] / FOOT.shear_stiffness
-            estimate = self.inner.update(self.time, felt, (marker, 0.0, height), 0.0)
+            estimate = self.inner.update(self.time, felt, (marker, 0.0, GROUND + height), 0.0)
         return estimate
 
 
