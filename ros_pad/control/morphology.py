@@ -26,8 +26,6 @@ DOME = 'dome'
 TOUCH_DOWN = 1.5
 """Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
 
-_SINCE_EVER = 1_000_000  # steps: the shape that a foot starts with is nobody's recent choice
-
 
 @dataclass(frozen=True)
 class LiftOff:
@@ -39,9 +37,9 @@ class LiftOff:
         Number of the leg.
     morphology : str
         Shape of the step that ends, ``flat`` or ``dome``.
-    steps : int
-        Steps taken since that shape was chosen, this one counted; a million and more where it is
-        the one that the foot started with.
+    steps : float
+        Steps taken since that shape was chosen, this one counted; infinite for the shape that the
+        foot started with, which nobody chose of late.
     probing : bool
         Whether that step was a probe.
     wet_ahead : float
@@ -54,7 +52,7 @@ class LiftOff:
 
     leg: int
     morphology: str
-    steps: int
+    steps: float
     probing: bool
     wet_ahead: float
     next_position: tuple[float, float]
@@ -172,7 +170,7 @@ class _Leg:
 
     def __init__(self, morphology: str, peak: float) -> None:
         self.morphology = morphology
-        self.steps = _SINCE_EVER
+        self.steps = math.inf
         self.probing = False
         self.standing = False
         self.decided = 0
