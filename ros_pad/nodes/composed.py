@@ -207,17 +207,19 @@ class ComposedTrial:
     def close(self) -> None:
         """Let the recorder catch up, and close bag and nodes."""
         recorder = getattr(self, 'recorder', None)
-        if recorder is not None:
-            count = -1
-            while recorder.message_count > count:
-                count = recorder.message_count
-                for _ in range(200):
-                    self._executor.spin_once(timeout_sec=0.001)
-            recorder.close()
-        for node in self._nodes:
-            self._executor.remove_node(node)
-            node.destroy_node()
-        self._executor.shutdown()
+        try:
+            if recorder is not None:
+                count = -1
+                while recorder.message_count > count:
+                    count = recorder.message_count
+                    for _ in range(200):
+                        self._executor.spin_once(timeout_sec=0.001)
+                recorder.close()
+        finally:  # nodes that stay behind would go on talking to others
+            for node in self._nodes:
+                self._executor.remove_node(node)
+                node.destroy_node()
+            self._executor.shutdown()
 
 
 @contextmanager

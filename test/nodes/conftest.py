@@ -8,6 +8,7 @@ holds, and fails the test if it does not in time: no test ever sleeps.
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 import time
@@ -34,6 +35,9 @@ def context() -> Iterator[rclpy.Context]:
     rclpy.init(context=context)
     yield context
     context.try_shutdown()
+    # Lifecycle nodes hold themselves, and with them their place in the domain, until the garbage
+    # is collected. There are only so many places: later tests would not find one another.
+    gc.collect()
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rclpy
 from mcap.reader import make_reader
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from ros_pad import trials
@@ -266,7 +267,7 @@ def test_a_node_that_does_not_answer_is_told_of_soon(deaf, monkeypatch, tmp_path
     assert len(messages_of(tmp_path / 'bag')['/leg_1/wrench']) > 120
 
 
-def test_a_full_disk_ends_the_trial_with_its_own_words(monkeypatch, tmp_path):
+def test_a_full_disk_ends_the_trial_with_its_own_words(context, monkeypatch, tmp_path):
     write = BagWriter.write
     count = 0
 
@@ -280,6 +281,13 @@ def test_a_full_disk_ends_the_trial_with_its_own_words(monkeypatch, tmp_path):
     monkeypatch.setattr(BagWriter, 'write', until_full)
     with pytest.raises(BagError, match='5000 messages are saved'):
         composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
+    # No node stays behind and goes on talking.
+    observer = Node('observer', context=context)
+    deadline = time.monotonic() + 10.0
+    while observer.count_publishers('/leg_1/morphology'):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    observer.destroy_node()
 
 
 def test_a_bag_that_exists_is_not_overwritten(tmp_path):
