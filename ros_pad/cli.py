@@ -8,10 +8,13 @@ import dataclasses
 import json
 import os
 import pathlib
+import signal
 import sys
+import threading
 from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextlib import suppress
 from typing import Any
 
 from tqdm import tqdm
@@ -20,6 +23,7 @@ import ros_pad
 from ros_pad import configuration
 from ros_pad import contact
 from ros_pad.control import POLICIES
+from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -47,14 +51,24 @@ def main(arguments: list[str] | None = None) -> int:
     """
     parser = _parser()
     options = parser.parse_args(arguments)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _stop)
     try:
         return int(options.command(options))
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; Python must not complain of it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (ConfigError, InvalidInput) as error:
         return _complain(error, 2)
     except (PadError, OSError) as error:
         return _complain(error, 1)
     except KeyboardInterrupt:
         return _complain('stopped', INTERRUPTED)
+
+
+def _stop(number: int, frame: Any) -> None:
+    raise KeyboardInterrupt
 
 
 def _complain(error: object, status: int) -> int:
@@ -162,11 +176,30 @@ def _run(options: argparse.Namespace) -> int:
         if not 1 <= options.cycles <= 100000:
             raise InvalidInput(f'--cycles {options.cycles}: from 1 to 100000 are needed')
         scene = dataclasses.replace(scene, cycles=options.cycles)
-    if options.seed < 0:
-        raise InvalidInput(f'--seed {options.seed}: must be 0 or more')
+    if not 0 <= options.seed < 2**31:
+        raise InvalidInput(
+            f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
+        )
     policy = options.policy or scene.policy
     rung = ladder.rung(scene, options.fidelity)
     folder = _new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
+    try:
+        return _run_in(folder, options, scene, policy, rung)
+    except KeyboardInterrupt:
+        bag = folder / 'bag'
+        if not bag.exists():
+            raise
+        return _complain(
+            f'stopped: the bag is complete, pad report {bag} makes its page', INTERRUPTED
+        )
+    finally:
+        with suppress(OSError):  # nothing came of it: the name stays free
+            folder.rmdir()
+
+
+def _run_in(
+    folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, rung: str
+) -> int:
     if options.no_ros:
         trial, bag = _walk(scene, policy, options.seed, f'{policy}, without ROS'), None
     else:
@@ -296,8 +329,8 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
             f'{row["policy"]:10} {1e3 * advance:9.1f}  {gain:>16}'
             f' {slip:18.2f} m {sum(row["switches"]):10d}'
         )
-    if len(rows) == 1:
-        print()
+    for refusal in own.refusals:
+        print(f'stayed flat: {refusal}')
     for omission in trial.settings['omitted']:
         bound = '' if omission['bound'] is None else f' (at most {100 * omission["bound"]:.1f} %)'
         print(f'left out: {omission["term"]}{bound}')
@@ -335,6 +368,8 @@ def _scenes(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     page = options.out or options.bag / '..' / 'report.html'
     page = pathlib.Path(os.path.normpath(page))
+    if not options.bag.exists():
+        raise BagError(f'{options.bag}: no such bag')
     if page.exists() and not options.force:
         raise InvalidInput(f'{page}: exists already; --force replaces it, --out names another')
     with _bar('reading', 1.0, 'bag') as progress:
@@ -398,13 +433,16 @@ def _contact(options: argparse.Namespace) -> int:
             'gap_m': pressed.gap,
             'status': pressed.status,
         }
-        wet = contact.meniscus(pressed, liquid)
-        values['meniscus'] = {
-            'height_m': wet.height,
-            'ring_radius_m': wet.ring_radius,
-            'tangential_force_n': wet.tangential_force,
-            'status': wet.status,
-        }
+        if force > 0.0:  # the ring of a dome that only touches has no size to speak of
+            wet = contact.meniscus(pressed, liquid)
+            values['meniscus'] = {
+                'height_m': wet.height,
+                'ring_radius_m': wet.ring_radius,
+                'tangential_force_n': wet.tangential_force,
+                'status': wet.status,
+            }
+        else:
+            values['meniscus'] = {'status': 'no_contact'}
         values['force_limit_n'] = {
             criterion: contact.force_limit(pad, pressure, criterion)
             for criterion in ('measured', 'max_depth', 'flattening')
@@ -416,7 +454,7 @@ def _contact(options: argparse.Namespace) -> int:
         return 0
     print(f'{options.pad} pad, {pressure:g} Pa gauge, {force:g} N')
     for part in ('free', 'pressed', 'meniscus', 'force_limit_n'):
-        print(part.removesuffix('_n').replace('_', ' '))
+        print(part.replace('_n', ' / N').replace('_', ' '))
         for name, value in values[part].items():
             shown = value if isinstance(value, str) else f'{value:.6g}'
             print(f'  {name:20} {shown}')

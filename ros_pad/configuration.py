@@ -129,7 +129,10 @@ class Table:
         if key in self._values:
             return self._values[key]
         if default is _REQUIRED:
-            raise ConfigError(f'{self.origin}: key {key!r} is missing')
+            others = [str(each) for each in self._values if each not in self._taken]
+            near = difflib.get_close_matches(key, others, n=1)
+            hint = f'; is {near[0]!r} meant to be it?' if near else ''
+            raise ConfigError(f'{self.origin}: key {key!r} is missing{hint}')
         return default
 
     def number(

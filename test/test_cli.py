@@ -53,7 +53,8 @@ def test_a_bad_value_names_file_key_value_and_range(
     ('arguments', 'part'),
     [
         (['--cycles', '0'], '--cycles 0: from 1'),
-        (['--seed', '-1'], '--seed -1: must be 0 or more'),
+        (['--seed', '-1'], '--seed -1: a whole number from 0'),
+        (['--seed', '2147483648'], 'from 0 to 2147483647'),
         (['--fidelity', 'L0'], "fidelity = 'L0'"),
     ],
 )
@@ -201,3 +202,26 @@ def test_readme_names_every_scene_and_command():
         assert f'`{name}`' in readme
     for command in ('run', 'scenes', 'report', 'bag info', 'contact'):
         assert f'`pad {command}' in readme
+
+
+def test_domes_that_cannot_carry_the_robot_are_reported(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    heavy = tmp_path / 'heavy.yaml'
+    heavy.write_text(SCENE.read_text().replace('mass: 2.09 ', 'mass: 5.0 '))
+    out = tmp_path / 'walk'
+    arguments = ['run', str(heavy), '--no-ros', '--cycles', '1', '--policy', 'dome']
+    assert cli.main([*arguments, '--out', str(out)]) == 0
+    said = capsys.readouterr().out
+    assert said.count('stayed flat: leg ') == 6
+    assert 'ceiling of 90000 Pa' in said
+    assert 'stayed flat, leg 1' in (out / 'report.html').read_text()
+
+
+def test_a_run_that_cannot_start_leaves_its_name_free(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    out = tmp_path / 'walk'
+    monkeypatch.setitem(sys.modules, 'ros_pad.nodes', None)
+    assert cli.main(['run', 'leg_dry_flat', '--cycles', '1', '--out', str(out)]) == 1
+    assert not out.exists()

@@ -23,6 +23,9 @@ from ros_pad.errors import LimitError
 FLAT = 'flat'
 DOME = 'dome'
 
+LOWEST_DOME = 1000.0
+"""Gauge pressure below which a pad is flat, Pa; who asks for less of a dome meant kilopascals."""
+
 TOUCH_DOWN = 1.5
 """Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
 
@@ -198,7 +201,7 @@ class MorphologyController:
     margin : float
         Factor on the load, for the pressure of a dome, above 0.
     fixed_pressure : float or None
-        Gauge pressure of every dome, Pa, above 0 up to the foot's ceiling; None chooses it from
+        Gauge pressure of every dome, Pa, from 1000 up to the foot's ceiling; None chooses it from
         the load.
     load_gate : float
         Share of the expected load below which a foot has lifted off, above 0 up to 0.6. It stands
@@ -235,7 +238,7 @@ class MorphologyController:
         number('margin', margin, '(factor)', above=True)
         number('load_gate', load_gate, '(share)', high=0.6, above=True)
         if fixed_pressure is not None:
-            number('fixed_pressure', fixed_pressure, 'Pa', above=True)
+            number('fixed_pressure', fixed_pressure, 'Pa', low=LOWEST_DOME)
             if fixed_pressure > foot.ceiling:
                 raise LimitError(
                     f'fixed_pressure = {fixed_pressure:g} Pa is above the ceiling of'

@@ -40,12 +40,15 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
     try:
         wanted = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
     except NoEquilibrium as error:
-        raise LimitError(f'{load:g} N on {foot.pads} pads of {foot.source}: {error}') from error
+        raise LimitError(
+            f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source} is more'
+            f' than domes carry at any pressure up to the ceiling of {foot.ceiling:.0f} Pa'
+        ) from error
     # Rounded up, or the margin would not be kept; the last digits of the inverse are no reason to.
     pressure = RESOLUTION * math.ceil(wanted / RESOLUTION - 1e-6)
     if pressure > foot.ceiling:
         raise LimitError(
-            f'{load:g} N with margin {margin:g} on {foot.pads} pads of {foot.source} needs'
+            f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source} needs'
             f' {pressure:.0f} Pa, above the ceiling of {foot.ceiling:.0f} Pa'
         )
     return pressure

@@ -279,16 +279,22 @@ def run(
     rung = ladder.rung(scene, fidelity)
     context = rclpy.Context()
     # Signals are ours: rclpy's handlers would cut the nodes off before the pads are vented.
-    rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise PadError(f'ROS 2 does not start: {error}') from error
     try:
         trial = ComposedTrial(scene, policy, seed, bag, context)
         started = time.perf_counter()
         try:
             with _interruptible(trial):
                 trial.walk(progress)
-        finally:
-            wall = time.perf_counter() - started
-            trial.close()
+        except BaseException:
+            with suppress(PadError):  # a bag on a full disk cannot be closed either
+                trial.close()
+            raise
+        wall = time.perf_counter() - started
+        trial.close()
     finally:
         rclpy.shutdown(context=context)
     robot = trial.simulator.robot

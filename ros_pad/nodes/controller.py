@@ -21,6 +21,8 @@ from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
 from ros_pad.control import policy_named
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
@@ -72,15 +74,21 @@ class ControllerNode(Node):
                 f"node {self.get_name()}: parameter scene = '' is not allowed:"
                 ' policy oracle needs the scene whose ground it sees'
             )
-        self.controller = MorphologyController(
-            values['foot'],
-            legs,
-            policy_named(values['policy'], is_wet),
-            values['expected_load'],
-            start='dome' if values['policy'] == 'dome' else 'flat',
-            margin=values['margin'],
-            fixed_pressure=values['dome_pressure'] or None,
-        )
+        try:
+            self.controller = MorphologyController(
+                values['foot'],
+                legs,
+                policy_named(values['policy'], is_wet),
+                values['expected_load'],
+                start='dome' if values['policy'] == 'dome' else 'flat',
+                margin=values['margin'],
+                fixed_pressure=values['dome_pressure'] or None,
+            )
+        except (InvalidInput, LimitError) as error:
+            # What ranges of single parameters cannot say: how they go together.
+            raise ConfigError(
+                f'node {self.get_name()}: {error} (parameter dome_pressure)'
+            ) from error
         self._ambient = values['ambient_pressure']
         self.wrenches = 0
         self._message = FluidPressure()
@@ -116,6 +124,11 @@ class ControllerNode(Node):
                 # if it stays so, the regulators vent.
                 return
             gauge = self.controller.update(leg, load, message.data, (point.x, point.y))
+            if leg in self.controller.refusals:
+                self.get_logger().warning(
+                    f'leg {leg} stays flat: {self.controller.refusals[leg]}',
+                    throttle_duration_sec=10.0,
+                )
             if self.controller.morphology(leg) != shape:
                 shape = self.controller.morphology(leg)
                 shapes.publish(String(data=shape))

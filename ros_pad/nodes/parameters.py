@@ -146,8 +146,8 @@ AMBIENT_PRESSURE = Parameter(
 def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
-    A node that is made with ``automatically_declare_parameters_from_overrides`` is also told of
-    parameters that it does not have: a misspelt one would have no effect.
+    A node that is made with ``automatically_declare_parameters_from_overrides`` also refuses what
+    looks like a misspelt parameter, and warns of others that it does not have.
 
     Raises
     ------
@@ -180,8 +180,16 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
             raise ConfigError(f'{where}{value!r} is not allowed: {error}') from error
     known = [parameter.name for parameter in table]
     for name in node.get_parameters_by_prefix(''):
-        if name not in (*known, *_OF_ROS) and '.' not in name:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f' Did you mean {near[0]!r}?' if near else ''
-            node.get_logger().warning(f'parameter {name!r} is not known here.{hint}')
+        head = name.split('.')[0]
+        if head in (*known, *_OF_ROS, BACKEND_OPTIONS):
+            continue
+        near = difflib.get_close_matches(head, [*known, BACKEND_OPTIONS], n=1, cutoff=0.75)
+        if near:
+            # A limit that is not heard of because of a slip of the pen must not pass.
+            raise ConfigError(
+                f'node {node.get_name()}: parameter {name!r} is not known here.'
+                f' Did you mean {near[0]!r}?'
+            )
+        if '.' not in name:
+            node.get_logger().warning(f'parameter {name!r} is not known here')
     return values

@@ -317,7 +317,7 @@ class Scene:
         policy = table.choice('policy', ('flat', 'dome', 'adaptive', 'oracle'))
         pressure = None
         if 'dome_pressure' in table:
-            pressure = table.number('dome_pressure', 'Pa', 1.0, foot.ceiling)
+            pressure = table.number('dome_pressure', 'Pa', 1000.0, foot.ceiling)
         scene = cls(
             source=source,
             name=name,

@@ -33,6 +33,7 @@ def summarise(
         overload_s=[foot.overload_time for foot in robot.feet],
         wet_accuracy=wet_accuracy(trial, LOAD_GATE * scene.expected_load),
         verdict=robot.verdict,
+        refusals=[f'leg {leg}: {why}' for leg, why in sorted(controller.refusals.items())],
     )
 
 

@@ -911,13 +911,18 @@ def _warnings(trial: Trial) -> list[str]:
     found = []
     if trial.settings.get('interrupted'):
         found.append('The trial was cut short: its metrics are of what was walked until then.')
+    if trial.metrics is not None:
+        found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
     if trial.settings.get('problem'):
         found.append(str(trial.settings['problem']))
     return found
 
 
 def _refuse(path: str | os.PathLike[str], force: bool) -> None:
-    if not force and pathlib.Path(path).exists():
+    path = pathlib.Path(path)
+    if path.exists() and not path.is_file():
+        raise PadError(f'{path}: is no regular file, and is never replaced')
+    if not force and path.exists():
         raise PadError(f'{os.fspath(path)}: exists, and is only replaced when that is forced')
 
 

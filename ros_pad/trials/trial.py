@@ -41,6 +41,8 @@ class Metrics:
         Share of flat stances of loaded feet at whose end P(wet) was on the right side of one half.
     verdict : str or None
         Why the walk is not valid.
+    refusals : list of str
+        Why feet that should have been domes stayed flat at the end; empty when all went well.
     """
 
     distance_m: float
@@ -55,6 +57,7 @@ class Metrics:
     overload_s: list[float]
     wet_accuracy: float | None
     verdict: str | None
+    refusals: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

@@ -263,7 +263,7 @@ def test_a_foot_too_heavy_for_domes_stays_flat_and_says_why():
     assert walk.step(1, load=LOAD) == 'dome'
     assert walk.step(1, load=20.0) == 'flat'
     assert walk.controller.setpoint(1) == 0.0
-    assert walk.controller.refusals[1].startswith('20 N on 37 pads of large37')
+    assert walk.controller.refusals[1].startswith('20 N with margin 1.2 on 37 pads')
     for _ in range(40):
         walk.step(1, load=LOAD)
     assert walk.controller.morphology(1) == 'dome'

@@ -213,6 +213,21 @@ def run_node(name, *arguments):
             'backend_options.ceiling:=500000.0',
             'node regulator: parameter backend_options.ceiling = 500000.0 is not allowed:',
         ),
+        (
+            'regulator',
+            'celing:=60000.0',
+            "node regulator: parameter 'celing' is not known here. Did you mean 'ceiling'?",
+        ),
+        (
+            'regulator',
+            'backend_optons.hose_length:=5.0',
+            "node regulator: parameter 'backend_optons.hose_length' is not known here. Did you",
+        ),
+        (
+            'controller',
+            'dome_pressure:=75.0',
+            'node controller: fixed_pressure = 75',
+        ),
         ('regulator', 'backend:=alicatt', "node regulator: parameter backend = 'alicatt' is not"),
         (
             'estimator',
@@ -258,7 +273,7 @@ def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp
     text = FILE.read_text().replace('legs: [1, 2, 3, 4, 5, 6]', 'legs: [4]')
     text = text.replace('scene: hexapod_patches', 'scene: leg_dry_flat')
     text = text.replace('folder: ""', f'folder: {tmp_path / "bag"}')
-    text += f'\n/**/regulator:\n  ros__parameters:\n    celing: {60000.0}\n'
+    text += '\n/**/regulator:\n  ros__parameters:\n    colour: red\n'
     (tmp_path / 'params.yaml').write_text(text)
     observer = Node('observer', context=context)
     executor.add_node(observer)
@@ -288,4 +303,4 @@ def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp
     assert {name: process.returncode for name, process in processes.items()} == dict.fromkeys(
         NODES, 0
     ), ends
-    assert "parameter 'celing' is not known here. Did you mean 'ceiling'?" in ends['regulator']
+    assert "parameter 'colour' is not known here" in ends['regulator']

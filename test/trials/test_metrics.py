@@ -101,7 +101,7 @@ def test_a_summary_is_what_the_robot_says():
         body=(3.0, -0.2, 0.1), time=SCENE.settle + 20.0 * SCENE.gait.cycle, feet=feet,
         dissipation=7.0, verdict=None,
     )  # fmt: skip
-    controller = types.SimpleNamespace(switches={1: 4})
+    controller = types.SimpleNamespace(switches={1: 4}, refusals={1: 'too heavy'})
     metrics = summarise(SCENE, trial, robot, controller)
     assert metrics.distance_m == 3.0
     assert metrics.cycles == pytest.approx(20.0)
@@ -119,7 +119,9 @@ def test_a_walk_that_ends_while_it_settles_has_no_cycles():
     robot = types.SimpleNamespace(
         body=(0.0, 0.0, 0.0), time=0.5 * SCENE.settle, feet=[], dissipation=0.0, verdict='tip-over'
     )
-    metrics = summarise(SCENE, one_leg([0.9] * 5), robot, types.SimpleNamespace(switches={1: 0}))
+    metrics = summarise(
+        SCENE, one_leg([0.9] * 5), robot, types.SimpleNamespace(switches={1: 0}, refusals={})
+    )
     assert (metrics.cycles, metrics.distance_per_cycle_m) == (0.0, 0.0)
 
 

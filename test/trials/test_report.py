@@ -374,3 +374,10 @@ def test_settings_survive_json(tmp_path):
     trial.settings = json.loads(json.dumps(trial.settings))
     report.write(trial, tmp_path / 'two.html')
     assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
+
+
+def test_what_is_no_regular_file_is_never_replaced(tmp_path):
+    trial = run(dataclasses.replace(Scene.load('leg_dry_flat'), cycles=1))
+    (tmp_path / 'page').mkdir()
+    with pytest.raises(PadError, match='is no regular file'):
+        report.write(trial, tmp_path / 'page', force=True)
