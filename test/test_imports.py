@@ -24,8 +24,11 @@ MAY_IMPORT = {
     'regulators': GROUND | {'contact', 'estimation', 'control', 'simulation'},
 }
 MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
+MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials'}
+MAY_IMPORT['figures'] = MAY_IMPORT['ladders'] | {'ladders'}
 MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
-MAY_IMPORT['cli'] = MAY_IMPORT['nodes'] | {'nodes'}
+MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes'}
+MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
 
 NUMERICS = {'numpy', 'scipy', 'yaml'}
 FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'tqdm'}
@@ -36,8 +39,11 @@ ROS = {
 FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'errors': set(),
     'trials': NUMERICS | FILES,
+    'ladders': NUMERICS | FILES | {'mpmath'},
+    'figures': NUMERICS | FILES,
     'nodes': NUMERICS | FILES | ROS,
-    'cli': NUMERICS | FILES,
+    'commands': NUMERICS | FILES,
+    'cli': set(),
 }
 
 

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad run``: walk a scene in closed loop."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import pathlib
+from contextlib import suppress
+from typing import Any
+
+from ros_pad.commands.command import INTERRUPTED
+from ros_pad.commands.command import Commands
+from ros_pad.commands.command import add_command
+from ros_pad.commands.command import complain
+from ros_pad.commands.progress import bar
+from ros_pad.control import POLICIES
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
+from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials import Trial
+from ros_pad.trials import label as labels
+from ros_pad.trials import loop
+from ros_pad.trials import report
+from ros_pad.trials.bag import annotate
+
+
+def add(commands: Commands) -> None:
+    """Add the command and its arguments."""
+    part = add_command(
+        commands,
+        'run',
+        run,
+        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report.',
+        'pad run hexapod_patches --seed 3',
+    )
+    part.add_argument('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
+    part.add_argument('--policy', choices=POLICIES, help="default: the scene's own")
+    part.add_argument('--seed', type=int, default=0, help='of floor and noise (default 0)')
+    part.add_argument('--cycles', type=int, help="gait cycles (default: the scene's own)")
+    part.add_argument('--fidelity', choices=ladder.FIDELITIES, default='auto')
+    part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
+    part.add_argument(
+        '--no-compare',
+        action='store_true',
+        help='do not run the other policies on the same ground (an adaptive run does)',
+    )
+    part.add_argument(
+        '--live',
+        action='store_true',
+        help='let other processes on this machine hear the topics, and be heard: '
+        'real regulators in the same ROS domain would obey',
+    )
+    part.add_argument(
+        '--out', type=pathlib.Path, metavar='DIR', help='new folder (default: runs/<scene>_...)'
+    )
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Walk the scene; return the exit status."""
+    scene = Scene.load(options.scene)
+    if options.cycles is not None:
+        if not 1 <= options.cycles <= 100000:
+            raise InvalidInput(f'--cycles {options.cycles}: from 1 to 100000 are needed')
+        scene = dataclasses.replace(scene, cycles=options.cycles)
+    if not 0 <= options.seed < 2**31:
+        raise InvalidInput(
+            f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
+        )
+    policy = options.policy or scene.policy
+    rung = ladder.rung(scene, options.fidelity)
+    folder = _new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
+    try:
+        return _run_in(folder, options, scene, policy, rung)
+    except KeyboardInterrupt:
+        bag = folder / 'bag'
+        if not bag.exists():
+            raise
+        return complain(
+            f'stopped: the bag is complete, pad report {bag} makes its page', INTERRUPTED
+        )
+    finally:
+        with suppress(OSError):  # nothing came of it: the name stays free
+            folder.rmdir()
+
+
+def _run_in(
+    folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, rung: str
+) -> int:
+    if options.no_ros:
+        trial, bag = _walk(scene, policy, options.seed, f'{policy}, without ROS'), None
+    else:
+        bag = folder / 'bag'
+        trial = _walk_on_nodes(scene, policy, options.seed, bag, options.live)
+        if trial.settings['interrupted']:
+            return complain(
+                f'stopped at {trial.metrics.duration_s:.1f} s of {scene.duration:.1f} s:'  # type: ignore[union-attr]
+                f' pads vented, bag closed: {bag}',
+                INTERRUPTED,
+            )
+    others = []
+    if policy == 'adaptive' and not options.no_compare:
+        others = [
+            _walk(scene, other, options.seed, f'{other:8} on the same ground')
+            for other in POLICIES
+            if other != policy
+        ]
+    assert trial.metrics is not None
+    trial.settings['comparison'] = [
+        {'policy': other.policy, **other.metrics.as_dict()}
+        for other in others
+        if other.metrics is not None
+    ]
+    if bag is not None:
+        annotate(
+            bag,
+            labels.label(
+                scene,
+                policy,
+                options.seed,
+                rung,
+                metrics=trial.metrics,
+                real_time_factor=trial.real_time_factor,
+                comparison=trial.settings['comparison'],
+            ),
+        )
+    page = folder / 'report.html'
+    with bar('report', 1.0, 'page') as progress:
+        report.write(trial, page, progress=progress)
+    summary = _summary(trial, bag, page)
+    (folder / 'summary.json').write_text(json.dumps(summary, indent=1), encoding='utf-8')
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        _show(trial, bag, page)
+    if trial.metrics.verdict:
+        return complain(f'the walk ended early: {trial.metrics.verdict}', 1)
+    return 0
+
+
+def _new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
+    """Make the folder that is wanted, or the next free one below ``runs``."""
+    if wanted is not None:
+        try:
+            wanted.mkdir(parents=True)
+        except FileExistsError:
+            raise InvalidInput(
+                f'--out {wanted}: exists already, and nothing is ever overwritten'
+            ) from None
+        return wanted
+    number = 1
+    while True:
+        folder = pathlib.Path('runs') / (name if number == 1 else f'{name}_{number}')
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
+
+
+def _walk(scene: Scene, policy: str, seed: int, text: str) -> Trial:
+    with bar(text, scene.duration) as progress:
+        return loop.run(scene, policy, seed, progress=progress)
+
+
+def _walk_on_nodes(scene: Scene, policy: str, seed: int, bag: pathlib.Path, live: bool) -> Trial:
+    if not live:
+        # One process talks to itself: no other node, and no real regulator, hears a set-point.
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'OFF'
+    try:
+        from ros_pad.nodes import composed
+    except ModuleNotFoundError as error:
+        raise PadError(
+            f'ROS 2 is not here ({error}): source it, or pip install "ros_pad[ros]",'
+            ' or walk without it: --no-ros'
+        ) from error
+    with bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress:
+        return composed.run(scene, policy, seed, bag=bag, progress=progress)
+
+
+def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict[str, Any]:
+    assert trial.metrics is not None
+    return {
+        'scene': trial.scene,
+        'policy': trial.policy,
+        'seed': trial.seed,
+        'fidelity': trial.fidelity,
+        **trial.metrics.as_dict(),
+        'real_time_factor': trial.real_time_factor,
+        'bag': str(bag) if bag else None,
+        'report': str(page),
+        'omitted': trial.settings['omitted'],
+        'comparison': trial.settings['comparison'],
+    }
+
+
+def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
+    own = trial.metrics
+    assert own is not None
+    print(
+        f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
+        f' {own.cycles:.0f} cycles, {trial.real_time_factor:.1f} times real time\n'
+    )
+    print('policy      mm/cycle  against adaptive   slip path per foot   switches')
+    rows = [{'policy': trial.policy, **own.as_dict()}, *trial.settings['comparison']]
+    for row in rows:
+        advance = row['distance_per_cycle_m']
+        gain = (
+            f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
+            if row is not rows[0] and own.distance_per_cycle_m
+            else ''
+        )
+        slip = sum(row['slip_path_m']) / len(row['slip_path_m'])
+        print(
+            f'{row["policy"]:10} {1e3 * advance:9.1f}  {gain:>16}'
+            f' {slip:18.2f} m {sum(row["switches"]):10d}'
+        )
+    for refusal in own.refusals:
+        print(f'stayed flat: {refusal}')
+    for omission in trial.settings['omitted']:
+        bound = '' if omission['bound'] is None else f' (at most {100 * omission["bound"]:.1f} %)'
+        print(f'left out: {omission["term"]}{bound}')
+    if bag:
+        print(f'bag:      {bag}')
+    print(f'report:   {page}')
