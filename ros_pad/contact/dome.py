@@ -65,7 +65,7 @@ _PRESSED_SEED = (
 )
 
 # Rows of a batch that are worked on at a time: their temporaries stay in the processor's cache.
-_CHUNK = 4096
+_CHUNK = 16384
 
 
 class Inflated(NamedTuple):
@@ -208,7 +208,7 @@ def press(
     code = np.zeros(rows.size, dtype=np.int8)
     for start in range(0, rows.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        pressed[:, part], code[part] = _press_rows(pad, rows[part], loads[part], a)
+        code[part] = _press_rows(pad, rows[part], loads[part], a, pressed[:, part])
     height, depth, contact, sphere, gap = pressed.reshape(5, *p.shape)
     return Pressed(height, depth, contact, sphere, gap, words(code.reshape(p.shape)))
 
@@ -423,24 +423,24 @@ def _height_of_one(tension: float, f: float, a: float) -> float:
 
 
 def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
-    """Return the heights in equilibrium; NaN where no root has the certificate."""
-    height = np.empty_like(tension)
-    active = np.arange(tension.size)
-    x = _seed(tension, f)
-    p, load = tension, f
-    for _ in range(5):
-        at = _balance(x, p, load, a, np.sqrt)
-        step = -at.residual / at.slope
-        settled = _settled(x, step, at)
-        x = x + step
-        if not settled.any():
-            continue
-        height[active[settled]] = x[settled]
-        left = ~settled
+    """Return the heights in equilibrium; NaN where no root has the certificate.
+
+    Nine of ten rows settle in three steps; the others go on by themselves.
+    """
+    height, active = _seed(tension, f), np.arange(tension.size)
+    x, p, load = height, tension, f
+    for steps in (3, 1, 1, 1):
+        for _ in range(steps):
+            at = _balance(x, p, load, a, np.sqrt)
+            step = -at.residual / at.slope
+            settled = _settled(x, step, at)
+            x = x + step
+        height[active] = x
+        left = np.flatnonzero(~settled)
+        if not left.size:
+            return height
         active, x, p, load = active[left], x[left], p[left], load[left]
-        if not active.size:
-            break
-    for row in active:
+    for row in active.tolist():
         height[row] = _height_of_one(float(tension[row]), float(f[row]), a)
     return height
 
@@ -453,7 +453,8 @@ def _flattens(tension: Floats, f: Floats, a: float) -> Floats:
     near = f > tension - 1.25 * math.sqrt(2.0 * a)
     if isinstance(near, bool):
         return near and f >= flattening_force(tension, a)
-    near[near] = f[near] >= flattening_force(tension[near], a)
+    if near.any():
+        near[near] = f[near] >= flattening_force(tension[near], a)
     return near
 
 
@@ -499,29 +500,37 @@ def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
 
 # Only domes far lower than an atom overflow or underflow: they fail the certificate.
 @np.errstate(divide='ignore', invalid='ignore', over='ignore')
-def _press_rows(pad: Pad, p: Array, load: Array, a: float) -> tuple[Array, Codes]:
+def _press_rows(pad: Pad, p: Array, load: Array, a: float, lengths: Array) -> Codes:
+    """Write the five lengths of each row, return its code."""
     r = pad.radius
     tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
-    deficit = _deficit(pad, p)
     code = np.zeros(p.size, dtype=np.int8)
-    code[_flattens(tension, f, a)] = FLATTENED
-    code[tension > largest_tension(a)] = FOLD_ZONE
-    code[deficit <= 0.0] = NO_INFLATION
-    pressed = np.full((5, p.size), np.nan)
-    free = free_height(tension, deficit) if a <= 0.0 else np.full_like(tension, np.nan)
-    apart = (code == OK) & _hovers(free, f, a)
-    touching = (code == OK) & ~apart
-    rows: Any = slice(None) if touching.all() else touching
-    x = _heights_of_rows(tension[rows], f[rows], a)
-    pressed[:, rows] = _shape(x, tension[rows], f[rows], a, np.sqrt)
+    flat = _flattens(tension, f, a)
+    if flat.any():
+        code[flat] = FLATTENED
+    if tension.max() > largest_tension(a):
+        code[tension > largest_tension(a)] = FOLD_ZONE
+        code[_deficit(pad, p) <= 0.0] = NO_INFLATION
+    free = free_height(tension, BURST - tension) if a <= 0.0 else tension
     if a <= 0.0:
-        apart[rows] |= _hovers(x, f[rows], a)
-        x, none = free[apart], np.zeros(apart.sum())
-        pressed[:, apart] = x, none, none, 0.5 * (x + 1.0 / x), x
-        code[apart] = NO_CONTACT
+        code[(code == OK) & _hovers(free, f, a)] = NO_CONTACT
+    rows: Any = slice(None)
+    if code.any():
+        lengths.fill(np.nan)
+        rows = code == OK
+    tension, f = tension[rows], f[rows]
+    x = _heights_of_rows(tension, f, a)
     # Without a certified root the force is past the fold, where the text's sign ends the branch.
-    code[np.isnan(pressed[0]) & (code == OK)] = FLATTENED
-    return r * pressed, code
+    code[rows] = np.isnan(x) * np.int8(FLATTENED)
+    for row, length in zip(lengths, _shape(x, tension, f, a, np.sqrt), strict=True):
+        row[rows] = r * length
+    if a <= 0.0:
+        code[rows] |= _hovers(x, f, a) * np.int8(NO_CONTACT)
+        apart = code == NO_CONTACT
+        x = free[apart]
+        for row, length in zip(lengths, (x, 0.0, 0.0, 0.5 * (x + 1.0 / x), x), strict=True):
+            row[apart] = r * length
+    return code
 
 
 def signed_adhesion(pad: Pad, adhesion: str) -> float:
