@@ -42,7 +42,7 @@ WINDOW = 8.0  # s of the trial that are drawn large
 DOME_PRESSURE = 1000.0  # Pa gauge above which a pad is no longer flat
 _WIDTH = 11.0  # inches of a figure
 _ROW_GAP = 0.4  # inches between the rows of a map
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     'font.family': 'DejaVu Sans',  # comes with matplotlib
     'font.size': 10.0,
     'axes.spines.top': False,
@@ -53,6 +53,12 @@ _STYLE: dict[Any, Any] = {
     'svg.fonttype': 'path',
     'svg.hashsalt': 'ros_pad',  # the same trial gives the same file
     'path.simplify': True,
+}
+# What a file says of its making, by kind: left out.
+_MARKS = {
+    'svg': ('Date', 'Creator'),
+    'png': ('Software',),
+    'pdf': ('CreationDate', 'Creator', 'Producer'),
 }
 
 
@@ -365,7 +371,7 @@ def _comparison_figure(view: _View) -> Figure:
     return figure
 
 
-def _legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
     """Add a legend above all axes, where it hides no data."""
     figure.legend(handles=handles, loc='upper left', ncols=columns)
     layout = figure.get_layout_engine()
@@ -405,7 +411,7 @@ def _overview_figure(view: _View, window: tuple[float, float]) -> Figure:
         Line2D([], [], linestyle='', marker='|', color=BLACK, markersize=8, label='slip alarm'),
         Patch(facecolor='none', edgecolor=PALE, linestyle=':', label='drawn large below'),
     ]
-    _legend(figure, handles, columns=5)
+    legend(figure, handles, columns=5)
     return figure
 
 
@@ -476,7 +482,7 @@ def _window_figure(view: _View, window: tuple[float, float]) -> Figure:
         Line2D([], [], color=GREEN, label='slip'),
         Line2D([], [], linestyle='', marker='.', color=VERMILION, markersize=9, label='alarm'),
     ]
-    _legend(figure, handles, columns=6)
+    legend(figure, handles, columns=6)
     figure.align_ylabels(axes[:, 0])
     return figure
 
@@ -542,7 +548,7 @@ def _reliability_figure(believed: np.ndarray, wet: np.ndarray) -> Figure:
         Line2D([], [], color=BLUE, marker='o', label='stances, with their number'),
         Line2D([], [], color=PALE, linestyle='--', label='belief as it should be'),
     ]
-    _legend(figure, handles, columns=2)
+    legend(figure, handles, columns=2)
     return figure
 
 
@@ -575,7 +581,7 @@ def lead_picture(
     rows = max(2, _map_rows(_map_extent(view)))
     wide, map_width = 16.0, 9.7
     tall = _map_tall(view, rows, map_width) + 1.55
-    with matplotlib.rc_context(_STYLE | {'font.size': 13.0}):
+    with matplotlib.rc_context(STYLE | {'font.size': 13.0}):
         figure = Figure(figsize=(wide, tall), dpi=100)
         _draw_map(figure, view, rows, 0.95, 0.6, map_width, size=8.0)
         bars = _panel(figure, 12.35, 0.6, 3.45, tall - 1.15)
@@ -594,13 +600,13 @@ def lead_picture(
             bbox_to_anchor=(0.85 / wide, 1.0 - 0.4 / tall),
             ncols=3,
         )
-        _save(path, _rendered(figure, 'png', dpi=100))
+        save(path, rendered(figure, 'png', dpi=100))
 
 
-def _rendered(figure: Figure, kind: str, **options: Any) -> bytes:
+def rendered(figure: Figure, kind: str, **options: Any) -> bytes:
     """Return a figure as a file that does not depend on when or where it was drawn."""
     stream = io.BytesIO()
-    metadata = {'Date': None, 'Creator': None} if kind == 'svg' else {'Software': None}
+    metadata = dict.fromkeys(_MARKS[kind])
     figure.savefig(stream, format=kind, metadata=metadata, **options)
     return stream.getvalue()
 
@@ -684,7 +690,7 @@ def _result(view: _View) -> str:
     return text
 
 
-def _table(head: Sequence[str], body: Iterable[Sequence[str]], numbers: range) -> str:
+def table(head: Sequence[str], body: Iterable[Sequence[str]], numbers: range) -> str:
     """Return an HTML table of escaped cells; ``numbers`` are the columns set to the right."""
 
     def cells(tag: str, row: Sequence[str]) -> str:
@@ -710,7 +716,7 @@ def _metrics_tables(view: _View) -> str:
             for text in [number(row).replace('-', '\N{MINUS SIGN}')]
         ]
         body.append([name, unit, *values, meaning])
-    text = _table(head, body, range(2, 2 + len(names)))
+    text = table(head, body, range(2, 2 + len(names)))
     if len(names) > 1:
         text += f'<p class="note">{_POLICY_TEXTS}</p>'
     own = view.trial.metrics
@@ -722,7 +728,7 @@ def _metrics_tables(view: _View) -> str:
         ('changes of shape', '', [str(own.switches[k]) for k in view.order]),
         ('overload', 's', [f'{own.overload_s[k]:.2f}' for k in view.order]),
     ]
-    text += '<h3>Leg by leg</h3>' + _table(
+    text += '<h3>Leg by leg</h3>' + table(
         ['', 'unit', *(f'leg {leg}' for leg in legs)],
         [[name, unit, *values] for name, unit, values in per_leg],
         range(2, 2 + len(legs)),
@@ -742,7 +748,7 @@ def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
         for each in omitted
     ]
     head = ['left out', 'share of the friction of a loaded foot', 'where the bound comes from']
-    return _table(head, rows, range(1, 2))
+    return table(head, rows, range(1, 2))
 
 
 def _facts(trial: Trial) -> str:
@@ -796,6 +802,24 @@ td.number {{ white-space: nowrap; }}
 """
 
 
+def page(title: str, parts: Sequence[str]) -> str:
+    """Return an HTML page of its title and its parts, which are HTML."""
+    return _PAGE.format(title=html.escape(title), body='\n'.join(parts))
+
+
+def embedded(figure: Figure, alt: str, caption: str, kind: str = '') -> str:
+    """Return a figure as HTML that needs no other file.
+
+    ``alt`` is plain text, ``caption`` HTML, ``kind`` attributes of the ``figure`` element.
+    """
+    data = base64.b64encode(rendered(figure, 'svg')).decode()
+    return (
+        f'<figure{kind}><img alt="{html.escape(alt, quote=True)}" '
+        f'src="data:image/svg+xml;base64,{data}">'
+        f'<figcaption>{caption}</figcaption></figure>'
+    )
+
+
 def write(
     trial: Trial,
     path: str | os.PathLike[str],
@@ -831,12 +855,7 @@ def write(
     parts: list[str] = []
 
     def figure(number: int, drawn: Figure, alt: str, caption: str, kind: str = '') -> None:
-        data = base64.b64encode(_rendered(drawn, 'svg')).decode()
-        parts.append(
-            f'<figure{kind}><img alt="{html.escape(alt, quote=True)}" '
-            f'src="data:image/svg+xml;base64,{data}">'
-            f'<figcaption>{caption}</figcaption></figure>'
-        )
+        parts.append(embedded(drawn, alt, caption, kind))
         if progress:
             progress(number / 5.0)
 
@@ -845,7 +864,7 @@ def write(
     parts.append(f'<p class="result">{html.escape(_result(view))}</p>')
     for warning in _warnings(trial):
         parts.append(f'<p class="warning">{html.escape(warning)}</p>')
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         if len(view.rows) > 1:
             parts.append('<h2>What the shapes are worth</h2>')
             figure(
@@ -901,8 +920,7 @@ def write(
             )
     parts.append('<h2>What the model leaves out</h2>')
     parts.append(_omitted_table(view.settings.get('omitted', [])))
-    page = _PAGE.format(title=html.escape(f'{name}: ros_pad'), body='\n'.join(parts))
-    _save(path, page.encode())
+    save(path, page(f'{name}: ros_pad', parts).encode())
     if progress:
         progress(1.0)
 
@@ -926,7 +944,7 @@ def _refuse(path: str | os.PathLike[str], force: bool) -> None:
         raise PadError(f'{os.fspath(path)}: exists, and is only replaced when that is forced')
 
 
-def _save(path: str | os.PathLike[str], data: bytes) -> None:
+def save(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file as a whole, so that no half of one is ever left."""
     path = pathlib.Path(path)
     new = path.with_name(path.name + '.new')
@@ -938,4 +956,4 @@ def _save(path: str | os.PathLike[str], data: bytes) -> None:
         raise PadError(f'{path}: cannot be written: {error.strerror}') from error
 
 
-__all__ = ['lead_picture', 'write']
+__all__ = ['embedded', 'lead_picture', 'legend', 'page', 'rendered', 'save', 'table', 'write']
