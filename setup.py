@@ -39,6 +39,7 @@ setup(
         'numpy>=1.26',
         'scipy>=1.11',
         'matplotlib>=3.6',
+        'mpmath>=1.2',
         'pyyaml>=6.0',
         'tqdm>=4.66',
         'mcap>=1.5',

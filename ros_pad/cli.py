@@ -12,6 +12,7 @@ from typing import Any
 
 import ros_pad
 from ros_pad.commands import bag
+from ros_pad.commands import chart
 from ros_pad.commands import contact
 from ros_pad.commands import report
 from ros_pad.commands import run
@@ -29,6 +30,7 @@ COMMANDS = (
     report,
     bag,
     contact,
+    chart,
 )
 
 

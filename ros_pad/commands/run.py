@@ -15,6 +15,7 @@ from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
         )
     policy = options.policy or scene.policy
     rung = ladder.rung(scene, options.fidelity)
-    folder = _new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
+    folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
     try:
         return _run_in(folder, options, scene, policy, rung)
     except KeyboardInterrupt:
@@ -140,27 +141,6 @@ def _run_in(
     if trial.metrics.verdict:
         return complain(f'the walk ended early: {trial.metrics.verdict}', 1)
     return 0
-
-
-def _new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
-    """Make the folder that is wanted, or the next free one below ``runs``."""
-    if wanted is not None:
-        try:
-            wanted.mkdir(parents=True)
-        except FileExistsError:
-            raise InvalidInput(
-                f'--out {wanted}: exists already, and nothing is ever overwritten'
-            ) from None
-        return wanted
-    number = 1
-    while True:
-        folder = pathlib.Path('runs') / (name if number == 1 else f'{name}_{number}')
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            number += 1
-        else:
-            return folder
 
 
 def _walk(scene: Scene, policy: str, seed: int, text: str) -> Trial:

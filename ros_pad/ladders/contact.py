@@ -35,6 +35,7 @@ from ros_pad.ladders.ladder import Method
 from ros_pad.ladders.ladder import Problem
 from ros_pad.ladders.ladder import Progress
 from ros_pad.ladders.ladder import Rung
+from ros_pad.ladders.ladder import chart
 from ros_pad.ladders.ladder import climb
 from ros_pad.trials.report import GREEN
 from ros_pad.trials.report import PALE
@@ -71,6 +72,12 @@ def measure(progress: Progress | None = None) -> list[Rung]:
     return free + pressed
 
 
+def figures(rungs: list[Rung], progress: Progress | None = None) -> dict[str, Figure]:
+    """Return the pictures by name: the chart, and the map of where methods fail."""
+    maps = failure_maps(progress=progress)
+    return {'contact': chart(rungs, 'the height'), 'contact_failures': draw_maps(maps)}
+
+
 # --- free dome -----------------------------------------------------------------------------------
 
 
@@ -79,8 +86,10 @@ def free_problem() -> Problem:
     pressures = np.array(FREE_PRESSURES)
     heights = []
     with mpmath.workdps(40):
+        # Radius and stiffness as they are written: near bursting their last bit would be seen.
+        radius, stiffness = mpmath.mpf(str(_R)), mpmath.mpf(str(_K))
         for pressure in FREE_PRESSURES:
-            tension = mpmath.mpf(pressure) * mpmath.mpf(_R) / mpmath.mpf(_K)
+            tension = mpmath.mpf(pressure) * radius / stiffness
             low, high = mpmath.mpf(0), mpmath.pi / 2
             for _ in range(130):
                 t = (low + high) / 2
@@ -88,7 +97,7 @@ def free_problem() -> Problem:
                     low = t
                 else:
                     high = t
-            heights.append(float(mpmath.mpf(_R) * mpmath.tan(low)))
+            heights.append(float(radius * mpmath.tan(low)))
     return Problem(
         'free dome',
         {'pressure_pa': pressures},
@@ -331,7 +340,7 @@ _MEANING = {
     COARSE: ('off by up to 1 %', '#B8DE9C'),
     WRONG: ('a wrong root, without a word', VERMILION),
     INVENTED: ('an answer where there is none', '#E69F00'),
-    REFUSED: ('says that it has none', '#DDDDDD'),
+    REFUSED: ('says that it has none, or warns', '#DDDDDD'),
 }
 
 
@@ -422,9 +431,10 @@ def _outcome(
 
 def draw_maps(maps: list[FailureMap]) -> Figure:
     """Return the picture of where each method is right, wrong, or silent."""
-    figure = Figure(figsize=(3.0 * len(maps), 3.9), layout='constrained')
+    figure = Figure(figsize=(9.6, 7.0), layout='constrained')
     colours = ListedColormap([colour for _, colour in _MEANING.values()])
-    panels = figure.subplots(1, len(maps), sharey=True)
+    grid = figure.subplots(2, len(maps) // 2, sharex=True, sharey=True)
+    panels = grid.ravel()
     edge = PAD.stiffness / PAD.radius
     pressures = np.linspace(2e3, 91.3e3, 200)
     limit = force_limit(PAD, pressures, 'flattening') / (math.pi * _R * _R * pressures)
@@ -434,16 +444,18 @@ def draw_maps(maps: list[FailureMap]) -> Figure:
         )
         panel.plot(pressures / 1e3, limit, color='black', lw=0.8)
         panel.axvline(3.426 * edge / 1e3, color='black', lw=0.8, ls=':')
-        panel.set(title=each.method, xlabel='gauge pressure, kPa')
-        panel.title.set_fontsize(9)
-        panel.set(xlim=(0.0, 100.0), ylim=(0.0, 1.1))
+        panel.set(title=each.method, xlim=(0.0, 100.0), ylim=(0.0, 1.1))
+        panel.title.set_fontsize(10)
     panels[-1].text(
         96.0, 0.5, 'history decides', rotation=90, ha='center', va='center', fontsize=8
     )
     panels[-1].text(45.0, 1.05, 'flattened', ha='center', va='center', fontsize=8)
-    panels[0].set_ylabel('force / (pressure × area of the pad)')
+    for panel in grid[-1]:
+        panel.set_xlabel('gauge pressure, kPa')
+    for panel in grid[:, 0]:
+        panel.set_ylabel('force / (pressure × area of the pad)')
     handles = [
         Patch(facecolor=colour, edgecolor=PALE, label=text) for text, colour in _MEANING.values()
     ]
-    figure.legend(handles=handles, loc='outside lower center', ncols=5, frameon=False)
+    figure.legend(handles=handles, loc='outside lower center', ncols=3, frameon=False)
     return figure
