@@ -145,6 +145,7 @@ ROSDEP_KEY = {
     'yaml': 'python3-yaml',
     'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
+    'mpmath': 'python3-sympy',
 }
 PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
 
