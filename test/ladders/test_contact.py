@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import math
+import pathlib
+
+import numpy as np
+import pytest
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import force_limit
+from ros_pad.ladders import contact
+from ros_pad.ladders.contact import INVENTED
+from ros_pad.ladders.contact import REFUSED
+from ros_pad.ladders.contact import RIGHT
+from ros_pad.ladders.contact import WRONG
+
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
+
+
+@pytest.fixture(scope='module')
+def rungs():
+    shares = []
+    measured = contact.measure(shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    return {(rung.problem, rung.method): rung for rung in measured}
+
+
+def test_truth_of_the_free_dome_is_that_of_the_reference_table():
+    problem = contact.free_problem()
+    truth = dict(zip(problem.inputs['pressure_pa'].tolist(), problem.truth, strict=True))
+    rows = json.loads((REFERENCE / 'free_dome.json').read_text())['rows']
+    shared = [row for row in rows if float(row['p_Pa']) in truth]
+    assert len(shared) >= 10
+    for row in shared:
+        assert truth[float(row['p_Pa'])] == pytest.approx(float(row['c1_m']), rel=1e-15)
+
+
+def test_following_the_branch_gives_the_reference_table():
+    rows = json.loads((REFERENCE / 'pressed_dome.json').read_text())['rows']
+    for pressure in (50e3, 75e3):
+        end = force_limit(LARGE_PAD, pressure, 'flattening')
+        # The table goes on past flattening, and to where the window of three roots begins.
+        inside = [r for r in rows if r['pressure'] == pressure and 0 < r['force'] < 0.99 * end]
+        assert len(inside) >= 10
+        followed = contact._follow(pressure, [row['force'] for row in inside], end)
+        for row, (depth, height) in zip(inside, followed, strict=True):
+            assert height == pytest.approx(float(row['height']), rel=1e-14)
+            assert depth == pytest.approx(float(row['depth']), rel=1e-14)
+
+
+def test_ours_never_fail_and_are_exact(rungs):
+    ours = [rung for rung in rungs.values() if rung.ours]
+    assert len(ours) == 4
+    for rung in ours:
+        assert rung.failures == rung.wrong == 0
+        assert rung.error < (1e-12 if rung.problem == 'free dome' else 1e-10)
+
+
+def test_every_method_is_there_with_its_time(rungs):
+    assert len(rungs) == 17
+    for rung in rungs.values():
+        assert rung.us_per_solve > 0.0
+        assert 0 <= rung.wrong <= rung.failures <= rung.cases
+        assert rung.error >= rung.median_error >= 0.0
+        base = rungs[rung.problem, contact.BASELINE]
+        assert rung.versus == pytest.approx(rung.us_per_solve / base.us_per_solve)
+        assert len(rung.examples) == min(rung.failures, 5)
+    assert rungs['pressed dome', 'mpmath, as vpasolve'].wrong > 0
+    assert rungs['pressed dome', contact.BASELINE].failures == 0
+
+
+def test_maps_show_the_wrong_branch_of_general_solvers():
+    maps = {each.method: each for each in contact.failure_maps(size=28)}
+    ours = maps['press'].outcome
+    assert set(np.unique(ours)) == {RIGHT, REFUSED}
+    # Near flattening from 53 kPa on there are three roots, and fsolve says of a wrong one that it
+    # converged.
+    free = maps['fsolve, start at the free dome']
+    assert (free.outcome == WRONG).any()
+    pressures = np.broadcast_to(free.pressures, free.outcome.shape)[free.outcome == WRONG]
+    assert pressures.min() > 2.0 * LARGE_PAD.stiffness / LARGE_PAD.radius
+    assert (maps['brentq, one unknown'].outcome == INVENTED).any()
+
+
+def test_pictures_are_drawn(rungs, tmp_path):
+    pictures = contact.figures(list(rungs.values()))
+    assert set(pictures) == {'contact', 'contact_failures'}
+    for name, figure in pictures.items():
+        figure.savefig(tmp_path / f'{name}.png')
+        assert (tmp_path / f'{name}.png').stat().st_size > 20_000
+    assert not math.isnan(pictures['contact'].axes[0].get_xlim()[0])
