@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -73,6 +74,22 @@ class TestFree:
             assert dome.height == pytest.approx(float(row['c1_m']), rel=1e-12)
             assert dome.sphere_radius == pytest.approx(float(row['R1_m']), rel=1e-12)
             assert dome.volume == pytest.approx(float(row['V1_m3']), rel=1e-12)
+
+    @pytest.mark.parametrize('below', ['1e-9', '1e-6', '1e-3', '0.1', '0.9', '1.05'])
+    def test_digits_are_kept_up_to_bursting(self, below):
+        # At P = 6 - d, in powers of two so that radius, stiffness and pressure are exact.
+        pad = Pad(radius=2.0**-9, stiffness=32.0)
+        pressure = (6.0 - float(below)) * 2.0**14
+        with mpmath.workdps(40):
+            tension = mpmath.mpf(pressure) / 2**14
+            t = mpmath.findroot(
+                lambda t: 6 * mpmath.sin(t) - 2 * mpmath.sin(2 * t) - tension,
+                (mpmath.mpf(1) / 10, mpmath.pi / 2),
+                solver='illinois',
+            )
+            height = float(mpmath.tan(t) / 2**9)
+        assert inflate(pad, pressure).height == pytest.approx(height, rel=2e-15)
+        assert inflate(pad, [pressure, 1.0]).height[0] == pytest.approx(height, rel=2e-15)
 
     def test_gentle_pressure_follows_the_series(self):
         p = np.geomspace(1e-9, 1e-3, 7)
@@ -267,6 +284,44 @@ class TestPressed:
                     assert value.shape == (3, 4)
                     assert value[i, j] == pytest.approx(getattr(alone, name), rel=1e-13)
         assert isinstance(alone.height, float)
+
+    @given(
+        st.lists(st.tuples(st.floats(1e-3, 3.5), st.floats(0.0, 1.1)), min_size=1, max_size=30),
+        st.sampled_from(['matlab', 'text', 'none']),
+        st.sampled_from([0.0, 1e-6, 1.5e-4, 0.01]),
+    )
+    def test_a_row_does_not_depend_on_its_neighbours(self, states, adhesion, energy):
+        pad = Pad(1.0, 1.0, energy)
+        tension, share = np.array(states).T
+        force = math.pi * tension * share
+        together = press(pad, tension, force, adhesion)
+        for row in range(len(states)):
+            try:
+                alone = press(pad, float(tension[row]), float(force[row]), adhesion)
+            except NoEquilibrium as error:
+                assert together.status[row] == error.status
+                assert np.isnan(together.height[row])
+            else:
+                assert together.status[row] == alone.status
+                # Near flattening the height is ill-conditioned: a last digit more or less.
+                rel = 1e-13 / max(1e-4, abs(1.0 - share[row]))
+                assert together.height[row] == pytest.approx(alone.height, rel=rel)
+                assert together.contact_radius[row] == pytest.approx(alone.contact_radius, rel=rel)
+
+    @pytest.mark.parametrize('tension', [1.0, 2.0, 3.0, 3.335])
+    def test_text_sign_follows_its_branch_to_the_fold(self, tension):
+        # With repulsion this strong the second root is close; it has the lower dome.
+        pad = Pad(1.0, 1.0, 0.01)
+        share = np.linspace(0.05, 1.0, 20001)
+        dome = press(pad, tension, math.pi * tension * share, 'text')
+        there = dome.status == 'ok'
+        assert 5000 < there.sum() < 20001
+        assert (np.diff(there.astype(int)) <= 0).all(), 'once it has ended it does not come back'
+        fall = -np.diff(dome.height[there])
+        assert (fall > 0.0).all()
+        # It falls ever faster into the fold, as a square root, without a jump.
+        assert fall[-1] < 0.2 * dome.height[there][-1]
+        assert fall[-20:-1].max() < 3.0 * fall[-30:-2].max()
 
     def test_every_row_of_a_large_array_is_solved(self):
         # Rows settle after different numbers of steps; none may drift away meanwhile.
