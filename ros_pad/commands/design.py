@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad design``: how many pads a sole holds, whether they carry a load, and at what pressure."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ros_pad.commands.command import Commands
+from ros_pad.commands.command import add_command
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import Design
+from ros_pad.contact import Foot
+from ros_pad.contact import design
+from ros_pad.contact import pressure_for
+from ros_pad.contact.design import CELL
+from ros_pad.contact.design import READINGS
+from ros_pad.contact.limits import CRITERIA
+from ros_pad.contact.pad import number
+from ros_pad.errors import InvalidInput
+
+CEILING = 90e3  # Pa gauge, of the shipped feet
+RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
+OPTIMUM = (
+    'The optimum of 0.3 to 0.8 mm that the thesis claims for the pad radius comes out of no '
+    'reading: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
+)
+
+
+def add(commands: Commands) -> None:
+    """Add the command and its arguments."""
+    part = add_command(
+        commands,
+        'design',
+        run,
+        'Pads on a sole: number, load, pressure, height of rise; corrected and as in the thesis.',
+        'pad design --load 7 --foot large37 --figure design.png',
+    )
+    part.add_argument('--load', type=float, required=True, metavar='N', help='on one foot, N')
+    sole = part.add_mutually_exclusive_group()
+    sole.add_argument('--area', type=float, metavar='M2', help='of the sole, m²')
+    sole.add_argument('--sole-radius', type=float, metavar='M', help='of a round sole, m')
+    part.add_argument(
+        '--radius', type=float, metavar='M', help=f'of a pad, m ({LARGE_PAD.radius:g})'
+    )
+    part.add_argument(
+        '--stiffness', type=float, metavar='N/M', help=f'of a pad, N/m ({LARGE_PAD.stiffness:g})'
+    )
+    part.add_argument(
+        '--pressure',
+        type=float,
+        metavar='PA',
+        help=f'highest of the supply, Pa gauge ({CEILING:g})',
+    )
+    part.add_argument(
+        '--margin', type=float, default=1.2, metavar='X', help='factor on the load (%(default)g)'
+    )
+    part.add_argument('--criterion', choices=CRITERIA, help='of the force limit (measured)')
+    part.add_argument(
+        '--foot',
+        metavar='FOOT',
+        help='shipped foot or .yaml file: gives sole, pad, number, ceiling and criterion '
+        'where nothing else is said',
+    )
+    part.add_argument('--figure', metavar='FILE', help='draw load and rise over the pad radius')
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the designs; return the exit status."""
+    foot = None if options.foot is None else Foot.load(options.foot)
+    pad = LARGE_PAD if foot is None else foot.pad
+    for name in ('radius', 'stiffness'):
+        if getattr(options, name) is not None:
+            pad = replace(pad, **{name: getattr(options, name)})
+    area = _area(options, foot)
+    ceiling = CEILING if foot is None else foot.ceiling
+    rules: dict[str, Any] = {
+        'ceiling': ceiling if options.pressure is None else options.pressure,
+        'margin': options.margin,
+        'criterion': options.criterion or ('measured' if foot is None else foot.limit),
+    }
+    designs = {each: design(options.load, area, pad, reading=each, **rules) for each in READINGS}
+    if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
+        built = design(options.load, area, pad, pads=foot.pads, **rules)
+        designs = {'as built': built, **designs}
+
+    def over(radii: Sequence[float]) -> list[list[Design]]:
+        # Only such pads as the sole has room for.
+        return [
+            [
+                design(options.load, area, replace(pad, radius=r), reading=reading, **rules)
+                for r in radii
+                if area >= CELL['corrected'] * r * r
+            ]
+            for reading in READINGS
+        ]
+
+    rows = over(RADII)
+    says = [
+        *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
+        *_overlap('Of the reading thesis ', designs['thesis']),
+        OPTIMUM,
+    ]
+    if options.figure is not None:
+        from ros_pad.figures.design import draw
+
+        draw(options.figure, *over(np.linspace(0.3e-3, 2.5e-3, 221).tolist()))
+    if options.json:
+        print(
+            json.dumps(
+                {
+                    'designs': [{'name': name, **values(each)} for name, each in designs.items()],
+                    'radii': [values(each) for row in rows for each in row],
+                    'says': says,
+                    'figure': options.figure,
+                }
+            )
+        )
+        return 0
+    _print(designs, rows)
+    print()
+    for sentence in says:
+        print(sentence)
+    return 0
+
+
+def values(each: Design) -> dict[str, Any]:
+    """Return what is known of a design, units in the names; None for what it has not."""
+    found = {
+        'reading': each.reading,
+        'load_n': each.load,
+        'area_m2': each.area,
+        'radius_m': each.pad.radius,
+        'stiffness_n_per_m': each.pad.stiffness,
+        'criterion': each.criterion,
+        'margin': each.margin,
+        'pads': each.pads,
+        'pitch_m': each.pitch,
+        'load_per_pad_n': each.load_per_pad,
+        'pressure_pa': each.pressure,
+        'ceiling_pa': each.ceiling,
+        'pad_limit_n': each.pad_limit,
+        'reachable_load_n': each.reachable_load,
+        'flat_force_n': each.flat_force,
+        'dome_width_m': each.dome_width,
+        'rise_height_m': each.rise_height,
+        'pads_needed': each.pads_needed,
+        'pads_without_touching': each.pads_without_touching,
+        'carried': each.carried,
+        'touching': each.touching,
+    }
+    # JSON has neither NaN nor infinity.
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in found.items()
+    }
+
+
+def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterator[str]:
+    """Yield in words whether the load is carried and, if not, what would carry it.
+
+    Parameters
+    ----------
+    each : Design
+        The one that is asked about.
+    candidates : sequence of Design
+        The same load and sole with other radii.
+    supply : float
+        Highest pressure of the supply, Pa gauge.
+    """
+    ends = 'the supply ends' if each.ceiling == supply else 'the model of such pads ends'
+    if each.carried:
+        yield (
+            f'{each.load:g} N is carried: {each.pads} pads with {each.load_per_pad:.3g} N each, '
+            f'at {each.pressure:.0f} Pa or more.'
+        )
+    else:
+        yield (
+            f'{each.load:g} N cannot be carried: {each.pads} pads reach {each.reachable_load:.3g} '
+            f'N with a margin of {each.margin:g} at {each.ceiling:.0f} Pa, where {ends}.'
+        )
+        yield from _remedies(each, candidates)
+    yield from _overlap('', each)
+
+
+def _overlap(of: str, each: Design) -> Iterator[str]:
+    if each.pitch < 2.0 * each.pad.radius:
+        yield (
+            f'{of}{each.pads} pads overlap even when flat: {2 * each.pad.radius:.3g} m wide at a '
+            f'pitch of {each.pitch:.3g} m.'
+        )
+    elif each.touching:
+        yield (
+            f'{of}{each.pads} domes touch one another: {each.dome_width:.3g} m wide at a pitch of '
+            f'{each.pitch:.3g} m.'
+        )
+
+
+def _remedies(each: Design, candidates: Sequence[Design]) -> Iterator[str]:
+    if each.pressure > each.ceiling:
+        yield f'A supply of {each.pressure:.0f} Pa would do.'
+    if math.isinf(each.pads_needed):
+        least = pressure_for(each.pad, 0.0, each.criterion)
+        yield f'No number of them would do: such a pad carries nothing below {least:.0f} Pa.'
+    else:
+        area = each.pads_needed * CELL['corrected'] * each.pad.radius**2
+        yield (
+            f'{each.pads_needed} pads would do, on a sole of {area:.3g} m² '
+            f'(radius {math.sqrt(area / math.pi):.3g} m).'
+        )
+        if each.pads_needed <= each.pads_without_touching:
+            yield (
+                'This sole would hold them in a closer pattern: the domes are '
+                f'{each.dome_width:.3g} m wide, not the {3 * each.pad.radius:.3g} m kept for them.'
+            )
+    radii = [other.pad.radius for other in candidates if other.carried]
+    if radii:
+        yield f'On this sole pads of radius {radii[0]:g} to {radii[-1]:g} m would carry it.'
+
+
+def _area(options: argparse.Namespace, foot: Foot | None) -> float:
+    if options.area is not None:
+        return float(options.area)
+    if options.sole_radius is not None:
+        return math.pi * number('--sole-radius', options.sole_radius, 'm', above=True) ** 2
+    if foot is None:
+        raise InvalidInput(
+            'one of --area, --sole-radius and --foot must say how large the sole is'
+        )
+    return foot.sole_area
+
+
+def _print(designs: dict[str, Design], rows: Sequence[Sequence[Design]]) -> None:
+    first = next(iter(designs.values()))
+    print(
+        f'{first.load:g} N on a sole of {first.area:.4g} m², pads of radius {first.pad.radius:g} '
+        f'm and {first.pad.stiffness:g} N/m, limit {first.criterion}, margin {first.margin:g}'
+    )
+    table = {name: values(each) for name, each in designs.items()}
+    print(f'\n{"":26}' + ''.join(f'{name:>12}' for name in table))
+    for key, text in (
+        ('pads', 'pads'),
+        ('pitch_m', 'pitch, m'),
+        ('load_per_pad_n', 'load per pad, N'),
+        ('pressure_pa', 'pressure needed, Pa'),
+        ('ceiling_pa', 'ceiling, Pa'),
+        ('reachable_load_n', 'reachable load, N'),
+        ('flat_force_n', 'pressure × flat area, N'),
+        ('dome_width_m', 'width of the domes, m'),
+        ('touching', 'domes touch'),
+        ('rise_height_m', 'height of rise, m'),
+        ('carried', 'load carried'),
+    ):
+        print(f'{text:26}' + ''.join(_cell(each[key], 12) for each in table.values()))
+    print('\n' + f'{"radius":>9}' + ''.join(f'{reading:^36}' for reading in READINGS))
+    names = ''.join(f'{name:>9}' for name in ('pads', 'Pa', 'reach, N', 'rise, m'))
+    print(f'{"m":>9}' + names + names)
+    for pair in zip(*rows, strict=True):
+        cells = ''.join(
+            _cell(values(each)[key], 9)
+            for each in pair
+            for key in ('pads', 'pressure_pa', 'reachable_load_n', 'rise_height_m')
+        )
+        print(f'{pair[0].pad.radius:9.5g}' + cells)
+
+
+def _cell(value: object, width: int) -> str:
+    if isinstance(value, bool):
+        text = 'yes' if value else 'no'
+    elif isinstance(value, float):
+        text = f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
+    else:
+        text = '-' if value is None else str(value)
+    return f'{text:>{width}}'

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figure: load and height of rise of a sole over the radius of its pads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ros_pad.contact import Design
+from ros_pad.contact import foot_force
+from ros_pad.contact import rise_height
+from ros_pad.contact.design import DOME
+from ros_pad.errors import InvalidInput
+from ros_pad.trials.report import BLACK
+from ros_pad.trials.report import BLUE
+from ros_pad.trials.report import STANCE
+from ros_pad.trials.report import VERMILION
+
+CLAIMED = (0.3, 0.8)  # mm, the thesis' optimum
+_STYLE: dict[Any, Any] = {
+    'font.family': 'DejaVu Sans',
+    'font.size': 9.0,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.titlesize': 9.0,
+    'axes.titlelocation': 'left',
+    'legend.frameon': False,
+    'svg.hashsalt': 'ros_pad',
+}
+
+
+def draw(
+    path: str | os.PathLike[str], corrected: Sequence[Design], thesis: Sequence[Design]
+) -> None:
+    """Draw the designs of one sole and load, one for each radius, in both readings.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .png, .svg or .pdf. An existing file is replaced.
+    corrected, thesis : sequence of Design
+        Of :func:`ros_pad.contact.design`, of the same rising radii.
+
+    Raises
+    ------
+    InvalidInput
+        For another ending, or a sole that has no room for any pad.
+    """
+    text = os.fspath(path)
+    if not text.endswith(('.png', '.svg', '.pdf')):
+        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    if not corrected:
+        raise InvalidInput('the sole is too small for a pad of any radius that is drawn')
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(7.2, 3.3), layout='constrained')
+        loads, heights = figure.subplots(1, 2)
+        _loads(loads, corrected, thesis)
+        _heights(heights, corrected, thesis)
+        figure.savefig(text, dpi=200)
+
+
+def _loads(axes: Axes, corrected: Sequence[Design], thesis: Sequence[Design]) -> None:
+    for designs, colour in ((corrected, BLUE), (thesis, VERMILION)):
+        each = designs[0]
+        r = np.array([design.pad.radius for design in designs])
+        flat = foot_force(each.area, r, each.pad.stiffness, each.reading)
+        reach = np.array([design.reachable_load for design in designs])
+        reach[reach <= 0.0] = np.nan  # the logarithm has no place for pads that carry nothing
+        axes.plot(1e3 * r, flat, '--', color=colour, lw=1.2)
+        axes.plot(1e3 * r, reach, color=colour, lw=1.8, label=each.reading)
+    axes.axhline(each.load, color=BLACK, lw=1.0, ls=':', label='load')
+    axes.plot([], [], color=BLACK, lw=1.8, label=f'force limit {each.criterion}')
+    axes.plot([], [], '--', color=BLACK, lw=1.2, label='all pads flat (3.92)')
+    axes.set_yscale('log')
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, 8.0 * high)  # room for the legend
+    axes.set_ylabel('load of the foot, N')
+    axes.set_title('(a) what a sole carries')
+    _dress(axes)
+    axes.legend(fontsize=8, ncols=2, loc='upper right')
+
+
+def _heights(axes: Axes, corrected: Sequence[Design], thesis: Sequence[Design]) -> None:
+    for designs, colour in ((corrected, BLUE), (thesis, VERMILION)):
+        r = np.array([design.pad.radius for design in designs])
+        # Of whole cells: the design's own cells differ by what rounding pads leaves over.
+        height = rise_height(r, reading=designs[0].reading)
+        axes.plot(1e3 * r, 1e3 * height, color=colour, lw=1.8, label=designs[0].reading)
+    axes.plot(1e3 * r, 2e3 * DOME * r, color=BLACK, lw=1.0, ls=':', label='gap full')
+    axes.set_ylim(0.0, 7.5)
+    axes.set_ylabel('height of rise, mm')
+    axes.set_title('(b) liquid between the domes')
+    axes.text(
+        *(float(np.mean(CLAIMED)), 7.3),
+        'claimed\noptimum:\ncomes\nout of no\nreading',
+        ha='center',
+        va='top',
+        fontsize=7.5,
+    )
+    _dress(axes)
+    axes.legend(fontsize=8, loc='lower right')
+
+
+def _dress(axes: Axes) -> None:
+    axes.axvspan(*CLAIMED, color=STANCE, lw=0, zorder=0)
+    axes.set_xlim(0.0, 2.5)
+    axes.set_xlabel('radius of the pads, mm')
