@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact of one inflated pad with the floor (thesis chapter 3)."""
 
+from ros_pad.contact.design import DESIGN_WATER
+from ros_pad.contact.design import Design
+from ros_pad.contact.design import design
+from ros_pad.contact.design import design_pressure
+from ros_pad.contact.design import foot_force
+from ros_pad.contact.design import pads_in
+from ros_pad.contact.design import rise_height
 from ros_pad.contact.dome import Inflated
 from ros_pad.contact.dome import Pressed
 from ros_pad.contact.dome import inflate
@@ -22,10 +29,12 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
 
 __all__ = [
+    'DESIGN_WATER',
     'LARGE_PAD',
     'SMALL_PAD',
     'THESIS_LIQUID',
     'WATER',
+    'Design',
     'Film',
     'Foot',
     'Inflated',
@@ -34,11 +43,16 @@ __all__ = [
     'Pad',
     'Pressed',
     'contact_angle',
+    'design',
+    'design_pressure',
     'film_thickness',
+    'foot_force',
     'force_limit',
     'inflate',
     'meniscus',
+    'pads_in',
     'press',
     'pressure_for',
+    'rise_height',
     'tangential_resistance',
 ]
