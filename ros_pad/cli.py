@@ -14,6 +14,7 @@ import ros_pad
 from ros_pad.commands import bag
 from ros_pad.commands import chart
 from ros_pad.commands import contact
+from ros_pad.commands import design
 from ros_pad.commands import report
 from ros_pad.commands import run
 from ros_pad.commands import scenes
@@ -30,6 +31,7 @@ COMMANDS = (
     report,
     bag,
     contact,
+    design,
     chart,
 )
 
