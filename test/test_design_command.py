@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad design`` as a user types it."""
+
+import json
+import math
+import pathlib
+
+import pytest
+
+from ros_pad import cli
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    assert cli.main(['design', *arguments, '--json']) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ''
+    return json.loads(printed.out)
+
+
+def test_a_shipped_foot_beside_both_readings(capsys: pytest.CaptureFixture[str]):
+    values = said(capsys, '--load', '7', '--foot', 'large37')
+    built, corrected, thesis = values['designs']
+    assert [each['name'] for each in values['designs']] == ['as built', 'corrected', 'thesis']
+    assert built['pads'] == 37
+    # 1.2 * 7/37 N by the line through the measurements.
+    needed = 75e3 + (1.2 * 7 / 37 - 0.2833) / 1.25e-5
+    assert built['pressure_pa'] == pytest.approx(needed, rel=1e-12)
+    assert built['reachable_load_n'] == pytest.approx(37 * 0.4708 / 1.2)
+    assert (corrected['pads'], thesis['pads']) == (51, 145)
+    assert not corrected['touching']
+    assert thesis['touching']
+    assert 'overlap even when flat' in ' '.join(values['says'])
+    assert 'comes out of no reading' in values['says'][-1]
+    small = [row for row in values['radii'] if row['radius_m'] < 0.565e-3]
+    assert {row['rise_height_m'] is None for row in small if row['reading'] == 'thesis'} == {True}
+
+
+def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
+    values = said(
+        capsys,
+        *('--load', '2', '--foot', 'large37', '--radius', '1e-3', '--stiffness', '30'),
+        *('--pressure', '70e3', '--margin', '1', '--criterion', 'max_depth'),
+    )
+    assert [each['name'] for each in values['designs']] == ['corrected', 'thesis']
+    first = values['designs'][0]
+    expected = {
+        'radius_m': 1e-3,
+        'stiffness_n_per_m': 30.0,
+        'ceiling_pa': 70e3,
+        'margin': 1.0,
+        'criterion': 'max_depth',
+        'area_m2': math.pi * 0.017**2,
+    }
+    assert {key: first[key] for key in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'parts'),
+    [
+        (['25'], ['cannot be carried', '64 pads would do', 'closer pattern', '90000 Pa']),
+        (['16', '--pressure', '80e3'], ['cannot be carried', 'A supply of 82', 'would do']),
+        (['7', '--pressure', '50e3'], ['No number of them', 'nothing below 52336 Pa']),
+        (['7', '--radius', '2.4e-3'], ['the model of such pads ends', 'radius 0.0003 to 0.002 m']),
+        (['7'], ['is carried: 51 pads']),
+    ],
+)
+def test_words_say_what_would_carry(
+    arguments: list[str], parts: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(['design', '--sole-radius', '0.017', '--load', *arguments]) == 0
+    printed = capsys.readouterr().out
+    for part in parts:
+        assert part in printed
+
+
+def test_what_would_do_does(capsys: pytest.CaptureFixture[str]):
+    heavy = said(capsys, '--load', '25', '--sole-radius', '0.017')['designs'][0]
+    assert not heavy['carried']
+    area = heavy['pads_needed'] * 4.5 * math.sqrt(3) * 1.5e-3**2
+    assert said(capsys, '--load', '25', '--area', str(area))['designs'][0]['carried']
+
+
+def test_table_has_a_column_for_each_reading(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['design', '--load', '7', '--area', '9e-4']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line.split() for line in lines if line.startswith('pads'))
+    assert row == ['pads', '51', '143']
+    radii = [line.split() for line in lines if line.startswith('   0.00')]
+    assert [float(each[0]) for each in radii] == sorted(float(each[0]) for each in radii)
+    assert {len(each) for each in radii} == {9}
+    assert float(radii[0][0]) == 0.0003
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'part'),
+    [
+        (['--load', '7'], '--sole-radius'),
+        (['--load', '0', '--area', '1e-3'], 'load = 0 N'),
+        (['--load', '7', '--area', '-1'], 'area = -1 m²'),
+        (['--load', '7', '--sole-radius', '-1'], '--sole-radius = -1 m'),
+        (['--load', '7', '--area', '1e-6'], 'area = 1e-06 m²'),
+        (['--load', '7', '--area', '1e-3', '--radius', '0'], 'radius = 0 m'),
+        (['--load', '7', '--area', '1e-3', '--pressure', '0'], 'ceiling = 0 Pa'),
+        (['--load', '7', '--area', '1e-3', '--pressure', '1e5', '--radius', '1e-3'], '91360 Pa'),
+        (['--load', '7', '--foot', 'huge'], 'large37'),
+        (['--load', '7', '--area', '1e-3', '--figure', 'design.txt'], '.png'),
+    ],
+)
+def test_bad_input(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['design', *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ''
+    assert part in printed.err
+
+
+def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    path = tmp_path / 'design.png'
+    values = said(capsys, '--load', '7', '--foot', 'large19', '--figure', str(path))
+    assert values['figure'] == str(path)
+    assert path.read_bytes().startswith(b'\x89PNG')
+    # A supply under which no pad carries anything leaves nothing to draw on a logarithm.
+    arguments = ['--load', '7', '--area', '1e-3', '--pressure', '5e4']
+    assert said(capsys, *arguments, '--figure', str(path))
+    missing = tmp_path / 'none' / 'design.svg'
+    assert cli.main(['design', '--load', '7', '--area', '1e-3', '--figure', str(missing)]) == 1
+    assert str(missing) in capsys.readouterr().err
