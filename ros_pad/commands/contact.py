@@ -11,7 +11,17 @@ from ros_pad import contact
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.contact.dome import ADHESION_SIGNS
+from ros_pad.contact.dome import MODELS
 from ros_pad.errors import NoEquilibrium
+
+_TITLES = {
+    'free': 'free dome',
+    'pressed': 'pressed on the floor',
+    'meniscus': 'ring of liquid',
+    'force_limit_n': 'force limit, by criterion',
+}
+_UNITS = {'m': 'm', 'm3': 'm³', 'n': 'N'}
 
 
 def add(commands: Commands) -> None:
@@ -25,17 +35,52 @@ def add(commands: Commands) -> None:
     )
     part.add_argument('--pressure', type=float, required=True, metavar='PA', help='gauge, Pa')
     part.add_argument('--force', type=float, default=0.0, metavar='N', help='on the pad, N')
-    part.add_argument('--pad', choices=('large', 'small'), default='large')
-    part.add_argument('--liquid', choices=('water', 'thesis'), default='water')
+    which = part.add_mutually_exclusive_group()
+    which.add_argument(
+        '--pad',
+        choices=('large', 'small'),
+        default='large',
+        help="the thesis' pads of 1.5 mm (default) and 0.5 mm",
+    )
+    which.add_argument('--foot', help='the pad of a foot: a name in config/feet or a YAML file')
+    part.add_argument(
+        '--adhesion',
+        choices=tuple(ADHESION_SIGNS),
+        default='matlab',
+        help='sign of the adhesion between pad and floor (default matlab: it attracts)',
+    )
+    part.add_argument(
+        '--model',
+        choices=MODELS,
+        default='thesis',
+        help='spherical dome (default), or the exact membrane, which is slower',
+    )
+    part.add_argument(
+        '--liquid',
+        choices=('water', 'thesis'),
+        default='water',
+        help="tensions of water on silicone (default), or those of the thesis' appendix",
+    )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
     """Print what is known of the pad; return the exit status."""
     pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
+    name = f'{options.pad} pad'
+    if options.foot is not None:
+        pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
     liquid = contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
     pressure, force = options.pressure, options.force
-    values: dict[str, Any] = {'pad': options.pad, 'pressure_pa': pressure, 'force_n': force}
+    values: dict[str, Any] = {
+        'pad': options.foot or options.pad,
+        'radius_m': pad.radius,
+        'stiffness_n_per_m': pad.stiffness,
+        'adhesion': options.adhesion,
+        'model': options.model,
+        'pressure_pa': pressure,
+        'force_n': force,
+    }
     try:
         free = contact.inflate(pad, pressure)
         values['free'] = {
@@ -43,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
             'sphere_radius_m': free.sphere_radius,
             'volume_m3': free.volume,
         }
-        pressed = contact.press(pad, pressure, force)
+        pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
         values['pressed'] = {
             'height_m': pressed.height,
             'depth_m': pressed.depth,
@@ -71,10 +116,13 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(values))
         return 0
-    print(f'{options.pad} pad, {pressure:g} Pa gauge, {force:g} N')
-    for part in ('free', 'pressed', 'meniscus', 'force_limit_n'):
-        print(part.replace('_n', ' / N').replace('_', ' '))
-        for name, value in values[part].items():
-            shown = value if isinstance(value, str) else f'{value:.6g}'
-            print(f'  {name:20} {shown}')
+    print(f'{name}, {pressure:g} Pa gauge, {force:g} N')
+    for part, title in _TITLES.items():
+        print(title)
+        for key, value in values[part].items():
+            words, _, unit = key.rpartition('_') if part != 'force_limit_n' else (key, '', 'n')
+            if isinstance(value, str):
+                print(f'  {key:18} {value}')
+            else:
+                print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
     return 0

@@ -43,12 +43,6 @@ LARGEST_ADHESION = 0.01
 Codes: TypeAlias = npt.NDArray[np.int8]
 STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation'])
 OK, NO_CONTACT, FLATTENED, FOLD_ZONE, NO_INFLATION = range(5)
-_WHY = {
-    FLATTENED: 'is more than the dome can carry: the contact spans the whole pad',
-    FOLD_ZONE: 'has an answer that depends on the history of the load: too high a pressure',
-    NO_INFLATION: 'has no inflated shape: the dome would grow without end',
-}
-
 # Least-squares fits that start Newton; they decide how long it takes, not where it ends.
 # Half-angle of the free dome over P, by falling powers of P up to 6: within 4e-4.
 _FREE_SEED = (
@@ -483,15 +477,15 @@ def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
     tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
     deficit = _deficit(pad, p)
     if deficit <= 0.0:
-        _refuse(NO_INFLATION, pad, p, load)
+        _refuse(NO_INFLATION, pad, p, load, a)
     if tension > largest_tension(a):
-        _refuse(FOLD_ZONE, pad, p, load)
+        _refuse(FOLD_ZONE, pad, p, load, a)
     if _flattens(tension, f, a):
-        _refuse(FLATTENED, pad, p, load)
+        _refuse(FLATTENED, pad, p, load, a)
     free = free_height(tension, deficit) if a <= 0.0 else math.nan
     x = free if _hovers(free, f, a) else _height_of_one(tension, f, a)
     if math.isnan(x):  # past the fold where the text's sign ends the branch
-        _refuse(FLATTENED, pad, p, load)
+        _refuse(FLATTENED, pad, p, load, a)
     if _hovers(x, f, a):
         return Pressed(r * free, 0.0, 0.0, r * 0.5 * (free + 1.0 / free), r * free, 'no_contact')
     height, depth, contact, rho, gap = _shape(x, tension, f, a, math.sqrt)
@@ -557,9 +551,21 @@ def broadcast(p: Array, load: Array) -> tuple[Array, Array]:
     return first, second
 
 
-def _refuse(code: int, pad: Pad, p: float, load: float | None = None) -> NoReturn:
+def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float = 0.0) -> NoReturn:
+    unit = pad.stiffness / pad.radius
     what = f'pressure {p:g} Pa' + ('' if load is None else f' with force {load:g} N')
-    raise NoEquilibrium(f'{what} on {pad} {_WHY[code]}', str(STATUS[code]))
+    what += f' on a pad of radius {pad.radius:g} m and stiffness {pad.stiffness:g} N/m '
+    if code == NO_INFLATION:
+        what += f'makes the dome grow without end: below {BURST * unit:.6g} Pa is needed'
+    elif code == FOLD_ZONE:
+        most = largest_tension(a) * unit
+        what += f'has an answer that depends on the history of the load: up to {most:.6g} Pa '
+        what += 'is needed'
+    else:
+        most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
+        what += f'spreads the contact over the whole pad: below {max(most, 0.0):.6g} N is needed'
+        what += ' (and, with the repulsion of the text, less)' if a < 0.0 else ''
+    raise NoEquilibrium(what, str(STATUS[code]))
 
 
 def words(code: Codes) -> npt.NDArray[np.str_]:
