@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps of docs/derivation.md that can be checked in numbers, by other means than the code's."""
+
+import math
+from collections.abc import Callable
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from mpmath import mp
+from mpmath import mpf
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import WATER
+from ros_pad.contact import Pad
+from ros_pad.contact import inflate
+from ros_pad.contact import meniscus
+from ros_pad.contact import press
+from ros_pad.contact.dome import largest_tension
+
+R, K, GAMMA = mpf('1.5e-3'), mpf(40), mpf('0.006')
+PRESSURES = (20e3, 55e3, 75e3, 90e3)
+
+
+@pytest.fixture(autouse=True)
+def _digits():
+    with mp.workdps(30):
+        yield
+
+
+def cut_sphere(height: mpf, depth: mpf) -> tuple[mpf, mpf]:
+    """Return area, contact disc included, and volume of a spherical dome, by quadrature.
+
+    The sphere goes through the rim and has the given height; the floor cuts ``depth`` off.
+    """
+    sphere = (R * R + height * height) / (2 * height)
+
+    def section(z: mpf) -> mpf:
+        return sphere**2 - (z - height + sphere) ** 2
+
+    gap = height - depth
+    # The meridian's arc length per height is sphere/radius, the circumference 2 pi radius.
+    wall = mpmath.quad(
+        lambda z: 2 * mp.pi * mp.sqrt(section(z)) * sphere / mp.sqrt(section(z)), [0, gap]
+    )
+    volume = mpmath.quad(lambda z: mp.pi * section(z), [0, gap])
+    return wall + mp.pi * section(gap), volume
+
+
+def tension_energy(area: mpf) -> mpf:
+    """Return what it takes to stretch the flat pad to an area against 1.5 k √(S/S₀) - k."""
+    flat = mp.pi * R * R
+    return mpmath.quad(lambda s: K * (mpf(3) / 2 * mp.sqrt(s / flat) - 1), [flat, area])
+
+
+def printed_work(height: mpf, depth: mpf, contact: mpf, pressure: mpf) -> mpf:
+    """Return W_F as printed before 3.44, its adhesion with the sign of the appendix."""
+    side = R * R + height**2 - depth**2
+    return (
+        -pressure * mp.pi / 6 * height * (3 * R * R + height**2)
+        + pressure * mp.pi / 6 * depth * (3 * contact**2 + depth**2)
+        + mp.pi * K * side ** mpf(1.5) / R
+        - mp.pi * K * side
+        - GAMMA * mp.pi * contact**2
+    )
+
+
+@pytest.mark.parametrize('pressure', PRESSURES)
+def test_free_dome_is_where_the_energy_is_least(pressure: float):
+    def energy(height: mpf) -> mpf:
+        area, volume = cut_sphere(height, mpf(0))
+        return tension_energy(area) - pressure * volume
+
+    height = mpf(inflate(LARGE_PAD, pressure).height)
+    slope, bend = mpmath.diff(energy, height), mpmath.diff(energy, height, 2)
+    assert bend > 0
+    # The Newton step that is left to the least energy.
+    assert abs(slope / bend / height) < 1e-14
+
+
+@pytest.mark.parametrize('pressure', PRESSURES)
+@pytest.mark.parametrize('share', [0.05, 0.4, 0.8])
+def test_printed_work_is_energy_of_the_cut_sphere(pressure: float, share: float):
+    dome = press(LARGE_PAD, pressure, share * pressure * math.pi * 1.5e-3**2, 'none')
+    height, depth = mpf(dome.height), mpf(dome.depth)
+    contact = mp.sqrt(depth * (2 * (R * R + height**2) / (2 * height) - depth))
+    area, volume = cut_sphere(height, depth)
+    expected = tension_energy(area) - pressure * volume - GAMMA * mp.pi * contact**2
+    printed = printed_work(height, depth, contact, mpf(pressure))
+    assert abs(printed - expected) < mpf('1e-15') * abs(expected)
+
+
+@pytest.mark.parametrize('pressure', PRESSURES)
+@pytest.mark.parametrize('share', [1e-6, 0.05, 0.4, 0.8, 0.95])
+def test_both_balances_from_the_work(pressure: float, share: float):
+    force = share * pressure * math.pi * 1.5e-3**2
+    dome = press(LARGE_PAD, pressure, force)
+    shape = (mpf(dome.height), mpf(dome.depth), mpf(dome.contact_radius))
+
+    def partial(*order: int) -> mpf:
+        return mpmath.diff(lambda *at: printed_work(*at, mpf(pressure)), shape, order)
+
+    # 3.57: depth against height, the contact held.
+    assert partial(0, 1, 0) - partial(1, 0, 0) == pytest.approx(force, rel=1e-9)
+    # The tangent membrane: air on the contact disc carries the floor, adhesion helps to spread it.
+    pull = 2 * mp.pi * GAMMA * dome.sphere_radius
+    assert pressure * mp.pi * shape[2] ** 2 == pytest.approx(force + pull, rel=1e-12)
+    # 3.44 to 3.49, the contact moved along the sphere: less than half, of which 3.52 makes all.
+    with_b = partial(0, 0, 1) * mp.sqrt(dome.sphere_radius**2 - shape[2] ** 2) / shape[2]
+    without_adhesion = with_b + 2 * mp.pi * GAMMA * mp.sqrt(dome.sphere_radius**2 - shape[2] ** 2)
+    assert without_adhesion < pressure * mp.pi * shape[2] ** 2 / 2
+
+
+# --- the branch ----------------------------------------------------------------------------------
+
+
+def balance(x: np.ndarray, depth: np.ndarray, tension: float, a: float) -> np.ndarray:
+    """Return the residual of 3.58 with the force taken from 3.53: zero at the equilibria."""
+    rho = 0.5 * (x + 1 / x)
+    sigma = np.sqrt(1 + (x - depth) * (x + depth))
+    force = tension * depth * (2 * rho - depth) - 2 * a * rho
+    return (x + depth) * (tension * rho - 3 * sigma + 2) - force
+
+
+def certificate(x: np.ndarray, depth: np.ndarray, tension: float) -> np.ndarray:
+    rho = 0.5 * (x + 1 / x)
+    sigma = np.sqrt(1 + (x - depth) * (x + depth))
+    return tension * (rho - 2 * depth) + 3 * sigma - 2 - 3 * depth * (x + depth) / sigma
+
+
+def halved(falls: Callable[[np.ndarray], np.ndarray], high: np.ndarray) -> np.ndarray:
+    """Return where a function that is positive at 0 loses its sign."""
+    low = np.zeros_like(high)
+    for _ in range(70):
+        middle = 0.5 * (low + high)
+        positive = falls(middle) > 0
+        low, high = np.where(positive, middle, low), np.where(positive, high, middle)
+    return low
+
+
+def branch(tension: float, a: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return heights, whether they have a certified equilibrium, and the force there."""
+    free = math.tan(
+        float(mpmath.findroot(lambda t: 6 * mp.sin(t) - 2 * mp.sin(2 * t) - tension, tension / 4))
+    )
+    x = np.linspace(1e-3, 1.1 * free, 20001)
+    rho = 0.5 * (x + 1 / x)
+    turn = halved(lambda depth: certificate(x, depth, tension), np.minimum(x, rho))
+    there = (balance(x, 0 * x, tension, a) >= 0) & (balance(x, turn, tension, a) <= 0)
+    depth = halved(lambda depth: balance(x, depth, tension, a), turn)
+    return x, there, tension * depth * (2 * rho - depth) - 2 * a * rho
+
+
+@given(st.floats(0.01, 3.4), st.floats(0.01, 1.0), st.floats(0.0, 1.0), st.sampled_from([0, 1e-3]))
+def test_certificate_is_the_fall_of_the_balance_with_depth(tension, share, part, a):
+    x = 0.6 * tension * share
+    depth = part * min(x, 0.5 * (x + 1 / x))
+    with mp.workdps(30):
+
+        def exact(d):
+            rho = (x + 1 / mpf(x)) / 2
+            sigma = mp.sqrt(1 + (x - d) * (x + d))
+            force = tension * d * (2 * rho - d) - 2 * a * rho
+            return (x + d) * (tension * rho - 3 * sigma + 2) - force
+
+        slope, bend = mpmath.diff(exact, depth), mpmath.diff(exact, depth, 2)
+    assert float(slope) == pytest.approx(-certificate(x, depth, tension), rel=1e-9, abs=1e-9)
+    assert bend > 0  # so each height has at most one depth with a certificate
+
+
+@pytest.mark.parametrize('energy', [0.0, 0.006, 0.1, 0.4])
+def test_below_the_cusp_the_force_falls_along_the_branch(energy: float):
+    pad = Pad(1.0, 40.0, energy)
+    a = energy / 40.0
+    end = largest_tension(a) * (1 - 1e-12)
+    for tension in (0.3, 1.0, 2.0, 2.8, 3.2, end):
+        x, there, force = branch(tension, a)
+        assert (np.diff(np.flatnonzero(there)) == 1).all()
+        assert (np.diff(force[there]) < 0).all()
+        # The code returns that branch.
+        some = np.flatnonzero(there & (force > 0) & (force < 0.95 * tension))[::500]
+        loads = force[some] * math.pi * 40.0
+        np.testing.assert_allclose(press(pad, tension * 40.0, loads).height, x[some], rtol=1e-7)
+    # The domain ends just below the cusp: a little higher, force against height is S-shaped.
+    x, there, force = branch(end + 0.006 + 0.8 * a, a)
+    assert (np.diff(force[there]) > 0).any()
+
+
+def test_far_above_the_cusp_the_branch_breaks():
+    _, there, _ = branch(3.46, 0.0)
+    assert (np.diff(np.flatnonzero(there)) == 1).all()
+    _, there, _ = branch(3.47, 0.0)
+    assert (np.diff(np.flatnonzero(there)) > 1).any()
+
+
+@pytest.mark.parametrize('tension', [0.5, 2.0, 3.3])
+def test_first_order_of_the_force_near_flattening(tension: float):
+    # f = P - 4 x + a/x: it ends at x = √(a/2) for attraction and turns at √(-a)/2 for repulsion.
+    for scale in (1e-2, 1e-3):
+        pad = Pad(1.0, 1.0, 1e-4 * scale)
+        for adhesion, a in (('matlab', 1e-4 * scale), ('text', -1e-4 * scale), ('none', 0.0)):
+            x = 3 * math.sqrt(1e-4 * scale)
+            load = math.pi * (tension - 4 * x + a / x)
+            height = press(pad, tension, load, adhesion).height
+            assert height == pytest.approx(x, rel=20 * x)
+
+
+# --- the liquid ----------------------------------------------------------------------------------
+
+
+@settings(max_examples=30)
+@given(st.floats(20e3, 90e3), st.floats(0.02, 0.9))
+def test_ring_hangs_from_its_own_surface(pressure: float, share: float):
+    dome = press(LARGE_PAD, pressure, share * pressure * math.pi * 1.5e-3**2)
+    ring = meniscus(dome, WATER)
+    b, h = dome.contact_radius, ring.height
+    slope = math.sqrt(dome.sphere_radius**2 - b * b) / b  # cot of the wall's angle
+    z, weights = np.polynomial.legendre.leggauss(4)
+    z, weights = 0.5 * h * (z + 1), 0.5 * h * weights
+    # Between the wall, a cone, and the cylinder below the ring.
+    volume = np.sum(weights * math.pi * (ring.ring_radius**2 - (b + z * slope) ** 2))
+    lift = math.sin(WATER.angle + math.asin(b / dome.sphere_radius))
+    pull = 2 * math.pi * ring.ring_radius * WATER.surface_tension * lift
+    assert 1000 * 9.81 * volume == pytest.approx(pull, rel=1e-9)
+
+
+def test_a_symmetric_ring_pushes_nowhere():
+    dome = press(LARGE_PAD, 75e3, 0.08)
+    ring = meniscus(dome, WATER)
+    suction = WATER.surface_tension * (2 / ring.height - 1 / ring.ring_radius)
+
+    def push(start: float, end: float) -> float:
+        return float(
+            mpmath.quad(
+                lambda angle: suction * ring.height * ring.ring_radius * mp.cos(angle),
+                [start, 0.5 * (start + end), end],
+            )
+        )
+
+    half = push(-math.pi / 2, math.pi / 2)
+    assert half == pytest.approx(ring.tangential_force, rel=1e-9)
+    assert push(0, 2 * math.pi) == pytest.approx(0, abs=1e-12 * half)
+
+
+def test_pinned_line_holds_between_pi_over_four_and_all_of_the_bound():
+    # Cosine of the contact angle over the azimuth, from receding (1) to advancing (0).
+    def held(cosine: Callable[[mpf], mpf]) -> mpf:
+        quarters = [0, mp.pi / 2, mp.pi, 3 * mp.pi / 2, 2 * mp.pi]
+        return mpmath.quad(lambda angle: cosine(angle) * mp.cos(angle), quarters)
+
+    jump = held(lambda angle: mpf(1) if mp.cos(angle) > 0 else mpf(0))
+    smooth = held(lambda angle: (1 + mp.cos(angle)) / 2)
+    assert jump == pytest.approx(2)  # times γ r (cos θ_rec - cos θ_adv): K = 1 of w = 2 r
+    assert smooth == pytest.approx(mp.pi / 2)  # K = pi/4
