@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+r"""Exact shape of an inflated pad pressed on a floor: a membrane of constant mean curvature.
+
+The thesis presses a spherical cap (:mod:`ros_pad.contact.dome`). Here the wall takes whatever
+shape makes the thesis' own energy stationary, which is what its approximation is measured by.
+
+With radius and stiffness 1 the energy of the membrane is ``U = A (sigma - 1)`` (3.41), where
+``A = pi sigma²`` is its whole area, side wall and contact disc. At pressure P under force F the
+potential is ``U(A) - P V + F d``, with volume V and gap d between pad base and floor.
+
+1. U depends on the whole area alone, so ``dU = T dA``, ``T = dU/dA = 1.5 sigma - 1``: the tension
+   is the same everywhere, in the wall as in the disc.
+2. Moving the wall by n along its normal gives ``dA = ∫ 2H n``, ``dV = ∫ n``: ``2 H T = P``, so the
+   mean curvature is constant; its radius is ``l = T/P``.
+3. Moving the edge of contact, radius b, along the floor gives ``T (1 - cos psi)`` per length: the
+   wall meets the floor at a tangent. That is the whole effect of the missing adhesion.
+4. Moving the floor and the disc by d gives ``F = pi b² P``: b is known before the shape, and it
+   is that of the thesis without adhesion (3.53).
+5. The balance of the wall between b and r along the axis is ``sin psi = (r² - b²)/(2 l r)``.
+
+The one unknown left is the angle psi at the rim, from 0 to pi; beyond 90° the wall bulges out
+over the rim. Along the wall ``r = l sin psi + W``, ``W² = b² + l² sin² psi``, so everything is
+smooth through the widest place; with ``h = l sin psi = (1 - b²)/2`` at the rim
+
+    d = l (1 - cos psi) + ∫ (l sin psi)²/W dpsi,    sigma² = b² + 2 l (2 d + b² ∫ dpsi/W),
+
+both integrals over the wall and both elliptic. The unknown used is ``t = tan(psi/2)``, which is
+the height of the free dome where b = 0.
+
+How many roots there are is decided by ``Q(psi) = T/l`` at fixed b, which must be P. Up to 90° it
+rises: both sin psi and the area do, for a steeper wall is longer at every r. It goes on rising to
+its limit 6 if ``b² <= 0.7143``. For larger contacts it has a maximum and then a minimum, and all
+minima are above P = 5.1427, the cusp (137.1 kPa for the large pad). So below either bound there
+is **exactly one** shape, hence the one continuous with the free dome, and a change of sign is all
+the certificate it needs. Where both are exceeded the branch folds, and the answer depends on the
+history of the load.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.contact.dome import BURST
+from ros_pad.contact.dome import FLATTENED
+from ros_pad.contact.dome import FOLD_ZONE
+from ros_pad.contact.dome import NO_CONTACT
+from ros_pad.contact.dome import NO_INFLATION
+from ros_pad.contact.dome import OK
+from ros_pad.contact.dome import STATUS
+from ros_pad.contact.dome import Pressed
+from ros_pad.contact.dome import broadcast
+from ros_pad.contact.dome import free_height
+from ros_pad.contact.dome import words
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import quantity
+from ros_pad.errors import NoEquilibrium
+
+# A little below the cusp at P = 5.14267, b² = 0.71433: there the root has no digits.
+LARGEST_PRESSURE = 5.14
+LARGEST_SHARE = 0.71
+
+_WHY = {
+    FLATTENED: 'flattens the membrane: the contact would span the whole pad',
+    FOLD_ZONE: 'is past a fold of the membrane: its shape depends on the history of the load',
+    NO_INFLATION: 'has no inflated shape: the membrane would grow without end',
+}
+
+
+def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> Pressed:
+    """Return the exact membrane of a pad pressed on a floor, without adhesion.
+
+    Parameters
+    ----------
+    pad : Pad
+        What the pad is made of. Its ``adhesion_energy`` has no effect.
+    pressure : float or array
+        Gauge pressure, Pa, from 0 to below ``6 stiffness/radius``.
+    force : float or array
+        Normal force on this one pad, N, from 0 to ``pressure pi radius²``; above
+        ``5.14 stiffness/radius`` only to 0.71 of that. Broadcasts with the pressure.
+
+    Returns
+    -------
+    Pressed
+        ``gap`` and ``contact_radius`` are those of the membrane. Its wall is no sphere: ``height``,
+        ``depth`` and ``sphere_radius`` are those of the spherical cap through rim and edge of
+        contact, as the thesis takes them from its measurements (its section 3.2.1).
+
+    Raises
+    ------
+    NoEquilibrium
+        For scalar input, with status ``flattened`` (the contact would span the pad),
+        ``fold_zone`` (both bounds of the module's text are exceeded) or ``no_inflation``.
+    InvalidInput
+        For values that are negative, not finite, or do not broadcast.
+
+    Notes
+    -----
+    ``P = p r/k`` and ``F/(p pi r²)`` decide all; lengths go with the radius. Gap and contact
+    radius are right to 1e-10, but for what the rounding of the pressure leaves near P = 6.
+
+    Examples
+    --------
+    >>> round(press_membrane(LARGE_PAD, 75e3, 0.19).gap, 9)
+    7.55e-07
+    """
+    p, load = broadcast(quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N'))
+    r, k = pad.radius, pad.stiffness
+    lengths, code = _press(
+        p.ravel() * (r / k),
+        load.ravel() / (math.pi * k * r),
+        (BURST * k / r - p.ravel()) * (r / k),
+    )
+    if p.ndim == 0:
+        if code[0] in _WHY:
+            raise NoEquilibrium(
+                f'pressure {p:g} Pa with force {load:g} N on {pad} {_WHY[int(code[0])]}',
+                str(STATUS[code[0]]),
+            )
+        return Pressed(*(r * lengths[:, 0]).tolist(), str(STATUS[code[0]]))
+    return Pressed(*(r * lengths).reshape(5, *p.shape), words(code.reshape(p.shape)))
+
+
+def _press(pressure: Array, force: Array, deficit: Array) -> tuple[Array, npt.NDArray[np.int8]]:
+    """Return height, depth, contact radius, sphere radius and gap as rows, and the status codes.
+
+    Parameters
+    ----------
+    pressure, force : array
+        ``P = p r/k`` and ``f = F/(pi k r)``, one-dimensional.
+    deficit : array
+        ``6 - P``, given apart for its digits.
+    """
+    code = np.where(force > 0.0, OK, NO_CONTACT).astype(np.int8)
+    code[force >= pressure] = FLATTENED
+    code[(pressure > LARGEST_PRESSURE) & (force > LARGEST_SHARE * pressure)] = FOLD_ZONE
+    code[deficit <= 0.0] = NO_INFLATION
+    lengths = np.full((5, code.size), np.nan)
+
+    free = code == NO_CONTACT
+    height = free_height(pressure[free], deficit[free])
+    lengths[:, free] = height, 0.0 * height, 0.0 * height, 0.5 * (height + 1.0 / height), height
+
+    rows = np.flatnonzero(code == OK)
+    p, f = pressure[rows], force[rows]
+    share, rest = f / p, (p - f) / p
+    t, certain = _rim(p, share, rest, deficit[rows])
+    code[rows[~certain]] = FOLD_ZONE  # the sign change is lost in rounding, as at a fold
+    gap = np.where(certain, _wall(t, share, rest)[2], np.nan)
+    # The cap through rim and edge of contact: its centre is ``below`` above the floor.
+    below = 0.5 * (gap + rest / gap)
+    sphere = np.sqrt(below * below + share)
+    depth = share / (sphere + below)
+    lengths[:, rows] = gap + depth, depth, np.sqrt(share), sphere, gap
+    return lengths, code
+
+
+def _wall(t: Array, share: Array, rest: Array) -> tuple[Array, Array, Array]:
+    """Return radius of mean curvature l, stretch sigma and gap of the wall with rim angle t.
+
+    The integrals are Carlson's R_F and R_D. They reach to 90°; beyond, the wall is twice the one
+    to 90° less the rest, for sin psi comes back.
+    """
+    from scipy.special import elliprd
+    from scipy.special import elliprf
+
+    b2 = np.maximum(share, 1e-90)  # below, the contact is a point to the last digit
+    square = 1.0 + t * t
+    sine, cosine = 2.0 * t / square, (1.0 - t) * (1.0 + t) / square
+    curve = 0.5 * rest / sine
+    side, width = 0.5 * rest, 0.5 * (1.0 + share)
+
+    here = b2 * cosine * cosine, width * width, b2
+    inverse = sine * elliprf(*here)
+    rise = side * side * sine * b2 / 3.0 * elliprd(*here)
+    over = t > 1.0
+    if over.any():
+        c, b2 = curve[over], b2[over]
+        half = 0.0, b2 + c * c, b2
+        inverse[over] = 2.0 * elliprf(*half) - inverse[over]
+        rise[over] = 2.0 * c * c * b2 / 3.0 * elliprd(*half) - rise[over]
+    gap = side * t + rise  # l (1 - cos psi) = l sin psi tan(psi/2)
+    return curve, np.sqrt(share + 2.0 * curve * (2.0 * gap + share * inverse)), gap
+
+
+def _residual(t: Array, pressure: Array, share: Array, rest: Array) -> Array:
+    """Return ``T - P l``, times a factor which makes it nearly linear in t at both ends."""
+    curve, sigma, _ = _wall(t, share, rest)
+    return (1.5 * sigma - 1.0 - pressure * curve) * (t / (1.0 + t))
+
+
+def _rim(pressure: Array, share: Array, rest: Array, deficit: Array) -> tuple[Array, npt.NDArray]:
+    """Return ``t = tan(psi/2)`` at the rim, and whether the residual changes its sign there.
+
+    Regula falsi with the weights of Anderson and Björck, from a bracket: at t = 0 the tension is
+    too low; it is too high where ``sin psi = P (1 - b²)``, for sigma > 1, and near 180°, where Q
+    is ``6 - 1/l``.
+    """
+    sine = np.minimum(pressure * rest, 1.0)
+    high = np.where(sine < 1.0, sine / (1.0 + np.sqrt(1.0 - sine * sine)), 8.0 / (rest * deficit))
+    high = high * (1.0 + 1e-9)  # a sure step beyond, where sigma rounds to 1
+    given = np.stack((pressure, share, rest))
+    rim, active = high.copy(), np.arange(high.size)
+    last, off_last = high, _residual(high, *given)
+    across, off_across = np.zeros_like(high), -0.25 * pressure * rest
+    for _ in range(100):  # a dozen is enough for most
+        t = last - off_last * ((last - across) / (off_last - off_across))
+        off = _residual(t, *given)
+        rim[active] = t
+        left = np.flatnonzero((np.abs(t - last) > 1e-14 * t) & (off != 0.0))
+        if not left.size:
+            break
+        active, given = active[left], given[:, left]
+        t, off, last, off_last = t[left], off[left], last[left], off_last[left]
+        changed = (off < 0.0) != (off_last < 0.0)
+        weight = 1.0 - off / off_last
+        weight[weight <= 0.0] = 0.5
+        across = np.where(changed, last, across[left])
+        off_across = np.where(changed, off_last, weight * off_across[left])
+        last, off_last = t, off
+    width = 1e-10 + 4e-15 / deficit
+    below = _residual(rim * (1.0 - width), pressure, share, rest)
+    above = _residual(rim * (1.0 + width), pressure, share, rest)
+    return rim, (below < 0.0) & (above > 0.0)
