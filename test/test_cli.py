@@ -2,6 +2,7 @@
 """The ``pad`` command as a user types it: output, exit status, and what it says of bad input."""
 
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -102,6 +103,42 @@ def test_without_a_folder_the_next_free_one_is_made(
     assert cli.main(arguments) == cli.main(arguments) == 0
     made = sorted(path.name for path in (tmp_path / 'runs').iterdir())
     assert made == ['hexapod_patches_adaptive_seed0', 'hexapod_patches_adaptive_seed0_2']
+
+
+def test_a_foot_of_ones_own_walks(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    shipped = pathlib.Path(__file__).parent.parent / 'config' / 'feet' / 'large37.yaml'
+    mine = tmp_path / 'mine.yaml'
+    mine.write_text(shipped.read_text().replace('friction: 0.35', 'friction: 0.25'))
+    monkeypatch.chdir(tmp_path)
+    walk = ['run', 'hexapod_patches', '--no-ros', '--no-compare', '--cycles', '2', '--json']
+    summaries = []
+    for foot in ([], ['--foot', 'large37'], ['--foot', str(mine)]):
+        assert cli.main([*walk, *foot]) == 0
+        summaries.append(json.loads(capsys.readouterr().out))
+    own, named, other = summaries
+    assert own['foot'] == named['foot'] == 'large37'
+    assert other['foot'] == str(mine)
+    assert own['distance_m'] == named['distance_m'] > other['distance_m']
+    assert cli.main([*walk, '--foot', 'wide']) == 2
+    assert 'large19' in capsys.readouterr().err
+    mine.write_text(mine.read_text().replace('90.0e+3', '70.0e+3'))
+    assert cli.main(['run', 'leg_wet_dome_75', '--no-ros', '--foot', str(mine)]) == 2
+    assert 'ceiling of 70000 Pa' in capsys.readouterr().err
+
+
+def test_contact_of_the_pad_of_a_foot(capsys: pytest.CaptureFixture[str]):
+    force = ['contact', '--pressure', '75e3', '--force', '0.1', '--json']
+    answers = []
+    for pad in (['--pad', 'large'], ['--foot', 'large19'], ['--adhesion', 'none']):
+        assert cli.main([*force, *pad]) == 0
+        answers.append(json.loads(capsys.readouterr().out)['pressed'])
+    assert answers[0] == answers[1]
+    # Adhesion enlarges the contact: without it, pi p b² = F.
+    radius = (0.1 / (math.pi * 75e3)) ** 0.5
+    assert answers[2]['contact_radius_m'] == pytest.approx(radius, rel=1e-12)
+    assert answers[0]['contact_radius_m'] > radius
 
 
 def test_contact_prints_the_thesis_height(capsys: pytest.CaptureFixture[str]):

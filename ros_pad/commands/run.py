@@ -17,6 +17,7 @@ from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
+from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
@@ -39,6 +40,9 @@ def add(commands: Commands) -> None:
         'pad run hexapod_patches --seed 3',
     )
     part.add_argument('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
+    part.add_argument(
+        '--foot', help="a foot other than the scene's: a name in config/feet or a YAML file"
+    )
     part.add_argument('--policy', choices=POLICIES, help="default: the scene's own")
     part.add_argument('--seed', type=int, default=0, help='of floor and noise (default 0)')
     part.add_argument('--cycles', type=int, help="gait cycles (default: the scene's own)")
@@ -68,6 +72,8 @@ def run(options: argparse.Namespace) -> int:
         if not 1 <= options.cycles <= 100000:
             raise InvalidInput(f'--cycles {options.cycles}: from 1 to 100000 are needed')
         scene = dataclasses.replace(scene, cycles=options.cycles)
+    if options.foot is not None:
+        scene = _on_foot(scene, Foot.load(options.foot))
     if not 0 <= options.seed < 2**31:
         raise InvalidInput(
             f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
@@ -87,6 +93,15 @@ def run(options: argparse.Namespace) -> int:
     finally:
         with suppress(OSError):  # nothing came of it: the name stays free
             folder.rmdir()
+
+
+def _on_foot(scene: Scene, foot: Foot) -> Scene:
+    if scene.dome_pressure is not None and scene.dome_pressure > foot.ceiling:
+        raise InvalidInput(
+            f'--foot {foot.source}: its ceiling of {foot.ceiling:g} Pa is below the dome_pressure'
+            f' of {scene.name}, {scene.dome_pressure:g} Pa'
+        )
+    return dataclasses.replace(scene, foot=foot)
 
 
 def _run_in(
@@ -170,6 +185,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         'policy': trial.policy,
         'seed': trial.seed,
         'fidelity': trial.fidelity,
+        'foot': trial.settings['foot'],
         **trial.metrics.as_dict(),
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,

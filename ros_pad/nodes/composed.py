@@ -82,7 +82,7 @@ class ComposedTrial:
         rate = 1e9 / CONTROL_PERIOD_NS
         feet = {'legs': legs, 'foot': scene.foot.source}
         felt = feet | {'expected_load': scene.expected_load}
-        ground = {'scene': scene.source, 'seed': seed}
+        ground = {'scene': scene.source, 'foot': scene.foot.source, 'seed': seed}
 
         def add(kind: Callable[..., Any], **parameters: Any) -> Any:
             overrides = [Parameter(key, value=value) for key, value in parameters.items()]

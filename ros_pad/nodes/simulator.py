@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
@@ -16,6 +17,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -32,6 +34,12 @@ from ros_pad.simulation.sensors import Sensors
 
 PARAMETERS = (
     SCENE,
+    Parameter(
+        'foot',
+        '',
+        "Name of a foot in config/feet, or path of a YAML file; empty for the scene's.",
+        read=lambda name: Foot.load(name) if name else None,
+    ),
     SEED,
     Parameter(
         'rate', 0.0, "Samples a second, at least 50; 0 takes the scene's.", 'Hz', 0.0, 1000.0
@@ -61,6 +69,8 @@ class SimulatorNode(Node):
                 f' 0, or a number from {_SLOWEST:g} to 1000 Hz is needed'
             )
         self.scene: Scene = values['scene']
+        if values['foot'] is not None:
+            self.scene = replace(self.scene, foot=values['foot'])
         self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
         self.floor = self.scene.floor.build(values['seed'])
         self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9)

@@ -65,6 +65,7 @@ def label(
 def settings(scene: Scene) -> dict[str, Any]:
     """Return what a reader of a trial needs to know of its scene."""
     return {
+        'foot': scene.foot.source,
         'expected_load': scene.expected_load,
         'stride_m': scene.stride,
         'cycle_s': scene.gait.cycle,
