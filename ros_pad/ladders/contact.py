@@ -3,8 +3,8 @@
 
 The truth is made here with 30 digits and in another way than in :mod:`ros_pad.contact.dome`: the
 free dome by bisection of thesis 3.60, the pressed one by continuation, that is by following the
-root of 3.58 from the free dome up to each force in small steps. So it is on the physical branch by
-construction.
+root of 3.58 from the free dome up to each force in small steps, so that it is on the physical
+branch by construction.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
@@ -61,21 +62,22 @@ FORCES = (1e-9, 1e-6, 1e-4)  # N
 
 
 def measure(progress: Progress | None = None) -> list[Rung]:
-    """Climb the ladder of the free dome and that of the pressed one; ``progress`` from 0 to 1."""
+    """Climb the ladders of free dome, pressed dome and gap; ``progress`` from 0 to 1."""
     tell = progress or (lambda _: None)
     problem = free_problem()
     methods = _free_methods(problem)
     free = climb(problem, methods, BASELINE, lambda done: tell(0.4 * done / len(methods)))
     problem, starts = pressed_problem(lambda share: tell(0.4 + 0.2 * share))
     others = _pressed_methods(starts)
-    pressed = climb(problem, others, BASELINE, lambda done: tell(0.6 + 0.4 * done / len(others)))
-    return free + pressed
+    pressed = climb(problem, others, BASELINE, lambda done: tell(0.6 + 0.3 * done / len(others)))
+    model = climb(gap_problem(), GAP_METHODS, QUADRATURE, lambda done: tell(0.9 + 0.02 * done))
+    return free + pressed + model
 
 
 def figures(rungs: list[Rung], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the pictures by name: the chart, and the map of where methods fail."""
     maps = failure_maps(progress=progress)
-    return {'contact': chart(rungs, 'the height'), 'contact_failures': draw_maps(maps)}
+    return {'contact': chart(rungs), 'contact_failures': draw_maps(maps)}
 
 
 # --- free dome -----------------------------------------------------------------------------------
@@ -330,6 +332,75 @@ def _pressed_methods(starts: dict[tuple[float, float], Start]) -> tuple[Method, 
         Method('press', lambda p, f: press(PAD, p, f).height, ours=True),
         Method('press, batch', lambda p, f: press(PAD, p, f).height, batch=True, ours=True),
     )
+
+
+# --- what the spherical cap is worth -------------------------------------------------------------
+
+QUADRATURE = 'membrane, quadrature and brentq'
+
+
+def gap_problem() -> Problem:
+    """Return pressed pads with the gap under the exact membrane of the same energy."""
+    pressures, shares = np.meshgrid(PRESSURES, SHARES)
+    pressures, shares = pressures.ravel(), shares.ravel()
+    forces = shares * math.pi * _R * _R * pressures
+    gaps = [_membrane_gap(*case) for case in zip(pressures.tolist(), forces.tolist(), strict=True)]
+    return Problem(
+        'gap, against the exact membrane',
+        {'pressure_pa': pressures, 'force_n': forces},
+        np.array(gaps),
+        (pressures > 1e4) & (pressures < 86e3) & (shares > 0.04) & (shares < 0.91),
+        wrong=math.inf,
+    )
+
+
+def _membrane_gap(pressure: float, force: float) -> float:
+    """Return the gap from the integrals of a wall of constant mean curvature."""
+    tension, share = pressure * _R / _K, force / (pressure * math.pi * _R * _R)
+
+    def wall(rim: float) -> tuple[float, float]:
+        """Return gap, and tension less ``P l``, for the angle of the wall at the rim."""
+        curve = 0.5 * (1.0 - share) / math.sin(rim)
+
+        def radii(angle: float) -> tuple[float, float]:
+            width = math.hypot(curve * math.sin(angle), math.sqrt(share))
+            return curve * math.sin(angle) + width, width
+
+        def rise(angle: float) -> float:
+            radius, width = radii(angle)
+            return curve * radius / width * math.sin(angle)
+
+        def area(angle: float) -> float:
+            radius, width = radii(angle)
+            return 2.0 * curve * radius / width * radius
+
+        # Near the floor the wall turns within the contact radius.
+        bend = min(math.sqrt(share) / curve, 0.5 * rim)
+        rules = {'epsabs': 0.0, 'epsrel': 1e-10, 'limit': 200, 'points': (bend, 0.5 * rim)}
+        stretch = math.sqrt(share + quad(area, 0.0, rim, **rules)[0])
+        return quad(rise, 0.0, rim, **rules)[0], 1.5 * stretch - 1.0 - tension * curve
+
+    rim = brentq(lambda rim: wall(rim)[1], 1e-4, math.pi - 1e-4, xtol=1e-15, rtol=1e-14)
+    return _R * wall(rim)[0]
+
+
+GAP_METHODS = (
+    Method(QUADRATURE, _membrane_gap),
+    Method('press, membrane', lambda p, f: press(PAD, p, f, model='membrane').gap, ours=True),
+    Method(
+        'press, membrane, batch',
+        lambda p, f: press(PAD, p, f, model='membrane').gap,
+        batch=True,
+        ours=True,
+    ),
+    Method('press, spherical cap', lambda p, f: press(PAD, p, f, 'none').gap, ours=True),
+    Method(
+        'press, spherical cap, batch',
+        lambda p, f: press(PAD, p, f, 'none').gap,
+        batch=True,
+        ours=True,
+    ),
+)
 
 
 # --- where methods fail --------------------------------------------------------------------------

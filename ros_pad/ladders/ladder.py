@@ -30,8 +30,6 @@ from ros_pad.trials.report import VERMILION
 
 Progress = Callable[[float], None]
 
-# An answer this far off without a word of warning is a wrong one.
-WRONG = 0.01
 # Rows of a batch when it is timed, and how long a method for one case is repeated, s.
 BATCH = 100_000
 _TIMED = 0.05
@@ -53,12 +51,16 @@ class Problem:
     truth : array
     ordinary : array of bool
         The cases on which methods are timed: those without a trap.
+    wrong : float
+        Relative error from which an answer without a word of warning is a wrong one; infinite
+        where methods approximate, and their error is what is asked for.
     """
 
     name: str
     inputs: Mapping[str, Array]
     truth: Array
     ordinary: np.ndarray[Any, np.dtype[np.bool_]]
+    wrong: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class Rung:
         Largest relative error of the answers that are no failures.
     median_error : float
     failures : int
-        Answers refused, with a warning, or off by more than 1 %.
+        Answers refused, with a warning, or wrong.
     wrong : int
         Those of them that were given without a word.
     cases : int
@@ -156,7 +158,7 @@ def _rung(
     problem: Problem, method: Method, answers: Array, us_per_solve: float, baseline: str
 ) -> Rung:
     error = abs(answers - problem.truth) / abs(problem.truth)
-    refused, wrong = np.isnan(answers), error > WRONG
+    refused, wrong = np.isnan(answers), error > problem.wrong
     failed = refused | wrong
     good = error[~failed]
     examples = [
@@ -256,8 +258,8 @@ def table(rungs: Sequence[Rung]) -> str:
     return '\n'.join(lines)
 
 
-def chart(rungs: Sequence[Rung], quantity: str) -> Figure:
-    """Return the log-log picture of time against error of a quantity, a panel for each problem.
+def chart(rungs: Sequence[Rung]) -> Figure:
+    """Return the log-log picture of time against error, a panel for each problem.
 
     A disc is the median error of a method, its whisker ends at the worst; the list below the panel
     has the names, by rising time, and what failed.
@@ -270,7 +272,7 @@ def chart(rungs: Sequence[Rung], quantity: str) -> Figure:
             (rung for rung in rungs if rung.problem == name), key=lambda rung: rung.us_per_solve
         )
         panel.set(xscale='log', yscale='log', title=name, xlabel='time for one solution, µs')
-        panel.set_ylabel(f'relative error of {quantity}')
+        panel.set_ylabel('relative error')
         handles = []
         for number, rung in enumerate(part, start=1):
             colour = GREEN if rung.ours else VERMILION if rung.wrong else BLUE
