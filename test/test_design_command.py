@@ -60,7 +60,10 @@ def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
         (['25'], ['cannot be carried', '64 pads would do', 'closer pattern', '90000 Pa']),
         (['16', '--pressure', '80e3'], ['cannot be carried', 'A supply of 82', 'would do']),
         (['7', '--pressure', '50e3'], ['No number of them', 'nothing below 52336 Pa']),
-        (['7', '--radius', '2.4e-3'], ['the model of such pads ends', 'radius 0.0003 to 0.002 m']),
+        (
+            ['7', '--radius', '2.4e-3'],
+            ['what is known of such pads ends', 'radius 0.0003 to 0.002 m'],
+        ),
         (['7'], ['is carried: 51 pads']),
     ],
 )
@@ -101,7 +104,6 @@ def test_table_has_a_column_for_each_reading(capsys: pytest.CaptureFixture[str])
         (['--load', '7', '--area', '1e-6'], 'area = 1e-06 m²'),
         (['--load', '7', '--area', '1e-3', '--radius', '0'], 'radius = 0 m'),
         (['--load', '7', '--area', '1e-3', '--pressure', '0'], 'ceiling = 0 Pa'),
-        (['--load', '7', '--area', '1e-3', '--pressure', '1e5', '--radius', '1e-3'], '91360 Pa'),
         (['--load', '7', '--foot', 'huge'], 'large37'),
         (['--load', '7', '--area', '1e-3', '--figure', 'design.txt'], '.png'),
     ],

@@ -176,7 +176,7 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
     supply : float
         Highest pressure of the supply, Pa gauge.
     """
-    ends = 'the supply ends' if each.ceiling == supply else 'the model of such pads ends'
+    ends = 'the supply ends' if each.ceiling == supply else 'what is known of such pads ends'
     if each.carried:
         yield (
             f'{each.load:g} N is carried: {each.pads} pads with {each.load_per_pad:.3g} N each, '
@@ -189,6 +189,12 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
         )
         yield from _remedies(each, candidates)
     yield from _overlap('', each)
+    if each.pad_limit > 0.0:
+        yield (
+            f'All pads pressed flat at {each.ceiling:.0f} Pa would push with '
+            f'{each.flat_force:.3g} N: {each.flat_force / (each.pads * each.pad_limit):.3g} times '
+            f'the limit {each.criterion}, and 3.92 takes that for what a foot carries.'
+        )
 
 
 def _overlap(of: str, each: Design) -> Iterator[str]:

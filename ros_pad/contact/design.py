@@ -19,6 +19,7 @@ import numpy.typing as npt
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.dome import largest_tension
 from ros_pad.contact.dome import signed_adhesion
+from ros_pad.contact.limits import _FIT_END
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.meniscus import GRAVITY
@@ -247,8 +248,8 @@ class Design:
     margin : factor on the load that the force limit has to cover.
     criterion : of :func:`ros_pad.contact.force_limit`.
     pressure : Pa gauge, needed for the load; NaN where no pressure of the model carries it.
-    ceiling : Pa gauge, the highest there is: that of the supply, or the end of the model if that
-        is lower.
+    ceiling : Pa gauge, the highest there is: that of the supply, or where the model or the
+        measurements end if that is lower.
     pad_limit : N, the force limit of one pad at the ceiling.
     reachable_load : N, on the whole foot at the ceiling, margin taken off.
     flat_force : N, by :func:`foot_force`'s rule that a pad pushes with all its area, at the
@@ -323,8 +324,8 @@ def design(
     pads : int, optional
         How many there are. By default as many as :func:`pads_in` says, rounded down.
     ceiling : float
-        Highest pressure of the supply, Pa gauge, above 0. Where the model ends below it, its end
-        is taken instead.
+        Highest pressure of the supply, Pa gauge, above 0. Where the model or, for ``measured``,
+        the measurements end below it, their end is taken instead and told as ``ceiling``.
     margin : float
         Factor on the load, above 0.
     criterion : {'measured', 'flattening', 'max_depth'}
@@ -337,11 +338,13 @@ def design(
     Raises
     ------
     InvalidInput
-        For values out of range, a sole too small for its pads, or a ceiling past the measurements.
+        For values out of range, or a sole too small for its pads.
     """
     load = number('load', load, 'N', above=True)
     area = number('area', area, 'm²', above=True)
     end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
+    if criterion == 'measured':
+        end = min(end, _FIT_END)
     # The end itself is refused where rounding carries it a digit too far.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)

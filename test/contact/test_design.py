@@ -249,6 +249,10 @@ def test_what_is_asked_beyond_the_model_is_not_carried():
     large = design(7.0, SOLE, Pad(2.5e-3, 40.0))
     assert large.ceiling == pytest.approx(3.426 * 40.0 / 2.5e-3, rel=1e-3)
     assert not large.carried
+    # And a strong supply does not stretch the line through the measurements.
+    assert design(7.0, SOLE, Pad(1e-3, 40.0), ceiling=200e3).ceiling == pytest.approx(91.36e3)
+    free = design(7.0, SOLE, Pad(1e-3, 40.0), ceiling=120e3, criterion='max_depth')
+    assert free.ceiling == 120e3
 
 
 def test_pads_as_built():
