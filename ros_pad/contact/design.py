@@ -212,9 +212,7 @@ def rise_height(
             'no_rise',
         )
     room = np.where(room > 0.5, room, np.nan)
-    u = _crossing(
-        1e6 * drawn / r_mm, lambda y: room - 1.5 + y / 3.0, np.maximum(room - 1.5, 0), room - 0.5
-    )
+    u = _crossing(1e6 * drawn / r_mm, lambda y: room - 1.5 + y / 3.0, 0.0, room - 0.5)
     return _plain(3.0 * r / (1.0 + u * u))
 
 
