@@ -177,8 +177,9 @@ def rise_height(
     Notes
     -----
     With ``L = 2 γ cos θ / (ρ g)`` the pull round all domes lifts the liquid between them:
-    ``L √((3 r - h) h) = (cell/π) r² h - h (9 r h - 2 h²)/6``. In ``u² = (3 r - h)/h`` the
-    left side rises from 0 and there is one root; as typed, too.
+    ``L √((3 r - h) h) = (cell/π) r² h - h (9 r h - 2 h²)/6``. Divided by h, with
+    ``u² = (3 r - h)/h``, the left side is proportional to u and meets the right one once; as
+    typed, too.
 
     The wall is taken to be upright. It leans over above the equator of the dome, where liquid
     of contact angle θ stops at ``1.5 r (1 + cos θ)``, at 60 degrees 2.25 r instead of 3 r.
@@ -199,9 +200,9 @@ def rise_height(
     drawn = 2.0 * liquid.surface_tension * math.cos(liquid.angle) / (liquid.density * GRAVITY)
     if reading == 'corrected':
         share = (cell or CELL['corrected']) / math.pi
-        with np.errstate(over='ignore', divide='ignore'):  # the gap of a tiny pad is full
-            pull = drawn / (r * r)
-        u = _crossing(pull, lambda y: share + (y / 3.0 - 1.5) * y, share - 1.6875, share)
+        u = _crossing(
+            drawn / (r * r), lambda y: share + (y / 3.0 - 1.5) * y, share - 1.6875, share
+        )
         return _plain(3.0 * r / (1.0 + u * u))
     r_mm = 1e3 * r
     room = CELL['thesis'] / math.pi * r_mm
@@ -221,8 +222,7 @@ def _crossing(pull: Array, weight: Callable[[Array], Array], low: Floats, high: 
 
     ``y = 3/(1 + u²)`` is height over radius. Halving cannot miss the one crossing.
     """
-    with np.errstate(over='ignore', divide='ignore'):
-        low, high = low / pull, high / pull
+    low, high = low / pull, high / pull
     for _ in range(80):
         middle = 0.5 * (low + high)
         short = pull * middle < weight(3.0 / (1.0 + middle * middle))
