@@ -15,6 +15,7 @@ from ros_pad.contact import WATER
 from ros_pad.contact import Liquid
 from ros_pad.contact import Pressed
 from ros_pad.contact import contact_angle
+from ros_pad.contact import hysteresis_force
 from ros_pad.contact import meniscus
 from ros_pad.contact import press
 from ros_pad.errors import InvalidInput
@@ -155,3 +156,64 @@ def test_bad_calls():
         meniscus(dome, Liquid(0.073, 0.027, contact_angle=2.8))
     with pytest.raises(InvalidInput, match='press'):
         meniscus(0.001, WATER)
+
+
+@pytest.mark.parametrize('factor', [math.pi / 4, 0.9, 1.0])
+def test_hysteresis_force(factor):
+    # Water, 0.8 mm, cosines half apart: 0.06 mN.
+    force = hysteresis_force(0.8e-3, 0.073, 2 * math.pi / 3, math.pi / 2, factor)
+    assert force == pytest.approx(factor * 0.073 * 1.6e-3 * 0.5, rel=1e-14)
+    assert type(force) is float
+
+
+def test_hysteresis_force_integrates_the_line():
+    # The pull of the line on the disc, with the angle's cosine going as that of the azimuth (pi/4)
+    # or jumping between its halves (1).
+    azimuth = (np.arange(20000) + 0.5) * (2 * math.pi / 20000)
+    low, high = math.cos(1.9), math.cos(0.7)
+    for factor, share in ((math.pi / 4, np.cos(azimuth)), (1.0, np.sign(np.cos(azimuth)))):
+        cosines = 0.5 * (low + high) + 0.5 * (high - low) * share
+        pull = 0.05 * 1e-3 * np.mean(cosines * np.cos(azimuth)) * 2 * math.pi
+        assert hysteresis_force(1e-3, 0.05, 1.9, 0.7, factor) == pytest.approx(pull, rel=1e-6)
+
+
+def test_thesis_force_is_the_hysteresis_bound_at_its_widest():
+    # 3.82 without its second radius: 4 γ r.
+    assert hysteresis_force(1e-3, 0.073, math.pi, 0.0) == pytest.approx(4 * 0.073e-3, rel=1e-14)
+    assert hysteresis_force(1e-3, 0.073, 1.0, 1.0) == 0.0
+    # 1e-9 apart nothing is lost to cancellation.
+    assert hysteresis_force(1.0, 1.0, 1.0 + 1e-9, 1.0) == pytest.approx(
+        2e-9 * math.sin(1.0), rel=1e-6
+    )
+
+
+def test_hysteresis_force_takes_arrays():
+    radii = np.array([[0.0], [1e-3]])
+    forces = hysteresis_force(radii, 0.073, np.array([1.2, 1.5, 2.0]), 0.9)
+    assert forces.shape == (2, 3)
+    assert np.all(forces[0] == 0) and np.all(np.diff(forces[1]) > 0)
+    assert forces[1, 2] == hysteresis_force(1e-3, 0.073, 2.0, 0.9)
+
+
+@pytest.mark.parametrize(
+    ('change', 'name'),
+    [
+        ({'contact_radius': -1e-3}, 'contact_radius'),
+        ({'surface_tension': 0.0}, 'surface_tension'),
+        ({'advancing_angle': 3.2}, 'advancing_angle'),
+        ({'receding_angle': -0.1}, 'receding_angle'),
+        ({'receding_angle': 1.6}, 'advancing_angle - receding_angle'),
+        ({'shape_factor': 0.78}, 'shape_factor'),
+        ({'shape_factor': 1.01}, 'shape_factor'),
+        ({'contact_radius': [1e-3, 2e-3], 'advancing_angle': [1.5, 1.6, 1.7]}, 'broadcast'),
+    ],
+)
+def test_bad_hysteresis(change, name):
+    good = {
+        'contact_radius': 1e-3,
+        'surface_tension': 0.073,
+        'advancing_angle': 1.5,
+        'receding_angle': 1.0,
+    }
+    with pytest.raises(InvalidInput, match=name):
+        hysteresis_force(**{**good, **change})

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meniscus that a vertical fibre draws out of a wide bath, or pushes down into it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Floats
+from ros_pad.contact.pad import choice
+from ros_pad.contact.pad import number
+from ros_pad.contact.pad import quantity
+from ros_pad.errors import InvalidInput
+
+# Radii over capillary length: what the exact method was checked in, and where the asymptote ends.
+THINNEST, THICKEST, THIN = 1e-6, 1e4, 0.1
+
+
+def fibre_meniscus(
+    radius: npt.ArrayLike,
+    surface_tension: npt.ArrayLike,
+    contact_angle: npt.ArrayLike,
+    density: npt.ArrayLike = 1000.0,
+    gravity: npt.ArrayLike = GRAVITY,
+    method: str = 'young_laplace',
+) -> Floats:
+    """Return how high a liquid climbs the outside of a vertical fibre, m.
+
+    Parameters
+    ----------
+    radius : float
+        Of the fibre, m; from 1e-6 to 1e4 capillary lengths sqrt(surface_tension / (density
+        gravity)) for ``young_laplace``, above 0 to 0.1 for ``derjaguin``.
+    surface_tension : float
+        N/m, above 0.
+    contact_angle : float
+        rad, from 0 to pi. Above pi/2 the liquid is pushed down: the height is negative.
+    density : float
+        Of the liquid less that of the gas, kg/m³, above 0.
+    gravity : float
+        m/s², above 0.
+    method : {'young_laplace', 'derjaguin'}
+        Exact (scalars only), or the asymptote for thin fibres of Derjaguin and James, 0.006 %
+        high at 0.1 capillary lengths and complete wetting, but 0.7 and 1.5 % low there at 30 and
+        60 degrees; it takes arrays.
+
+    Raises
+    ------
+    InvalidInput
+        For values that are not finite or not in range, or an unknown method.
+
+    Notes
+    -----
+    With lengths in capillary lengths and ψ the slope angle of the surface at radius r and height
+    z, ``dr/dψ = -cos ψ / (z + sin ψ / r)`` and ``dz/dψ = sin ψ / (z + sin ψ / r)``. In ln ψ this
+    is smooth from the linear surface far away, ``z/ψ = K0(r)/K1(r)``, to the fibre. The asymptote
+    is ``ε cos θ (ln(4 / (ε (1 + sin θ))) - 0.57722)``, ε = radius in capillary lengths.
+
+    Examples
+    --------
+    >>> round(1e3 * fibre_meniscus(1e-3, 0.073, 0.0), 3)
+    1.839
+    """
+    choice('method', method, ('young_laplace', 'derjaguin'))
+    check: Callable[..., Any] = number if method == 'young_laplace' else quantity
+    a = check('radius', radius, 'm', above=True)
+    tension = check('surface_tension', surface_tension, 'N/m', above=True)
+    theta = check('contact_angle', contact_angle, 'rad', high=math.pi)
+    rho = check('density', density, 'kg/m³', above=True)
+    g = check('gravity', gravity, 'm/s²', above=True)
+    try:
+        length = np.sqrt(tension / (rho * g))
+        thickness = a / length + 0.0 * theta
+    except ValueError as error:
+        raise InvalidInput('the values do not broadcast') from error
+    if method == 'derjaguin':
+        quantity('radius / capillary length', thickness, '(ratio)', high=THIN, above=True)
+        cosine, sine = np.cos(theta), np.sin(theta)
+        logarithm = np.log(4.0 / (thickness * (1.0 + sine))) - np.euler_gamma
+        height = length * thickness * cosine * logarithm
+        return float(height) if np.ndim(height) == 0 else height
+    thickness = number('radius / capillary length', thickness, '(ratio)', THINNEST, THICKEST)
+    return float(length) * _height(thickness, 0.5 * math.pi - theta)
+
+
+def _height(radius: float, slope: float) -> float:
+    """Return the height at a radius and slope angle there, in capillary lengths."""
+    if slope <= 0.0:
+        return -_height(radius, -slope) if slope < 0.0 else 0.0
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import brentq
+    from scipy.special import k0e
+    from scipy.special import k1e
+
+    outer = 1e-6 * slope  # there the surface is linear to 1e-12
+
+    def miss(distance: float) -> tuple[float, float]:
+        """Return ln(r / radius) and z where a surface ends that is linear at this distance."""
+        start = radius + distance
+
+        def rates(log: float, state: Array) -> tuple[float, float]:
+            psi, r = math.exp(log), radius + state[0]
+            rise = math.sin(psi)
+            pull = psi / (state[1] + rise / r)
+            return -math.cos(psi) * pull, rise * pull
+
+        end = solve_ivp(
+            rates,
+            (math.log(outer), math.log(slope)),
+            (distance, outer * k0e(start) / k1e(start)),
+            method='DOP853',
+            rtol=1e-11,
+            atol=(1e-12 * min(radius, 1.0), 1e-12 * outer),
+        ).y[:, -1]
+        return math.log1p(end[0] / radius), end[1]
+
+    # A slope falls off at least as fast as exp(-2/3 distance).
+    distance = brentq(lambda far: miss(far)[0], 0.0, 25.0, xtol=1e-12)
+    return float(miss(distance)[1])

@@ -1,0 +1,430 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import json
+import math
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+
+from ros_pad.contact.bridge import bridge
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoBridge
+
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'sphere_plane_bridge.json'
+ROWS = json.loads(REFERENCE.read_text())['rows']
+
+
+def cap(beta):
+    return math.pi / 3 * (1 - math.cos(beta)) ** 2 * (2 + math.cos(beta))
+
+
+def degrees(*angles):
+    return tuple(math.radians(angle) for angle in angles)
+
+
+def shot(found, plane, weight=0.0):
+    """Integrate from the plane with the floor radius and pressure found (unit sphere, tension).
+
+    Returns by how much the meridian misses the contact line, its inclination there, and the
+    volume under it.
+    """
+    edge, top, start = math.sin(found.filling_angle), found.height, found.floor_radius
+
+    def rates(_, y):
+        r, z, phi, _ = y
+        turn = found.pressure - weight * z - math.sin(phi) / r
+        return math.cos(phi), math.sin(phi), turn, math.pi * r * r * math.sin(phi)
+
+    size = math.hypot(edge - start, top)
+    path = solve_ivp(
+        rates,
+        (0.0, 6.0 * size),
+        (start, 0.0, math.pi - plane, 0.0),
+        method='DOP853',
+        rtol=1e-10,
+        atol=1e-12 * min(size, edge, start),
+        dense_output=True,
+        max_step=0.2 * size,
+    ).sol
+
+    def miss(s):
+        return math.hypot(path(s)[0] - edge, path(s)[1] - top) / size
+
+    s = np.linspace(0.0, 6.0 * size, 1201)
+    misses = np.hypot(path(s)[0] - edge, path(s)[1] - top)
+    # The first pass: a nodoid comes by again.
+    k = next(
+        k for k in range(1, 1200) if misses[k] <= min(misses[k - 1], misses[k + 1], size / 50)
+    )
+    least = minimize_scalar(
+        miss, bounds=(s[k - 1], s[k + 1]), method='bounded', options={'xatol': 1e-12 * size}
+    )
+    _, _, phi, volume = path(least.x)
+    return least.fun, phi, volume - cap(found.filling_angle)
+
+
+def check_by_shooting(found, theta, plane, weight=0.0):
+    miss, phi, volume = shot(found, plane, weight)
+    assert miss < 2e-7
+    assert phi == pytest.approx(found.filling_angle + theta, abs=1e-6)
+    assert volume == pytest.approx(found.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize('row', ROWS, ids=lambda row: f'{row["theta"]}-{row["beta"]}')
+def test_reference_table(row):
+    theta, beta = degrees(row['theta'], row['beta'])
+    exact = bridge(1.0, 1.0, theta, filling_angle=beta)
+    assert exact.status == 'ok'
+    assert exact.force / (4 * math.pi) == pytest.approx(row['F_over_4piRg'], abs=1e-10)
+    assert exact.force / (4 * math.pi) == pytest.approx(row['F_quad'], abs=1e-12)
+    assert exact.pressure == pytest.approx(row['dpR_over_gamma'], rel=1e-10)
+    assert exact.volume == pytest.approx(row['V_over_R3'], rel=2e-7)  # the table's own error
+    assert exact.neck_radius == pytest.approx(row['neck'], rel=2e-8)
+    assert exact.floor_radius == pytest.approx(row['r0'], rel=1e-11)
+    assert exact.height == pytest.approx(row['h'], rel=1e-12)
+    circle = bridge(1.0, 1.0, theta, filling_angle=beta, method='circle')
+    assert circle.force / (4 * math.pi) == pytest.approx(row['circ_F_gorge'], abs=1e-12)
+    by_volume = bridge(1.0, 1.0, theta, volume=row['V_over_R3'])
+    assert by_volume.filling_angle == pytest.approx(beta, rel=1e-7)
+    assert by_volume.force == pytest.approx(exact.force, rel=2e-8)
+
+
+# Contact angle, plane angle, filling angle in degrees; separation; status.
+@pytest.mark.parametrize(
+    ('theta', 'plane', 'beta', 'gap', 'status'),
+    [
+        (0, 0, 0.1, 0.0, 'ok'),
+        (0, 0, 110, 0.0, 'ok'),
+        (40, 40, 110, 0.0, 'ok'),
+        (30, 30, 4, 0.05, 'ok'),
+        (17, 17, 5, 0.5, 'unstable'),  # a hair of a neck
+        (60, 60, 60, 0.0, 'ok'),  # flat: the circle's singularity
+        (60, 60, 60.001, 0.0, 'ok'),
+        (60, 60, 59.999, 0.0, 'ok'),
+        (30, 60, 30, 0.0, 'ok'),  # both ends equal: a symmetric neck
+        (90, 90, 0.1, 0.0, 'ok'),
+        (90, 90, 150, 0.1, 'ok'),
+        (90, 90, 170, 0.0, 'unstable'),  # more liquid than drowns the sphere
+        (120, 120, 40, 0.01, 'ok'),
+        (150, 20, 30, 0.0, 'ok'),
+        (20, 150, 30, 0.0, 'ok'),
+        (170, 170, 90, 0.0, 'ok'),
+        (0, 150, 45, 0.0, 'ok'),
+        (180, 120, 60, 0.0, 'ok'),
+    ],
+)
+def test_exact_against_shooting(theta, plane, beta, gap, status):
+    theta, plane, beta = degrees(theta, plane, beta)
+    found = bridge(1.0, 1.0, theta, filling_angle=beta, separation=gap, plane_angle=plane)
+    assert found.status == status
+    check_by_shooting(found, theta, plane)
+    if status == 'ok':
+        again = bridge(1.0, 1.0, theta, volume=found.volume, separation=gap, plane_angle=plane)
+        assert again.filling_angle == pytest.approx(beta, rel=1e-7)
+        assert again.force == pytest.approx(found.force, rel=1e-6, abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 3.0),
+    st.floats(0.01, 2.0),
+    st.floats(0.0, 0.3),
+    st.booleans(),
+)
+def test_any_bridge_against_shooting(theta, plane, beta, gap, same):
+    plane = theta if same else max(plane, 0.05)
+    try:
+        found = bridge(
+            1.0, 1.0, theta, filling_angle=beta, separation=gap * beta, plane_angle=plane
+        )
+    except NoBridge:
+        assert not same or gap > 0.0  # with equal angles and no gap there always is one
+        return
+    if found.floor_radius < 30.0:
+        check_by_shooting(found, theta, plane)
+
+
+def test_cylinder():
+    theta, plane, beta = degrees(60, 90, 30)
+    for method in ('young_laplace', 'circle'):
+        found = bridge(1.0, 1.0, theta, beta, plane_angle=plane, method=method)
+        assert found.force == pytest.approx(math.pi * 0.5, rel=1e-7)
+        assert found.pressure == pytest.approx(2.0, rel=1e-7)
+        assert found.floor_radius == pytest.approx(0.5, rel=1e-7)
+        assert found.volume == pytest.approx(math.pi * 0.25 * found.height - cap(beta), rel=1e-7)
+    again = bridge(1.0, 1.0, theta, volume=found.volume, plane_angle=plane)
+    assert again.filling_angle == pytest.approx(beta, rel=1e-6)
+
+
+def test_sphere_of_liquid_pulls_with_nothing():
+    # Liquid sphere of radius s round (0, m): it meets the plane at the angle acos(-m/s).
+    s, m, gap = 1.3, 0.4, 0.2
+    top = 1.0 + gap
+    z = ((s * s - m * m) - (1.0 - top * top)) / (2.0 * (top - m))  # where both spheres meet
+    beta = math.acos(top - z)
+    edge = math.sin(beta)
+    theta = math.atan2(edge, m - z) - beta  # inclination of the liquid less that of the sphere
+    plane = math.acos(-m / s)
+    found = bridge(1.0, 1.0, theta, filling_angle=beta, separation=gap, plane_angle=plane)
+    assert found.force == pytest.approx(0.0, abs=1e-12)
+    assert found.pressure == pytest.approx(2.0 / s, rel=1e-12)
+    assert found.floor_radius == pytest.approx(math.sqrt(s * s - m * m), rel=1e-12)
+    under = math.pi * (s * s * z - ((z - m) ** 3 + m**3) / 3.0)
+    assert found.volume == pytest.approx(under - cap(beta), rel=1e-12)
+
+
+def test_catenoid_has_no_pressure():
+    # r = a cosh((z - m) / a), whose slope dr/dz is sinh.
+    a, m, z, gap = 0.3, 0.15, 0.33, 0.25
+    edge = a * math.cosh((z - m) / a)
+    # The sphere through (edge, z) whose lowest point is at the gap, scaled to radius 1.
+    size = (edge**2 + (z - gap) ** 2) / (2.0 * (z - gap))
+    beta = math.asin(edge / size)
+    assert math.cos(beta) == pytest.approx(1.0 - (z - gap) / size)
+    theta = math.atan2(1.0, math.sinh((z - m) / a)) - beta
+    plane = math.pi - math.atan2(1.0, math.sinh(-m / a))
+    found = bridge(size, 1.0, theta, filling_angle=beta, separation=gap, plane_angle=plane)
+    assert found.pressure == pytest.approx(0.0, abs=1e-11)
+    assert found.force == pytest.approx(2.0 * math.pi * a, rel=1e-12)
+    assert found.neck_radius == pytest.approx(a, rel=1e-11)
+    assert found.floor_radius == pytest.approx(a * math.cosh(m / a), rel=1e-12)
+
+
+@pytest.mark.parametrize('theta', [0.0, 0.7, 1.4])
+def test_small_bridges_pull_with_4_pi_gamma_r_cos_theta(theta):
+    for method in ('young_laplace', 'circle'):
+        found = bridge(2e-3, 0.05, theta, filling_angle=1e-3, method=method)
+        assert found.force == pytest.approx(4 * math.pi * 2e-3 * 0.05 * math.cos(theta), abs=4e-6)
+
+
+def test_complete_wetting_ends_in_a_catenoid():
+    # Both discs wide: the pressure vanishes and the ring alone pulls, with 2 pi sin².
+    (beta,) = degrees(170)
+    found = bridge(1.0, 1.0, 0.0, filling_angle=beta)
+    assert found.force == pytest.approx(2.0 * math.pi * math.sin(beta) ** 2, rel=1e-12)
+
+
+def test_scales():
+    one = bridge(1.0, 1.0, 0.4, filling_angle=0.5, separation=0.02)
+    small = bridge(1e-3, 0.073, 0.4, filling_angle=0.5, separation=0.02e-3)
+    assert small.force == pytest.approx(0.073e-3 * one.force, rel=1e-13)
+    assert small.pressure == pytest.approx(73.0 * one.pressure, rel=1e-13)
+    assert small.volume == pytest.approx(1e-9 * one.volume, rel=1e-12)
+    for name in ('neck_radius', 'floor_radius', 'height'):
+        assert getattr(small, name) == pytest.approx(1e-3 * getattr(one, name), rel=1e-13)
+    assert all(type(v) is float for v in dataclasses.astuple(small)[:-1])
+
+
+@pytest.mark.parametrize(('theta', 'plane'), [(0.0, 0.0), (0.3, 0.3), (0.3, 2.0), (1.2, 1.2)])
+def test_rupture(theta, plane):
+    """Volumes of the filling angles one by one, against those that are found by volume."""
+
+    def at(beta):
+        try:
+            return bridge(1.0, 1.0, theta, beta, separation=0.05, plane_angle=plane).volume
+        except NoBridge:
+            return math.inf
+
+    turns = np.geomspace(2e-3, 0.3, 120)
+    volumes = np.array([at(beta) for beta in turns])
+    k = int(np.argmin(volumes))
+    least = minimize_scalar(at, bounds=turns[[k - 1, k + 1]], method='bounded').fun
+
+    def of(volume):
+        return bridge(1.0, 1.0, theta, volume=volume, separation=0.05, plane_angle=plane)
+
+    found = of(1.002 * least)
+    assert found.volume == pytest.approx(1.002 * least, rel=1e-8)
+    assert found.status == 'ok'
+    check_by_shooting(found, theta, plane)
+    # Where a least filling angle is, stable bridges go on past it, to thinner necks.
+    turns_back = not math.isfinite(volumes[k - 1]) or volumes[k - 1] > 2.0 * least
+    with pytest.raises(NoBridge, match='ruptured'):
+        of((0.5 if turns_back else 0.999) * least)
+
+
+def test_of_two_bridges_the_stable_one():
+    thin = bridge(1.0, 1.0, 0.3, filling_angle=math.radians(14), separation=0.5)
+    assert thin.status == 'unstable'
+    check_by_shooting(thin, 0.3, 0.3)
+    thick = bridge(1.0, 1.0, 0.3, volume=thin.volume, separation=0.5)
+    assert thick.status == 'ok'
+    assert thick.volume == pytest.approx(thin.volume, rel=1e-9)
+    assert thick.filling_angle > 1.2 * thin.filling_angle
+    check_by_shooting(thick, 0.3, 0.3)
+
+
+def test_past_the_least_filling_angle():
+    # The curve of stable bridges turns back: two at one filling angle, both stable.
+    (beta,) = degrees(7)
+    wide = bridge(1.0, 1.0, 0.3, filling_angle=beta, separation=0.05, plane_angle=2.0)
+    narrow = bridge(1.0, 1.0, 0.3, volume=0.72e-3, separation=0.05, plane_angle=2.0)
+    assert narrow.volume == pytest.approx(0.72e-3, rel=1e-9) and narrow.status == 'ok'
+    assert narrow.neck_radius < 0.7 * wide.neck_radius
+    check_by_shooting(narrow, 0.3, 2.0)
+
+
+@pytest.mark.parametrize('extra', [{}, {'gravity': 9.81}])
+def test_too_much_liquid_drowns_the_sphere(extra):
+    with pytest.raises(NoBridge, match='drowns'):
+        bridge(1e-4, 0.073, math.radians(120), volume=1e-10, **extra)
+
+
+# --- Gravity
+
+
+@pytest.mark.parametrize(
+    ('theta', 'plane', 'beta', 'gap', 'bond'),
+    [
+        (0, 0, 30, 0.0, 1.0),
+        (40, 40, 30, 0.02, 30.0),
+        (60, 60, 60, 0.0, 3.0),
+        (90, 90, 80, 0.0, 2.0),
+        (120, 120, 50, 0.05, 5.0),
+        (20, 100, 40, 0.0, 10.0),
+        (150, 20, 30, 0.0, 1.0),
+        (30, 30, 4, 0.01, 1000.0),
+    ],
+)
+def test_gravity_against_shooting(theta, plane, beta, gap, bond):
+    theta, plane, beta = degrees(theta, plane, beta)
+    known = {'separation': gap, 'plane_angle': plane, 'gravity': bond, 'density': 1.0}
+    found = bridge(1.0, 1.0, theta, filling_angle=beta, **known)
+    check_by_shooting(found, theta, plane, bond)
+    # What pulls the sphere down, less the liquid's weight, pulls the plane up.
+    floor = found.floor_radius
+    on_plane = 2 * math.pi * floor * math.sin(plane) - math.pi * floor**2 * found.pressure
+    assert found.force - bond * found.volume == pytest.approx(on_plane, rel=1e-7, abs=1e-9)
+    again = bridge(1.0, 1.0, theta, volume=found.volume, **known)
+    assert again.filling_angle == pytest.approx(beta, rel=1e-8)
+    assert again.force == pytest.approx(found.force, rel=1e-7)
+
+
+def test_gravity_of_small_drops_is_nothing():
+    light = bridge(1e-5, 0.073, 0.5, filling_angle=0.5)
+    heavy = bridge(1e-5, 0.073, 0.5, filling_angle=0.5, gravity=9.81)
+    assert heavy.force == pytest.approx(light.force, rel=1e-4)
+    assert heavy.force != light.force
+    assert heavy.neck_radius == pytest.approx(light.neck_radius, rel=1e-5)
+
+
+def test_gravity_spreads_what_would_drown_the_sphere():
+    known = {'plane_angle': math.radians(147), 'density': 1.0}
+    with pytest.raises(NoBridge):
+        bridge(1.0, 1.0, 1.2, volume=90.0, **known)
+    found = bridge(1.0, 1.0, 1.2, volume=90.0, gravity=0.9, **known)
+    assert found.volume == pytest.approx(90.0, rel=1e-10)
+    check_by_shooting(found, 1.2, math.radians(147), 0.9)
+
+
+def test_weight_tears():
+    # A wide puddle of this liquid is 0.6 radii deep: none reaches up to a wall so far.
+    with pytest.raises(NoBridge, match='weight'):
+        bridge(1.0, 1.0, math.radians(146), filling_angle=1.54, gravity=11.5, density=1.0)
+
+
+# --- Circle
+
+
+def test_circle_is_continuous_where_it_is_flat():
+    (flat,) = degrees(60)
+    at = bridge(1.0, 1.0, flat, filling_angle=flat, method='circle')
+    assert at.pressure == pytest.approx(math.sin(math.radians(120)) / at.neck_radius, rel=1e-12)
+    for change in (-1e-7, 1e-7):
+        near = bridge(1.0, 1.0, flat, filling_angle=flat + change, method='circle')
+        for name, value in vars(at).items():
+            if name != 'status':
+                assert getattr(near, name) == pytest.approx(value, abs=3e-6)
+
+
+def test_circle_takes_arrays():
+    theta = np.radians([[20.0], [60.0], [175.0]])
+    beta = np.radians([5.0, 30.0, 60.0, 110.0])
+    plane = np.radians(20.0)
+    many = bridge(
+        1e-3, 0.073, theta, filling_angle=beta, separation=1e-5, method='circle', plane_angle=plane
+    )
+    assert many.force.shape == many.status.shape == (3, 4)
+    assert set(many.status.ravel()) == {'ok', 'no_bridge'}
+    for i, j in np.ndindex(3, 4):
+        known = {'separation': 1e-5, 'method': 'circle', 'plane_angle': plane}
+        if many.status[i, j] == 'no_bridge':
+            assert all(math.isnan(v[i, j]) for k, v in vars(many).items() if k != 'status')
+            with pytest.raises(NoBridge):
+                bridge(1e-3, 0.073, float(theta[i, 0]), filling_angle=float(beta[j]), **known)
+            continue
+        one = bridge(1e-3, 0.073, float(theta[i, 0]), filling_angle=float(beta[j]), **known)
+        for name, value in vars(one).items():
+            if name != 'status':
+                assert getattr(many, name)[i, j] == pytest.approx(value, rel=1e-12)
+
+
+def test_circle_comes_near_the_exact_bridge():
+    for theta, beta, error in ((0.2, 0.05, 0.004), (0.8, 0.2, 0.01), (0.0, 0.6, 0.04)):
+        exact = bridge(1.0, 1.0, theta, filling_angle=beta)
+        circle = bridge(1.0, 1.0, theta, filling_angle=beta, method='circle')
+        assert circle.force == pytest.approx(exact.force, rel=error)
+        assert circle.force != pytest.approx(exact.force, rel=1e-5)
+        assert circle.volume == pytest.approx(exact.volume, rel=error)
+        again = bridge(1.0, 1.0, theta, volume=circle.volume, method='circle')
+        assert again.filling_angle == pytest.approx(beta, rel=1e-9)
+
+
+def test_circle_ends_where_its_neck_closes():
+    known = {'separation': 0.05, 'method': 'circle'}
+    turns = np.linspace(0.01, 0.05, 4001)
+    volumes = bridge(1.0, 1.0, 0.3, filling_angle=turns, **known).volume
+    least = np.nanmin(volumes)
+    found = bridge(1.0, 1.0, 0.3, volume=1.01 * least, **known)
+    assert found.volume == pytest.approx(1.01 * least, rel=1e-9)
+    assert found.neck_radius < 1e-3
+    with pytest.raises(NoBridge, match='ruptured'):
+        bridge(1.0, 1.0, 0.3, volume=0.95 * least, **known)
+
+
+def test_circle_without_a_neck():
+    with pytest.raises(NoBridge, match='neck'):
+        bridge(1.0, 1.0, 0.0, filling_angle=0.1, separation=0.3, method='circle')
+
+
+# --- Input
+
+
+@pytest.mark.parametrize(
+    ('change', 'name'),
+    [
+        ({'radius': 0.0}, 'radius'),
+        ({'radius': [1e-3, 2e-3]}, 'radius'),
+        ({'surface_tension': math.nan}, 'surface_tension'),
+        ({'contact_angle': -0.1}, 'contact_angle'),
+        ({'contact_angle': 3.2}, 'contact_angle'),
+        ({'contact_angle': [0.1, 0.2]}, 'contact_angle'),
+        ({'plane_angle': 3.2}, 'plane_angle'),
+        ({'filling_angle': 0.0}, 'filling_angle'),
+        ({'filling_angle': math.pi}, 'filling_angle'),
+        ({'filling_angle': None}, 'exactly one'),
+        ({'volume': 1e-10}, 'exactly one'),
+        ({'filling_angle': None, 'volume': 0.0}, 'volume'),
+        ({'separation': -1e-6}, 'separation'),
+        ({'gravity': -9.81}, 'gravity'),
+        ({'density': 0.0}, 'density'),
+        ({'method': 'toroid'}, 'young_laplace, circle'),
+        ({'method': 'circle', 'gravity': 9.81}, 'gravity'),
+    ],
+)
+def test_bad_input(change, name):
+    good = {'radius': 1e-3, 'surface_tension': 0.073, 'contact_angle': 0.5, 'filling_angle': 0.5}
+    with pytest.raises(InvalidInput, match=name):
+        bridge(**{**good, **change})
+
+
+def test_what_does_not_broadcast():
+    with pytest.raises(InvalidInput, match='broadcast'):
+        bridge(1e-3, 0.073, [0.1, 0.2], filling_angle=[0.1, 0.2, 0.3], method='circle')
