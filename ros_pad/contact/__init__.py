@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact of one inflated pad with the floor (thesis chapter 3)."""
 
+from ros_pad.contact.bridge import Bridge
+from ros_pad.contact.bridge import bridge
 from ros_pad.contact.design import DESIGN_WATER
 from ros_pad.contact.design import Design
 from ros_pad.contact.design import design
@@ -12,6 +14,7 @@ from ros_pad.contact.dome import Inflated
 from ros_pad.contact.dome import Pressed
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.dome import press
+from ros_pad.contact.fibre import fibre_meniscus
 from ros_pad.contact.film import Film
 from ros_pad.contact.film import film_thickness
 from ros_pad.contact.limits import force_limit
@@ -21,6 +24,7 @@ from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.meniscus import Meniscus
 from ros_pad.contact.meniscus import contact_angle
+from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import SMALL_PAD
@@ -34,6 +38,7 @@ __all__ = [
     'SMALL_PAD',
     'THESIS_LIQUID',
     'WATER',
+    'Bridge',
     'Design',
     'Film',
     'Foot',
@@ -42,12 +47,15 @@ __all__ = [
     'Meniscus',
     'Pad',
     'Pressed',
+    'bridge',
     'contact_angle',
     'design',
     'design_pressure',
+    'fibre_meniscus',
     'film_thickness',
     'foot_force',
     'force_limit',
+    'hysteresis_force',
     'inflate',
     'meniscus',
     'pads_in',
