@@ -28,6 +28,7 @@ from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import SMALL_PAD
+from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
@@ -44,6 +45,7 @@ __all__ = [
     'Foot',
     'Inflated',
     'Liquid',
+    'MeasuredLimit',
     'Meniscus',
     'Pad',
     'Pressed',

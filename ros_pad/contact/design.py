@@ -17,10 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.contact.dome import inflate
-from ros_pad.contact.dome import largest_tension
-from ros_pad.contact.dome import signed_adhesion
-from ros_pad.contact.limits import _FIT_END
 from ros_pad.contact.limits import force_limit
+from ros_pad.contact.limits import largest_pressure
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
@@ -340,9 +338,7 @@ def design(
     """
     load = number('load', load, 'N', above=True)
     area = number('area', area, 'm²', above=True)
-    end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
-    if criterion == 'measured':
-        end = min(end, _FIT_END)
+    end = largest_pressure(pad, criterion)
     # The end itself is refused where rounding carries it a digit too far.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)

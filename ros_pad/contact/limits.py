@@ -2,7 +2,8 @@
 """How much force an inflated pad carries, by three named criteria, and the pressure for a force.
 
 ``measured``
-    A line through the thesis' three measurements (0.15, 0.30, 0.40 N at 65, 75, 85 kPa).
+    A line through what was measured: on the pad itself, else the thesis' three measurements on its
+    large pad (0.15, 0.30, 0.40 N at 65, 75, 85 kPa), in proportion to the area.
 ``max_depth``
     The force at which the cap is cut off deepest: pressing on lets the dome collapse sideways.
 ``flattening``
@@ -26,6 +27,7 @@ from ros_pad.contact.dome import signed_adhesion
 from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
+from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import quantity
@@ -34,10 +36,10 @@ from ros_pad.errors import NoEquilibrium
 
 CRITERIA = ('measured', 'flattening', 'max_depth')
 
-# The fit: force per pad of 1.5 mm, N, against gauge pressure, Pa.
-_FIT_FORCE, _FIT_PRESSURE, _FIT_SLOPE = 0.2833, 75e3, 1.25e-5
-# No pad was measured above 85 kPa; the line is drawn on to where that pad's model ends.
-_FIT_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
+# The fit to the thesis' measurements on its large pad.
+THESIS_LIMIT = MeasuredLimit(force=0.2833, pressure=75e3, slope=1.25e-5)
+# It measured nothing above 85 kPa; the line is drawn on to where that pad's model ends.
+_THESIS_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
 # Bounds, over the radius, of height and depth of the deepest dome at the model's largest
 # pressure. A second, uncertified solution has depths above 0.57.
@@ -53,10 +55,11 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         What the pad is made of.
     pressure : float or array
         Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`);
-        for ``measured`` also at most 91.36 kPa, whatever the pad.
+        for the thesis' measurements also at most 91.36 kPa, whatever the pad.
     criterion : {'measured', 'flattening', 'max_depth'}
-        ``measured`` is ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm and in proportion
-        to the radius squared for others, which nobody has measured.
+        ``measured`` is the pad's own ``measured_limit``. Without one it is
+        ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm and in proportion to the radius
+        squared for others, which nobody has measured.
 
     Returns
     -------
@@ -85,8 +88,9 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
             status,
         )
     if criterion == 'measured':
-        quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_FIT_END)
-        limit = (_FIT_FORCE + _FIT_SLOPE * (p - _FIT_PRESSURE)) * _area_ratio(pad)
+        quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_end_of_measurements(pad))
+        line, scale = _line(pad)
+        limit = (line.force + line.slope * (p - line.pressure)) * scale
     else:
         tension = np.where(inside, tension, 1.0)
         if criterion == 'flattening':
@@ -136,9 +140,7 @@ def pressure_for(
     except ValueError as error:
         raise InvalidInput('force and margin do not broadcast') from error
     a = signed_adhesion(pad, 'matlab')
-    end = largest_tension(a) * pad.stiffness / pad.radius
-    if criterion == 'measured':
-        end = min(end, _FIT_END)
+    end = largest_pressure(pad, criterion)
     strongest = force_limit(pad, end * (1.0 - 1e-15), criterion)
     carried = load <= strongest
     if np.ndim(load) == 0 and not carried:
@@ -149,7 +151,8 @@ def pressure_for(
         )
     load = np.where(carried, load, 0.0)
     if criterion == 'measured':
-        p = _FIT_PRESSURE + (load / _area_ratio(pad) - _FIT_FORCE) / _FIT_SLOPE
+        line, scale = _line(pad)
+        p = line.pressure + (load / scale - line.force) / line.slope
     else:
         f = load / (math.pi * pad.stiffness * pad.radius)
         invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
@@ -158,8 +161,25 @@ def pressure_for(
     return float(p) if p.ndim == 0 else p
 
 
-def _area_ratio(pad: Pad) -> float:
-    return (pad.radius / LARGE_PAD.radius) ** 2
+def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
+    """Return the pressure, Pa gauge, at which a criterion's force limits end.
+
+    That is the end of the pressed dome's model, or of the measurements if they end before.
+    """
+    choice('criterion', criterion, CRITERIA)
+    end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
+    return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
+
+
+def _line(pad: Pad) -> tuple[MeasuredLimit, float]:
+    """Return the measured line that holds for a pad, and the factor on its force."""
+    if pad.measured_limit is not None:
+        return pad.measured_limit, 1.0
+    return THESIS_LIMIT, (pad.radius / LARGE_PAD.radius) ** 2
+
+
+def _end_of_measurements(pad: Pad) -> float:
+    return _THESIS_END if pad.measured_limit is None else math.inf
 
 
 def _tension_at_flattening(f: Array, a: float) -> Array:

@@ -160,7 +160,9 @@ class Measurements:
             pressed=PressedDomes(*columns('pressed', PressedDomes._fields)),
             force_limits=ForceLimits(*columns('limit', ForceLimits._fields)),
             friction=Friction(
-                *columns('friction', ('pressure', 'load', 'tangential_force')),
+                pressure=column('friction', 'pressure'),
+                load=column('friction', 'load'),
+                tangential_force=column('friction', 'tangential_force'),
                 wet=column('friction', SURFACE) == 1.0,
                 stance_time=column('friction', 'stance_time'),
             ),

@@ -87,6 +87,35 @@ def choice(name: str, value: str, allowed: tuple[str, ...]) -> str:
 
 
 @dataclass(frozen=True)
+class MeasuredLimit:
+    """A line through the force limits that were measured on a pad.
+
+    Parameters
+    ----------
+    force : float
+        Normal force on one pad, N, that it carries at ``pressure``.
+    pressure : float
+        Gauge pressure, Pa, above 0.
+    slope : float
+        How the limit rises with pressure, N/Pa, above 0.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or outside its range.
+    """
+
+    force: float
+    pressure: float
+    slope: float
+
+    def __post_init__(self) -> None:
+        number('force', self.force, 'N')
+        number('pressure', self.pressure, 'Pa', above=True)
+        number('slope', self.slope, 'N/Pa', above=True)
+
+
+@dataclass(frozen=True)
 class Pad:
     """One round pad, clamped at its rim: flat at zero gauge pressure, a dome when inflated.
 
@@ -99,6 +128,9 @@ class Pad:
         thesis' pressure law alone: another law of the same membrane has another constant.
     adhesion_energy : float
         Work of adhesion between pad and floor, J/m², 0 or more.
+    measured_limit : MeasuredLimit, optional
+        Force limits measured on this very pad. By default those of the thesis' large pad, in
+        proportion to the area.
 
     Raises
     ------
@@ -109,6 +141,7 @@ class Pad:
     radius: float
     stiffness: float
     adhesion_energy: float = 0.006
+    measured_limit: MeasuredLimit | None = None
 
     def __post_init__(self) -> None:
         number('radius', self.radius, 'm', above=True)

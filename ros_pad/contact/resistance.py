@@ -29,6 +29,7 @@ from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
+from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import number
@@ -147,6 +148,7 @@ class Foot:
                 radius=pad_table.number('radius', 'm', 1e-4, 1e-2),
                 stiffness=pad_table.number('stiffness', 'N/m', 1.0, 1e4),
                 adhesion_energy=pad_table.number('adhesion_energy', 'J/m2', 0.0, 1.0),
+                measured_limit=_measured_limit(pad_table),
             )
         values: dict[str, Any] = {
             'pads': table.integer('pads', 1, 10000),
@@ -221,6 +223,17 @@ class Foot:
         return touching * dry + (1.0 - touching) * self.boundary_friction * load
 
 
+def _measured_limit(pad_table: Table) -> MeasuredLimit | None:
+    if 'measured_limit' not in pad_table:
+        return None
+    with pad_table.table('measured_limit') as table:
+        return MeasuredLimit(
+            force=table.number('force', 'N', 0.0, 1e3),
+            pressure=table.number('pressure', 'Pa', 1.0, 1e6),
+            slope=table.number('slope', 'N/Pa', 1e-9, 1.0),
+        )
+
+
 def tangential_resistance(
     foot: Foot,
     load: ArrayLike,
@@ -244,8 +257,9 @@ def tangential_resistance(
     Returns
     -------
     float or ndarray
-        Resistance in newtons, broadcast over the inputs. The capillary force is left out: per pad
-        it is bounded by :func:`ros_pad.contact.meniscus` at 1e-3 of the friction of a loaded pad.
+        Resistance in newtons, broadcast over the inputs. The capillary force is left out: the
+        hysteresis of a contact line (:func:`ros_pad.contact.hysteresis_force`) is at most 1e-3 of
+        the friction of a loaded pad.
 
     Raises
     ------

@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import MeasuredLimit
 from ros_pad.contact import Pad
 from ros_pad.contact import force_limit
 from ros_pad.contact import press
 from ros_pad.contact import pressure_for
+from ros_pad.contact.limits import largest_pressure
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
@@ -132,3 +134,20 @@ def test_bad_words():
             function(LARGE_PAD, 0.1, 'strength')
     with pytest.raises(InvalidInput, match='broadcast'):
         pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0])
+
+
+def test_a_pad_with_measurements_of_its_own():
+    own = Pad(2e-3, 60.0, measured_limit=MeasuredLimit(force=0.5, pressure=60e3, slope=2e-5))
+    assert force_limit(own, 70e3) == pytest.approx(0.7)
+    assert force_limit(own, 10e3) == 0.0
+    assert pressure_for(own, 0.6, margin=1.5) == pytest.approx(80e3)
+    # Its model ends at 3.426 k/r less a little; so do its limits, wherever the thesis' ended.
+    end = largest_pressure(own)
+    assert 102.6e3 < end < 102.78e3
+    assert largest_pressure(own, 'flattening') == end
+    assert force_limit(own, 0.999 * end) == pytest.approx(0.5 + 2e-5 * (0.999 * end - 60e3))
+    # The other criteria do not know of it.
+    plain = Pad(2e-3, 60.0)
+    for criterion in ('flattening', 'max_depth'):
+        assert force_limit(own, 70e3, criterion) == force_limit(plain, 70e3, criterion)
+    assert largest_pressure(plain) == pytest.approx(3.426 * 40.0 / 1.5e-3)

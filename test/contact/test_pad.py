@@ -6,13 +6,14 @@ import pytest
 
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import MeasuredLimit
 from ros_pad.contact import Pad
 from ros_pad.errors import InvalidInput
 
 
 def test_the_thesis_pads():
-    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006)
-    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006)
+    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006, None)
+    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006, None)
 
 
 def test_frozen():
@@ -32,3 +33,17 @@ def test_only_adhesion_may_be_zero():
     for values in [(0.0, 40.0), (1e-3, 0.0)]:
         with pytest.raises(InvalidInput, match='above 0'):
             Pad(*values)
+
+
+@pytest.mark.parametrize(
+    ('values', 'name'),
+    [
+        ((-0.1, 75e3, 1e-5), 'force'),
+        ((0.3, 0.0, 1e-5), 'pressure'),
+        ((0.3, 75e3, 0.0), 'slope'),
+        ((0.3, 75e3, math.nan), 'slope'),
+    ],
+)
+def test_a_measured_limit_rises(values, name):
+    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed'):
+        MeasuredLimit(*values)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from ros_pad import configuration
 from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import MeasuredLimit
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
 from ros_pad.errors import ConfigError
@@ -315,3 +316,17 @@ def test_bad_pads_in_files(tmp_path, key, value):
 def test_unknown_foot():
     with pytest.raises(ConfigError, match=r"no foot named 'large73'.* Did you mean 'large37'"):
         Foot.load('large73')
+
+
+def test_a_foot_file_may_give_the_limit_of_its_pads(tmp_path):
+    shipped = configuration.locate('feet', 'large19').read_text()
+    line = '  measured_limit: {force: 0.2, pressure: 60.0e+3, slope: 1.0e-5}\n'
+    path = tmp_path / 'own.yaml'
+    path.write_text(shipped.replace('\npads:', f'{line}\npads:', 1))
+    foot = Foot.load(path)
+    assert foot.pad.measured_limit == MeasuredLimit(0.2, 60e3, 1e-5)
+    assert foot.dome_load(100.0, 60e3) == pytest.approx(19 * 0.2)
+    assert foot.dome_load(100.0, 70e3) == pytest.approx(19 * 0.3, rel=1e-6)
+    path.write_text(path.read_text().replace('slope: 1.0e-5', 'slope: -1.0'))
+    with pytest.raises(ConfigError, match=r'own\.yaml.*slope'):
+        Foot.load(path)
