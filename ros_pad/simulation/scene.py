@@ -252,15 +252,14 @@ class Scene:
     @classmethod
     def read(cls, table: Table, source: str, name: str) -> Scene:
         """Read a scene from a table; the whole table must be used up."""
+        if 'bench' in table:
+            raise ConfigError(
+                f'{table.origin}: is a bench, on which no robot walks: '
+                f'pad run {source}, or ros_pad.trials.bench.run'
+            )
         robot = table.choice('robot', ('hexapod', 'rail_leg'))
         description = table.text('description', default='')
-        foot_name = table.text('foot')
-        if foot_name.endswith(('.yaml', '.yml')):  # a file lies beside the scene, not where we are
-            foot_name = os.fspath(pathlib.Path(table.origin).parent / foot_name)
-        try:
-            foot = Foot.load(foot_name)
-        except ConfigError as error:
-            raise ConfigError(f'{table.origin}: foot: {error}') from error
+        foot = foot_of(table)
         body: HexapodBody | RailBody
         gait: TripodGait | RailGait
         heading_gain = 0.0
@@ -339,6 +338,17 @@ class Scene:
         )
         table.finish()
         return scene
+
+
+def foot_of(table: Table) -> Foot:
+    """Return the foot that a scene names; a file of one's own lies beside the scene."""
+    foot_name = table.text('foot')
+    if foot_name.endswith(('.yaml', '.yml')):
+        foot_name = os.fspath(pathlib.Path(table.origin).parent / foot_name)
+    try:
+        return Foot.load(foot_name)
+    except ConfigError as error:
+        raise ConfigError(f'{table.origin}: foot: {error}') from error
 
 
 def _hexapod_body(part: Table) -> HexapodBody:
