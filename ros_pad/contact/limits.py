@@ -89,8 +89,8 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         )
     if criterion == 'measured':
         quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_end_of_measurements(pad))
-        line, scale = _line(pad)
-        limit = (line.force + line.slope * (p - line.pressure)) * scale
+        line = measured_line(pad)
+        limit = line.force + line.slope * (p - line.pressure)
     else:
         tension = np.where(inside, tension, 1.0)
         if criterion == 'flattening':
@@ -151,8 +151,8 @@ def pressure_for(
         )
     load = np.where(carried, load, 0.0)
     if criterion == 'measured':
-        line, scale = _line(pad)
-        p = line.pressure + (load / scale - line.force) / line.slope
+        line = measured_line(pad)
+        p = line.pressure + (load - line.force) / line.slope
     else:
         f = load / (math.pi * pad.stiffness * pad.radius)
         invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
@@ -171,11 +171,14 @@ def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
     return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
 
 
-def _line(pad: Pad) -> tuple[MeasuredLimit, float]:
-    """Return the measured line that holds for a pad, and the factor on its force."""
+def measured_line(pad: Pad) -> MeasuredLimit:
+    """Return the line of measured force limits that holds for a pad: its own, or the thesis'."""
     if pad.measured_limit is not None:
-        return pad.measured_limit, 1.0
-    return THESIS_LIMIT, (pad.radius / LARGE_PAD.radius) ** 2
+        return pad.measured_limit
+    scale = (pad.radius / LARGE_PAD.radius) ** 2
+    return MeasuredLimit(
+        THESIS_LIMIT.force * scale, THESIS_LIMIT.pressure, THESIS_LIMIT.slope * scale
+    )
 
 
 def _end_of_measurements(pad: Pad) -> float:
