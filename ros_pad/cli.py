@@ -12,6 +12,7 @@ from typing import Any
 
 import ros_pad
 from ros_pad.commands import bag
+from ros_pad.commands import calibrate
 from ros_pad.commands import chart
 from ros_pad.commands import contact
 from ros_pad.commands import design
@@ -31,6 +32,7 @@ COMMANDS = (
     report,
     bag,
     contact,
+    calibrate,
     design,
     chart,
 )

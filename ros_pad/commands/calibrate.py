@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad calibrate``: a foot of one's own from one's own measurements."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import pathlib
+from dataclasses import asdict
+from typing import Any
+
+from ros_pad.commands.command import Commands
+from ros_pad.commands.command import add_command
+from ros_pad.contact import Foot
+from ros_pad.contact.calibrate import Calibration
+from ros_pad.contact.calibrate import calibrate
+from ros_pad.contact.calibrate import foot_file
+from ros_pad.contact.measurements import Measurements
+from ros_pad.errors import InvalidInput
+from ros_pad.figures.calibration import draw
+
+
+def add(commands: Commands) -> None:
+    """Add the command and its arguments."""
+    part = add_command(
+        commands,
+        'calibrate',
+        run,
+        'Fit a foot to measured shapes and forces; write its YAML file and a picture of what is '
+        'left.',
+        'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml',
+    )
+    part.add_argument(
+        'csv',
+        metavar='CSV',
+        type=pathlib.Path,
+        help='measurements, units in the header: see docs/calibrate.md and '
+        'config/measurements/thesis.csv',
+    )
+    part.add_argument(
+        '--foot',
+        default='large37',
+        help='where to start, and what is kept of what was not measured (default large37)',
+    )
+    part.add_argument(
+        '--film-thickness',
+        type=float,
+        default=3.0e-4,
+        metavar='M',
+        help='liquid on the wet floor before a foot stands in it, m (default 3e-4)',
+    )
+    part.add_argument(
+        '--viscosity',
+        type=float,
+        default=1.0e-3,
+        metavar='PA_S',
+        help='of that liquid, Pa s (default 1e-3, water)',
+    )
+    part.add_argument(
+        '--out',
+        type=pathlib.Path,
+        metavar='FILE',
+        help='foot to write (default: <name of the CSV>_foot.yaml, here)',
+    )
+    part.add_argument(
+        '--figure',
+        type=pathlib.Path,
+        metavar='FILE',
+        help='picture to write, .png, .pdf or .svg (default: beside the foot, .png)',
+    )
+    part.add_argument('--force', action='store_true', help='replace files that are there')
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit, write, print; return the exit status."""
+    foot_path = options.out or pathlib.Path(f'{options.csv.stem}_foot.yaml')
+    if foot_path.suffix not in ('.yaml', '.yml'):
+        raise InvalidInput(f'--out {foot_path}: a name that ends in .yaml is needed')
+    figure_path = options.figure or foot_path.with_suffix('.png')
+    if figure_path.suffix not in ('.png', '.pdf', '.svg'):
+        raise InvalidInput(f'--figure {figure_path}: .png, .pdf or .svg is needed')
+    for path in (foot_path, figure_path):
+        if path.exists() and not options.force:
+            raise InvalidInput(f'{path}: exists already; --force replaces it')
+    found = calibrate(
+        Measurements.read(options.csv),
+        Foot.load(options.foot),
+        options.film_thickness,
+        options.viscosity,
+    )
+    figure = draw(found)
+    foot_path.write_text(foot_file(found), encoding='utf-8')
+    figure.savefig(figure_path, dpi=150)
+    if options.json:
+        print(json.dumps(_values(found, foot_path, figure_path)))
+    else:
+        _show(found)
+        print(f'\nfoot:    {foot_path}\npicture: {figure_path}')
+    return 0
+
+
+def _values(
+    found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path
+) -> dict[str, Any]:
+    def plain(values: dict[str, Any]) -> dict[str, Any]:
+        """JSON knows no NaN."""
+        return {
+            key: None if isinstance(value, float) and math.isnan(value) else value
+            for key, value in values.items()
+        }
+
+    return {
+        'measurements': found.measurements.source,
+        'constants': [plain(asdict(constant)) for constant in found.constants],
+        'residuals': [
+            plain(asdict(residual) | {'error': residual.error}) for residual in found.residuals
+        ],
+        'warnings': list(found.warnings),
+        'foot': str(foot_path),
+        'figure': str(figure_path),
+    }
+
+
+def _show(found: Calibration) -> None:
+    print(f'{"constant":20} {"value":>11}  {"95 % interval":>25}  {"unit":15} points')
+    for each in found.constants:
+        between = 'kept' if not each.fitted else 'too few points'
+        if not math.isnan(each.low):
+            between = f'{each.low:.4g} to {each.high:.4g}'
+        print(
+            f'{each.name:20} {each.value:11.5g}  {between:>25}  {each.unit:15} {each.points:6d}'
+            f'  {each.note}'
+        )
+    print(f'\n{"measured":18} {"at":34} {"measured":>11} {"model":>11}   error')
+    for row in found.residuals:
+        mark = '' if row.used else '  (not fitted)'
+        error = 'no equilibrium' if math.isnan(row.error) else f'{100.0 * row.error:+6.1f} %'
+        print(
+            f'{row.quantity:18} {row.setting:34} {row.measured:11.5g} {row.modelled:11.5g}'
+            f'  {error}{mark}'
+        )
+    for warning in found.warnings:
+        print(f'\nnote: {warning}')
