@@ -24,6 +24,7 @@ from ros_pad.contact.dome import press
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit
+from ros_pad.contact.limits import largest_pressure
 from ros_pad.contact.limits import measured_line
 from ros_pad.contact.measurements import Friction
 from ros_pad.contact.measurements import Measurements
@@ -165,7 +166,7 @@ def calibrate(
     warnings: list[str] = []
     pad = _stiffness(measurements, foot.pad, constants, warnings)
     pad = _limit(measurements, pad, constants, warnings)
-    foot = _with(foot, pad=pad)
+    foot = _with(foot, pad=pad, ceiling=_ceiling(foot, pad, warnings))
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     if not any(constant.fitted for constant in constants):
@@ -180,6 +181,19 @@ def calibrate(
         *_friction_residuals(measurements.friction, foot, wet_floor),
     )
     return Calibration(measurements, foot, tuple(constants), residuals, tuple(warnings))
+
+
+def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
+    """Return the foot's ceiling, lowered in whole kPa to where the model of softer pads ends."""
+    end = largest_pressure(pad, foot.limit)
+    if foot.ceiling <= end:
+        return foot.ceiling
+    lowered = 1e3 * math.floor(end / 1e3)
+    warnings.append(
+        f'the ceiling is lowered from {foot.ceiling:g} to {lowered:g} Pa: the model of these'
+        f' softer pads ends at {end:.6g} Pa'
+    )
+    return lowered
 
 
 def _with(foot: Foot, **changes: float | Pad) -> Foot:

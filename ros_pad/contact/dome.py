@@ -554,7 +554,7 @@ def broadcast(p: Array, load: Array) -> tuple[Array, Array]:
 def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float = 0.0) -> NoReturn:
     unit = pad.stiffness / pad.radius
     what = f'pressure {p:g} Pa' + ('' if load is None else f' with force {load:g} N')
-    what += f' on a pad of radius {pad.radius:g} m and stiffness {pad.stiffness:g} N/m '
+    what += f' on {pad} '
     if code == NO_INFLATION:
         what += f'makes the dome grow without end: below {BURST * unit:.6g} Pa is needed'
     elif code == FOLD_ZONE:

@@ -148,6 +148,9 @@ class Pad:
         number('stiffness', self.stiffness, 'N/m', above=True)
         number('adhesion_energy', self.adhesion_energy, 'J/m²')
 
+    def __str__(self) -> str:
+        return f'a pad of radius {self.radius:g} m and stiffness {self.stiffness:g} N/m'
+
 
 LARGE_PAD = Pad(radius=1.5e-3, stiffness=40.0)
 SMALL_PAD = Pad(radius=0.5e-3, stiffness=40.0)

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from ros_pad import configuration
+from ros_pad.contact import Foot
+from ros_pad.contact import force_limit
+from ros_pad.contact import inflate
+from ros_pad.contact import press
+from ros_pad.contact import tangential_resistance
+from ros_pad.contact.calibrate import calibrate
+from ros_pad.contact.calibrate import foot_file
+from ros_pad.contact.calibrate import stiffness_of
+from ros_pad.contact.film import Film
+from ros_pad.contact.measurements import ForceLimits
+from ros_pad.contact.measurements import FreeDomes
+from ros_pad.contact.measurements import Friction
+from ros_pad.contact.measurements import Measurements
+from ros_pad.contact.measurements import PressedDomes
+from ros_pad.errors import InvalidInput
+
+THESIS = Measurements.read(configuration.shared_folder() / 'measurements' / 'thesis.csv')
+FOOT = Foot.load('large37')
+FILM, VISCOSITY = 3e-4, 1e-3
+NONE = np.array([])
+NOTHING = Measurements(
+    'test',
+    FreeDomes(NONE, NONE),
+    PressedDomes(*[NONE] * 6),
+    ForceLimits(NONE, NONE),
+    Friction(NONE, NONE, NONE, NONE.astype(bool), NONE),
+)
+# A foot whose friction differs from the shipped one in every constant.
+OTHER = dataclasses.replace(
+    FOOT,
+    friction=0.45,
+    shear_strength=3000.0,
+    conforming_pressure=7000.0,
+    boundary_friction=0.17,
+    critical_film=3e-7,
+    film_exponent=1.6,
+)
+
+
+def constants(calibration):
+    return {constant.name: constant for constant in calibration.constants}
+
+
+def slips_of(foot, rows, noise=0.0, seed=0):
+    """Return tangential forces as the foot has them: rows of pressure, load, wet, stance time."""
+    forces = []
+    for pressure, load, wet, stance_time in rows:
+        films = (0.0, 0.0)
+        if wet:
+            film = Film(foot, VISCOSITY)
+            film.touch_down(FILM)
+            domes = foot.dome_load(load, pressure)
+            film.drain(domes, load - domes, pressure, stance_time)
+            films = (film.under_domes, film.under_sole)
+        forces.append(tangential_resistance(foot, load, pressure, *films))
+    pressure, load, wet, stance_time = (np.array(column) for column in zip(*rows, strict=True))
+    noisy = np.array(forces) * (
+        1.0 + noise * np.random.default_rng(seed).standard_normal(len(rows))
+    )
+    friction = Friction(pressure, load, noisy, wet.astype(bool), stance_time)
+    return dataclasses.replace(NOTHING, friction=friction)
+
+
+DRY_FLAT = [(0.0, load, False, math.nan) for load in (1.0, 3.0, 5.0, 6.0, 7.0, 9.0, 12.0)]
+DRY_DOMES = [(p, load, False, math.nan) for p in (60e3, 75e3, 85e3) for load in (1.0, 3.0, 6.0)]
+WET = [
+    (p, load, True, t) for p in (0.0, 60e3, 75e3, 85e3) for load in (2.0, 5.0) for t in (0.1, 0.5)
+]
+
+
+class TestThesis:
+    found = calibrate(THESIS, FOOT)
+
+    def test_stiffness_is_that_of_the_relative_least_squares(self):
+        k = constants(self.found)['stiffness']
+        assert k.value == pytest.approx(40.32, abs=0.005)
+        assert k.fitted
+        assert k.points == 4
+        # By hand: s² = sum of squares/3, slope d ln h/d ln k by differences, t = 3.182.
+        pad = self.found.foot.pad
+        p, h = THESIS.free
+        error = inflate(pad, p).height / h - 1
+        up = inflate(dataclasses.replace(pad, stiffness=pad.stiffness * 1.0001), p).height / h
+        slope = (up - 1 - error) / math.log(1.0001)
+        width = 3.182446 * math.sqrt((error @ error) / 3 / (slope @ slope))
+        assert math.log(k.high / k.value) == pytest.approx(width, rel=1e-3)
+        assert math.log(k.value / k.low) == pytest.approx(width, rel=1e-3)
+
+    def test_stiffness_of_single_points_falls(self):
+        each = stiffness_of(FOOT.pad, *THESIS.free)
+        np.testing.assert_allclose(each, [44.03, 40.94, 39.06, 38.75], atol=0.005)
+        assert len(self.found.warnings) == 1
+        assert 'from 44 N/m at 55000 Pa to 38.8' in self.found.warnings[0]
+
+    def test_two_parameters_fit_within_a_kilopascal(self):
+        rest, rise = (constants(self.found)[n] for n in ('tension_at_rest', 'tension_stiffness'))
+        assert rest.value == pytest.approx(26.5, abs=0.1)
+        assert rise.value == pytest.approx(49.4, abs=0.1)
+        p, h = THESIS.free
+        r = FOOT.pad.radius
+        stretch = np.sqrt(1 + (h / r) ** 2)
+        law = 2 * (rest.value + rise.value * (stretch - 1)) / ((r * r + h * h) / (2 * h))
+        assert abs(law - p).max() < 1e3
+
+    def test_line_of_the_force_limit(self):
+        line = self.found.foot.pad.measured_limit
+        assert line.pressure == pytest.approx(75e3)
+        assert line.force == pytest.approx(0.2833, abs=5e-5)
+        assert line.slope == pytest.approx(1.25e-5)
+        # One point to spare, t = 12.7: residuals -1/120, 1/60, -1/120 of the line.
+        s = math.sqrt((2 * (1 / 120) ** 2 + (1 / 60) ** 2) / 1)
+        known = constants(self.found)['force_limit']
+        assert known.high - known.value == pytest.approx(12.7062 * s / math.sqrt(3), rel=1e-4)
+
+    def test_errors_are_those_of_the_model_against_the_points(self):
+        at = {(r.quantity, r.setting): r for r in self.found.residuals}
+        first = at['height', 'free, 55000 Pa']
+        assert first.used
+        assert first.error == pytest.approx(
+            inflate(self.found.foot.pad, 55e3).height / 1.25e-3 - 1
+        )
+        pressed = at['contact_radius', '75000 Pa, 0.19 N']
+        assert not pressed.used
+        assert pressed.modelled == press(self.found.foot.pad, 75e3, 0.19).contact_radius
+        assert len(self.found.residuals) == 4 + 9 + 3
+
+    def test_friction_is_kept_and_said_to_be(self):
+        for name in ('friction', 'shear_strength', 'critical_film'):
+            kept = constants(self.found)[name]
+            assert (kept.value, kept.fitted, kept.points) == (getattr(FOOT, name), False, 0)
+            assert math.isnan(kept.low)
+
+
+class TestShapes:
+    def test_the_truth_comes_back_from_free_domes_of_any_radius(self):
+        pad = dataclasses.replace(FOOT.pad, radius=0.8e-3, stiffness=55.0)
+        foot = dataclasses.replace(
+            FOOT, pad=dataclasses.replace(pad, stiffness=20.0), ceiling=80e3
+        )
+        p = np.array([20e3, 100e3, 250e3])
+        data = dataclasses.replace(NOTHING, free=FreeDomes(p, inflate(pad, p).height))
+        k = constants(calibrate(data, foot))['stiffness']
+        assert k.value == pytest.approx(55.0, rel=1e-9)
+        assert k.high - k.low < 1e-6
+
+    def test_pressed_domes_alone_will_do_by_height_or_gap(self):
+        pad = dataclasses.replace(FOOT.pad, stiffness=47.0)
+        p, force = np.array([60e3, 75e3, 90e3]), np.array([0.05, 0.15, 0.3])
+        dome = press(pad, p, force)
+        blank = np.full(3, np.nan)
+        for height, gap in ((dome.height, blank), (blank, dome.gap)):
+            data = dataclasses.replace(
+                NOTHING, pressed=PressedDomes(p, force, height, blank, blank, gap)
+            )
+            found = calibrate(data, FOOT)
+            assert constants(found)['stiffness'].value == pytest.approx(47.0, rel=1e-9)
+            assert found.foot.pad.stiffness == pytest.approx(47.0, rel=1e-9)
+            assert all(residual.used for residual in found.residuals)
+
+    def test_a_single_dome_has_no_interval(self):
+        data = dataclasses.replace(NOTHING, free=FreeDomes(np.array([75e3]), np.array([2e-3])))
+        k = constants(calibrate(data, FOOT))['stiffness']
+        assert k.value == pytest.approx(39.0625)
+        assert math.isnan(k.low)
+        assert 'too few for an interval' in foot_file(calibrate(data, FOOT))
+
+    def test_softer_pads_lower_the_ceiling(self):
+        data = dataclasses.replace(NOTHING, free=FreeDomes(np.array([75e3]), np.array([2e-3])))
+        found = calibrate(data, FOOT)
+        # The model of 39.06 N/m ends at 3.426 k/r less a little, 89.2 kPa.
+        assert found.foot.ceiling == 89e3
+        assert 'lowered from 90000 to 89000 Pa' in found.warnings[0]
+        assert calibrate(THESIS, FOOT).foot.ceiling == 90e3
+
+    def test_intervals_hold_the_truth_as_often_as_they_say(self):
+        p = np.linspace(30e3, 85e3, 6)
+        true = inflate(dataclasses.replace(FOOT.pad, stiffness=40.0), p).height
+        inside = 0
+        for seed in range(200):
+            noisy = true * (1 + 0.03 * np.random.default_rng(seed).standard_normal(6))
+            data = dataclasses.replace(NOTHING, free=FreeDomes(p, noisy))
+            k = constants(calibrate(data, FOOT))['stiffness']
+            inside += k.low <= 40.0 <= k.high
+        assert 0.90 <= inside / 200 <= 0.99
+
+
+class TestForceLimit:
+    def test_limits_that_fall_are_refused(self):
+        data = dataclasses.replace(
+            NOTHING, force_limits=ForceLimits(np.array([60e3, 80e3]), np.array([0.4, 0.2]))
+        )
+        with pytest.raises(InvalidInput, match='fall with pressure'):
+            calibrate(data, FOOT)
+
+    def test_one_pressure_keeps_the_line_and_says_so(self):
+        data = dataclasses.replace(
+            THESIS, force_limits=ForceLimits(np.array([75e3, 75e3]), np.array([0.28, 0.3]))
+        )
+        found = calibrate(data, FOOT)
+        assert found.foot.pad.measured_limit is None
+        assert any('one pressure is not enough' in warning for warning in found.warnings)
+        kept = constants(found)['force_limit']
+        assert (kept.fitted, kept.value) == (False, 0.2833)
+
+
+class TestFriction:
+    def test_all_constants_come_back_from_forces_without_noise(self):
+        found = calibrate(slips_of(OTHER, DRY_FLAT + DRY_DOMES + WET), FOOT, FILM, VISCOSITY)
+        for name in (
+            *('friction', 'shear_strength', 'conforming_pressure'),
+            *('boundary_friction', 'critical_film', 'film_exponent'),
+        ):
+            assert getattr(found.foot, name) == pytest.approx(getattr(OTHER, name), rel=1e-4)
+            assert constants(found)[name].fitted
+        assert found.warnings == ()
+
+    def test_only_what_the_forces_tell_is_fitted(self):
+        # Under a flat sole that does not conform all over, F/N is friction + shear/conforming.
+        found = calibrate(slips_of(OTHER, DRY_FLAT[:3]), FOOT, FILM, VISCOSITY)
+        fitted = [c.name for c in found.constants if c.fitted]
+        assert fitted == ['friction']
+        ratio = OTHER.friction + OTHER.shear_strength / OTHER.conforming_pressure
+        kept = FOOT.shear_strength / FOOT.conforming_pressure
+        assert found.foot.friction == pytest.approx(ratio - kept, rel=1e-6)
+        assert 'shear_strength, conforming_pressure' in found.warnings[0]
+        # Dry ground says nothing of films.
+        found = calibrate(slips_of(OTHER, DRY_FLAT + DRY_DOMES), FOOT, FILM, VISCOSITY)
+        assert {c.name for c in found.constants if c.fitted} == {
+            *('friction', 'shear_strength', 'conforming_pressure')
+        }
+
+    def test_intervals_hold_the_truth_about_as_often_as_they_say(self):
+        inside, of = Counter(), Counter()
+        for seed in range(30):
+            found = calibrate(slips_of(OTHER, DRY_FLAT + DRY_DOMES + WET, 0.03, seed), FOOT)
+            for constant in found.constants:
+                if constant.fitted:
+                    of[constant.name] += 1
+                    truth = getattr(OTHER, constant.name)
+                    inside[constant.name] += constant.low <= truth <= constant.high
+        assert set(of.values()) == {30}
+        assert sum(inside.values()) / sum(of.values()) > 0.87
+
+    def test_wet_floors_need_the_time_of_stance(self):
+        data = slips_of(OTHER, WET)
+        blank = data.friction._replace(stance_time=np.full(len(WET), np.nan))
+        with pytest.raises(InvalidInput, match='needs stance_time'):
+            calibrate(dataclasses.replace(data, friction=blank), FOOT)
+
+    def test_pressures_above_the_ceiling_are_refused(self):
+        data = slips_of(dataclasses.replace(OTHER, ceiling=91e3), [(91e3, 2.0, False, 0.0)] * 2)
+        with pytest.raises(InvalidInput, match='above the ceiling'):
+            calibrate(data, FOOT)
+
+
+def test_nothing_to_fit_is_refused():
+    with pytest.raises(InvalidInput, match='nothing can be fitted: stiffness needs'):
+        calibrate(NOTHING, FOOT)
+    for name, value in (('film_thickness', 0.0), ('viscosity', math.nan)):
+        with pytest.raises(InvalidInput, match=name):
+            calibrate(THESIS, FOOT, **{name: value})
+
+
+def test_the_foot_file_is_the_calibrated_foot(tmp_path):
+    data = dataclasses.replace(
+        slips_of(OTHER, DRY_FLAT + DRY_DOMES + WET, 0.02),
+        free=THESIS.free,
+        force_limits=THESIS.force_limits,
+    )
+    found = calibrate(data, FOOT)
+    path = tmp_path / 'own.yaml'
+    path.write_text(foot_file(found))
+    foot = Foot.load(path)
+    for field in dataclasses.fields(Foot):
+        if field.init and field.name not in ('source', 'pad'):
+            value = getattr(found.foot, field.name)
+            expected = pytest.approx(value, rel=1e-8) if isinstance(value, float) else value
+            assert getattr(foot, field.name) == expected
+    assert foot.pad.stiffness == pytest.approx(found.foot.pad.stiffness, rel=1e-8)
+    assert force_limit(foot.pad, 80e3) == pytest.approx(0.2833 + 5e3 * 1.25e-5, abs=1e-4)
+    assert 'N/m, fitted: 36.8' in path.read_text()
