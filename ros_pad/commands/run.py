@@ -11,6 +11,7 @@ import pathlib
 from contextlib import suppress
 from typing import Any
 
+from ros_pad.commands.bench import run_bench
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
@@ -21,6 +22,7 @@ from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.simulation import bench
 from ros_pad.simulation import fidelity as ladder
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import Trial
@@ -36,7 +38,8 @@ def add(commands: Commands) -> None:
         commands,
         'run',
         run,
-        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report.',
+        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; of a bench '
+        'scene, draw the figures of the thesis.',
         'pad run hexapod_patches --seed 3',
     )
     part.add_argument('scene', metavar='SCENE', help='name of a scene, or path of a YAML file')
@@ -66,8 +69,10 @@ def add(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Walk the scene; return the exit status."""
-    scene = Scene.load(options.scene)
+    """Walk the scene, or work out the bench; return the exit status."""
+    scene = bench.load(options.scene)
+    if isinstance(scene, bench.BenchScene):
+        return run_bench(options, options.scene)
     if options.cycles is not None:
         if not 1 <= options.cycles <= 100000:
             raise InvalidInput(f'--cycles {options.cycles}: from 1 to 100000 are needed')
