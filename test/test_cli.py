@@ -237,7 +237,8 @@ def test_readme_names_every_scene_and_command():
     readme = (SCENE.parent.parent.parent / 'README.md').read_text(encoding='utf-8')
     for name in configuration.names('scenes'):
         assert f'`{name}`' in readme
-    for command in ('run', 'scenes', 'report', 'bag info', 'contact'):
+    for module in cli.COMMANDS:
+        command = module.__name__.rpartition('.')[2]
         assert f'`pad {command}' in readme
 
 
