@@ -12,6 +12,7 @@ import matplotlib
 
 import ros_pad
 from ros_pad.figures.thesis import STYLE
+from ros_pad.figures.thesis import WIDE
 from ros_pad.figures.thesis import Drawn
 from ros_pad.trials.bench import FIDELITY
 from ros_pad.trials.bench import BenchTrial
@@ -78,7 +79,10 @@ def write(trial: BenchTrial, drawn: Mapping[str, Drawn], path: str | os.PathLike
         for each in drawn.values():
             caption = html.escape(each.caption)
             parts.append(f'<h2>{html.escape(each.title)}</h2>')
-            parts.append(embedded(each.figure, each.alt, caption))
+            width = 100.0 * each.figure.get_figwidth() / WIDE
+            parts.append(
+                embedded(each.figure, each.alt, caption, f' style="max-width: {width:.0f}%"')
+            )
     parts.append('<h2>Point by point</h2>')
     parts.append(
         table(

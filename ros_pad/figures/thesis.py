@@ -41,7 +41,7 @@ from ros_pad.trials.report import VERMILION
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)
-_WIDE = 7.2  # inches: both columns of a paper
+WIDE = 7.2  # inches: both columns of a paper
 STYLE: dict[Any, Any] = PAGE_STYLE | {
     'font.size': 9.0,
     'axes.titlesize': 9.0,
@@ -119,7 +119,7 @@ def figure_15(trial: BenchTrial) -> Drawn:
     """Draw height and radius of free domes over pressure, their errors, and the stiffness."""
     setup = trial.scene.setup
     assert isinstance(setup, InflationBench)
-    figure = Figure(figsize=(_WIDE, 4.9), layout='constrained')
+    figure = Figure(figsize=(WIDE, 4.9), layout='constrained')
     axes = figure.subplots(2, 2, sharex=True)
     heights = trial.pick('height')
     low = 0.75 * min(_pressures(heights))  # kPa; below it the sphere grows without end
@@ -191,9 +191,12 @@ def figure_16(trial: BenchTrial) -> Drawn:
     """Draw the profiles of pressed domes with either reading of the forces."""
     radius = trial.scene.pad.radius
     readings = [name for name in (CODED, TEXT) if trial.pick('gap', 'thesis', name)]
-    figure = Figure(figsize=(_WIDE if len(readings) > 1 else 4.6, 2.75), layout='constrained')
+    figure = Figure(figsize=(WIDE if len(readings) > 1 else 4.6, 2.75), layout='constrained')
     axes = figure.subplots(1, len(readings), sharey=True, squeeze=False)[0]
     free = trial.pick('free height')
+    highest = max(
+        max(row.modelled, row.measured or 0.0) for row in [*free, *trial.pick('gap', 'thesis')]
+    )
     for ax, letter, reading in zip(axes, 'ab', readings, strict=False):
         ax.plot(1e3 * np.array([-radius, radius]), [0.0, 0.0], color=PALE, lw=2.0)
         for row in free:
@@ -225,8 +228,9 @@ def figure_16(trial: BenchTrial) -> Drawn:
         ax.set_xlabel('x / mm')
         ax.set_title(f'({letter}) {reading}')
         ax.legend(loc='upper left', bbox_to_anchor=(-0.02, 1.0), handlelength=1.2)
-        ax.set_xlim(-2.45, 1.75)
-        ax.set_ylim(-0.05, 2.25)
+        # Room for the legend on the left; a dome bulges out over the rim by less than a tenth.
+        ax.set_xlim(-1.63e3 * radius, 1.17e3 * radius)
+        ax.set_ylim(-0.05, 1.13e3 * highest)
     axes[0].set_ylabel('z / mm')
     _above(
         figure,
@@ -249,7 +253,7 @@ def figure_16(trial: BenchTrial) -> Drawn:
 
 def figure_17(trial: BenchTrial) -> Drawn:
     """Draw height and sphere radius of pressed domes over force."""
-    figure = Figure(figsize=(_WIDE, 3.1), layout='constrained')
+    figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
     _over_force(trial, figure, ('height', 'sphere radius'))
     return Drawn(
         figure,
@@ -262,7 +266,7 @@ def figure_17(trial: BenchTrial) -> Drawn:
 
 def figure_18(trial: BenchTrial) -> Drawn:
     """Draw contact radius, depth and gap of pressed domes over force."""
-    figure = Figure(figsize=(_WIDE, 3.1), layout='constrained')
+    figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
     _over_force(trial, figure, ('contact radius', 'depth', 'gap'))
     return Drawn(
         figure,
@@ -309,6 +313,7 @@ def _over_force(trial: BenchTrial, figure: Figure, quantities: Sequence[str]) ->
         ax.set_title(f'({letter}) {quantity}')
         ax.set_xlabel('normal force / N')
         ax.set_ylabel(f'{quantity} / mm')
+        ax.margins(y=0.12)
         ax.set_ylim(0.5 if quantity == 'sphere radius' else 0.0, None)
         ax.set_xlim(0.0, None)
     handles: list[Any] = [
@@ -336,7 +341,7 @@ def _over_force(trial: BenchTrial, figure: Figure, quantities: Sequence[str]) ->
 
 def figure_20(trial: BenchTrial) -> Drawn:
     """Draw tangential over normal force, flat and domes, dry and wet."""
-    figure = Figure(figsize=(_WIDE, 3.4), layout='constrained')
+    figure = Figure(figsize=(WIDE, 3.4), layout='constrained')
     force, ratio = figure.subplots(1, 2)
     shapes = _shapes(trial)
     for pressure, colour in shapes.items():
@@ -445,7 +450,7 @@ def figure_10(trial: BenchTrial) -> Drawn:
     ax.axvspan(*claimed, color=STANCE, lw=0.0)
     styles = zip(
         RISE, (VERMILION, PURPLE, BLUE), ((0, (4, 2)), (0, (1, 1.2)), '-'),
-        ((0, 6), (0, -14), (-2, -24)), strict=True,
+        ((0, 6), (0, -14), (-8, -26)), strict=True,
     )  # fmt: skip
     handles: list[Any] = []
     highest = 1e3 * max(row.modelled for row in trial.pick('greatest rise'))
@@ -501,9 +506,10 @@ def _cap(
 ) -> tuple[Array, Array]:
     """Return x and z, mm, of a spherical cap on the rim, cut off at a gap above it."""
     sphere = (radius**2 + height**2) / (2.0 * height)
-    # Angles from the apex: at the rim, beyond a right angle where the dome bulges; at the contact.
+    # Angles from the apex: at the rim, beyond a right angle where the dome bulges; at the floor,
+    # where the measured contact ends a little off the measured sphere.
     rim = np.arctan2(radius, sphere - height)
-    edge = np.arcsin(contact / sphere)
+    edge = 0.0 if gap is None else np.arccos(1.0 - (height - gap) / sphere)
     wall = np.linspace(rim, edge, 200)
     x, z = sphere * np.sin(wall), height - sphere + sphere * np.cos(wall)
     if gap is not None:

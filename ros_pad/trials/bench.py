@@ -294,11 +294,11 @@ def _stiffness(radius: float, pressure: Array, height: Array) -> Array:
 
 _PRESSED = (
     # figure, name of the rows, attribute of Pressed
+    (16, 'gap', 'gap'),
     (17, 'height', 'height'),
     (17, 'sphere radius', 'sphere_radius'),
     (18, 'contact radius', 'contact_radius'),
     (18, 'depth', 'depth'),
-    (16, 'gap', 'gap'),
 )
 CODED, TEXT = 'force as coded', 'force as in the text'
 
