@@ -191,7 +191,7 @@ def figure_16(trial: BenchTrial) -> Drawn:
     """Draw the profiles of pressed domes with either reading of the forces."""
     radius = trial.scene.pad.radius
     readings = [name for name in (CODED, TEXT) if trial.pick('gap', 'thesis', name)]
-    figure = Figure(figsize=(WIDE if len(readings) > 1 else 4.6, 2.75), layout='constrained')
+    figure = Figure(figsize=(WIDE if len(readings) > 1 else 4.6, 2.9), layout='constrained')
     axes = figure.subplots(1, len(readings), sharey=True, squeeze=False)[0]
     free = trial.pick('free height')
     highest = max(
