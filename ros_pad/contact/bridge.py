@@ -302,11 +302,12 @@ def _young_laplace(
     heights = edge * (_cumulative(128) @ shape.rise)
     if shape.floor > 1.0:
         heights = edge * shape.height - heights
-    _clear_of_solids(edge * shape.radius, heights, gap)
+    held = edge**3 * float(shape.volume) - _cap(beta)
+    _clear_of_solids(edge * shape.radius, heights, gap, held)
     return Bridge(
         force=2.0 * math.pi * edge * float(shape.integral),
         pressure=float(shape.curvature) / edge,
-        volume=edge**3 * float(shape.volume) - _cap(beta),
+        volume=held,
         neck_radius=edge * float(shape.neck),
         filling_angle=beta,
         floor_radius=edge * float(shape.floor),
@@ -358,8 +359,11 @@ def _shapes(place: Floats, start: Floats, end: Floats, order: int) -> _Shape:
     h = 2.0 * (sine + y) / (1.0 + floor)
     h = np.where(h == 0.0, 1e-300, h)
     # Angle of the rotation about i/H from the plane to the sphere, between the spokes H ζ - i.
+    # Written in x and the turning, it is 0 where both are, however the sines are rounded.
     below, above = h * floor * sine - 1.0, h * np.sin(end) - 1.0
-    cross = floor * np.cos(start) * above - np.cos(end) * below
+    half = 0.5 * (end - start)
+    turning = h * floor * np.cos(half) - np.sin(0.5 * (start + end))
+    cross = 2.0 * np.sin(half) * turning - x * np.cos(start)
     tau = np.arctan2(h * cross, h * h * floor * np.cos(start) * np.cos(end) + below * above)
     tau = np.where(tau * h < 0.0, tau + 2.0 * math.pi * np.sign(h), tau)
     length = tau / h
@@ -644,14 +648,11 @@ def _cap(beta: Floats) -> Floats:
     return math.pi / 3.0 * (2.0 * np.sin(0.5 * beta) ** 2) ** 2 * (2.0 + np.cos(beta))
 
 
-def _clear_of_solids(radii: Array, heights: Array, gap: float) -> None:
+def _clear_of_solids(radii: Array, heights: Array, gap: float, volume: float) -> None:
     """Refuse a meridian that runs through the plane or the sphere."""
     inside = np.hypot(radii, heights - gap - 1.0) < 1.0 - 1e-7
-    if inside.any() or np.min(heights) < -1e-7:
-        raise NoBridge(
-            'no bridge is free there: its surface would run through the '
-            + ('sphere' if inside.any() else 'plane')
-        )
+    if inside.any() or np.min(heights) < -1e-7 or volume <= 0.0:
+        raise NoBridge('no bridge is free there: its surface would run through sphere or plane')
 
 
 # --- Gravity --------------------------------------------------------------------------------
@@ -748,7 +749,7 @@ def _at_order(way: list[_Case], order: int) -> Bridge:
     if np.max(abs(series[-4:])) > 1e-8 * np.max(abs(series)):
         raise _Coarse
     _, radius, height, volume, _ = _surface(case, state)
-    _clear_of_solids(radius, height, case.gap)
+    _clear_of_solids(radius, height, case.gap, float(volume))
     pressure, length, beta = state[-3:]
     edge, top = math.sin(beta), case.gap + 2.0 * math.sin(0.5 * beta) ** 2
     floor = edge - length * float(np.cos(_surface(case, state)[0]) @ weights)

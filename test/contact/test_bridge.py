@@ -151,6 +151,22 @@ def test_any_bridge_against_shooting(theta, plane, beta, gap, same):
         check_by_shooting(found, theta, plane)
 
 
+@pytest.mark.parametrize('theta', [1, 15, 35, 50, 60, 75, 89])
+@pytest.mark.parametrize('gap', [0.0, 0.1])
+def test_exactly_flat_or_even_is_between_its_neighbours(theta, gap):
+    """Where the inclinations of both ends are the same, or their sines, formulas break down."""
+    for beta, plane in ((180 - 2 * theta, theta), (23, theta + 23), (140 - theta, 40)):
+        angle, filling, other = degrees(theta, beta, plane)
+        found = [
+            bridge(1.0, 1.0, angle, filling + change, separation=gap, plane_angle=other)
+            for change in (-1e-6, 0.0, 1e-6)
+        ]
+        for name in ('force', 'pressure', 'volume', 'floor_radius'):
+            low, middle, high = (getattr(each, name) for each in found)
+            assert middle == pytest.approx(0.5 * (low + high), rel=1e-7, abs=1e-8)
+        assert {each.status for each in found} == {found[0].status}
+
+
 def test_cylinder():
     theta, plane, beta = degrees(60, 90, 30)
     for method in ('young_laplace', 'circle'):
