@@ -504,7 +504,8 @@ def draw_maps(maps: list[FailureMap]) -> Figure:
     """Return the picture of where each method is right, wrong, or silent."""
     figure = Figure(figsize=(9.6, 7.0), layout='constrained')
     colours = ListedColormap([colour for _, colour in _MEANING.values()])
-    grid = figure.subplots(2, len(maps) // 2, sharex=True, sharey=True)
+    above, below = figure.subfigures(2, 1, height_ratios=[12, 1])
+    grid = above.subplots(2, len(maps) // 2, sharex=True, sharey=True)
     panels = grid.ravel()
     edge = PAD.stiffness / PAD.radius
     pressures = np.linspace(2e3, 91.3e3, 200)
@@ -528,5 +529,5 @@ def draw_maps(maps: list[FailureMap]) -> Figure:
     handles = [
         Patch(facecolor=colour, edgecolor=PALE, label=text) for text, colour in _MEANING.values()
     ]
-    figure.legend(handles=handles, loc='outside lower center', ncols=3, frameon=False)
+    below.legend(handles=handles, loc='center', ncol=3, frameon=False)
     return figure
