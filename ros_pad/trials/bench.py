@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_pad.contact.calibrate import stiffness_of
 from ros_pad.contact.design import DESIGN_WATER
 from ros_pad.contact.design import rise_height
 from ros_pad.contact.dome import MODELS
@@ -210,7 +211,7 @@ def _inflation(scene: BenchScene, setup: InflationBench, measured: Measurements)
     pressures, heights = _free_points(scene, measured)
     model = inflate(pad, pressures)
     claimed = f'±{100.0 * setup.claimed_error:g} %'
-    stiffness = _stiffness(pad.radius, pressures, heights)
+    stiffness = stiffness_of(pad, pressures, heights)
     rows = [
         Row(15, quantity, unit, 'thesis', 'free', p, 0.0, own, found, said)
         for quantity, unit, modelled, measurement, said in (
@@ -282,12 +283,6 @@ def _inflation(scene: BenchScene, setup: InflationBench, measured: Measurements)
             Omission('errors of the microscope', None, 'the thesis codes one value a point'),
         ),
     )
-
-
-def _stiffness(radius: float, pressure: Array, height: Array) -> Array:
-    """Return the stiffness with which the free dome has this height (3.60 with F = 0)."""
-    stretch = 1.5 * np.hypot(1.0, height / radius) - 1.0
-    return pressure * _sphere(radius, height) / (2.0 * stretch)
 
 
 # --- press: figures 16 to 18 ---------------------------------------------------------------------
