@@ -13,10 +13,11 @@ from ros_pad.commands.command import add_command
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.ladders import contact
+from ros_pad.ladders import meniscus
 from ros_pad.ladders.ladder import machine
 from ros_pad.ladders.ladder import table
 
-LADDERS = {'contact': contact}
+LADDERS = {'contact': contact, 'meniscus': meniscus}
 
 
 def add(commands: Commands) -> None:

@@ -80,7 +80,7 @@ def bridge(
     filling_angle: npt.ArrayLike | None = None,
     volume: float | None = None,
     separation: npt.ArrayLike = 0.0,
-    method: str = 'young_laplace',
+    method: str = 'circle',
     gravity: float = 0.0,
     density: float = 1000.0,
     plane_angle: npt.ArrayLike | None = None,
@@ -103,9 +103,10 @@ def bridge(
         whose volume grows with it.
     separation : float
         Least distance between sphere and plane, m, from 0.
-    method : {'young_laplace', 'circle'}
-        Exact, or with a circular arc for a meridian (the toroidal approximation), whose pressure
-        and force are those of its narrowest section. The circle takes arrays for angles and
+    method : {'circle', 'young_laplace'}
+        With a circular arc for a meridian (the toroidal approximation), whose pressure and force
+        are those of its narrowest section, or exact. The circle is 1 % off in the median, above
+        10 % where a bridge is wide, flat or near rupture. It takes arrays for angles and
         separation, with a filling angle; all else is for scalars.
     gravity : float
         m/s², from 0, towards the plane. Above 0 for ``young_laplace`` alone.
@@ -124,7 +125,7 @@ def bridge(
 
     Examples
     --------
-    >>> round(1e6 * bridge(1e-3, 0.073, 0.0, filling_angle=0.1).force, 1)
+    >>> round(1e6 * bridge(1e-3, 0.073, 0.0, filling_angle=0.1, method='young_laplace').force, 1)
     899.0
     """
     size = number('radius', radius, 'm', above=True)
@@ -136,7 +137,10 @@ def bridge(
     if plane_angle is None:
         plane_angle = contact_angle
     if method == 'circle' and weight > 0.0:
-        raise InvalidInput(f'gravity = {gravity:g} m/s² is not allowed: a circle has 0')
+        raise InvalidInput(
+            f"gravity = {gravity:g} m/s² is not allowed with method 'circle', which has none: "
+            "method='young_laplace' is needed"
+        )
 
     check: Callable[..., Any] = number
     if method == 'circle' and volume is None:

@@ -228,7 +228,8 @@ def _circle(theta: Array, beta: Array, gap: Array) -> Array:
 def _exact(gravity: float) -> Callable[[float, float, float], float]:
     def solve(theta: float, beta: float, gap: float) -> float:
         known: dict[str, Any] = {'separation': gap, 'gravity': gravity, 'density': _DENSITY}
-        return float(bridge(RADIUS, _TENSION, theta, filling_angle=beta, **known).force)
+        known |= {'filling_angle': beta, 'method': 'young_laplace'}
+        return float(bridge(RADIUS, _TENSION, theta, **known).force)
 
     return solve
 

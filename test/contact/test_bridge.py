@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
+import functools
 import json
 import math
 import pathlib
@@ -12,9 +13,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from ros_pad.contact.bridge import bridge
+from ros_pad.contact.bridge import bridge as any_bridge
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoBridge
+
+bridge = functools.partial(any_bridge, method='young_laplace')
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'sphere_plane_bridge.json'
 ROWS = json.loads(REFERENCE.read_text())['rows']
@@ -380,6 +383,12 @@ def test_circle_takes_arrays():
         for name, value in vars(one).items():
             if name != 'status':
                 assert getattr(many, name)[i, j] == pytest.approx(value, rel=1e-12)
+
+
+def test_circle_is_the_default():
+    assert any_bridge(1.0, 1.0, 0.4, 0.5) == any_bridge(1.0, 1.0, 0.4, 0.5, method='circle')
+    with pytest.raises(InvalidInput, match="method='young_laplace' is needed"):
+        any_bridge(1.0, 1.0, 0.4, 0.5, gravity=9.81)
 
 
 def test_circle_comes_near_the_exact_bridge():
