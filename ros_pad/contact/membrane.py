@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-r"""Exact shape of an inflated pad pressed on a floor: a membrane of constant mean curvature.
+"""Exact shape of an inflated pad pressed on a floor: a membrane of constant mean curvature.
 
 The thesis presses a spherical cap (:mod:`ros_pad.contact.dome`). Here the wall takes whatever
 shape makes the thesis' own energy stationary, which is what its approximation is measured by.
@@ -12,9 +12,9 @@ potential is ``U(A) - P V + F d``, with volume V and gap d between pad base and 
    is the same everywhere, in the wall as in the disc.
 2. Moving the wall by n along its normal gives ``dA = ∫ 2H n``, ``dV = ∫ n``: ``2 H T = P``, so the
    mean curvature is constant; its radius is ``l = T/P``.
-3. Moving the edge of contact, radius b, along the floor gives ``T (1 - cos psi)`` per length: the
-   wall meets the floor at a tangent. That is the whole effect of the missing adhesion.
-4. Moving the floor and the disc by d gives ``F = pi b² P``: b is known before the shape, and it
+3. Moving the edge of contact, radius b, along the floor gives ``T (1 - cos psi) = 0`` per length:
+   the wall meets the floor at a tangent. There is **no adhesion**: it would open that angle.
+4. Moving the floor with the disc gives ``F = pi b² P``: b is known before the shape, and it
    is that of the thesis without adhesion (3.53).
 5. The balance of the wall between b and r along the axis is ``sin psi = (r² - b²)/(2 l r)``.
 
@@ -29,11 +29,12 @@ the height of the free dome where b = 0.
 
 How many roots there are is decided by ``Q(psi) = T/l`` at fixed b, which must be P. Up to 90° it
 rises: both sin psi and the area do, for a steeper wall is longer at every r. It goes on rising to
-its limit 6 if ``b² <= 0.7143``. For larger contacts it has a maximum and then a minimum, and all
-minima are above P = 5.1427, the cusp (137.1 kPa for the large pad). So below either bound there
-is **exactly one** shape, hence the one continuous with the free dome, and a change of sign is all
-the certificate it needs. Where both are exceeded the branch folds, and the answer depends on the
-history of the load.
+its limit 6 if ``b² <= 0.7143``; for larger contacts it has a maximum and then a minimum, and all
+minima are above P = 5.1427, the cusp (both found in dense scans). So below either bound there is
+**exactly one** shape, hence the one continuous with the free dome, and a change of sign is all
+the certificate it needs. Up to P = 5.14 (137 kPa for the large pad) the branch therefore ends
+nowhere but at the rim, ``F = p pi r²``. Where both bounds are exceeded it folds: there are up to
+three shapes, and which one is taken depends on the history of the load.
 """
 
 from __future__ import annotations
@@ -86,9 +87,9 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
     Returns
     -------
     Pressed
-        ``gap`` and ``contact_radius`` are those of the membrane. Its wall is no sphere: ``height``,
-        ``depth`` and ``sphere_radius`` are those of the spherical cap through rim and edge of
-        contact, as the thesis takes them from its measurements (its section 3.2.1).
+        ``gap`` and ``contact_radius`` are those of the membrane. Its wall is no sphere:
+        ``height``, ``depth`` and ``sphere_radius`` are those of the spherical cap through rim and
+        edge of contact, as the thesis takes them from its measurements (its section 3.2.1).
 
     Raises
     ------
@@ -106,25 +107,27 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
     Examples
     --------
     >>> round(press_membrane(LARGE_PAD, 75e3, 0.19).gap, 9)
-    7.55e-07
+    0.000755475
     """
     p, load = broadcast(quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N'))
     r, k = pad.radius, pad.stiffness
-    lengths, code = _press(
-        p.ravel() * (r / k),
-        load.ravel() / (math.pi * k * r),
-        (BURST * k / r - p.ravel()) * (r / k),
-    )
+    rows = p.ravel()
+    deficit = (BURST * k / r - rows) * (r / k)
+    lengths, code = _press(rows * (r / k), load.ravel() / (math.pi * k * r), deficit)
+    lengths *= r
     if p.ndim == 0:
+        status = str(STATUS[code[0]])
         if code[0] in _WHY:
-            raise NoEquilibrium(
-                f'pressure {p:g} Pa with force {load:g} N on {pad} {_WHY[int(code[0])]}',
-                str(STATUS[code[0]]),
-            )
-        return Pressed(*(r * lengths[:, 0]).tolist(), str(STATUS[code[0]]))
-    return Pressed(*(r * lengths).reshape(5, *p.shape), words(code.reshape(p.shape)))
+            what = f'pressure {p:g} Pa with force {load:g} N on {pad}'
+            raise NoEquilibrium(f'{what} {_WHY[int(code[0])]}', status)
+        height, depth, contact, sphere, gap = lengths[:, 0].tolist()
+        return Pressed(height, depth, contact, sphere, gap, status)
+    height, depth, contact, sphere, gap = lengths.reshape(5, *p.shape)
+    return Pressed(height, depth, contact, sphere, gap, words(code.reshape(p.shape)))
 
 
+# Only domes far lower than an atom overflow: they fail the certificate.
+@np.errstate(divide='ignore', invalid='ignore', over='ignore')
 def _press(pressure: Array, force: Array, deficit: Array) -> tuple[Array, npt.NDArray[np.int8]]:
     """Return height, depth, contact radius, sphere radius and gap as rows, and the status codes.
 
@@ -149,13 +152,14 @@ def _press(pressure: Array, force: Array, deficit: Array) -> tuple[Array, npt.ND
     p, f = pressure[rows], force[rows]
     share, rest = f / p, (p - f) / p
     t, certain = _rim(p, share, rest, deficit[rows])
-    code[rows[~certain]] = FOLD_ZONE  # the sign change is lost in rounding, as at a fold
-    gap = np.where(certain, _wall(t, share, rest)[2], np.nan)
-    # The cap through rim and edge of contact: its centre is ``below`` above the floor.
-    below = 0.5 * (gap + rest / gap)
-    sphere = np.sqrt(below * below + share)
-    depth = share / (sphere + below)
-    lengths[:, rows] = gap + depth, depth, np.sqrt(share), sphere, gap
+    code[rows[~certain]] = NO_INFLATION  # so near P = 6 that rounding hides the balance
+    gap = _wall(t, share, rest)[2]
+    # The cap through rim and edge of contact has its centre this far from the floor.
+    centre = 0.5 * (gap + rest / gap)
+    sphere = np.sqrt(centre * centre + share)
+    depth = share / (sphere + centre)
+    cap = gap + depth, depth, np.sqrt(share), sphere, gap
+    lengths[:, rows] = np.where(certain, cap, np.nan)
     return lengths, code
 
 
@@ -222,7 +226,7 @@ def _rim(pressure: Array, share: Array, rest: Array, deficit: Array) -> tuple[Ar
         across = np.where(changed, last, across[left])
         off_across = np.where(changed, off_last, weight * off_across[left])
         last, off_last = t, off
-    width = 1e-10 + 4e-15 / deficit
+    width = np.minimum(1e-10 + 4e-15 / deficit, 0.5)
     below = _residual(rim * (1.0 - width), pressure, share, rest)
     above = _residual(rim * (1.0 + width), pressure, share, rest)
     return rim, (below < 0.0) & (above > 0.0)

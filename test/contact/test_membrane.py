@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+import subprocess
+import sys
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from scipy.optimize import root
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import SMALL_PAD
+from ros_pad.contact import Pad
+from ros_pad.contact import inflate
+from ros_pad.contact import press
+from ros_pad.contact.membrane import press_membrane
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+
+LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
+UNIT = Pad(1.0, 1.0)  # pressure is then P, and force pi P times the share of the pad in contact
+APPENDIX_PI = math.pi / 3.1415
+
+# Pressure P and share, over the whole domain: one rectangle up to the cusp, one past it.
+states = st.tuples(st.floats(1e-3, 5.14), st.floats(1e-9, 0.999)) | st.tuples(
+    st.floats(5.14, 5.99), st.floats(1e-9, 0.7099)
+)
+
+
+def full(pad, pressure):
+    """Force at which the contact would span the pad."""
+    return math.pi * pad.radius**2 * pressure
+
+
+def exact_gap(pressure, share, digits=22):
+    """Gap over radius, by quadrature and bracketing in many digits.
+
+    Kenmotsu's parameter of the same surface: r² = l² + m² + 2 l m sin(a), arc length l a.
+    """
+    with mp.workdps(digits):
+        pressure, share = mp.mpf(pressure), mp.mpf(share)
+
+        def shape(psi):
+            inner = (1 - share) / (2 * mp.sin(psi))
+            outer = mp.sqrt(inner**2 + share)
+            start = -mp.asin(inner / outer)
+            end = mp.atan2(mp.sin(psi) - inner, mp.cos(psi))
+            end = end if end > start else end + 2 * mp.pi
+            points, step = [start], mp.sqrt(share) / (4 * inner)
+            while start + step < end:  # the integrands are sharp near the floor
+                points.append(start + step)
+                step *= 6
+            points.append(end)
+
+            def r(a):
+                return mp.sqrt(inner**2 + outer**2 + 2 * inner * outer * mp.sin(a))
+
+            area = share + 2 * inner * mp.quad(r, points)
+            gap = inner * mp.quad(lambda a: (inner + outer * mp.sin(a)) / r(a), points)
+            return (1.5 * mp.sqrt(area) - 1) / inner, gap
+
+        low, high = mp.mpf('1e-4') * pressure * (1 - share), mp.pi * (1 - mp.mpf('1e-4'))
+        psi = mp.findroot(
+            lambda psi: shape(psi)[0] / pressure - 1, (low, high), solver='anderson', tol=1e-40
+        )
+        return shape(psi)[1]
+
+
+def balanced(psi, share):
+    """P that each rim angle balances, and gap, by Gauss-Legendre on the same parameter."""
+    inner = (1 - share) / (2 * np.sin(psi))
+    outer = np.sqrt(inner**2 + share)
+    start = -np.arcsin(inner / outer)
+    end = np.arctan2(np.sin(psi) - inner, np.cos(psi))
+    end = np.where(end > start, end, end + 2 * np.pi)
+    node, weight = np.polynomial.legendre.leggauss(80)
+    sine = np.sin(start + (end - start) * (0.5 + 0.5 * node[:, None]))
+    r = np.sqrt(inner**2 + outer**2 + 2 * inner * outer * sine)
+    half = 0.5 * inner * (end - start)
+    area = share + 2 * half * (weight @ r)
+    return (1.5 * np.sqrt(area) - 1) / inner, half * (weight @ ((inner + outer * sine) / r))
+
+
+class TestAgainstOtherMethods:
+    @pytest.mark.parametrize(
+        ('force', 'gap'), [(0.08, 1.350e-3), (0.19, 0.756e-3), (0.285, 0.354e-3)]
+    )
+    def test_states_of_the_appendix(self, force, gap):
+        assert press_membrane(LARGE_PAD, 75e3, force).gap == pytest.approx(gap, abs=0.9e-6)
+        thesis = press(LARGE_PAD, 75e3, force, adhesion='none')
+        exact = press(LARGE_PAD, 75e3, force, model='membrane')
+        assert exact.contact_radius == pytest.approx(thesis.contact_radius, rel=1e-14)
+        assert exact == press_membrane(LARGE_PAD, 75e3, force)
+
+    @pytest.mark.parametrize(
+        ('pressure', 'share'),
+        [
+            (1e-4, 0.3),
+            (0.01, 0.999),
+            (1.0, 1e-9),
+            (1.0, 0.5),
+            (2.8125, 0.2),
+            (2.8125, 0.95),
+            (3.4, 0.99),
+            (4.5, 0.05),
+            (5.13, 0.714),
+            (5.13, 0.9),
+            (5.5, 0.7),
+            (5.9, 0.3),
+        ],
+    )
+    def test_gap_in_many_digits(self, pressure, share):
+        force = float(math.pi * pressure * share)
+        with mp.workdps(25):
+            share = mp.mpf(force) / mp.pi / pressure  # of the rounded force
+        exact = exact_gap(pressure, share)
+        pressed = press_membrane(UNIT, pressure, force)
+        assert abs(pressed.gap / exact - 1) < 1e-12
+        assert abs(pressed.contact_radius / mp.sqrt(share) - 1) < 1e-14
+
+    @pytest.mark.parametrize(('pressure', 'share'), [(0.5, 0.3), (2.8125, 0.2), (4.5, 0.5)])
+    def test_shape_makes_the_energy_stationary(self, pressure, share):
+        """No curvature, no tangent and no F = p pi b² put in: only the energy of the thesis.
+
+        The wall is any curve from the rim to the edge of contact, given by its distance from the
+        pad's centre over the angle; that curve, contact radius and gap are all free.
+        """
+        order = 22
+        node, weight = np.polynomial.legendre.leggauss(60)
+        x, weight = 0.5 + 0.5 * node, 0.5 * weight
+        hump = x * (1 - x)
+        basis = np.polynomial.chebyshev.chebvander(node, order)
+        slope = np.stack(
+            [np.polynomial.Chebyshev.basis(n).deriv()(node) for n in range(order + 1)], axis=1
+        )
+        bulge = hump[:, None] * basis
+        turn = 2 * hump[:, None] * slope + (1 - 2 * x)[:, None] * basis
+
+        def potential(shape):
+            b, gap, free = shape[0], shape[1], shape[2:]
+            sweep, far = np.arctan(gap / b), np.sqrt(b * b + gap * gap)
+            rho = 1 + (far - 1) * x + bulge @ free
+            r = rho * np.cos(sweep * x)
+            length = np.sqrt((far - 1 + turn @ free) ** 2 + (rho * sweep) ** 2)
+            area = 2 * np.pi * (weight @ (r * length)) + np.pi * b * b
+            volume = 2 * np.pi / 3 * sweep * (weight @ (rho**2 * r)) + np.pi / 3 * b * b * gap
+            energy = area * (np.sqrt(area / np.pi) - 1)
+            return energy - pressure * volume + np.pi * pressure * share * gap
+
+        def gradient(shape):
+            tilted = shape + 1e-30j * np.eye(shape.size)
+            return np.array([potential(row).imag * 1e30 for row in tilted])
+
+        guess = np.zeros(order + 3)
+        guess[:2] = 0.5, 0.6 * inflate(UNIT, pressure).height
+        found = root(gradient, guess, tol=1e-12).x
+        assert np.abs(gradient(found)).max() < 1e-7
+        pressed = press_membrane(UNIT, pressure, np.pi * pressure * share)
+        assert found[0] == pytest.approx(pressed.contact_radius, rel=1e-6)
+        assert found[1] == pytest.approx(pressed.gap, rel=1e-6)
+
+    # How far the sphere of the thesis is off, per cent, at 65, 75 and 85 kPa.
+    @pytest.mark.parametrize(
+        ('share', 'least', 'most'),
+        [(0.05, 5.5, 7.0), (0.2, 16.5, 18.0), (0.4, 27.5, 36.5), (0.6, 38.5, 87.5)],
+    )
+    def test_gap_of_the_thesis_is_too_large(self, share, least, most):
+        p = np.array([65e3, 75e3, 85e3])
+        thesis = press(LARGE_PAD, p, share * full(LARGE_PAD, p), adhesion='none')
+        exact = press_membrane(LARGE_PAD, p, share * full(LARGE_PAD, p))
+        excess = (thesis.gap / exact.gap - 1) * 100
+        assert least < excess.min() and excess.max() < most
+
+
+class TestLimits:
+    @pytest.mark.parametrize('pressure', [1e-3, 10.0, 40e3, 75e3, 120e3, 159e3])
+    def test_no_force_is_the_free_dome(self, pressure):
+        free = inflate(LARGE_PAD, pressure)
+        apart = press_membrane(LARGE_PAD, pressure, 0)
+        assert apart.status == 'no_contact'
+        assert (apart.depth, apart.contact_radius) == (0.0, 0.0)
+        assert apart.height == apart.gap == pytest.approx(free.height, rel=1e-14)
+        assert apart.sphere_radius == pytest.approx(free.sphere_radius, rel=1e-14)
+        # A touch, for which another equation is solved, changes next to nothing.
+        touch = press_membrane(LARGE_PAD, pressure, 1e-15 * full(LARGE_PAD, pressure))
+        assert touch.status == 'ok'
+        for name in ('height', 'sphere_radius', 'gap'):
+            assert getattr(touch, name) == pytest.approx(getattr(apart, name), rel=1e-11)
+
+    def test_gentle_pressure_is_a_membrane_of_constant_tension(self):
+        # Small slopes at tension k/2: the height obeys z" + z'/r = -2P, so that
+        # gap = P (1 - b² + 2 b² ln b)/2.
+        share = np.array([1e-6, 0.01, 0.3, 0.9])
+        gap = press_membrane(UNIT, 1e-6, 1e-6 * np.pi * share).gap
+        np.testing.assert_allclose(gap, 1e-6 * (1 - share + share * np.log(share)) / 2, rtol=1e-11)
+
+    def test_nearly_flattened_the_wall_is_an_arc(self):
+        # The ring left is narrow and the tension k/2: an arc of radius 1/(2P).
+        pressure, rest = 2.8125, np.array([1e-4, 1e-6])
+        gap = press_membrane(UNIT, pressure, np.pi * pressure * (1 - rest)).gap
+        width = rest / 2
+        np.testing.assert_allclose(gap, width**2 * pressure, rtol=3e-4)
+
+    @settings(max_examples=150)
+    @given(states)
+    def test_there_is_one_root_and_it_is_the_one_returned(self, state):
+        pressure, share = state[0], max(state[1], 1e-3)  # fewer nodes cannot tell from a point
+        low = np.geomspace(1e-2, np.pi / 2, 700) * min(1.0, pressure * (1 - share))
+        psi = np.unique(np.concatenate((low, np.pi - np.geomspace(1e-4, np.pi / 2, 1000))))
+        balance, gap = balanced(psi, share)
+        assert balance[0] < pressure < balance[-1]
+        (before,) = np.flatnonzero((balance[:-1] < pressure) != (balance[1:] < pressure))
+        pressed = press_membrane(UNIT, pressure, math.pi * pressure * share)
+        assert gap[before] * (1 - 1e-6) < pressed.gap < gap[before + 1] * (1 + 1e-6)
+
+    @settings(max_examples=200)
+    @given(states, st.floats(1.001, 1.05))
+    def test_more_force_lowers_the_pad_and_more_pressure_lifts_it(self, state, factor):
+        pressure, share = state[0], max(state[1], 1e-6)  # less is lost in rounding
+        force = math.pi * pressure * share
+        pressed = press_membrane(UNIT, pressure, force)
+        lowered = press_membrane(UNIT, [pressure], force * factor)
+        lifted = press_membrane(UNIT, [pressure * factor], force)
+        if lowered.status[0] == 'ok':
+            assert lowered.gap[0] < pressed.gap
+            assert lowered.contact_radius[0] > pressed.contact_radius
+        if lifted.status[0] == 'ok':
+            assert lifted.gap[0] > pressed.gap
+            assert lifted.contact_radius[0] < pressed.contact_radius
+        assert lowered.status[0] in ('ok', 'fold_zone', 'flattened')
+        assert lifted.status[0] in ('ok', 'fold_zone', 'no_inflation')
+
+    @given(states, st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
+    def test_one_pad_is_every_pad(self, state, radius, stiffness):
+        pressure, share = state
+        force = math.pi * pressure * share
+        one = press_membrane(UNIT, pressure, force)
+        pad = Pad(radius, stiffness, adhesion_energy=1.0)  # which has no say
+        other = press_membrane(pad, pressure * stiffness / radius, force * stiffness * radius)
+        loss = 1e-12 / min(1 - share, (6 - pressure) ** 2)
+        for name in LENGTHS:
+            assert getattr(other, name) / radius == pytest.approx(getattr(one, name), rel=loss)
+
+    @given(states)
+    def test_cap_is_the_one_the_thesis_takes_from_measurements(self, state):
+        pressure, share = state
+        pressed = press_membrane(UNIT, pressure, math.pi * pressure * share)
+        b, d = pressed.contact_radius, pressed.gap
+        part = mp.mpf(1) - mp.mpf(b) ** 2 - mp.mpf(d) ** 2
+        height = (mp.sqrt(part**2 + 4 * mp.mpf(d) ** 2) - part) / (2 * mp.mpf(d))
+        assert pressed.height == pytest.approx(float(height), rel=1e-8)
+        assert pressed.height - pressed.depth == pytest.approx(d, abs=1e-14 * pressed.height)
+        assert pressed.sphere_radius == pytest.approx(float((1 + height**2) / (2 * height)), 1e-8)
+
+
+class TestInterface:
+    def test_statuses_at_the_edges(self):
+        # The cusp is at P = 5.1427 and a share of 0.7143, 137.14 kPa for the large pad.
+        cases = [
+            (0.0, 0.0, 'flattened'),  # a flat pad
+            (1.0, 0.0, 'no_contact'),
+            (75e3, 0.9999999, 'ok'),
+            (75e3, 1.0000001, 'flattened'),
+            (75e3, 3.0, 'flattened'),
+            (137.0e3, 0.9999, 'ok'),
+            (137.0e3, 1.0001, 'flattened'),
+            (137.2e3, 0.709, 'ok'),
+            (137.2e3, 0.715, 'fold_zone'),
+            (137.2e3, 1.5, 'fold_zone'),
+            (159.9e3, 0.0, 'no_contact'),
+            (159.9e3, 0.709, 'ok'),
+            (160e3, 0.0, 'no_inflation'),
+            (160e3, 0.5, 'no_inflation'),
+        ]
+        pressure, share, status = (np.array(column) for column in zip(*cases, strict=True))
+        force = share * full(LARGE_PAD, pressure)
+        together = press_membrane(LARGE_PAD, pressure, force)
+        assert together.status.tolist() == status.tolist()
+        there = np.isin(status, ('ok', 'no_contact'))
+        for name in LENGTHS:
+            assert (np.isfinite(getattr(together, name)) == there).all()
+        for p, load, expected in zip(pressure, force, status, strict=True):
+            if expected in ('ok', 'no_contact'):
+                assert press_membrane(LARGE_PAD, p, load).status == expected
+            else:
+                with pytest.raises(NoEquilibrium, match=r'Pa.*N') as caught:
+                    press_membrane(LARGE_PAD, p, load)
+                assert caught.value.status == expected
+
+    def test_past_the_cusp_there_are_three_shapes(self):
+        balance, _ = balanced(np.linspace(1e-3, np.pi - 1e-3, 20001), 0.727)
+        assert np.diff(balance < 5.2).sum() == 3
+        with pytest.raises(NoEquilibrium, match='history'):
+            press_membrane(UNIT, 5.2, math.pi * 5.2 * 0.727)
+
+    def test_arrays_broadcast_and_equal_scalars(self):
+        p, f = np.array([[40e3], [60e3], [75e3], [130e3]]), np.array([0.0, 1e-9, 0.01, 0.25])
+        together = press(LARGE_PAD, p, f, model='membrane')
+        for i in range(4):
+            for j in range(4):
+                alone = press(LARGE_PAD, p[i, 0], f[j], model='membrane')
+                assert together.status[i, j] == alone.status
+                for name in LENGTHS:
+                    value = getattr(together, name)
+                    assert value.shape == (4, 4)
+                    assert value[i, j] == pytest.approx(getattr(alone, name), rel=1e-13)
+        assert type(alone.gap) is float and type(alone.status) is str
+        assert press_membrane(LARGE_PAD, [], 0.1).gap.shape == (0,)
+
+    def test_small_pad_carries_its_area_share(self):
+        large = press_membrane(LARGE_PAD, 30e3, 0.09)
+        small = press_membrane(SMALL_PAD, 90e3, 0.03)
+        assert small.gap * 3 == pytest.approx(large.gap, rel=1e-13)
+
+    @settings(max_examples=300)
+    @given(st.floats(0, 200e3, allow_subnormal=False), st.floats(0, 2.0) | st.floats(1e-300, 1e-3))
+    def test_never_a_silent_nan(self, pressure, force):
+        pressed = press_membrane(LARGE_PAD, [pressure], force)
+        there = pressed.status[0] in ('ok', 'no_contact')
+        for name in ('height', 'depth', 'contact_radius', 'gap'):
+            assert np.isfinite(getattr(pressed, name)[0]) == there
+
+    @pytest.mark.parametrize('value', [-1e-9, math.nan, math.inf, 'x', None, [0.1, math.nan]])
+    def test_bad_numbers(self, value):
+        with pytest.raises(InvalidInput, match=r'force = .*N'):
+            press_membrane(LARGE_PAD, 75e3, value)
+        with pytest.raises(InvalidInput, match='pressure = '):
+            press_membrane(LARGE_PAD, value, 0.1)
+
+    def test_shapes_that_do_not_fit(self):
+        with pytest.raises(InvalidInput, match='broadcast'):
+            press_membrane(LARGE_PAD, [1e3, 2e3], [0.1, 0.1, 0.1])
+
+
+def test_import_needs_no_scipy():
+    code = 'import sys, ros_pad.contact.membrane; print("scipy" in sys.modules)'
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == 'False'
