@@ -101,8 +101,9 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
 
     Notes
     -----
-    ``P = p r/k`` and ``F/(p pi r²)`` decide all; lengths go with the radius. Gap and contact
-    radius are right to 1e-10, but for what the rounding of the pressure leaves near P = 6.
+    ``P = p r/k`` and ``F/(p pi r²)`` decide all; lengths go with the radius. The gap is right to
+    1e-12, but for what the rounding of the input leaves: 1e-16/(1 - F/(p pi r²)) near flattening
+    and 1e-15/(6 - P) near bursting.
 
     Examples
     --------
