@@ -159,8 +159,9 @@ def press(
     pad : Pad
         What the pad is made of.
     pressure : float or array
-        Gauge pressure, Pa, from 0. The model ends at ``P = p r/k`` of about 3.425 (91.3 kPa for
-        the large pad): beyond, the same force has several equilibria.
+        Gauge pressure, Pa, from 0. The thesis' model ends at ``P = p r/k`` of about 3.425
+        (91.3 kPa for the large pad): beyond, the same force has several equilibria. The membrane
+        has one up to 5.14, and for smaller forces up to bursting.
     force : float or array
         Normal force on this one pad, N, from 0. Broadcasts with the pressure.
     adhesion : {'matlab', 'text', 'none'}
@@ -187,12 +188,13 @@ def press(
     one that grows out of the free dome, the floor is above the pad base and the contact inside
     the rim.
     """
-    a = signed_adhesion(pad, adhesion)
     if model != 'thesis':
         choice('model', model, MODELS)
+        choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
         from ros_pad.contact.membrane import press_membrane
 
         return press_membrane(pad, pressure, force)
+    a = signed_adhesion(pad, adhesion)
     p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
     if isinstance(p, float) and isinstance(load, float):
         return _press_one(pad, float(p), float(load), a)

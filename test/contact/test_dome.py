@@ -406,6 +406,13 @@ class TestPressed:
         with pytest.raises(InvalidInput, match='pressure = '):
             press(LARGE_PAD, value, 0.1)
 
+    def test_the_membrane_needs_no_adhesion_in_range(self):
+        sticky = Pad(1.5e-3, 40.0, adhesion_energy=1.0)
+        plain = press(LARGE_PAD, 75e3, 0.19, model='membrane')
+        assert press(sticky, 75e3, 0.19, model='membrane') == plain
+        with pytest.raises(InvalidInput, match='adhesion'):
+            press(LARGE_PAD, 75e3, 0.19, adhesion='glue', model='membrane')
+
     def test_bad_words_and_shapes(self):
         with pytest.raises(InvalidInput, match='matlab, text, none'):
             press(LARGE_PAD, 75e3, 0.1, adhesion='both')
