@@ -26,7 +26,7 @@ ROSDEP_KEYS = {
     *('std_msgs', 'std_srvs', 'visualization_msgs'),
     *('mcap-ros2-support', 'python3-hypothesis', 'python3-matplotlib', 'python3-numpy'),
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
-    *('python3-serial', 'python3-tqdm', 'python3-yaml'),
+    *('python3-serial', 'python3-sympy', 'python3-tqdm', 'python3-yaml'),
 }
 
 

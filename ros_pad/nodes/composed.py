@@ -82,7 +82,7 @@ class ComposedTrial:
         rate = 1e9 / CONTROL_PERIOD_NS
         feet = {'legs': legs, 'foot': scene.foot.source}
         felt = feet | {'expected_load': scene.expected_load}
-        ground = {'scene': scene.source, 'foot': scene.foot.source, 'seed': seed}
+        ground = {'scene': scene.source, 'seed': seed}
 
         def add(kind: Callable[..., Any], **parameters: Any) -> Any:
             overrides = [Parameter(key, value=value) for key, value in parameters.items()]
@@ -123,7 +123,13 @@ class ComposedTrial:
                 **felt,
                 **(ground if policy == 'oracle' else {}),
             )
-            self.simulator = add(SimulatorNode, publish_clock=True, free_running=False, **ground)
+            self.simulator = add(
+                SimulatorNode,
+                foot=scene.foot.source,
+                publish_clock=True,
+                free_running=False,
+                **ground,
+            )
             # The executor takes in new nodes as it spins: messages that come before would be
             # handed over in another order.
             self._executor.spin_once(timeout_sec=0.01)
