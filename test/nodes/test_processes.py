@@ -4,6 +4,7 @@
 One walk of five seconds is shared by the tests of it. Its processes are always ended.
 """
 
+import gc
 import itertools
 import signal
 import subprocess
@@ -103,6 +104,8 @@ class Observer:
 def walk(tmp_path_factory):
     """Run the five processes, count for five seconds, then end them one by one."""
     bag = tmp_path_factory.mktemp('walk') / 'bag'
+    # Nodes of earlier tests that are still in this process would be peers of the walk's.
+    gc.collect()
     observer = Observer()
     processes = {}
     result = SimpleNamespace(bag=bag, errors={}, status={}, rates={}, longest={})
@@ -155,9 +158,12 @@ def walk(tmp_path_factory):
         ]:
             end(name, number)
     finally:
-        for process in processes.values():
+        for name, process in processes.items():
             process.kill()
-            process.wait()
+            if not process.stderr.closed:
+                # Shown by pytest if the walk did not get as far as this.
+                print(f'--- {name}', process.communicate()[1], sep='\n')
+        print('never heard:', *[name for name, times in observer.times.items() if not times])
         observer.close()
     return result
 
