@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import json
 import os
 import pathlib
-from contextlib import suppress
+from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.commands.bench import run_bench
@@ -30,6 +31,8 @@ from ros_pad.trials import label as labels
 from ros_pad.trials import loop
 from ros_pad.trials import report
 from ros_pad.trials.bag import annotate
+
+_DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
 
 def add(commands: Commands) -> None:
@@ -96,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
             f'stopped: the bag is complete, pad report {bag} makes its page', INTERRUPTED
         )
     finally:
-        with suppress(OSError):  # nothing came of it: the name stays free
+        with contextlib.suppress(OSError):  # nothing came of it: the name stays free
             folder.rmdir()
 
 
@@ -169,9 +172,6 @@ def _walk(scene: Scene, policy: str, seed: int, text: str) -> Trial:
 
 
 def _walk_on_nodes(scene: Scene, policy: str, seed: int, bag: pathlib.Path, live: bool) -> Trial:
-    if not live:
-        # One process talks to itself: no other node, and no real regulator, hears a set-point.
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'OFF'
     try:
         from ros_pad.nodes import composed
     except ModuleNotFoundError as error:
@@ -179,8 +179,25 @@ def _walk_on_nodes(scene: Scene, policy: str, seed: int, bag: pathlib.Path, live
             f'ROS 2 is not here ({error}): source it, or pip install "ros_pad[ros]",'
             ' or walk without it: --no-ros'
         ) from error
-    with bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress:
+    with (
+        contextlib.nullcontext() if live else _alone(),
+        bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
+    ):
         return composed.run(scene, policy, seed, bag=bag, progress=progress)
+
+
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """Let this process talk to itself alone: no real regulator hears its set-points."""
+    before = os.environ.get(_DISCOVERY)
+    os.environ[_DISCOVERY] = 'OFF'
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_DISCOVERY]
+        else:
+            os.environ[_DISCOVERY] = before
 
 
 def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from ros_pad import cli
 from ros_pad import trials
 from ros_pad.errors import BagError
 from ros_pad.errors import PadError
@@ -308,3 +309,18 @@ def test_it_runs_in_a_thread_too(tmp_path):
     thread.start()
     thread.join(timeout=30)
     assert found[0].metrics.duration_s == pytest.approx(scene_of('leg_wet_flat', 1).duration)
+
+
+def test_pad_run_hides_its_nodes_and_leaves_the_environment_alone(tmp_path, monkeypatch):
+    ranges = []
+
+    def look(*arguments, **keywords):
+        ranges.append(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])
+        raise PadError('enough seen')
+
+    monkeypatch.setattr(composed, 'run', look)
+    for number, live in enumerate([[], ['--live']]):
+        out = str(tmp_path / str(number))
+        assert cli.main(['run', 'leg_dry_flat', '--no-compare', '--out', out, *live]) == 1
+    assert ranges == ['OFF', 'LOCALHOST']
+    assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
