@@ -20,6 +20,7 @@ import math
 import os
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,41 @@ class Foot:
         """Area of the sole, m²."""
         return math.pi * self.sole_radius**2
 
+    def on_rough(self, roughness: float) -> Foot:
+        """Return this foot as it is on a floor with a texture of its own.
+
+        Parameters
+        ----------
+        roughness : float
+            Root mean square height of the texture under a foot, m, >= 0.
+
+        Returns
+        -------
+        Foot
+            With a critical film and a conforming pressure that are larger by the factor
+            √(1 + (roughness/critical_film)²). The critical film stands for the roughness of pad
+            and smooth floor; heights of floor and pad are taken to be independent, Gaussian and
+            of one wavelength. Then what a film must cover is their composite, as in the
+            film-thickness ratio of mixed lubrication (Tallian 1967), and the mean slope, hence the
+            pressure at which soft rubber touches everywhere (Persson 2001), grows by the same.
+            That valleys hold liquid is left out.
+
+        Raises
+        ------
+        InvalidInput
+            When the roughness is negative or not finite.
+        """
+        number('roughness', roughness, 'm')
+        if not roughness:
+            return self
+        composite = math.hypot(self.critical_film, roughness)
+        rougher = composite / self.critical_film
+        return replace(
+            self,
+            critical_film=composite,
+            conforming_pressure=rougher * self.conforming_pressure,
+        )
+
     def air_volume(self, pressure: float) -> float:
         """Air that pads and chamber hold at a gauge pressure, Pa: m³ (free domes)."""
         domes = self.pads * float(inflate(self.pad, pressure).volume) if pressure > 0.0 else 0.0
@@ -207,7 +243,8 @@ class Foot:
         """Resistance in newtons for a given share of the load: the kernel, scalars only."""
         total = under_domes = 0.0
         if dome_load > 0.0:
-            under_domes = dome_load / pressure
+            # Where the air presses less than it takes to conform, only a share touches.
+            under_domes = dome_load / max(pressure, self.conforming_pressure)
             dry = self.friction * dome_load + self.shear_strength * under_domes
             total += self._on_film(dry, dome_load, dome_film)
         if sole_load > 0.0:

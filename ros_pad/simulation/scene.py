@@ -13,6 +13,7 @@ from ros_pad.configuration import Table
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.terrain import FLOORS
 from ros_pad.simulation.terrain import Floor
@@ -33,12 +34,20 @@ class HexapodBody:
         Of the centre of mass above the floor, m.
     homes : tuple of (float, float)
         Where feet 1 to 6 stand in the body, fore and left, m.
+    coxa, femur, tibia : float
+        Lengths of a leg's links, m; for a robot with joints. Lynxmotion CH3-R unless told.
+    leg_stiffness : float
+        Of a leg and its foot, vertical, N/m: how much more a foot carries on higher ground.
     """
 
     mass: float
     inertia: float
     height: float
     homes: tuple[tuple[float, float], ...]
+    coxa: float = 0.029
+    femur: float = 0.057
+    tibia: float = 0.141
+    leg_stiffness: float = 3000.0
 
 
 @dataclass(frozen=True)
@@ -140,13 +149,24 @@ class FloorPlan:
     Attributes
     ----------
     kind : str
-        ``dry``, ``wet`` or ``patches``.
+        ``dry``, ``wet``, ``patches`` or ``drawn``.
     film_thickness : float
         Depth of the liquid where it is wet, m.
     viscosity : float
         Of the liquid, Pa s.
     wet_fraction, patch_length : float
         Share of wet floor, and mean length of a wet patch, m; patches only.
+    drawing : tuple of str
+        Rows of ``#`` (wet) and ``.`` (dry), see :meth:`Floor.drawn`; drawn only.
+    cell : float
+        Edge of what a character of the drawing covers, m; drawn only.
+    slope : float
+        Rise of the floor along +x, rad.
+    roughness : float
+        Root mean square height of the floor's texture under a foot, m, see
+        :meth:`ros_pad.contact.Foot.on_rough`.
+    unevenness : float
+        Root mean square of the heights on which feet stand, m, see :meth:`Floor.uneven`.
     """
 
     kind: str
@@ -154,12 +174,21 @@ class FloorPlan:
     viscosity: float
     wet_fraction: float = 0.0
     patch_length: float = 0.0
+    drawing: tuple[str, ...] = ()
+    cell: float = 0.0
+    slope: float = 0.0
+    roughness: float = 0.0
+    unevenness: float = 0.0
 
     def build(self, seed: int) -> Floor:
         """Return the floor for a seed."""
         if self.kind == 'patches':
-            return Floor.patches(self.wet_fraction, self.patch_length, self.film_thickness, seed)
-        return Floor.uniform(self.kind == 'wet', self.film_thickness)
+            floor = Floor.patches(self.wet_fraction, self.patch_length, self.film_thickness, seed)
+        elif self.kind == 'drawn':
+            floor = Floor.drawn(self.drawing, self.cell, self.film_thickness)
+        else:
+            floor = Floor.uniform(self.kind == 'wet', self.film_thickness)
+        return floor.uneven(self.unevenness, seed)
 
 
 @dataclass(frozen=True)
@@ -369,19 +398,36 @@ def _hexapod_body(part: Table) -> HexapodBody:
             (0.0, -middle_y),
             (corner_x, -corner_y),
         ),
+        coxa=part.number('coxa', 'm', 1e-3, 1.0, default=0.029),
+        femur=part.number('femur', 'm', 1e-3, 1.0, default=0.057),
+        tibia=part.number('tibia', 'm', 1e-3, 1.0, default=0.141),
+        leg_stiffness=part.number('leg_stiffness', 'N/m', 1.0, 1e7, default=3000.0),
     )
 
 
 def _floor_plan(part: Table) -> FloorPlan:
     kind = part.choice('kind', FLOORS)
-    wet_fraction = patch_length = 0.0
+    wet_fraction = patch_length = cell = 0.0
+    drawing: tuple[str, ...] = ()
     if kind == 'patches':
         wet_fraction = part.number('wet_fraction', '(share)', 0.01, 0.99)
         patch_length = part.number('patch_length', 'm', *patch_lengths(wet_fraction))
+    if kind == 'drawn':
+        drawing = tuple(part.text('drawing').split())
+        cell = part.number('cell', 'm', 1e-3, 10.0)
+        try:
+            Floor.drawn(drawing, cell, 0.0)
+        except InvalidInput as error:
+            raise ConfigError(f'{part.origin}: {error}') from error
     return FloorPlan(
         kind=kind,
         film_thickness=part.number('film_thickness', 'm', 1e-9, 0.01, default=3e-4),
         viscosity=part.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
         wet_fraction=wet_fraction,
         patch_length=patch_length,
+        drawing=drawing,
+        cell=cell,
+        slope=part.number('slope', 'rad', -0.5, 0.5, default=0.0),
+        roughness=part.number('roughness', 'm', 0.0, 1e-3, default=0.0),
+        unevenness=part.number('unevenness', 'm', 0.0, 0.02, default=0.0),
     )

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The floor: where it is wet, and how deep."""
+"""The floor: where it is wet, how deep, and how uneven."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
@@ -13,10 +15,14 @@ from scipy import special
 
 from ros_pad.errors import InvalidInput
 
-FLOORS = ('dry', 'wet', 'patches')
+FLOORS = ('dry', 'wet', 'patches', 'drawn')
 
 # Period of a patchy floor along x and y, and edge of its cells, m.
 LENGTH, WIDTH, CELL = 16.0, 8.0, 0.02
+
+# Heights of an uneven floor lose their likeness (to 1/e) over this distance, m: more than a foot,
+# less than a step.
+UNEVEN_LENGTH = 0.05
 
 
 def patch_lengths(wet_fraction: float) -> tuple[float, float]:
@@ -40,9 +46,19 @@ def _smoothing(wet_fraction: float, patch_length: float) -> float:
     return math.exp(-(level**2) / 2.0) / (2.0 * math.pi * math.sqrt(2.0) * rate)
 
 
+def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
+    """Return smoothed noise on the cells of a floor; ``smoothing`` in m."""
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
+    shape = (round(WIDTH / CELL), round(LENGTH / CELL))
+    noise = np.random.default_rng([seed, stream]).normal(size=shape)
+    smooth: np.ndarray = ndimage.gaussian_filter(noise, smoothing / CELL, mode='wrap')
+    return smooth
+
+
 @dataclass(frozen=True)
 class Floor:
-    """A level floor with a map of wet ground, repeated in both directions.
+    """A floor with a map of wet ground, and one of heights, repeated in both directions.
 
     Attributes
     ----------
@@ -54,12 +70,16 @@ class Floor:
         World position of the corner of cell [0, 0], m.
     film_thickness : float
         Depth of the liquid on wet ground, m.
+    heights : ndarray of float, (rows along y, columns along x), or None
+        Height of the ground where a foot may stand, m, about zero; None for an even floor. Its
+        cells have an edge of ``CELL``, its corner is at (-1 m, -WIDTH/2).
     """
 
     wet_map: np.ndarray
     cell: float
     origin: tuple[float, float]
     film_thickness: float
+    heights: np.ndarray | None = None
     _rows: list[list[bool]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -104,14 +124,70 @@ class Floor:
                 f'patch_length = {patch_length!r} m: with a wet fraction of {wet_fraction:g} the'
                 f' floor has room for {shortest:.3g} to {longest:.3g} m'
             )
-        if not isinstance(seed, int) or seed < 0:
-            raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
-        smoothing = _smoothing(wet_fraction, patch_length) / CELL
-        shape = (round(WIDTH / CELL), round(LENGTH / CELL))
-        noise = np.random.default_rng([seed, 1]).normal(size=shape)
-        height = ndimage.gaussian_filter(noise, smoothing, mode='wrap')
-        wet = height > np.quantile(height, 1.0 - wet_fraction)
+        level = _field(_smoothing(wet_fraction, patch_length), seed, 1)
+        wet = level > np.quantile(level, 1.0 - wet_fraction)
         return cls(wet, CELL, (-1.0, -WIDTH / 2.0), film_thickness)
+
+    @classmethod
+    def drawn(cls, drawing: Sequence[str], cell: float, film_thickness: float) -> Floor:
+        """Return a floor that is wet where a drawing says so.
+
+        Parameters
+        ----------
+        drawing : sequence of str
+            Rows of equal length, from left (+y) to right of the robot; along a row goes +x, the
+            way the robot walks. ``#`` is wet, ``.`` is dry. The robot starts in the middle of the
+            first column, and the drawing begins again where it ends.
+        cell : float
+            Edge of what one character covers, m, > 0.
+        film_thickness : float
+            Depth of the liquid, m.
+
+        Raises
+        ------
+        InvalidInput
+            When rows differ in length or there are other characters, or no rows at all.
+        """
+        if not drawing or not drawing[0]:
+            raise InvalidInput('drawing is empty: rows of # (wet) and . (dry) are needed')
+        for number, row in enumerate(drawing, 1):
+            if len(row) != len(drawing[0]):
+                raise InvalidInput(
+                    f'drawing: row {number} has {len(row)} characters, the first {len(drawing[0])}'
+                )
+            if odd := set(row) - set('#.'):
+                raise InvalidInput(
+                    f'drawing: row {number} has {min(odd)!r}: # (wet) and . (dry) are known'
+                )
+        # Rows of the map go along +y, those of a drawing against it.
+        wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
+        return cls(wet, cell, (-cell / 2.0, -cell * len(drawing) / 2.0), film_thickness)
+
+    def uneven(self, unevenness: float, seed: int) -> Floor:
+        """Return this floor with random heights.
+
+        Parameters
+        ----------
+        unevenness : float
+            Root mean square of the heights, m, >= 0.
+        seed : int
+            Whole number from 0; the same seed gives the same heights.
+        """
+        if not unevenness:
+            return self
+        # Smoothing noise with a Gaussian of s.d. s makes it correlated as exp(-d²/4s²).
+        heights = _field(UNEVEN_LENGTH / 2.0, seed, 3)
+        heights -= heights.mean()
+        return replace(self, heights=heights * (unevenness / heights.std()))
+
+    def height(self, x: float, y: float) -> float:
+        """Height of the ground at a world position, m."""
+        heights = self.heights
+        if heights is None:
+            return 0.0
+        rows, columns = heights.shape
+        row, column = int((y + WIDTH / 2.0) // CELL) % rows, int((x + 1.0) // CELL) % columns
+        return float(heights[row, column])
 
     def wet(self, x: float, y: float) -> bool:
         """Whether there is liquid at a world position, m."""
