@@ -330,3 +330,39 @@ def test_a_foot_file_may_give_the_limit_of_its_pads(tmp_path):
     path.write_text(path.read_text().replace('slope: 1.0e-5', 'slope: -1.0'))
     with pytest.raises(ConfigError, match=r'own\.yaml.*slope'):
         Foot.load(path)
+
+
+# --- rough floors -----------------------------------------------------------------------------
+
+
+def test_a_smooth_floor_changes_nothing():
+    foot = Foot.load('large37')
+    assert foot.on_rough(0.0) is foot
+
+
+def test_a_rough_floor_by_hand():
+    """Critical film 0.5 µm on 1.2 µm: √(0.5² + 1.2²) = 1.3 µm, and 2.6 times the pressure."""
+    foot = Foot.load('large37')
+    rough = foot.on_rough(1.2e-6)
+    assert rough.critical_film == pytest.approx(1.3e-6)
+    # Dry flat: friction 0.35, and 4700 Pa on N/(2.6 · 10444 Pa).
+    held = tangential_resistance(rough, 6.8, 0.0)
+    assert held == pytest.approx(6.8 * (0.35 + 4700.0 / (2.6 * 10444.0)))
+    # Domes at 75 kPa still conform to the texture: as on a smooth floor.
+    assert tangential_resistance(rough, 6.8, 75e3) == tangential_resistance(foot, 6.8, 75e3)
+    # So rough that even they do not: at 100 µm, 200 times the pressure, 2.09 MPa.
+    coarse = foot.on_rough(100e-6)
+    expected = 6.8 * (0.35 + 4700.0 / (10444.0 * math.hypot(1.0, 200.0)))
+    assert tangential_resistance(coarse, 6.8, 75e3) == pytest.approx(expected)
+    assert tangential_resistance(coarse, 6.8, 0.0) == pytest.approx(expected)
+    # A film of 0.6 µm floats a foot on a smooth floor and not on a rough one.
+    share = math.exp(-((0.6 / 1.3) ** 2))
+    dry = 6.8 * (0.35 + 4700.0 / 75e3)
+    expected = share * dry + (1.0 - share) * 0.12 * 6.8
+    assert tangential_resistance(rough, 6.8, 75e3, 0.6e-6) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('value', [-1e-6, math.nan, math.inf])
+def test_bad_roughness(value):
+    with pytest.raises(InvalidInput, match='roughness'):
+        Foot.load('large37').on_rough(value)

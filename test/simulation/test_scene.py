@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
+import dataclasses
 import pathlib
 import re
 import shutil
@@ -102,6 +103,16 @@ BAD = [
     (HEXAPOD, 'floor.patch_length', 6.0, 'floor: patch_length = 6.0 is not allowed: a number'),
     (HEXAPOD, 'floor.film_thickness', 3, 'floor: film_thickness = 3 is not allowed'),
     (HEXAPOD, 'floor.viscosity', 0, 'floor: viscosity = 0 is not allowed'),
+    (
+        HEXAPOD,
+        'floor.slope',
+        0.6,
+        'floor: slope = 0.6 is not allowed: a number from -0.5 to 0.5 rad',
+    ),
+    (HEXAPOD, 'floor.roughness', -1e-6, 'floor: roughness = -1e-06 is not allowed'),
+    (HEXAPOD, 'floor.unevenness', 0.03, 'floor: unevenness = 0.03 is not allowed'),
+    (HEXAPOD, 'floor.drawing', '#', "floor: unknown key 'drawing'"),
+    (HEXAPOD, 'body.leg_stiffness', 0.0, 'body: leg_stiffness = 0.0 is not allowed'),
     (HEXAPOD, 'tow.friction_dry', ..., "tow: key 'friction_dry' is missing"),
     (HEXAPOD, 'tow.weight', float('inf'), 'tow: weight = inf is not allowed'),
     (HEXAPOD, 'sensors.rate', 5, 'sensors: rate = 5 is not allowed: a number from 50 to 1000 Hz'),
@@ -173,3 +184,43 @@ def test_floor_of_a_scene_depends_on_the_seed():
     plan = Scene.load('hexapod_patches').floor
     assert (plan.build(1).wet_map != plan.build(2).wet_map).any()
     assert plan.build(1).film_thickness == 3e-4
+
+
+def test_a_floor_can_be_drawn(tmp_path):
+    floor = {'kind': 'drawn', 'cell': 0.5, 'drawing': '..##\n.#..\n', 'slope': 0.05}
+    plan = Scene.load(written(tmp_path, HEXAPOD, ('floor', floor))).floor
+    assert plan.drawing == ('..##', '.#..')
+    assert plan.slope == 0.05
+    built = plan.build(0)
+    assert built.wet(1.0, 0.25) and built.wet(0.5, -0.25)
+    assert not built.wet(0.5, 0.25) and not built.wet(1.0, -0.25)
+
+
+@pytest.mark.parametrize(
+    'drawing, message',
+    [
+        ('#.\n#', 'floor: drawing: row 2 has 1 characters, the first 2'),
+        ('#x', "floor: drawing: row 1 has 'x'"),
+        ('', 'floor: drawing is empty'),
+        (3, 'floor: drawing = 3 is not allowed: text is needed'),
+    ],
+)
+def test_bad_drawings(tmp_path, drawing, message):
+    floor = {'kind': 'drawn', 'cell': 0.5, 'drawing': drawing}
+    file = written(tmp_path, HEXAPOD, ('floor', floor))
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        Scene.load(file)
+
+
+def test_rough_scenes_are_the_smooth_ones_on_a_rough_floor():
+    for name in ('dry_flat', 'wet_flat', 'wet_dome'):
+        smooth, rough = Scene.load(f'hexapod_smooth_{name}'), Scene.load(f'hexapod_rough_{name}')
+        assert rough.floor.roughness > 0.0 and rough.floor.unevenness > 0.0
+        level = dataclasses.replace(rough.floor, roughness=0.0, unevenness=0.0)
+        assert (
+            dataclasses.replace(
+                rough, floor=level, name=smooth.name, source=smooth.source,
+                description=smooth.description,
+            )
+            == smooth
+        )  # fmt: skip

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
+import re
 
 import numpy as np
 import pytest
@@ -130,3 +131,76 @@ def test_patch_lengths_that_no_floor_can_show(fraction):
 def test_bad_seed(seed):
     with pytest.raises(InvalidInput, match='seed'):
         Floor.patches(0.4, 1.0, FILM, seed)
+
+
+# --- drawn floors -----------------------------------------------------------------------------
+
+DRAWING = ('..#', '###')  # the left of the robot (+y) first
+
+
+def test_a_drawing_lies_as_the_robot_sees_it():
+    floor = Floor.drawn(DRAWING, 0.5, FILM)
+    # Columns are about x = 0, 0.5 and 1; rows about y = 0.25 and -0.25.
+    assert [floor.wet(x, 0.25) for x in (0.0, 0.5, 1.0)] == [False, False, True]
+    assert [floor.wet(x, -0.25) for x in (0.0, 0.5, 1.0)] == [True, True, True]
+    assert floor.depth(1.0, 0.25) == FILM
+    # It begins again where it ends.
+    assert not floor.wet(1.5, 0.25)
+    assert floor.wet(-0.5, 0.25)
+    assert floor.wet(0.0, 0.75) and not floor.wet(0.0, 1.25)
+
+
+@pytest.mark.parametrize(
+    'drawing, message',
+    [
+        ((), 'drawing is empty'),
+        (('',), 'drawing is empty'),
+        (('#.', '#'), 'row 2 has 1 characters, the first 2'),
+        (('#.', '#o'), "row 2 has 'o': # (wet) and . (dry) are known"),
+    ],
+)
+def test_bad_drawings(drawing, message):
+    with pytest.raises(InvalidInput, match=re.escape(message)):
+        Floor.drawn(drawing, 0.5, FILM)
+
+
+# --- heights ----------------------------------------------------------------------------------
+
+
+def test_an_even_floor_is_at_zero():
+    floor = Floor.uniform(True, FILM)
+    assert floor.uneven(0.0, 0) is floor
+    assert floor.height(0.3, -0.2) == 0.0
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+def test_heights_have_the_spread_and_the_reach_that_are_asked_for(seed):
+    heights = Floor.uniform(False, FILM).uneven(5e-4, seed).heights
+    assert heights.mean() == pytest.approx(0.0, abs=1e-12)
+    assert heights.std() == pytest.approx(5e-4)
+    # Correlation exp(-(d/0.05 m)²): 0.527 after two cells of 20 mm, 0.077 after four.
+    for axis, cells, expected in ((0, 2, 0.527), (1, 2, 0.527), (0, 4, 0.077), (1, 4, 0.077)):
+        likeness = (heights * np.roll(heights, cells, axis)).mean() / 25e-8
+        assert likeness == pytest.approx(expected, abs=0.02)
+    # As a normal distribution has it: 68.3 % within one standard deviation, 95.4 within two.
+    assert (np.abs(heights) < 5e-4).mean() == pytest.approx(0.683, abs=0.02)
+    assert (np.abs(heights) < 1e-3).mean() == pytest.approx(0.954, abs=0.02)
+
+
+def test_heights_are_the_seeds_own_and_leave_the_wet_map_alone():
+    floor = Floor.patches(0.45, 1.5, FILM, 4)
+    rough = floor.uneven(1e-3, 4)
+    assert (rough.wet_map == floor.wet_map).all()
+    assert rough.height(1.0, 1.0) == floor.uneven(1e-3, 4).height(1.0, 1.0)
+    assert rough.height(1.0, 1.0) != floor.uneven(1e-3, 5).height(1.0, 1.0)
+    # Wet places are neither high nor low: the two maps are drawn apart.
+    assert abs(np.corrcoef(rough.heights.ravel(), rough.wet_map.ravel())[0, 1]) < 0.05
+    with pytest.raises(InvalidInput, match='seed = -1'):
+        floor.uneven(1e-3, -1)
+
+
+def test_height_at_a_place_is_that_of_its_cell():
+    floor = Floor.uniform(False, FILM).uneven(1e-3, 0)
+    assert floor.height(-1.0 + 0.01, -4.0 + 0.01) == floor.heights[0, 0]
+    assert floor.height(0.51, 0.13) == floor.heights[206, 75]
+    assert floor.height(0.51 + 16.0, 0.13 - 8.0) == floor.height(0.51, 0.13)
