@@ -17,8 +17,10 @@ from typing import Any
 
 import mpmath
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
@@ -526,8 +528,15 @@ def draw_maps(maps: list[FailureMap]) -> Figure:
         panel.set_xlabel('gauge pressure, kPa')
     for panel in grid[:, 0]:
         panel.set_ylabel('force / (pressure × area of the pad)')
-    handles = [
-        Patch(facecolor=colour, edgecolor=PALE, label=text) for text, colour in _MEANING.values()
+    seen = np.unique(np.concatenate([np.unique(each.outcome) for each in maps]))
+    handles: list[Artist] = [
+        Patch(facecolor=colour, edgecolor=PALE, label=text)
+        for outcome, (text, colour) in _MEANING.items()
+        if outcome in seen
+    ]
+    handles += [
+        Line2D([], [], color='black', lw=0.8, label='contact reaches the rim'),
+        Line2D([], [], color='black', lw=0.8, ls=':', label='the dome model ends'),
     ]
     below.legend(handles=handles, loc='center', ncol=3, frameon=False)
     return figure

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -37,6 +38,11 @@ _REPEATS = 5
 # How a method says that it has no answer.
 _REFUSALS = (ArithmeticError, ValueError, RuntimeError, PadError)
 _FLOOR = 1e-17  # errors below are drawn here: a double has none smaller
+_CAPTION = (
+    'Disc: median error; whisker: worst of the answers that are no failures. An error of 0 is'
+    ' drawn at 1e-17. Green: ros_pad; blue: others; orange: others that are wrong without a'
+    ' warning.'
+)
 
 
 @dataclass(frozen=True)
@@ -262,11 +268,12 @@ def chart(rungs: Sequence[Rung]) -> Figure:
     """Return the log-log picture of time against error, a panel for each problem.
 
     A disc is the median error of a method, its whisker ends at the worst; the list below the panel
-    has the names, by rising time, and what failed.
+    has the names, by rising time, and what failed. The figure's last line says what is what.
     """
     problems = list(dict.fromkeys(rung.problem for rung in rungs))
-    figure = Figure(figsize=(5.2 * len(problems), 6.4), layout='constrained')
+    figure = Figure(figsize=(5.2 * len(problems), 6.6), layout='constrained')
     panels = figure.subplots(1, len(problems), squeeze=False)[0]
+    numbers = []
     for panel, name in zip(panels, problems, strict=True):
         part = sorted(
             (rung for rung in rungs if rung.problem == name), key=lambda rung: rung.us_per_solve
@@ -278,17 +285,9 @@ def chart(rungs: Sequence[Rung]) -> Figure:
             colour = GREEN if rung.ours else VERMILION if rung.wrong else BLUE
             low, high = max(rung.median_error, _FLOOR), max(rung.error, _FLOOR)
             panel.plot([rung.us_per_solve] * 2, [low, high], '-_', color=colour, lw=1.2, alpha=0.7)
-            disc = {'marker': 'o', 'color': colour, 'ms': 12, 'ls': '', 'mec': 'white'}
-            panel.plot(rung.us_per_solve, low, **disc, zorder=3 + number)
-            panel.annotate(
-                f'{number}',
-                (rung.us_per_solve, low),
-                ha='center',
-                va='center_baseline',
-                fontsize=8,
-                color='white',
-                zorder=3.5 + number,
-            )
+            disc = {'marker': 'o', 'color': colour, 'ms': 7, 'ls': '', 'mec': 'white'}
+            panel.plot(rung.us_per_solve, low, **disc, zorder=3)
+            numbers.append((panel, f'{number}', rung.us_per_solve, low, colour))
             said = f'{number}  {rung.method}'
             if rung.failures:
                 said += f': {rung.failures} of {rung.cases} fail'
@@ -305,4 +304,38 @@ def chart(rungs: Sequence[Rung]) -> Figure:
             fontsize=8.5,
             handletextpad=0.2,
         )
+    _write_numbers(figure, numbers)
+    figure.supxlabel(_CAPTION, fontsize=8.5)
     return figure
+
+
+def _write_numbers(figure: Figure, numbers: Sequence[tuple[Axes, str, float, float, str]]) -> None:
+    """Write each number beside its disc, where neither a disc nor another number stands."""
+    figure.draw_without_rendering()  # places are known only then
+    places = [panel.transData.transform((x, y)) for panel, _, x, y, _ in numbers]
+    points = figure.dpi / 72.0
+    taken = list(places)
+    for (panel, text, x, y, colour), place in zip(numbers, places, strict=True):
+        around = [
+            (reach * math.cos(angle), reach * math.sin(angle))
+            for reach in (9.0, 14.0, 20.0)
+            for angle in np.radians((-90.0, 0.0, 180.0, -45.0, -135.0, 45.0, 135.0))
+        ]
+
+        def room(shift: tuple[float, float], place: Array = place) -> float:
+            there = place + points * np.array(shift)
+            return min(math.dist(there, other) for other in taken)
+
+        shift = next((each for each in around if room(each) > 8.5 * points), max(around, key=room))
+        taken.append(place + points * np.array(shift))
+        panel.annotate(
+            text,
+            (x, y),
+            xytext=shift,
+            textcoords='offset points',
+            ha='center',
+            va='center',
+            fontsize=8.5,
+            color=colour,
+            zorder=4,
+        )
