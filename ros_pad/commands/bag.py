@@ -17,9 +17,13 @@ from ros_pad.trials.bag import BagReader
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
     part = add_command(
-        commands, 'bag', run, 'Say what is in a bag.', 'pad bag info runs/first/bag'
+        commands,
+        'bag',
+        run,
+        'Say what is in a bag.',
+        'pad bag info runs/hexapod_patches_adaptive_seed0/bag',
     )
-    part.add_argument('action', choices=('info',))
+    part.add_argument('action', choices=('info',), help='topics, types, numbers of messages')
     part.add_argument('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag')
     part.add_argument('--json', action='store_true', help='print one JSON object')
 

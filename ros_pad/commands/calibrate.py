@@ -27,8 +27,8 @@ def add(commands: Commands) -> None:
         commands,
         'calibrate',
         run,
-        'Fit a foot to measured shapes and forces; write its YAML file and a picture of what is '
-        'left.',
+        'Fit a foot to measured shapes and forces; write its YAML file and a picture of the fit '
+        'and what it leaves.',
         'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml',
     )
     part.add_argument(

@@ -29,7 +29,11 @@ def add(commands: Commands) -> None:
         'Measure a ladder of methods here and now: time, error, failures; table, JSON, pictures.',
         'pad chart contact',
     )
-    part.add_argument('ladder', choices=(*LADDERS, 'all'))
+    part.add_argument(
+        'ladder',
+        choices=(*LADDERS, 'all'),
+        help='contact takes about 15 seconds, meniscus a minute and a half',
+    )
     part.add_argument(
         '--out',
         type=pathlib.Path,

@@ -22,6 +22,16 @@ _TITLES = {
     'force_limit_n': 'force limit, by criterion',
 }
 _UNITS = {'m': 'm', 'm3': 'm³', 'n': 'N'}
+_DESCRIPTION = """\
+Shape of a pad at a pressure, free or pressed, and its force limits.
+
+  height            of the sphere over the pad base, as if nothing were cut off
+  depth             what the floor cuts off that height
+  gap               from pad base to floor: height less depth
+  ring of liquid    balance of weight and surface tension for a pad that stands alone: no
+                    prediction (docs/errata.md), and it does not know how wide the gap is
+  tangential force  of one half of the ring, a bound: the other half pushes back
+  force limit       what one pad carries; measured is the line through measurements"""
 
 
 def add(commands: Commands) -> None:
@@ -33,8 +43,11 @@ def add(commands: Commands) -> None:
         'Shape of a pad at a pressure, free or pressed, and its force limits.',
         'pad contact --pressure 75000 --force 0.1',
     )
+    part.description = _DESCRIPTION
     part.add_argument('--pressure', type=float, required=True, metavar='PA', help='gauge, Pa')
-    part.add_argument('--force', type=float, default=0.0, metavar='N', help='on the pad, N')
+    part.add_argument(
+        '--force', type=float, default=0.0, metavar='N', help='on the pad, N (default 0)'
+    )
     which = part.add_mutually_exclusive_group()
     which.add_argument(
         '--pad',
@@ -53,7 +66,8 @@ def add(commands: Commands) -> None:
         '--model',
         choices=MODELS,
         default='thesis',
-        help='spherical dome (default), or the exact membrane, which is slower',
+        help='spherical dome (default), or the exact membrane, which is slower; the free dome and '
+        'the force limits are those of the spherical dome with both',
     )
     part.add_argument(
         '--liquid',

@@ -43,6 +43,7 @@ def add(commands: Commands) -> None:
         'Pads on a sole: number, load, pressure, height of rise; corrected and as in the thesis.',
         'pad design --load 7 --foot large37 --figure design.png',
     )
+    part.description = f'{part.description}\nOne of --area, --sole-radius and --foot is needed.'
     part.add_argument('--load', type=float, required=True, metavar='N', help='on one foot, N')
     sole = part.add_mutually_exclusive_group()
     sole.add_argument('--area', type=float, metavar='M2', help='of the sole, m²')
@@ -69,7 +70,11 @@ def add(commands: Commands) -> None:
         help='shipped foot or .yaml file: gives sole, pad, number, ceiling and criterion '
         'where nothing else is said',
     )
-    part.add_argument('--figure', metavar='FILE', help='draw load and rise over the pad radius')
+    part.add_argument(
+        '--figure',
+        metavar='FILE',
+        help='draw load and rise over the pad radius: .png, .pdf or .svg',
+    )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
@@ -193,7 +198,8 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
         yield (
             f'All pads pressed flat at {each.ceiling:.0f} Pa would push with '
             f'{each.flat_force:.3g} N: {each.flat_force / (each.pads * each.pad_limit):.3g} times '
-            f'the limit {each.criterion}, and 3.92 takes that for what a foot carries.'
+            f'the limit {each.criterion}, and equation 3.92 of the thesis takes that for what a '
+            'foot carries.'
         )
 
 

@@ -19,7 +19,11 @@ from ros_pad.trials import report
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
     part = add_command(
-        commands, 'report', run, 'Write the HTML report of a bag.', 'pad report runs/first/bag'
+        commands,
+        'report',
+        run,
+        'Write the HTML report of a bag.',
+        'pad report runs/hexapod_patches_adaptive_seed0/bag --force',
     )
     part.add_argument('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag')
     part.add_argument(

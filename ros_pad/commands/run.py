@@ -49,10 +49,18 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--foot', help="a foot other than the scene's: a name in config/feet or a YAML file"
     )
-    part.add_argument('--policy', choices=POLICIES, help="default: the scene's own")
+    part.add_argument(
+        '--policy', choices=POLICIES, help="how shapes are chosen (default: the scene's own way)"
+    )
     part.add_argument('--seed', type=int, default=0, help='of floor and noise (default 0)')
     part.add_argument('--cycles', type=int, help="gait cycles (default: the scene's own)")
-    part.add_argument('--fidelity', choices=ladder.FIDELITIES, default='auto')
+    part.add_argument(
+        '--fidelity',
+        choices=ladder.FIDELITIES,
+        default='auto',
+        help='L0 is the leg on its rail, L1 the hexapod in the plane; auto (default) takes the one '
+        'that models the scene',
+    )
     part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
     part.add_argument(
         '--no-compare',
