@@ -58,8 +58,8 @@ def add(commands: Commands) -> None:
         '--fidelity',
         choices=ladder.FIDELITIES,
         default='auto',
-        help='L0 is the leg on its rail, L1 the hexapod in the plane; auto (default) takes the one '
-        'that models the scene',
+        help='L0 is the leg on its rail, L1 the hexapod in the plane; auto (default) takes the '
+        'one that models the scene',
     )
     part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
     part.add_argument(
