@@ -51,6 +51,8 @@ def _shape(calibration: Calibration, above: Axes, below: Axes) -> None:
     known = {constant.name: constant for constant in calibration.constants}
     pressure = np.linspace(0.0, 1.05 * float(free.pressure.max()), 300)
     k = known['stiffness']
+    label = f'model, k = {k.value:.4g} N/m'
+    above.plot(pressure / 1e3, 1e3 * _heights(pad, k.value, pressure), color=BLUE, label=label)
     if not math.isnan(k.low):
         above.fill_between(
             pressure / 1e3,
@@ -61,8 +63,6 @@ def _shape(calibration: Calibration, above: Axes, below: Axes) -> None:
             lw=0,
             label='its 95 % interval',
         )
-    label = f'model, k = {k.value:.4g} N/m'
-    above.plot(pressure / 1e3, 1e3 * _heights(pad, k.value, pressure), color=BLUE, label=label)
     if 'tension_at_rest' in known:
         rest, rise = known['tension_at_rest'].value, known['tension_stiffness'].value
         x = np.linspace(1e-3, 1.1 * float(free.height.max()) / pad.radius, 300)
@@ -121,7 +121,7 @@ def _limit(calibration: Calibration, above: Axes, below: Axes) -> None:
             wide / 1e3,
             np.maximum(0.0, line.force + line.slope * (wide - line.pressure)),
             color=BLUE,
-            label='line of the criterion measured',
+            label='fitted line (criterion measured)',
         )
         constants = {constant.name: constant for constant in calibration.constants}
         band = _band(constants['force_limit'], constants['force_limit_slope'], wide, line.pressure)
@@ -188,7 +188,7 @@ def _equal(panel: Axes, unit: str) -> None:
 
 def _residual_axes(panel: Axes, where: str) -> None:
     panel.axhline(0.0, color=PALE, lw=1, zorder=0)
-    panel.set(xlabel=where, ylabel='model over measured, %')
+    panel.set(xlabel=where, ylabel='model over measured − 1, %')
 
 
 def _heights(pad: Pad, stiffness: float, pressure: Array) -> Array:
