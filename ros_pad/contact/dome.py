@@ -307,33 +307,26 @@ def flattening_force(tension: Floats, a: float) -> Floats:
     return tension * (1.0 + x * x) - 2.0 * x
 
 
-class _Balance(NamedTuple):
-    """What a trial height says of the equilibrium.
-
-    Attributes
-    ----------
-    residual : of 3.58. It falls through zero at the equilibrium.
-    slope : of the residual over the height.
-    certificate : positive where the depth that balances this height is continuous with the free
-        dome.
-    spread : squared contact radius (3.53).
-    depth : what the floor cuts off (3.48).
-    """
-
-    residual: Floats
-    slope: Floats
-    certificate: Floats
-    spread: Floats
-    depth: Floats
-
-
 def _balance(
     x: Floats, tension: Floats, f: Floats, a: float, sqrt: Callable[[Floats], Floats]
-) -> _Balance:
-    """Return the balance at height x.
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return what a trial height x says of the equilibrium.
 
     Terms of order P are subtracted once, as ``P - f``, so that the residual keeps its digits near
     flattening.
+
+    Returns
+    -------
+    residual : float or array
+        Of 3.58. It falls through zero at the equilibrium.
+    slope : float or array
+        Of the residual over the height.
+    certificate : float or array
+        Positive where the depth that balances this height is continuous with the free dome.
+    spread : float or array
+        Squared contact radius (3.53).
+    depth : float or array
+        What the floor cuts off (3.48).
     """
     inverse = 1.0 / x
     rho = 0.5 * (x + inverse)
@@ -354,10 +347,12 @@ def _balance(
         - stretch * (x - depth * depth_slope)
     )
     certificate = tension * (wall - depth) + pull - depth * stretch
-    return _Balance(residual, slope, certificate, spread, depth)
+    return residual, slope, certificate, spread, depth
 
 
-def _settled(x: Floats, step: Floats, at: _Balance) -> Floats:
+def _settled(
+    x: Floats, step: Floats, slope: Floats, certificate: Floats, spread: Floats, depth: Floats
+) -> Floats:
     """Return whether a Newton step from x ends at the physical root, to the last digits.
 
     The step is so short that the next one would be a rounding error, and that the certificate
@@ -365,10 +360,10 @@ def _settled(x: Floats, step: Floats, at: _Balance) -> Floats:
     """
     return (
         (abs(step) <= 1e-7 * x)
-        & (at.slope < 0.0)
-        & (at.certificate > 1e-5)
-        & (at.spread <= 1.0 + 1e-9)
-        & (at.depth <= x * (1.0 + 1e-6))
+        & (slope < 0.0)
+        & (certificate > 1e-5)
+        & (spread <= 1.0 + 1e-9)
+        & (depth <= x * (1.0 + 1e-6))
     )
 
 
@@ -384,6 +379,21 @@ def _seed(tension: Floats, f: Floats) -> Floats:
 
 
 def _height_of_one(tension: float, f: float, a: float) -> float:
+    """Return the height in equilibrium; NaN where no root has the certificate."""
+    x = _seed(tension, f)
+    try:
+        for _ in range(4):  # nearly all settle in three
+            residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
+            step = -residual / slope
+            if _settled(x, step, slope, certificate, spread, depth):
+                return x + step
+            x += step
+    except (ValueError, ZeroDivisionError):
+        pass  # no sphere of this height has the contact
+    return _bracketed_height(tension, f, a)
+
+
+def _bracketed_height(tension: float, f: float, a: float) -> float:
     """Return the height in equilibrium; NaN where no root has the certificate.
 
     Safeguarded Newton. A trial height is too small where the residual is positive and the
@@ -396,14 +406,14 @@ def _height_of_one(tension: float, f: float, a: float) -> float:
     for _ in range(200):
         small, newton = False, math.nan
         try:
-            at = _balance(x, tension, f, a, math.sqrt)
+            residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
             # With the text's sign a second root lies left of the fold; there the residual rises.
-            small = at.certificate > 0.0 and (
-                at.residual > 0.0 or (a < 0.0 and at.slope > 0.0 and x * x < -a)
+            small = certificate > 0.0 and (
+                residual > 0.0 or (a < 0.0 and slope > 0.0 and x * x < -a)
             )
-            if at.slope < 0.0:
-                newton = x - at.residual / at.slope
-                if _settled(x, newton - x, at):
+            if slope < 0.0:
+                newton = x - residual / slope
+                if _settled(x, newton - x, slope, certificate, spread, depth):
                     return newton
         except (ValueError, ZeroDivisionError):
             pass  # no sphere of this height has the contact: too large
@@ -427,9 +437,9 @@ def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
     x, p, load = height, tension, f
     for steps in (3, 1, 1, 1):
         for _ in range(steps):
-            at = _balance(x, p, load, a, np.sqrt)
-            step = -at.residual / at.slope
-            settled = _settled(x, step, at)
+            residual, slope, *rest = _balance(x, p, load, a, np.sqrt)
+            step = -residual / slope
+            settled = _settled(x, step, slope, *rest)
             x = x + step
         height[active] = x
         left = np.flatnonzero(~settled)
@@ -437,7 +447,7 @@ def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
             return height
         active, x, p, load = active[left], x[left], p[left], load[left]
     for row in active.tolist():
-        height[row] = _height_of_one(float(tension[row]), float(f[row]), a)
+        height[row] = _bracketed_height(float(tension[row]), float(f[row]), a)
     return height
 
 
