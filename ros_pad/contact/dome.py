@@ -134,7 +134,8 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
         if deficit <= 0.0:
             _refuse(NO_INFLATION, pad, p)
         height = free_height(p * (pad.radius / pad.stiffness), deficit)
-        return Inflated(*_free_cap(pad.radius, height, height > 0.0), 'ok')
+        height, sphere, volume = _free_cap(pad.radius, height, height > 0.0)
+        return Inflated(height, sphere, volume, 'ok')
     rows = p.ravel()
     free = np.empty((3, rows.size))
     code = np.zeros(rows.size, dtype=np.int8)
@@ -259,7 +260,7 @@ def _tall_height(w: Floats, deficit: Floats) -> Floats:
 def _free_cap(r: float, height: Floats, inflated: bool) -> tuple[Floats, Floats, Floats]:
     """Return height, sphere radius and volume of a free dome in metres."""
     sphere = 0.5 * r * (height + 1.0 / height) if inflated else math.inf
-    return r * height, sphere, math.pi / 6.0 * r**3 * height * (3.0 + height * height)
+    return r * height, sphere, math.pi / 6.0 * r * r * r * height * (3.0 + height * height)
 
 
 def _inflate_rows(pad: Pad, p: Array) -> tuple[tuple[Array, ...], Codes]:
@@ -437,10 +438,11 @@ def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
     x, p, load = height, tension, f
     for steps in (3, 1, 1, 1):
         for _ in range(steps):
+            before = x
             residual, slope, *rest = _balance(x, p, load, a, np.sqrt)
             step = -residual / slope
-            settled = _settled(x, step, slope, *rest)
             x = x + step
+        settled = _settled(before, step, slope, *rest)
         height[active] = x
         left = np.flatnonzero(~settled)
         if not left.size:
