@@ -157,6 +157,26 @@ def test_contact_outside_the_model_says_so(capsys: pytest.CaptureFixture[str]):
     assert 'pressure' in capsys.readouterr().err
 
 
+def test_a_shape_is_shown_where_no_force_limit_is_known(capsys: pytest.CaptureFixture[str]):
+    above = ['contact', '--pressure', '100e3', '--force', '0.1', '--model', 'membrane']
+    assert cli.main(above) == 0
+    said = capsys.readouterr().out
+    assert said.count('not known above 91342 Pa') == 3
+    assert cli.main([*above, '--json']) == 0
+    limits = json.loads(capsys.readouterr().out)['force_limit_n']
+    assert limits == {'measured': None, 'max_depth': None, 'flattening': None}
+    # Nobody measured a small pad at this pressure, but its model goes on.
+    assert cli.main(['contact', '--pressure', '150e3', '--pad', 'small', '--json']) == 0
+    limits = json.loads(capsys.readouterr().out)['force_limit_n']
+    assert limits['measured'] is None
+    assert 0.0 < limits['max_depth'] < limits['flattening']
+
+
+def test_a_pad_that_sticks_flat_is_told_to_need_pressure(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['contact', '--pressure', '75', '--force', '0.1']) == 1
+    assert 'adhesion alone holds it' in capsys.readouterr().err
+
+
 def test_bag_that_is_not_there(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     assert cli.main(['bag', 'info', str(tmp_path / 'none')]) == 1
     assert 'no such bag' in capsys.readouterr().err

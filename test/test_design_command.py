@@ -8,6 +8,7 @@ import pathlib
 import pytest
 
 from ros_pad import cli
+from ros_pad import configuration
 
 
 def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
@@ -126,3 +127,21 @@ def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     missing = tmp_path / 'none' / 'design.svg'
     assert cli.main(['design', '--load', '7', '--area', '1e-3', '--figure', str(missing)]) == 1
     assert str(missing) in capsys.readouterr().err
+
+
+def test_pads_of_another_radius_carry_in_proportion_to_their_area(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    """A line of the pad's own, the thesis' one, must say what the thesis' one says."""
+    shipped = configuration.locate('feet', 'large37').read_text()
+    own = tmp_path / 'own.yaml'
+    line = '{force: 0.2833, pressure: 75.0e+3, slope: 1.25e-5}'
+    own.write_text(shipped.replace('pad:', f'pad:\n  measured_limit: {line}', 1))
+    for radius in ([], ['--radius', '0.0005']):
+        theirs = said(capsys, '--load', '7', '--foot', 'large37', *radius)
+        mine = said(capsys, '--load', '7', '--foot', str(own), *radius)
+        for a, b in zip(
+            theirs['designs'] + theirs['radii'], mine['designs'] + mine['radii'], strict=True
+        ):
+            for key in ('pads_needed', 'carried', 'reachable_load_n', 'pressure_pa'):
+                assert b[key] == (a[key] if a[key] is None else pytest.approx(a[key], rel=1e-9))

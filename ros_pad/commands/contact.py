@@ -13,6 +13,7 @@ from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.contact.dome import ADHESION_SIGNS
 from ros_pad.contact.dome import MODELS
+from ros_pad.contact.limits import largest_pressure
 from ros_pad.errors import NoEquilibrium
 
 _TITLES = {
@@ -121,12 +122,14 @@ def run(options: argparse.Namespace) -> int:
             }
         else:
             values['meniscus'] = {'status': 'no_contact'}
-        values['force_limit_n'] = {
-            criterion: contact.force_limit(pad, pressure, criterion)
-            for criterion in ('measured', 'max_depth', 'flattening')
-        }
     except NoEquilibrium as error:
         return complain(f'{error} (status {error.status})', 1)
+    # A shape may be known where a limit is not: the membrane goes on, measurements end.
+    ends = {each: largest_pressure(pad, each) for each in ('measured', 'max_depth', 'flattening')}
+    values['force_limit_n'] = {
+        criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
+        for criterion, end in ends.items()
+    }
     if options.json:
         print(json.dumps(values))
         return 0
@@ -135,7 +138,9 @@ def run(options: argparse.Namespace) -> int:
         print(title)
         for key, value in values[part].items():
             words, _, unit = key.rpartition('_') if part != 'force_limit_n' else (key, '', 'n')
-            if isinstance(value, str):
+            if value is None:
+                print(f'  {key:18} not known above {ends[key]:.6g} Pa')
+            elif isinstance(value, str):
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')

@@ -23,6 +23,7 @@ from ros_pad.contact import pressure_for
 from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
+from ros_pad.contact.limits import resized
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 
@@ -82,9 +83,10 @@ def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
     foot = None if options.foot is None else Foot.load(options.foot)
     pad = LARGE_PAD if foot is None else foot.pad
-    for name in ('radius', 'stiffness'):
-        if getattr(options, name) is not None:
-            pad = replace(pad, **{name: getattr(options, name)})
+    if options.stiffness is not None:
+        pad = replace(pad, stiffness=options.stiffness)
+    if options.radius is not None:
+        pad = resized(pad, options.radius)
     area = _area(options, foot)
     ceiling = CEILING if foot is None else foot.ceiling
     rules: dict[str, Any] = {
@@ -101,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
         # Only such pads as the sole has room for.
         return [
             [
-                design(options.load, area, replace(pad, radius=r), reading=reading, **rules)
+                design(options.load, area, resized(pad, r), reading=reading, **rules)
                 for r in radii
                 if area >= CELL['corrected'] * r * r
             ]

@@ -577,8 +577,13 @@ def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float =
         what += 'is needed'
     else:
         most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
-        what += f'spreads the contact over the whole pad: below {max(most, 0.0):.6g} N is needed'
-        what += ' (and, with the repulsion of the text, less)' if a < 0.0 else ''
+        if most <= 0.0:
+            what += (
+                'leaves the pad flat, for adhesion alone holds it there: more pressure is needed'
+            )
+        else:
+            what += f'spreads the contact over the whole pad: below {most:.6g} N is needed'
+            what += ' (and, with the repulsion of the text, less)' if a < 0.0 else ''
     raise NoEquilibrium(what, str(STATUS[code]))
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -179,6 +180,23 @@ def measured_line(pad: Pad) -> MeasuredLimit:
     return MeasuredLimit(
         THESIS_LIMIT.force * scale, THESIS_LIMIT.pressure, THESIS_LIMIT.slope * scale
     )
+
+
+def resized(pad: Pad, radius: float) -> Pad:
+    """Return a pad of another radius, m; what was measured of its force limit goes with its area.
+
+    Raises
+    ------
+    InvalidInput
+        When the radius is not a finite number above zero.
+    """
+    pad, old = replace(pad, radius=radius), pad
+    line = pad.measured_limit
+    if line is None:
+        return pad
+    scale = (radius / old.radius) ** 2
+    line = MeasuredLimit(line.force * scale, line.pressure, line.slope * scale)
+    return replace(pad, measured_limit=line)
 
 
 def _end_of_measurements(pad: Pad) -> float:
