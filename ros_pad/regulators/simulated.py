@@ -8,12 +8,16 @@ import math
 import random
 import time
 from collections.abc import Callable
+from collections.abc import Sequence
 from numbers import Real
 
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
 from ros_pad.regulators.protocol import Reading
 from ros_pad.regulators.protocol import permitted
+from ros_pad.simulation.faults import Fault
+from ros_pad.simulation.faults import condition
+from ros_pad.simulation.faults import parsed
 from ros_pad.simulation.pneumatics import Hose
 from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
@@ -49,11 +53,20 @@ class SimulatedRegulator:
         Standard deviation of a reading, Pa, 0 to 1e4. It never acts on the pneumatics.
     seed : int
         Of the noise.
+    faults : sequence of Fault or str
+        What this device suffers, whatever legs are named: faults, or texts as
+        :meth:`~ros_pad.simulation.faults.Fault.parse` reads them. Their times are those of the
+        clock, and are kept exactly.
 
     Raises
     ------
     InvalidInput
         When a value is outside its range, or the clock goes back while the regulator is open.
+    ConfigError
+        When a text is no fault.
+    TransportError
+        From every method but ``close`` while a fault of kind ``silence`` acts, as from a real
+        device that does not answer in time. The set-point stays then.
 
     Notes
     -----
@@ -82,6 +95,7 @@ class SimulatedRegulator:
         sensor_resolution: float = 10.0,
         sensor_noise: float = 0.0,
         seed: int = 0,
+        faults: Sequence[Fault | str] = (),
     ) -> None:
         model = RegulatorModel(
             natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit
@@ -103,7 +117,8 @@ class SimulatedRegulator:
         self._clock = clock
         self._ceiling = float(ceiling)
         hose = Hose(hose_diameter, hose_length, hose_conductance)
-        self._channel = PneumaticChannel(model, hose, pad_volume)
+        self._faults = parsed(faults)
+        self._channel = PneumaticChannel(model, hose, pad_volume, faults=self._faults)
         self._resolution = sensor_resolution
         self._noise = sensor_noise
         self._random = random.Random(seed)
@@ -124,17 +139,29 @@ class SimulatedRegulator:
         """Air drawn since the start, kg, up to the last internal step."""
         return self._channel.air_used
 
+    @property
+    def pad_pressure(self) -> float:
+        """True pressure in the pad now, gauge Pa, in steps of the sensor's resolution.
+
+        It is what a robot stands on, also where the device is silent or its sensor has drifted;
+        for a sound device without noise it is what :meth:`read` says.
+        """
+        return self._shown(self._present().pad_pressure)
+
     def open(self) -> None:
         """Start the clock. After ``close`` the air is found as it was left."""
         if not self._is_open:
+            now = self._clock()
+            self._listen(now)
             self._is_open = True
-            self._now = self._epoch = self._clock()
+            self._now = self._epoch = self._channel.time = now
             self._steps = 0
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Command a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``."""
         setpoint = permitted(gauge_pa, self._ceiling)
         rest = self._advance()
+        self._listen(self._now)
         if setpoint != self._channel.setpoint:
             self._channel.step(self._channel.setpoint, rest)
             self._channel.step(setpoint, 0.0)
@@ -143,18 +170,15 @@ class SimulatedRegulator:
 
     def read(self) -> Reading:
         """Return pad pressure and set-point at the present moment of the clock."""
-        rest = self._advance()
-        setpoint = self._channel.setpoint
-        pressure = self._channel.pad_pressure
-        if rest and not self._channel.settled:
-            pressure = copy.copy(self._channel).step(setpoint, rest)
+        channel = self._present()
+        self._listen(self._now)
+        pressure = channel.pad_pressure + self._drift()
         if self._noise:
             if self._now != self._disturbance_time:
                 self._disturbance_time = self._now
                 self._disturbance = self._random.gauss(0.0, self._noise)
             pressure += self._disturbance
-        shown = round(pressure / self._resolution) * self._resolution
-        return Reading(shown, setpoint, (), self._now)
+        return Reading(self._shown(pressure), channel.setpoint, (), self._now)
 
     def vent(self) -> None:
         """Command zero gauge pressure."""
@@ -165,6 +189,32 @@ class SimulatedRegulator:
         if self._is_open:
             self._channel.step(self._channel.setpoint, self._advance())
             self._is_open = False
+
+    def _shown(self, pressure: float) -> float:
+        return round(pressure / self._resolution) * self._resolution
+
+    def _drift(self) -> float:
+        """Return what the device's sensor reads too much now, Pa."""
+        acting = [each for each in self._faults if each.acts_at(self._now)]
+        return condition(acting, self._now, self._channel.regulator.full_scale).offset
+
+    def _listen(self, now: float) -> None:
+        """Raise what a driver raises when its device does not answer."""
+        for fault in self._faults:
+            if fault.kind == 'silence' and fault.acts_at(now):
+                raise TransportError(
+                    f'the simulated regulator does not answer (silence from {fault.start:g} s'
+                    f' to {fault.end:g} s)'
+                )
+
+    def _present(self) -> PneumaticChannel:
+        """Return the channel at the present moment of the clock: a copy between two steps."""
+        rest = self._advance()
+        if not rest:
+            return self._channel
+        channel = copy.copy(self._channel)
+        channel.step(channel.setpoint, rest)
+        return channel
 
     def _advance(self) -> float:
         """Do the internal steps up to now, and return the rest of time in s, below ``STEP``."""
@@ -179,8 +229,12 @@ class SimulatedRegulator:
         self._now = now
         elapsed = now - self._epoch
         steps = int(elapsed / STEP + _ROUNDING)
+        channel = self._channel
         while self._steps < steps:
-            self._channel.step(self._channel.setpoint, STEP)
-            self._steps = steps if self._channel.settled else self._steps + 1
+            count = 1
+            if channel.settled:
+                count = max(1, int(min(steps - self._steps, channel.quiet_time / STEP)))
+            channel.step(channel.setpoint, count * STEP)
+            self._steps += count
         rest = elapsed - steps * STEP
         return rest if rest > _ROUNDING * STEP else 0.0
