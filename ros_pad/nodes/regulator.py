@@ -37,6 +37,8 @@ from ros_pad.pace import Pace
 from ros_pad.regulators import BACKENDS
 from ros_pad.regulators import Regulator
 from ros_pad.regulators import create
+from ros_pad.simulation.faults import faults_of
+from ros_pad.simulation.faults import parsed
 
 PARAMETERS = (
     LEGS,
@@ -69,6 +71,7 @@ class _Channel:
         self.refusal = ''
         self.vented = True
         self.faults: tuple[str, ...] = ()
+        self.unread_ns: int | None = None  # when it last failed to answer
         self.pressure = 0.0
         self.setpoint = 0.0
 
@@ -136,7 +139,8 @@ class RegulatorNode(LifecycleNode):
         backend = self._values['backend']
         options: dict[str, Any] = {}
         if backend == 'simulated':
-            clock = self._last_tick if self._simulated_time else time.monotonic
+            started = time.monotonic()
+            clock = self._last_tick if self._simulated_time else lambda: time.monotonic() - started
             options = {'clock': clock, 'pad_volume': self._foot.air_volume}
         for name, parameter in self.get_parameters_by_prefix(BACKEND_OPTIONS).items():
             options[name] = parameter.value
@@ -147,7 +151,10 @@ class RegulatorNode(LifecycleNode):
                     f'parameter {BACKEND_OPTIONS}.ceiling = {options["ceiling"]!r} is not'
                     ' allowed: set the parameter ceiling'
                 )
+            faults = parsed(options.pop('faults', ()))
             for leg in self._values['legs']:
+                if faults:
+                    options['faults'] = faults_of(leg, faults)
                 regulator = create(backend, ceiling=self._values['ceiling'], **options)
                 regulator.open()
                 self.channels[leg] = _Channel(leg, regulator, self._pressure_publishers[leg])
@@ -295,6 +302,7 @@ class RegulatorNode(LifecycleNode):
             reading = channel.regulator.read()
         except PadError as error:
             channel.faults = (str(error),)
+            channel.unread_ns = now_ns
             self.get_logger().error(f'leg {channel.leg}: {error}', throttle_duration_sec=1.0)
             return
         channel.faults = reading.faults

@@ -14,6 +14,8 @@ from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.simulation.faults import Fault
+from ros_pad.simulation.faults import listed
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.terrain import FLOORS
 from ros_pad.simulation.terrain import Floor
@@ -223,6 +225,8 @@ class Scene:
         Gait cycles of a trial.
     accuracy : float
         Relative error of the distance that the scene tolerates.
+    faults : tuple of Fault
+        What regulators and hoses suffer, and when; see :mod:`ros_pad.simulation.faults`.
     """
 
     source: str
@@ -242,6 +246,7 @@ class Scene:
     settle: float
     cycles: int
     accuracy: float
+    faults: tuple[Fault, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -342,6 +347,10 @@ class Scene:
                 'hose_diameter': part.number('hose_diameter', 'm', 5e-4, 0.02),
                 'hose_length': part.number('hose_length', 'm', 0.01, 20.0),
             }
+            if 'hose_conductance' in part:
+                regulator['hose_conductance'] = part.number(
+                    'hose_conductance', 'm³/(s Pa)', 1e-12, 1e-5
+                )
         policy = table.choice('policy', ('flat', 'dome', 'adaptive', 'oracle'))
         pressure = None
         if 'dome_pressure' in table:
@@ -364,8 +373,16 @@ class Scene:
             settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
+            faults=listed(table),
         )
         table.finish()
+        for fault in scene.faults:
+            missing = sorted(set(fault.legs) - set(scene.legs))
+            if missing:
+                raise ConfigError(
+                    f'{table.origin}: faults: legs = {list(fault.legs)} is not allowed: '
+                    f'a {robot} has no leg {missing[0]}'
+                )
         return scene
 
 

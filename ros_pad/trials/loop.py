@@ -10,22 +10,27 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from ros_pad.control import MorphologyController
 from ros_pad.control import policy_named
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import TransportError
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.pace import Pace
-from ros_pad.regulators import Regulator
+from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
 from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import Sensors
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.trial import Trial
 
 CONTROL_PERIOD_NS = 20_000_000  # 50 Hz: what a regulator on a serial line manages
+
+COMMAND_TIMEOUT_NS = 500_000_000  # without a command for so long, the regulator node vents a pad
 
 Progress = Callable[[float], None]
 
@@ -40,16 +45,19 @@ def tuning_for(scene: Scene) -> Tuning:
     return Tuning(position_noise=scene.sensors.position, force_noise=scene.sensors.force)
 
 
-def simulated_regulator(scene: Scene, clock: Callable[[], float]) -> Regulator:
-    """Return the simulated regulator of one foot of a scene."""
+def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:
+    """Return the simulated regulator of one foot of a scene, with its faults."""
     foot = scene.foot
-    return create(
+    regulator = create(
         'simulated',
         clock=clock,
         ceiling=foot.ceiling,
         pad_volume=foot.air_volume,
+        faults=faults_of(leg, scene.faults),
         **scene.regulator,
     )
+    assert isinstance(regulator, SimulatedRegulator)
+    return regulator
 
 
 class ClosedLoop:
@@ -90,10 +98,13 @@ class ClosedLoop:
             fixed_pressure=scene.dome_pressure,
         )
         self._now = 0.0
-        self.regulators = [simulated_regulator(scene, self._clock) for _ in scene.legs]
+        self.regulators = [simulated_regulator(scene, leg, self._clock) for leg in scene.legs]
         for regulator in self.regulators:
             regulator.open()
-        self.pressures = [0.0] * len(scene.legs)
+        self.pressures = [0.0] * len(scene.legs)  # as reported last
+        self.pads = [0.0] * len(scene.legs)  # as they are
+        self._commanded = [0] * len(scene.legs)  # when each last took a command, ns
+        self._unheard: set[int] = set()  # whose last command was not taken
         self._legs = scene.legs
         self._pace = Pace(CONTROL_PERIOD_NS)
         self._stamp_ns = 0
@@ -106,10 +117,12 @@ class ClosedLoop:
 
         The robot moves; each foot is estimated with the pressure it last reported; at control
         steps the regulators report, the controller decides, and the regulators get its set-points.
+        A regulator that does not answer leaves its last report in force.
         """
         self._stamp_ns += self.period_ns
         now = self._now = self._stamp_ns * 1e-9
-        self.robot.step(self.pressures)
+        self._vent_unheard()
+        self.robot.step(self.pads)
         readings = self.sensors.read(self.robot)
         controller = self.controller
         due = self._pace.due(self._stamp_ns)
@@ -121,19 +134,40 @@ class ClosedLoop:
             )
         log.sample(now, self.robot.body, readings)
         if due:
-            self.pressures = [regulator.read().pressure for regulator in self.regulators]
+            for index, regulator in enumerate(self.regulators):
+                with suppress(TransportError):
+                    self.pressures[index] = regulator.read().pressure
+            self.pads = [regulator.pad_pressure for regulator in self.regulators]
             for index, leg in enumerate(self._legs):
                 force, position = readings[index]
                 setpoint = controller.update(
                     leg, force[2], estimates[index].wet_probability, position
                 )
-                self.regulators[index].set_pressure(setpoint)
+                self._command(index, setpoint)
             log.control(now, self.pressures, estimates, controller)
+
+    def _command(self, index: int, setpoint: float) -> None:
+        try:
+            self.regulators[index].set_pressure(setpoint)
+        except TransportError:
+            self._unheard.add(index)
+        else:
+            self._unheard.discard(index)
+            self._commanded[index] = self._stamp_ns
+
+    def _vent_unheard(self) -> None:
+        """Vent, as soon as they answer again, pads that took no command for too long."""
+        for index in sorted(self._unheard):
+            if self._stamp_ns - self._commanded[index] > COMMAND_TIMEOUT_NS:
+                with suppress(TransportError):
+                    self.regulators[index].vent()
+                    self._unheard.discard(index)
 
     def close(self) -> None:
         """Vent and close the regulators."""
         for regulator in self.regulators:
-            regulator.vent()
+            with suppress(TransportError):
+                regulator.vent()
             regulator.close()
 
 
