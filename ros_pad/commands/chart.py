@@ -14,10 +14,13 @@ from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.ladders import contact
 from ros_pad.ladders import meniscus
+from ros_pad.ladders import stability
 from ros_pad.ladders.ladder import machine
 from ros_pad.ladders.ladder import table
 
-LADDERS = {'contact': contact, 'meniscus': meniscus}
+LADDERS = {'contact': contact, 'meniscus': meniscus, 'stability': stability}
+# What is no ladder of time against error has a table of its own.
+TABLES = {'stability': stability.table}
 
 
 def add(commands: Commands) -> None:
@@ -66,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
             json.dumps({'machine': machine(), 'rows': rows}, indent=1) + '\n', encoding='utf-8'
         )
         if not options.json:
-            print(table(rungs))
+            print(TABLES.get(name, table)(rungs))
     if options.json:
         print(json.dumps(every))
     else:
