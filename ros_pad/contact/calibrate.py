@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import math
 import pathlib
 from collections.abc import Callable
@@ -50,6 +51,12 @@ _FRICTION = {
     'boundary_friction': ('(coefficient)', 0.1, 1e-4, 3.0),
     'critical_film': ('m', 3e-7, 1e-9, 1e-3),
     'film_exponent': ('(exponent)', 2.0, 0.1, 10.0),
+}
+# The ranges in which it may have what is fitted without bounds.
+_IN_FOOT = {
+    'stiffness': (1.0, 1e4),
+    'force_limit': (0.0, 1e3),
+    'force_limit_slope': (1e-9, 1.0),
 }
 
 
@@ -174,6 +181,8 @@ def calibrate(
             f'{measurements.source}: nothing can be fitted: stiffness needs a free or a pressed '
             'dome, the force limit two pressures, friction tangential forces'
         )
+    for constant in constants:
+        _fits_a_foot(measurements.source, constant)
     used_free = len(measurements.free.pressure) >= 1
     residuals = (
         *_shape_residuals(measurements, pad, used_free),
@@ -194,6 +203,16 @@ def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
         f' softer pads ends at {end:.6g} Pa'
     )
     return lowered
+
+
+def _fits_a_foot(source: str, constant: Constant) -> None:
+    least, most = _IN_FOOT.get(constant.name, (-math.inf, math.inf))
+    if constant.fitted and not least <= constant.value <= most:
+        raise InvalidInput(
+            f'{source}: {constant.name} comes out as {constant.value:.4g} {constant.unit}, which'
+            f' no foot may have: from {least:g} to {most:g} {constant.unit} is needed. Are the'
+            ' units right?'
+        )
 
 
 def _with(foot: Foot, **changes: float | Pad) -> Foot:
@@ -223,7 +242,8 @@ def foot_file(calibration: Calibration) -> str:
         f'# Calibrated by pad calibrate from {source}.',
         '# What was fitted has its 95 % interval; the rest is that of the foot it started from.',
         *(f'# {warning}' for warning in calibration.warnings),
-        f'description: {foot.source}, calibrated',
+        # Between quotes, for a path may hold what YAML takes for a mark of its own.
+        f'description: {json.dumps(foot.source + ", calibrated", ensure_ascii=False)}',
         '',
         'pad:',
         entry('radius', pad.radius, 'm', '  '),
@@ -282,7 +302,14 @@ def _stiffness(
     measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
 ) -> Pad:
     free, pressed = measurements.free, measurements.pressed
-    _tall_enough(measurements.source, 'height', free.height)
+    for name, values in (
+        ('height', free.height),
+        ('pressure of a free dome', free.pressure),
+        ('pressure of a pressed dome', pressed.pressure),
+        ('height of a pressed dome', pressed.height),
+        ('gap', pressed.gap),
+    ):
+        _tall_enough(measurements.source, name, values)
     if len(free.pressure):
         least = float(free.pressure.max()) * pad.radius / BURST
 

@@ -132,13 +132,13 @@ class Measurements:
         source = os.fspath(path)
         try:
             text = pathlib.Path(path).read_text(encoding='utf-8-sig')
-        except (OSError, UnicodeDecodeError) as error:
+            lines = [
+                (number, cells)
+                for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
+                if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith('#')
+            ]
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise ConfigError(f'{source}: cannot be read: {error}') from error
-        lines = [
-            (number, cells)
-            for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
-            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith('#')
-        ]
         if len(lines) < 2:
             raise ConfigError(f'{source}: a header and at least one row are needed')
         header = _header(f'{source}:{lines[0][0]}', lines[0][1])
@@ -186,12 +186,15 @@ def _header(where: str, cells: list[str]) -> list[tuple[str, float, float]]:
         if head == SURFACE:
             columns.append((SURFACE, 1.0, 1.0))
             continue
+        if re.search(rf'[;\t]\s*({_NAMES}|{SURFACE})', head):
+            raise ConfigError(f'{where}: commas are needed between columns, unlike in {head!r}')
         match = _HEAD.fullmatch(head)
         if match is None:
             known = ', '.join((*COLUMNS, SURFACE))
             raise ConfigError(f'{where}: column {head!r} is not known: {known}')
         name, *given = match.groups()
         unit = next((text.strip() for text in given if text is not None), '')
+        unit = unit.replace('\N{GREEK SMALL LETTER MU}', '\N{MICRO SIGN}')
         units = _UNITS[COLUMNS[name]]
         if unit not in units:
             raise ConfigError(

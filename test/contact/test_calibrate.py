@@ -288,3 +288,58 @@ def test_the_foot_file_is_the_calibrated_foot(tmp_path):
     assert foot.pad.stiffness == pytest.approx(found.foot.pad.stiffness, rel=1e-8)
     assert force_limit(foot.pad, 80e3) == pytest.approx(0.2833 + 5e3 * 1.25e-5, abs=1e-4)
     assert 'N/m, fitted: 36.8' in path.read_text()
+
+
+def text_of(tmp_path, text):
+    path = tmp_path / 'mine.csv'
+    path.write_text(text, encoding='utf-8')
+    return Measurements.read(path)
+
+
+@pytest.mark.parametrize(
+    ('text', 'complaint'),
+    [
+        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0 cannot'),
+        ('pressure [kPa],height [mm]\n0,1\n55,1.2\n', 'pressure of a free dome = 0 cannot'),
+        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0 cannot'),
+        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0 cannot'),
+        (
+            'pressure [kPa],force [N],height [mm]\n75,0.1,0\n',
+            'height of a pressed dome = 0 cannot',
+        ),
+    ],
+)
+def test_zeros_that_tell_nothing_are_refused(tmp_path, text, complaint):
+    with pytest.raises(InvalidInput, match=rf'mine\.csv: {complaint}'):
+        calibrate(text_of(tmp_path, text), FOOT)
+
+
+@pytest.mark.parametrize(
+    ('text', 'complaint'),
+    [
+        (
+            'pressure [kPa],height [mm]\n75,1e-6\n',
+            r'stiffness comes out as 8\.437e\+07 N/m.*from 1 to',
+        ),
+        (
+            'pressure [kPa],force_limit [N]\n75,0.3\n85,0.30000001\n',
+            r'force_limit_slope comes out as 1e-12 N/Pa.*from 1e-09 to 1 N/Pa is needed',
+        ),
+    ],
+)
+def test_constants_that_no_foot_file_may_hold_are_refused(tmp_path, text, complaint):
+    with pytest.raises(InvalidInput, match=complaint):
+        calibrate(text_of(tmp_path, text), FOOT)
+
+
+def test_the_start_foot_may_have_any_path(tmp_path):
+    start = tmp_path / 'pads: "soft" #2.yaml'
+    start.write_text(
+        (configuration.shared_folder() / 'feet' / 'large37.yaml').read_text(encoding='utf-8'),
+        encoding='utf-8',
+    )
+    found = calibrate(THESIS, Foot.load(start))
+    (tmp_path / 'mine.yaml').write_text(foot_file(found), encoding='utf-8')
+    assert Foot.load(tmp_path / 'mine.yaml').pad.stiffness == pytest.approx(
+        found.foot.pad.stiffness, rel=1e-8
+    )

@@ -76,6 +76,12 @@ def test_rows_of_every_kind_in_one_table(tmp_path):
     assert both.friction.stance_time[1] == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize('micro', ['u', '\N{MICRO SIGN}', '\N{GREEK SMALL LETTER MU}'])
+def test_micrometres_in_every_spelling(tmp_path, micro):
+    found = read(tmp_path, f'pressure [kPa],height [{micro}m]\n75,2000\n')
+    assert found.free.height == pytest.approx([2e-3])
+
+
 @pytest.mark.parametrize(
     ('text', 'complaint'),
     [
@@ -86,6 +92,12 @@ def test_rows_of_every_kind_in_one_table(tmp_path):
             r"mine\.csv:1: column 'pressure' needs its unit, as",
         ),
         ('pressure [mm],height [mm]\n1,1\n', 'one of kPa, Pa'),
+        ('pressure [kPa]; height [mm]\n55; 1,2\n', 'commas are needed between columns, unlike in'),
+        ('pressure [kPa]\theight [mm]\n55\t1\n', 'commas are needed between columns, unlike in'),
+        (
+            'pressure [kPa],height [mm]\n55,' + 200_000 * '1',
+            r'mine\.csv: cannot be read: field lar',
+        ),
         ('pressure [kPa],width [mm]\n1,1\n', r"column 'width \[mm\]' is not known: pressure, fo"),
         ('height [mm],height [m]\n1,1\n', 'column height is there twice'),
         ('pressure [kPa],height [mm]\n55,tall\n', r"mine\.csv:2: height = 'tall' is not a number"),
