@@ -232,8 +232,13 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
         f' {own.cycles:.0f} cycles, {trial.real_time_factor:.1f} times real time\n'
     )
-    print('policy      mm/cycle  against adaptive   slip path per foot   switches')
     rows = [{'policy': trial.policy, **own.as_dict()}, *trial.settings['comparison']]
+    for row in rows:
+        if row.get('goal_m') is not None:
+            seconds = row['time_to_goal_s']
+            after = 'not reached' if seconds is None else f'after {seconds:.1f} s'
+            print(f'{row["policy"]}: goal of {row["goal_m"]:g} m {after}')
+    print(f'policy      mm/cycle  against {trial.policy:8}   slip path per foot   switches')
     for row in rows:
         advance = row['distance_per_cycle_m']
         gain = (

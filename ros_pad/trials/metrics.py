@@ -7,6 +7,7 @@ import numpy as np
 
 from ros_pad.control import MorphologyController
 from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
@@ -20,6 +21,7 @@ def summarise(
     """Return the metrics of a trial from its series and from the robot that walked it."""
     x, y, heading = robot.body
     cycles = max(0.0, robot.time - scene.settle) / scene.gait.cycle
+    goal = scene.body.goal if isinstance(scene.body, RailBody) else None
     return Metrics(
         distance_m=x,
         duration_s=robot.time,
@@ -34,7 +36,25 @@ def summarise(
         wet_accuracy=wet_accuracy(trial, LOAD_GATE * scene.expected_load),
         verdict=robot.verdict,
         refusals=[f'leg {leg}: {why}' for leg, why in sorted(controller.refusals.items())],
+        goal_m=goal,
+        time_to_goal_s=None if goal is None else time_to(trial, goal, scene.settle),
     )
+
+
+def time_to(trial: Trial, way: float, start: float) -> float | None:
+    """Return how long after ``start``, s, the body was ``way`` metres ahead; None if it never was.
+
+    Between samples the body is taken to move evenly.
+    """
+    ahead = trial.body[:, 0]
+    there = np.flatnonzero(ahead >= way)
+    if not len(there):
+        return None
+    row = int(there[0])
+    if row == 0:
+        return 0.0
+    since = np.interp(way, ahead[row - 1 : row + 1], trial.time[row - 1 : row + 1])
+    return float(since) - start
 
 
 def stance_ends(trial: Trial, load_gate: float) -> list[np.ndarray]:

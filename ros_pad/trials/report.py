@@ -630,12 +630,21 @@ def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
 
 
+_GOAL = 'time to the goal'
+
+
+def _number_or_dash(value: float | None) -> str:
+    return '–' if value is None else f'{value:.1f}'
+
+
 # Of each metric: name, unit, what it means, and its number as text.
 _METRICS: tuple[tuple[str, str, str, Callable[[dict[str, Any]], str]], ...] = (
     ('advance per cycle', 'mm', 'Way of the body along x in a gait cycle.',
      lambda m: f'{1e3 * m["distance_per_cycle_m"]:.1f}'),
     ('distance', 'm', 'Way of the body along x.', lambda m: f'{m["distance_m"]:.2f}'),
     ('duration', 's', 'Time of the trial.', lambda m: f'{m["duration_s"]:.1f}'),
+    (_GOAL, 's', 'From the first step until the body was there.',
+     lambda m: _number_or_dash(m.get('time_to_goal_s'))),
     ('gait cycles', '', 'Cycles walked.', lambda m: f'{m["cycles"]:.1f}'),
     ('slip path', 'm', 'Way that a foot slid under load, mean of the feet.',
      lambda m: f'{_mean(m["slip_path_m"]):.2f}'),
@@ -685,6 +694,10 @@ def _result(view: _View) -> str:
             text += f'; {abs(gain):.0f} % {"further" if gain > 0.0 else "less far"} than {other}'
         text += f' ({1e3 * advance:.0f} mm)'
     text += '.'
+    if own.time_to_goal_s is not None:
+        text += f' It was at the goal of {own.goal_m:g} m after {own.time_to_goal_s:.1f} s.'
+    elif own.goal_m is not None:
+        text += f' It did not get to the goal of {own.goal_m:g} m.'
     if own.verdict:
         text += f' The walk is not valid: {own.verdict}.'
     return text
@@ -710,6 +723,8 @@ def _metrics_tables(view: _View) -> str:
     head = ['', 'unit', *(html.escape(name) for name in names), 'meaning']
     body = []
     for name, unit, meaning, number in _METRICS:
+        if name == _GOAL and view.trial.metrics and view.trial.metrics.goal_m is None:
+            continue
         values = [
             f'<b>{text}</b>' if row['policy'] == view.trial.policy else text
             for row in view.rows

@@ -43,6 +43,10 @@ class Metrics:
         Why the walk is not valid.
     refusals : list of str
         Why feet that should have been domes stayed flat at the end; empty when all went well.
+    goal_m : float or None
+        Way to the goal, on a rail that has one.
+    time_to_goal_s : float or None
+        From the first step until the body is there; None if it did not get there.
     """
 
     distance_m: float
@@ -58,6 +62,8 @@ class Metrics:
     wet_accuracy: float | None
     verdict: str | None
     refusals: list[str] = field(default_factory=list)
+    goal_m: float | None = None
+    time_to_goal_s: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

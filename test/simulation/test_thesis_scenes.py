@@ -22,11 +22,9 @@ SEEDS = (0, 1, 2)
 
 def time_to_goal(name: str, seed: int = 0) -> float:
     """Return the time, s, that the body needs to the end of the rail."""
-    scene = Scene.load(name)
-    trial = run(scene, seed=seed)
-    there = np.flatnonzero(trial.body[:, 0] >= scene.body.goal)
-    assert len(there), f'{name} did not reach {scene.body.goal} m'
-    return float(trial.time[there[0]]) - scene.settle
+    metrics = run(name, seed=seed).metrics
+    assert metrics.time_to_goal_s is not None, f'{name} did not reach {metrics.goal_m} m'
+    return metrics.time_to_goal_s
 
 
 @pytest.fixture(scope='module')

@@ -12,6 +12,7 @@ from ros_pad.trials import Trial
 from ros_pad.trials import run
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.metrics import summarise
+from ros_pad.trials.metrics import time_to
 from ros_pad.trials.metrics import wet_accuracy
 
 SCENE = Scene.load('hexapod_patches')
@@ -165,3 +166,21 @@ def test_wet_ground_below_the_feet_is_that_of_the_floor():
     assert trial.wet()[:, 0].tolist() == [True, True, True, False, False]
     with pytest.raises(ValueError, match='not known'):
         dataclasses.replace(trial, floor=None).wet()
+
+
+def test_time_to_a_goal_is_counted_from_the_first_step_and_between_samples():
+    trial = one_leg([0.9] * 5)
+    trial.time = np.array([0.0, 1.0, 2.0, 3.0])
+    trial.body = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.5, 0, 0], [0.4, 0, 0]])
+    assert time_to(trial, 0.2, 0.5) == pytest.approx(1.25 - 0.5)
+    assert time_to(trial, 0.5, 0.5) == pytest.approx(1.5)
+    assert time_to(trial, 0.6, 0.5) is None
+
+
+def test_only_a_rail_has_a_goal():
+    leg = run(dataclasses.replace(Scene.load('leg_dry_flat'), cycles=3)).metrics
+    assert leg.goal_m == 0.5
+    assert leg.time_to_goal_s is None  # three strokes of 50 mm
+    hexapod = run(dataclasses.replace(SCENE, cycles=1)).metrics
+    assert hexapod.goal_m is None
+    assert hexapod.time_to_goal_s is None
