@@ -106,7 +106,7 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
 def pressure_for(
     pad: Pad, force: npt.ArrayLike, criterion: str = 'measured', margin: npt.ArrayLike = 1.0
 ) -> Floats:
-    """Return the pressure whose force limit is ``margin * force``, Pa gauge.
+    """Return the least pressure whose force limit is ``margin * force``, Pa gauge.
 
     Parameters
     ----------
@@ -153,7 +153,8 @@ def pressure_for(
     load = np.where(carried, load, 0.0)
     if criterion == 'measured':
         line = measured_line(pad)
-        p = line.pressure + (load - line.force) / line.slope
+        # A line that starts above zero carries small forces without any pressure.
+        p = np.maximum(line.pressure + (load - line.force) / line.slope, 0.0)
     else:
         f = load / (math.pi * pad.stiffness * pad.radius)
         invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest

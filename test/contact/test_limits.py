@@ -10,6 +10,7 @@ from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import SMALL_PAD
 from ros_pad.contact import MeasuredLimit
 from ros_pad.contact import Pad
+from ros_pad.contact import design
 from ros_pad.contact import force_limit
 from ros_pad.contact import press
 from ros_pad.contact import pressure_for
@@ -134,6 +135,14 @@ def test_bad_words():
             function(LARGE_PAD, 0.1, 'strength')
     with pytest.raises(InvalidInput, match='broadcast'):
         pressure_for(LARGE_PAD, [0.1, 0.2], margin=[1.0, 2.0, 3.0])
+
+
+def test_a_line_that_starts_above_zero_asks_for_no_negative_pressure():
+    own = Pad(1.5e-3, 40.0, measured_limit=MeasuredLimit(force=0.2, pressure=50e3, slope=2e-6))
+    assert force_limit(own, 0.0) == pytest.approx(0.1)
+    assert pressure_for(own, 0.05) == 0.0
+    np.testing.assert_allclose(pressure_for(own, [0.0, 0.1, 0.2]), [0.0, 0.0, 50e3], atol=1e-9)
+    assert design(1.0, 1e-3, own).carried
 
 
 def test_a_pad_with_measurements_of_its_own():
