@@ -353,11 +353,13 @@ def design(
     else:
         choice('reading', reading, READINGS)
         most = math.floor(area / (math.pi * pad.radius**2))
-        if not isinstance(pads, int) or isinstance(pads, bool) or not 1 <= pads <= most:
+        whole = isinstance(pads, int | np.integer) and not isinstance(pads, bool)
+        if not whole or not 1 <= pads <= most:
             raise InvalidInput(
                 f'pads = {pads!r} is not allowed: a whole number from 1 to {most}, as many as '
                 f'lie beside one another on {area:g} m²'
             )
+        pads = int(pads)  # a number of NumPy's is no number to JSON
     try:
         pressure = pressure_for(pad, load / pads, criterion, margin)
     except NoEquilibrium:

@@ -143,6 +143,8 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
         raise InvalidInput(
             f'pressed = {pressed!r} is not allowed: the result of press() is needed'
         )
+    if not isinstance(liquid, Liquid):
+        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
     status = np.asarray(pressed.status)
     b, sphere = np.asarray(pressed.contact_radius), np.asarray(pressed.sphere_radius)
     touching = b > 0

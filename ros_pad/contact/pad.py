@@ -147,6 +147,11 @@ class Pad:
         number('radius', self.radius, 'm', above=True)
         number('stiffness', self.stiffness, 'N/m', above=True)
         number('adhesion_energy', self.adhesion_energy, 'J/m²')
+        if not isinstance(self.measured_limit, MeasuredLimit | None):
+            raise InvalidInput(
+                f'measured_limit = {self.measured_limit!r} is not allowed: a MeasuredLimit or None'
+                ' is needed'
+            )
 
     def __str__(self) -> str:
         return f'a pad of radius {self.radius:g} m and stiffness {self.stiffness:g} N/m'

@@ -295,3 +295,9 @@ def test_how_far_the_printed_force_is_from_what_was_measured():
     # And the design pressure is past the end of the pressed dome.
     with pytest.raises(NoEquilibrium):
         force_limit(LARGE_PAD, design_pressure(1.5e-3, 40.0), 'flattening')
+
+
+def test_pads_may_be_a_number_of_numpy():
+    sole = design(7.0, SOLE, pads=np.int64(37))
+    assert sole == design(7.0, SOLE, pads=37)
+    assert type(sole.pads) is int

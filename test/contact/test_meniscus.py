@@ -217,3 +217,8 @@ def test_bad_hysteresis(change, name):
     }
     with pytest.raises(InvalidInput, match=name):
         hysteresis_force(**{**good, **change})
+
+
+def test_a_liquid_is_needed():
+    with pytest.raises(InvalidInput, match="liquid = 'water' is not allowed"):
+        meniscus(press(LARGE_PAD, 75e3, 0.1), 'water')

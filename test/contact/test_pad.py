@@ -47,3 +47,8 @@ def test_only_adhesion_may_be_zero():
 def test_a_measured_limit_rises(values, name):
     with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed'):
         MeasuredLimit(*values)
+
+
+def test_a_measured_limit_is_one():
+    with pytest.raises(InvalidInput, match=r'measured_limit = 0\.3 is not allowed'):
+        Pad(1e-3, 40.0, measured_limit=0.3)
