@@ -299,7 +299,7 @@ class PneumaticChannel:
         self.outlet_pressure = 0.0
         self.pad_pressure = 0.0
         self.setpoint = 0.0
-        self.settled = True
+        self.settled = not faults  # one may be there from the beginning
         self._ambient = ambient
         self._faults = tuple(faults)
         self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
@@ -352,6 +352,7 @@ class PneumaticChannel:
     @time.setter
     def time(self, time: float) -> None:
         self._origin = time - self._time
+        self.settled = self.settled and not self._faults
 
     @property
     def quiet_time(self) -> float:
@@ -389,7 +390,7 @@ class PneumaticChannel:
                 h = min(dt, sound)
                 self._time += h
                 dt -= h
-                self.settled = h < sound
+                self.settled = sound - h > _INSTANT
                 continue
             h = dt if dt <= MAX_STEP else dt / math.ceil(dt / MAX_STEP)
             h = min(h, sound)
@@ -432,7 +433,9 @@ class PneumaticChannel:
         if h != self._transition_time:
             self._transition_time, self._transition = h, model.transition(h)
         ff, fr, rf, rr = self._transition
-        hardware = self._hardware(h) if self._faults else SOUND
+        # Steps end at the edges but for rounding: what acts at mid-step acts all the time.
+        now = self.time
+        hardware = self._hardware(now + 0.5 * h, now + h) if self._faults else SOUND
         # The loop is closed on what the sensor reads, but for an open exhaust.
         aim = self._reference - hardware.offset if self._reference else 0.0
         # A second-order system follows a ramp with a constant lag, and forgets the rest.
@@ -473,23 +476,27 @@ class PneumaticChannel:
 
         self._time += h
         if (
-            hardware.sound
-            and abs(self.pad_pressure - self._target) < _SETTLED
+            abs(self.pad_pressure - self._target) < _SETTLED
             and abs(outlet - self._target) < _SETTLED
             and abs(self._outlet_rate) < _SETTLED * model.natural_frequency
             and self._reference == self._target
             and not self._pending
+            and (not self._faults or self._sound_for_now())
         ):
             self.outlet_pressure = self._target
             self._outlet_rate = 0.0
             self._fill(self._target)
             self.settled = True
 
-    def _hardware(self, h: float) -> Condition:
-        """Return the state of the hardware at the end of a step that begins now."""
-        middle = self.time + 0.5 * h  # steps end at the edges but for rounding
-        acting = [each for each in self._faults if each.acts_at(middle)]
-        return condition(acting, self.time + h, self.regulator.full_scale)
+    def _hardware(self, during: float, time: float) -> Condition:
+        """Return what the faults that act at one time make of the hardware at another."""
+        acting = [each for each in self._faults if each.acts_at(during)]
+        return condition(acting, time, self.regulator.full_scale)
+
+    def _sound_for_now(self) -> bool:
+        """Whether no fault acts on the air, nor begins within the rounding of the clock."""
+        soon = self.time + 2.0 * _INSTANT
+        return self._hardware(soon, soon).sound
 
     def _relaxation(self, outlet: float, pad: float, leak: float) -> tuple[float, float]:
         """Return at what rate in 1/s the pad approaches what share of the outlet's pressure."""

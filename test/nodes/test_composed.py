@@ -21,6 +21,7 @@ from ros_pad.errors import BagError
 from ros_pad.errors import PadError
 from ros_pad.nodes import composed
 from ros_pad.nodes.composed import ComposedTrial
+from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.bag import BagWriter
@@ -89,6 +90,33 @@ def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves
     assert np.max(on_nodes.pressure) > 30e3
     assert sum(on_nodes.metrics.switches) >= moves
     assert on_nodes.metrics.distance_m > 0.0
+
+
+def test_faults_come_to_both_alike(tmp_path):
+    """Stuck, leaking, drifting and silent regulators, and a supply that goes for a while."""
+    texts = (
+        '{kind: silence, legs: [1], start: 1.51, end: 1.93}',  # shorter than the nodes wait
+        '{kind: silence, legs: [6], start: 0.053, end: 2.2}',  # longer, and in mid-filling
+        '{kind: leak, legs: [2], start: 1.0, conductance: 1.0e-9}',
+        '{kind: sensor_drift, legs: [3], start: 0.7, offset: -8.0e3, rise: 2.0}',
+        '{kind: stuck_valve, legs: [4], start: 0.05}',  # nothing vents this pad
+        '{kind: supply_loss, start: 3.0, end: 3.6, time_constant: 0.3}',
+    )
+    faults = tuple(Fault.parse(text) for text in texts)
+    scene = dataclasses.replace(scene_of('hexapod_patches', 4), faults=faults)
+    on_nodes = composed.run(scene, 'dome', seed=3, bag=tmp_path / 'bag')
+    without = trials.run(scene, 'dome', seed=3)
+    for series in SERIES:
+        one, other = getattr(on_nodes, series), getattr(without, series)
+        assert np.array_equal(one, other), series
+    assert on_nodes.metrics == without.metrics
+    sound = trials.run(scene_of('hexapod_patches', 4), 'dome', seed=3)
+    at = {round(time, 3): row for row, time in enumerate(sound.slow_time)}
+    assert on_nodes.pressure[at[2.16], 5] < 60e3 < sound.pressure[at[2.16], 5]  # as last heard
+    assert on_nodes.pressure[at[2.6], 5] > 70e3  # heard of again
+    assert np.ptp(on_nodes.pressure[at[0.5] : at[3.0], 3]) < 20.0  # stuck
+    assert (on_nodes.pressure[at[3.56]] < 30e3).all()
+    assert on_nodes.pressure[at[2.9], 1] < sound.pressure[at[2.9], 1]
 
 
 def test_every_message_arrives(tmp_path):

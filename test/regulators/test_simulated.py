@@ -252,6 +252,117 @@ def test_air_used():
     assert regulator.air_used == pytest.approx(2.0055e-5, rel=1e-3)  # Δp V ρ0/p0
 
 
+# --- faults ------------------------------------------------------------------------------------
+
+
+def test_silent_it_raises_what_a_device_raises_that_does_not_answer():
+    regulator, clock = opened(faults=['{kind: silence, start: 1.0, end: 2.0}'])
+    regulator.set_pressure(75e3)
+    clock.now = math.nextafter(1.0, 0.0)
+    assert regulator.read().pressure == 75e3
+    for now in (1.0, 1.5, math.nextafter(2.0, 0.0)):
+        clock.now = now
+        for call in (regulator.read, regulator.vent, lambda: regulator.set_pressure(40e3)):
+            with pytest.raises(TransportError, match=r'does not answer .silence from 1 s to 2 s'):
+                call()
+        assert regulator.pad_pressure == 75e3
+    regulator.close()
+    with pytest.raises(TransportError, match='does not answer'):
+        regulator.open()
+    clock.now = 2.0
+    regulator.open()
+    assert regulator.read() == Reading(75e3, 75e3, (), 2.0)
+
+
+def test_a_bad_setpoint_is_refused_by_a_silent_device_too():
+    regulator, clock = opened(faults=['{kind: silence, start: 1.0}'])
+    clock.now = 1.5
+    with pytest.raises(LimitError):
+        regulator.set_pressure(95e3)
+
+
+def test_a_silent_device_goes_on_filling():
+    regulator, clock = opened(faults=['{kind: silence, start: 0.05, end: 1.0}'])
+    sound, sound_clock = opened()
+    for each, own in ((regulator, clock), (sound, sound_clock)):
+        each.set_pressure(75e3)
+        own.now = 0.08
+    assert 1e3 < regulator.pad_pressure < 74e3
+    assert regulator.pad_pressure == sound.read().pressure
+
+
+def test_drifted_sensor_reads_the_setpoint_and_the_pad_is_off():
+    drift = '{kind: sensor_drift, start: 1.0, end: 5.0, offset: -6.0e3, rise: 1.0}'
+    regulator, clock = opened(faults=[drift])
+    regulator.set_pressure(60e3)
+    seen = {}
+    for now in (0.5, 3.0, 5.0, 7.0):
+        clock.now = now
+        seen[now] = regulator.read().pressure, regulator.pad_pressure
+    assert seen[0.5] == seen[7.0] == (60e3, 60e3)
+    assert seen[3.0] == (60e3, 66e3)
+    assert seen[5.0] == (66e3, 66e3)  # sound again, and nothing has moved yet
+
+
+def test_no_command_and_a_drifted_sensor_can_pass_full_scale():
+    """Above the ceiling a pad can be where the sensor reads too little, above full scale never."""
+    regulator, clock = opened(faults=['{kind: sensor_drift, offset: -30.0e3}'])
+    regulator.set_pressure(90e3)
+    clock.now = 2.0
+    assert regulator.pad_pressure == 100e3
+    assert regulator.read().pressure == 70e3  # less than asked for: it cannot do more
+    regulator.vent()
+    clock.now = 4.0
+    assert regulator.pad_pressure == 0.0
+
+
+@pytest.mark.parametrize('start', [0.0, 0.3, 0.3013])
+def test_with_faults_the_trajectory_does_not_depend_on_the_readings(start):
+    faults = [
+        f'{{kind: leak, start: {start}, end: 0.7, conductance: 5.0e-9}}',
+        f'{{kind: supply_loss, start: {start + 0.1}, end: {start + 0.35}, time_constant: 0.1}}',
+        '{kind: sensor_drift, start: 0.2, offset: 2.0e3, rise: 0.4}',
+    ]
+    rng = random.Random(5)
+    often = sorted([i / 50 for i in range(60)] + [rng.uniform(0.0, 1.2) for _ in range(300)])
+    seen = []
+    for times in ([i / 50 for i in range(60)], often):
+        regulator, clock = opened(faults=faults, sensor_resolution=0.1)
+        series = []
+        for now in times:
+            clock.now = now
+            if now == 0.04:
+                regulator.set_pressure(75e3)
+            pressure = regulator.read().pressure, regulator.pad_pressure
+            if now in {i / 50 for i in range(60)}:
+                series.append(pressure)
+        seen.append(series)
+    assert seen[0] == seen[1]
+    assert max(seen[0])[1] > 60e3 > min(seen[0][20:])[1]
+
+
+def test_a_fault_after_a_quiet_hour_is_exact():
+    regulator, clock = opened(faults=['{kind: stuck_valve, start: 3600.05, end: 3601.0}'])
+    clock.now = 3600.0
+    regulator.set_pressure(75e3)
+    sound, sound_clock = opened()
+    sound.set_pressure(75e3)
+    sound_clock.now = 0.05
+    clock.now = 3600.9
+    # The pad ends where the outlet was when the valve stuck; a hose of 4 mm is hardly behind.
+    assert regulator.read().pressure == pytest.approx(sound.read().pressure, abs=500.0)
+    clock.now = 3602.0
+    assert regulator.read().pressure == 75e3
+
+
+def test_bad_faults_are_told():
+    with pytest.raises(ConfigError, match=r'fault .*kind = .fire. is not allowed'):
+        create('simulated', faults=['{kind: fire}'])
+    for bad in ('{kind: silence}', 3):
+        with pytest.raises(ConfigError, match=r'faults = .* a list of faults is needed'):
+            create('simulated', faults=bad)
+
+
 # --- create ------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,9 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
+from ros_pad.simulation import pneumatics
 from ros_pad.simulation.pneumatics import Hose
 from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
@@ -311,6 +313,49 @@ def test_filling_is_monotone_at_any_step(dt, volume, diameter):
         assert pad.min() >= 0.0
 
 
+@pytest.mark.parametrize('volume', [1e-9, 5e-6])
+def test_one_step_of_20_ms_does_not_chatter_either(volume, monkeypatch):
+    """Where pressures meet, the law of the flow is so steep that explicit steps overshoot."""
+    monkeypatch.setattr(pneumatics, 'MAX_STEP', 0.02)
+    line = Hose(0.006, 0.1, measured_conductance=1e-7, measured_critical_ratio=0.4)
+    channel = PneumaticChannel(RegulatorModel(damping=1.0), line, volume)
+    pad = walk(channel, 75e3, 1.0, 0.02)
+    assert (np.diff(pad) >= 0.0).all()
+    assert pad[-1] == 75e3
+    naive, signs = 75e3 - 50.0, set()
+    for _ in range(20):
+        flow = line.mass_flow(75e3 + 101325.0, naive + 101325.0)
+        naive += 0.02 * flow * 100e3 / 1.185 / (volume + line.volume)
+        signs.add(naive > 75e3)
+    assert signs == {True, False}
+
+
+@pytest.mark.parametrize('start, end', [(0.0, 90e3), (90e3, 0.0), (30e3, 75e3)])
+def test_air_through_the_hose_is_air_in_the_domes(start, end):
+    """Mass balance by the ideal gas law on the shape of the domes, not on the channel's table."""
+    foot = Foot.load('large37')
+    line = Hose(0.001, 0.0, measured_conductance=2e-11, measured_critical_ratio=0.4)
+    channel = PneumaticChannel(BARE, line, foot.air_volume)
+    channel.step(start, 30.0)
+    states = [(channel.outlet_pressure, channel.pad_pressure)]
+    for _ in range(2500):
+        channel.step(end, 2e-4)
+        states.append((channel.outlet_pressure, channel.pad_pressure))
+    flows = [line.mass_flow(a + 101325.0, b + 101325.0) for a, b in states]
+    passed = np.trapezoid(flows, dx=2e-4) if hasattr(np, 'trapezoid') else np.trapz(flows, dx=2e-4)
+    first, last = states[0][1], states[-1][1]
+    rt = 100e3 / 1.185  # of the reference air
+
+    def mass(pressure):
+        return (pressure + 101325.0) * foot.air_volume(pressure) / rt
+
+    assert abs(last - first) > 30e3
+    assert passed == pytest.approx(mass(last) - mass(first), rel=2e-3)
+    # That the domes swell is a fifth of it and more.
+    rigid = (last - first) * foot.air_volume(0.0) / rt
+    assert abs(passed / rigid) > 1.2
+
+
 def test_air_used_is_the_air_in_the_pad():
     channel = PneumaticChannel(RegulatorModel(damping=1.0), FOUR_BY_ONE, 10e-6)
     channel.step(75e3, 5.0)
@@ -361,6 +406,63 @@ def time_to_ninety_percent(hose, volume):
     while channel.step(75e3, 0.001) < 67.5e3 and time < 5.0:
         time += 0.001
     return time + 0.001
+
+
+def time_through_a_divided_hose(diameter, length, volume):
+    """Time to 90 % with the hose divided into 16 cells, by Churchill's friction in each."""
+    cells = 16
+    area = math.pi / 4.0 * diameter**2
+    capacity = np.full(cells, area * length / cells)
+    capacity[-1] = capacity[-1] / 2.0 + volume  # the other half of a cell is at the outlet
+    # Of f Re², which the pressures give, the Reynolds number.
+    numbers = np.geomspace(1e-6, 1e7, 2000)
+    given = np.log(churchill(numbers) * numbers**2)
+
+    def rate(t, y):
+        outlet, speed, pads = y[0], y[1], y[2:] + 101325.0
+        before = np.concatenate([[outlet + 101325.0], pads[:-1]])
+        squares = before**2 - pads**2
+        lengths = np.full(cells, length / cells)
+        for _ in range(4):  # the inlet's one and a half dynamic heads, as a longer first cell
+            drive = np.abs(squares) * diameter**3 / (RT * lengths * VISCOSITY**2)
+            reynolds = np.exp(np.interp(np.log(np.maximum(drive, 1e-12)), given, np.log(numbers)))
+            lengths[0] = length / cells + 1.5 * diameter / churchill(reynolds[0])
+        flow = np.sign(squares) * reynolds * VISCOSITY / diameter * area
+        gain = flow - np.append(flow[1:], 0.0)
+        return [speed, 45.0**2 * (75e3 - outlet) - 81.0 * speed, *(gain * RT / capacity)]
+
+    def full(t, y):
+        return y[-1] - 67.5e3
+
+    full.terminal = True
+    start = np.zeros(cells + 2)
+    result = solve_ivp(rate, (0.0, 30.0), start, 'LSODA', rtol=1e-5, atol=1.0, events=full)
+    return result.t_events[0][0] + 0.010  # dead time
+
+
+@pytest.mark.parametrize(
+    'size, volume',
+    [
+        ((0.0005, 2.0), 2.4e-6),
+        ((0.001, 1.0), 2.4e-6),
+        ((0.001, 5.0), 2.4e-6),
+        ((0.001, 10.0), 20e-6),
+        ((0.002, 2.0), 20e-6),
+        ((0.004, 1.0), 2.4e-6),
+        ((0.004, 10.0), 2.4e-6),
+    ],
+)
+def test_time_to_fill_against_a_divided_hose(size, volume):
+    divided = time_through_a_divided_hose(*size, volume)
+    assert 0.81 < time_to_ninety_percent(Hose(*size), volume) / divided < 1.09
+
+
+def test_hoses_that_are_the_lag_are_long_and_thin_or_feed_much():
+    for size, volume in [((0.001, 5.0), 2.4e-6), ((0.0005, 1.0), 2.4e-6), ((0.001, 1.0), 20e-6)]:
+        assert time_to_ninety_percent(Hose(*size), volume) > 3.0 * 0.086
+    # A fitting of 0.15 mm² or so (C = 1.6e-3 A) does it too, whatever the hose.
+    choked = Hose(0.004, 1.0, measured_conductance=1.5e-10, measured_critical_ratio=0.5)
+    assert time_to_ninety_percent(choked, 2.4e-6) > 3.0 * 0.086
 
 
 @pytest.mark.parametrize('size', [(0.002, 0.5), (0.002, 1.0), (0.004, 1.0), (0.004, 2.0)])
