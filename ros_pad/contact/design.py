@@ -41,6 +41,8 @@ CELL = {'corrected': 2.0 * math.sqrt(3.0) * DOME**2, 'thesis': math.pi / 3.0 + m
 # Pressure that inflates a pad to that dome, over stiffness/radius (3.89). The law of the free
 # dome at sin t = height/√(radius² + height²) and sin 2t = 1/1.5.
 TENSION = {'corrected': math.sqrt(18.0 + 6.0 * math.sqrt(5.0)) - 4.0 / 3.0, 'thesis': 4.3}
+# Area over squared radius from which pads cannot be counted to the last one.
+_MOST_PADS = 2.0**53
 
 # The liquid of the thesis' figure 10: water at a contact angle of 60 degrees.
 DESIGN_WATER = Liquid(surface_tension=0.073, solid_tension=0.0410625, contact_angle=math.pi / 3)
@@ -342,6 +344,11 @@ def design(
     # The end itself is refused where rounding carries it a digit too far.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)
+    if area >= _MOST_PADS * pad.radius**2:
+        raise InvalidInput(
+            f'radius = {pad.radius:g} m is not allowed on an area of {area:g} m²: '
+            f'{math.sqrt(area / _MOST_PADS):.3g} m or more is needed, for pads to be counted'
+        )
     if pads is None:
         # A sole of exactly so many cells holds them all, whatever the last digit says.
         pads = math.floor(pads_in(area, pad.radius, reading) * (1.0 + 1e-12))
