@@ -17,6 +17,7 @@ from ros_pad.figures.thesis import PURPLE
 from ros_pad.figures.thesis import STYLE
 from ros_pad.ladders.stability import ILL
 from ros_pad.ladders.stability import KICK
+from ros_pad.ladders.stability import NEEDS_MUJOCO
 from ros_pad.ladders.stability import STABLE
 from ros_pad.ladders.stability import Outcome
 from ros_pad.ladders.stability import linear_limit
@@ -45,7 +46,8 @@ def draw(outcomes: Sequence[Outcome]) -> Figure:
             if case:
                 fill(panel, case)
             else:
-                panel.text(0.5, 0.5, 'not measured', ha='center', transform=panel.transAxes)
+                why = NEEDS_MUJOCO.replace(', ', ',\n') if letter == 'b' else 'not measured'
+                panel.text(0.5, 0.5, why, ha='center', fontsize=8, transform=panel.transAxes)
                 panel.set(xticks=[], yticks=[])
         panels[7].axis('off')
         handles = [
@@ -203,7 +205,7 @@ def _threshold(panel: Axes, case: Sequence[Outcome]) -> None:
         label = name.removeprefix('RailLeg, ')
         x, y = [1e2 * (o.at - 1.0) for o in part], [o.value for o in part]
         panel.plot(x, y, style, color=BLUE, ms=5, mfc='none', label=label)
-    law = methods[0][1]
+    law = [outcome for outcome in methods[0][1] if outcome.law is not None]
     panel.plot([1e2 * (o.at - 1.0) for o in law], [o.law for o in law], **_LAW)
     panel.axhline(ILL, color=PALE, lw=0.9, ls='--', zorder=1)
     panel.set_xticks([3.0, 10.0, 30.0, 100.0, 300.0], ['3', '10', '30', '100', '300'])

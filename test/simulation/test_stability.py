@@ -1,0 +1,417 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where methods fail: the naive one must fail as it is said to, and ours must not."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from ros_pad.ladders import stability
+from ros_pad.simulation.friction import Contact
+from ros_pad.simulation.friction import creeping
+from ros_pad.simulation.friction import elastic
+from ros_pad.simulation.pneumatics import Hose
+from ros_pad.simulation.pneumatics import PneumaticChannel
+from ros_pad.simulation.pneumatics import RegulatorModel
+
+MASS, INERTIA = stability.MASS, stability.INERTIA
+MASSES = np.diag([MASS, MASS, INERTIA])
+OURS = ('elastic', 'creeping', 'exact_stick')
+
+
+def by_method(outcomes, case=None):
+    found = {}
+    for outcome in outcomes:
+        if case in (None, outcome.case):
+            found.setdefault(outcome.method, []).append(outcome)
+    return found
+
+
+def arm(foot):
+    return np.array([[1.0, 0.0, -foot.lever_y], [0.0, 1.0, foot.lever_x]])
+
+
+def jacobian(function, at, small):
+    """Return the (3, 3) derivatives of a map of twists, by differences."""
+    columns = []
+    for axis in range(3):
+        step = small * np.eye(3)[axis]
+        ahead, behind = (np.array(function(tuple(at + sign * step))) for sign in (1, -1))
+        columns.append((ahead - behind) / (2.0 * small))
+    return np.array(columns).T
+
+
+# --- a: explicit friction ------------------------------------------------------------------------
+
+
+def test_step_limits_by_hand():
+    """2 m v/Σc = 2 v/(μ g) = 2.04 ms, and 2 I v/Σ c r² with all feet at about 0.2234 m."""
+    limits = stability.step_limits(1e-3)
+    assert limits['sliding'] == pytest.approx(2e-3 / (0.1 * 9.81), rel=1e-12)
+    assert limits['turning'] == pytest.approx(
+        2e-3 * 0.03 / (0.1 * 2.09 * 9.81 * 0.2234**2), rel=2e-3
+    )
+
+
+@pytest.mark.parametrize('mode', ['sliding', 'turning'])
+def test_limit_is_where_the_map_of_a_step_grows(mode):
+    """|eigenvalue| of the step's map, by differences, passes 1 at the limit."""
+    limit = stability.step_limits()[mode]
+    for share, grows in ((0.99, False), (1.01, True)):
+        feet = stability._feet([0.1 * stability.WEIGHT / 3.0] * 3)
+        slopes = jacobian(
+            lambda twist, feet=feet, dt=share * limit: stability.explicit_euler(twist, feet, dt),
+            np.zeros(3),
+            1e-8,
+        )
+        growth = abs(slopes[2, 2]) if mode == 'turning' else abs(slopes[0, 0])
+        assert (growth > 1.0) == grows
+        assert growth == pytest.approx(abs(1.0 - 2.0 * share), rel=1e-4)
+
+
+def test_explicit_friction_chatters_beyond_its_limit_and_ours_never():
+    found = by_method(stability.explicit_friction())
+    limit = stability.step_limits()['turning']
+    euler, fourth = found['explicit Euler'], found['RK4']
+    for outcome in euler:
+        assert outcome.fails == (outcome.at > limit)
+        if outcome.fails:
+            assert outcome.value == pytest.approx(outcome.law, rel=2e-3)
+    assert sum(outcome.fails for outcome in euler) > 10
+    # Four stages buy 39 % of step, not a cure.
+    for outcome in fourth:
+        assert outcome.fails == (outcome.at > 2.7853 / 2.0 * limit)
+    assert fourth[-1].value > 5e-3
+    for name in OURS:
+        assert found[name][-1].at == 0.02
+        assert not any(outcome.fails for outcome in found[name])
+
+
+# --- b: creep in MuJoCo --------------------------------------------------------------------------
+
+
+def test_creep_of_mujoco_does_not_shrink_with_the_step():
+    pytest.importorskip('mujoco')
+    found = by_method(stability.creep())
+    speeds = {name: np.array([outcome.value for outcome in found[name]]) for name in found}
+    for name in stability.SETTINGS:
+        if 'noslip' not in name:
+            assert np.ptp(speeds[name]) < 1e-6 * speeds[name].max()  # steps of 0.1 to 4 ms
+    plain = speeds['elliptic, impratio 1']
+    assert speeds['pyramidal, impratio 1 (default)'].min() > 3.0 * plain.max()
+    assert plain == pytest.approx(5.65e-3, rel=2e-3)
+    for ratio in (1, 10, 100):
+        name = f'elliptic, impratio {ratio}'
+        assert speeds[name] == pytest.approx(plain / ratio, rel=1e-4)
+        assert speeds[name] == pytest.approx(stability.creep_law(ratio), rel=1e-6)
+        assert all(outcome.fails for outcome in found[name]) == (ratio < 100)
+    assert speeds['elliptic, impratio 10, noslip 5'].max() < 1e-9
+
+
+def test_ours_does_not_creep_or_by_a_known_speed():
+    for dt in (1e-3, 4e-3):
+        assert abs(stability.planar_creep(elastic, dt)) < 2e-7
+        assert abs(stability.planar_creep(stability.OURS['exact_stick'], dt)) < 1e-9
+        # s/√(s² + ε²) = 0.8 at 4/3 ε.
+        assert stability.planar_creep(creeping, dt) == pytest.approx(4e-5 / 3.0, rel=1e-3)
+
+
+# --- c: three sticking feet ----------------------------------------------------------------------
+
+
+def test_six_forces_three_equations():
+    matrix = stability.balance(stability.TRIPOD)
+    assert matrix.shape == (3, 6)
+    assert np.linalg.matrix_rank(matrix) == 3
+    # Two feet that pull apart along their line: no push, no moment.
+    (x0, y0), (x1, y1), _ = stability.TRIPOD
+    apart = np.array([x1 - x0, y1 - y0, x0 - x1, y0 - y1, 0.0, 0.0])
+    assert matrix @ apart == pytest.approx(np.zeros(3), abs=1e-15)
+
+
+def test_gauss_seidel_splits_forces_by_the_order_of_the_feet():
+    push = np.array([stability.SPLIT_PUSH, 0.0, 0.0])
+    matrix = stability.balance(stability.TRIPOD)
+    forces = []
+    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        twist, force = stability.held('Gauss-Seidel', order)
+        # The robot stands in each, and push and moment balance.
+        assert stability.miss(twist, stability.STILL) < 1e-9
+        assert matrix @ force.ravel() + push == pytest.approx(np.zeros(3), abs=1e-7)
+        forces.append(force)
+    assert np.ptp(forces, axis=0).max() > 0.5 * stability.SPLIT_PUSH
+
+
+@pytest.mark.parametrize('name', OURS)
+def test_our_splits_follow_their_law_in_any_order(name):
+    """Against a constrained minimum of Σ|f|²/w by its optimality system of nine equations."""
+    weights = {'elastic': (3.0, 2.0, 1.0), 'creeping': (1.0, 2.0, 3.0)}.get(name, (1.0,) * 3)
+    matrix = stability.balance(stability.TRIPOD)
+    system = np.block([
+        [np.diag(1.0 / np.repeat(weights, 2)), matrix.T],
+        [matrix, np.zeros((3, 3))],
+    ])  # fmt: skip
+    expected = np.linalg.solve(system, [0.0] * 6 + [-stability.SPLIT_PUSH, 0.0, 0.0])[:6]
+    for order in ((0, 1, 2), (2, 0, 1), (1, 0, 2)):
+        twist, force = stability.held(name, order)
+        assert stability.miss(twist, stability.STILL) < 1e-5
+        assert force.ravel() == pytest.approx(expected, abs=1e-3 * stability.SPLIT_PUSH)
+
+
+def test_chart_of_the_splits():
+    found = by_method(stability.sticking_feet())
+    assert all(outcome.fails for outcome in found['Gauss-Seidel'])
+    for name in OURS:
+        assert not any(outcome.fails for outcome in found[name])
+        assert len(found[name]) == 18
+
+
+# --- d: all feet slip ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def slides():
+    return stability.slides(60, seed=1)
+
+
+def test_truth_of_the_slides(slides):
+    """M (q - b) + dt Σ c Bᵀ ŝ = 0: the only minimum of a strictly convex function."""
+    for slide in slides:
+        twist = np.array(slide.truth)
+        rest = MASSES @ (twist - slide.free)
+        scale = 0.0
+        for foot in slide.feet:
+            slip = arm(foot) @ twist + (foot.motion_x, foot.motion_y)
+            rest += slide.dt * foot.cap * arm(foot).T @ slip / np.linalg.norm(slip)
+            scale += slide.dt * foot.cap
+        assert np.abs(rest).max() < 1e-4 * scale
+
+
+def test_fixed_point_fails_where_its_law_says(slides):
+    fails = [not stability.miss(stability.fixed_point(s), s.truth) < 1e-6 for s in slides]
+    assert 10 < sum(fails) < 50
+    for slide, failed in zip(slides, fails, strict=True):
+        if slide.contraction > 1.0:
+            assert failed
+        if slide.contraction < 0.8:  # 0.8^100 = 2e-10
+            assert not failed
+
+
+def test_contraction_is_the_slope_of_the_iteration(slides, monkeypatch):
+    monkeypatch.setattr(stability, '_TRIES', 1)
+    for slide in slides[:20]:
+
+        def once(start, slide=slide):
+            return stability.fixed_point(stability.dataclasses.replace(slide, start=start))
+
+        slopes = jacobian(once, np.array(slide.truth), 1e-7)
+        assert np.abs(np.linalg.eigvals(slopes)).max() == pytest.approx(
+            slide.contraction, rel=1e-3
+        )
+
+
+def test_full_newton_fails_from_a_bad_start(slides):
+    assert sum(not stability.miss(stability.full_newton(s), s.truth) < 1e-6 for s in slides) > 5
+
+
+@pytest.mark.parametrize('scale', [1.0, 1e3])
+def test_ours_settle_from_any_start_with_forces_on_the_cones(slides, scale):
+    for slide in slides:
+        start = tuple(scale * value for value in slide.start)
+        for step in (elastic, creeping):
+            for foot in slide.feet:
+                foot.shear_x = foot.shear_y = 0.0
+            twist = step(slide.free, MASS, INERTIA, slide.feet, slide.dt, start)
+            # Creeping at 1e-5 m/s turns no foot of 3 mm/s by more than (ε/s)²/2 = 6e-6.
+            assert stability.miss(twist, slide.truth) < 1e-6
+            for foot in slide.feet:
+                force = math.hypot(foot.force_x, foot.force_y)
+                assert force == pytest.approx(foot.cap, rel=1e-5)
+                assert foot.slid > 0.0
+
+
+def test_chart_of_the_slides():
+    found = by_method(stability.slipping_feet())
+    for name in ('fixed point', 'Newton, full steps'):
+        assert any(outcome.fails for outcome in found[name])
+    for name in ('elastic', 'creeping'):
+        assert not any(outcome.fails for outcome in found[name])
+
+
+# --- e: a foot would have to pull ----------------------------------------------------------------
+
+
+def test_clamped_loads_make_up_weight_or_moment():
+    found = by_method(stability.pulling_feet())
+    for name in ('clamped', 'clamped, scaled to the weight'):
+        for outcome in found[name]:
+            assert outcome.fails == (outcome.at > 1e-12)
+            assert outcome.value == pytest.approx(outcome.law, abs=1e-12)
+        # 60 mm beyond an edge from which the third foot is 0.336 m away.
+        assert found[name][-1].value == pytest.approx(0.06 / 0.3355, rel=5e-3)
+
+
+def test_least_norm_on_three_feet_is_the_balance():
+    """Shares of areas, and negative just outside."""
+    (x0, y0), (x1, y1), (x2, y2) = stability.TRIPOD
+    for x, y in ((0.01, 0.02), (0.2, 0.0), (-0.3, 0.1)):
+        whole = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        first = ((x1 - x) * (y2 - y) - (x2 - x) * (y1 - y)) / whole
+        assert stability.least_norm(stability.TRIPOD, x, y)[0] == pytest.approx(first, abs=1e-12)
+
+
+def test_least_norm_on_six_feet_pulls_although_the_robot_stands():
+    """The rear feet seem to pull from 2/3 of the way to the front feet on: by hand, 1/6 = x/4X."""
+    homes = np.array(stability.BODY.homes)
+    front = homes[:, 0].max()
+    assert stability.least_norm(homes, 0.66 * front, 0.0).min() > 0.0
+    assert stability.least_norm(homes, 0.67 * front, 0.0).min() < 0.0
+    loads, misses = nnls(np.vstack([np.ones(6), homes.T]), [1.0, 0.9 * front, 0.0])
+    assert misses < 1e-12 and loads.min() >= 0.0
+
+
+@pytest.mark.parametrize('height', [0.9, 0.95, 1.0])
+def test_verdict_comes_when_the_pressure_point_leaves_the_tripod(height):
+    """Rigid, without slip: height a(t)/g behind the centre of mass; foot 1 is in front."""
+    fell, verdict = stability.walk_top_heavy(height)
+    # Found again, from the areas of the tripod 1, 3, 5, which moves back under the body.
+    speed, rate = 0.12, 4.0 * math.pi
+    for step in range(50, 250):
+        time = step * 1e-3
+        lean = -height * speed * rate * math.sin(rate * time) / 9.81
+        moved = speed * (time - 0.25) - speed / rate * (math.sin(rate * time) - math.sin(math.pi))
+        # The edge from foot 3 to foot 5, on the line y = 0, and lean is behind it.
+        (x3, y3), (x5, y5) = stability.TRIPOD[1], stability.TRIPOD[2]
+        edge = x3 + (x5 - x3) * (0.0 - y3) / (y5 - y3) - moved
+        if lean < edge:
+            break
+    assert fell == pytest.approx(time, abs=2.1e-3)
+    assert stability.tip_over_law(height) == pytest.approx(time, abs=1.1e-3)
+    assert verdict == f'tip-over at {fell:.3f} s: leg 1 would have to pull'
+
+
+def test_no_verdict_for_the_shipped_robot():
+    assert stability.walk_top_heavy(stability.BODY.height) == (None, None)
+    assert stability.tip_over_law(stability.BODY.height) is None
+
+
+# --- f: a hose near equal pressures --------------------------------------------------------------
+
+
+def test_printed_flow_law_has_no_stable_step_and_ours_no_chatter(monkeypatch):
+    monkeypatch.setattr(stability, 'TIMES', (0.05, 0.1))
+    monkeypatch.setattr(stability, 'SOLVERS', ('RK45', 'BDF'))
+    outcomes = stability.filling()
+    found = by_method(outcomes, stability.HOSE.name)
+    # (A dt/2)²: a tenth of the step leaves a hundredth of the chatter, at any step.
+    for outcome in found[stability.ISO]:
+        assert outcome.value > 0.05
+        if outcome.law is not None:
+            assert outcome.value == pytest.approx(outcome.law, rel=0.01)
+    for outcome in found[stability.ISO_LINEAR]:
+        assert outcome.fails == (outcome.at > stability.linear_limit())
+    assert any(outcome.fails for outcome in found[stability.ISO_LINEAR])
+    for outcome in found[stability.CHANNEL]:
+        assert outcome.value < 0.1
+
+    calls = by_method(outcomes, stability.FULL.name)
+    short, long = (outcome.value for outcome in calls['solve_ivp (RK45)'])
+    assert long > 1.8 * short > 1.8 * stability.MANY
+    # Implicit steps with error control are a fair way, too.
+    assert not any(outcome.fails for outcome in calls['solve_ivp (BDF)'])
+    assert not any(outcome.fails for outcome in calls[stability.CHANNEL])
+
+
+def test_radau_gets_stuck():
+    assert stability.adaptive_calls('Radau', 0.05) is None
+
+
+@pytest.mark.parametrize('dt', [1e-4, 5e-3, 0.02, 0.1])
+@pytest.mark.parametrize('volume', [1e-9, 2e-6, 1e-3])
+def test_channel_never_overshoots_however_stiff(volume, dt):
+    regulator = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0)
+    channel = PneumaticChannel(regulator, Hose(4e-3, 0.01), volume)
+    last = 0.0
+    for _ in range(max(20, round(0.05 / dt))):
+        pressure = channel.step(75e3, dt)
+        assert last <= pressure <= 75e3 * (1.0 + 1e-12)
+        last = pressure
+    if volume < 1e-5:
+        assert last == pytest.approx(75e3, abs=0.1)
+
+
+# --- g: the threshold of the rail leg ------------------------------------------------------------
+
+
+def test_no_step_makes_the_threshold_surer():
+    for ratio in (1.06, 1.17, 1.47):
+        # c/(c - F), for small c - F
+        law = ratio / (ratio - 1.0)
+        conditions = [stability.condition(ratio, dt) for dt in (2e-3, 1e-3, 2.5e-4)]
+        assert conditions == pytest.approx([law] * 3, rel=0.1)
+    found = stability.threshold()
+    for outcome in found:
+        if outcome.at <= 1.3:
+            assert outcome.fails
+        if outcome.at >= 2.0:
+            assert not outcome.fails
+
+
+# --- chart ---------------------------------------------------------------------------------------
+
+
+def test_chart_without_mujoco(monkeypatch, tmp_path):
+    """A case that cannot be measured is left out, and said to be."""
+    monkeypatch.setitem(sys.modules, 'mujoco', None)
+    monkeypatch.setattr(stability, 'CASES', (stability.creep, stability.pulling_feet))
+    shares = []
+    outcomes = stability.measure(shares.append)
+    assert shares == [0.0, 0.5, 1.0]
+    assert {outcome.case for outcome in outcomes} == {
+        stability.PULLING.name,
+        stability.FALLING.name,
+    }
+    text = stability.table(outcomes)
+    assert 'creep in MuJoCo: not measured, pip install ros_pad[mujoco]' in text
+    picture = stability.figures(outcomes)['stability']
+    picture.savefig(tmp_path / 'stability.png')
+    assert (tmp_path / 'stability.png').stat().st_size > 20_000
+
+
+def test_table_counts_failures():
+    def outcome(at, value, fails):
+        return stability.Outcome(
+            'case', 'method', False, 'step, s', at, 'size, m', value, 2.0, fails
+        )
+
+    text = stability.table([outcome(1.0, 2.0, False), outcome(3.0, 2.2, True)])
+    assert 'case (step, s: size, m)' in text
+    line = next(
+        line for line in text.splitlines() if line.startswith('  method  ') and '3' in line
+    )
+    assert line.split() == ['method', '2', '1', '3', '2', '2.2', '10', '%']
+
+
+def test_a_foot_of_the_tripod_is_where_the_scene_says():
+    feet = stability._feet([1.0, 2.0, 3.0])
+    assert [(f.lever_x, f.lever_y) for f in feet] == [
+        (0.193, 0.112), (-0.193, 0.112), (0.0, -0.224)
+    ]  # fmt: skip
+    assert all(isinstance(foot, Contact) for foot in feet)
+
+
+def test_every_panel_is_drawn(monkeypatch, tmp_path):
+    monkeypatch.setattr(stability, 'STEPS', (1e-4, 1e-3, 1e-2))
+    monkeypatch.setattr(stability, 'CREEP_STEPS', (2e-3, 4e-3))
+    monkeypatch.setattr(stability, 'SLIPS', 8)
+    monkeypatch.setattr(stability, 'FILL_STEPS', (1e-4, 1e-3, 1e-2))
+    monkeypatch.setattr(stability, 'SOLVERS', ('BDF',))
+    monkeypatch.setattr(stability, 'RATIOS', (1.1, 2.0))
+    picture = stability.figures(stability.measure())['stability']
+    picture.savefig(tmp_path / 'stability.png')
+    drawn = {panel.get_title(loc='left')[:1]: panel for panel in picture.axes if panel.lines}
+    assert set('acdefg') <= set(drawn) <= set('abcdefg')
+    for panel in drawn.values():
+        assert panel.get_xlabel() and (panel.get_ylabel() or panel.get_yticklabels())
