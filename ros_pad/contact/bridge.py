@@ -715,7 +715,10 @@ class _Coarse(Exception):
 
 def _at_order(way: list[_Case], order: int) -> Bridge:
     first, case = way[0], way[-1]
-    beta, place = _found_place(first.theta, first.plane, first.gap, first.beta, first.volume)
+    try:
+        beta, place = _found_place(first.theta, first.plane, first.gap, first.beta, first.volume)
+    except NoBridge as refusal:
+        raise NoBridge(f'{refusal} (without gravity; none was found with it, either)') from None
     start, end = _inclinations(first.theta, first.plane, beta)
     shape = _shapes(place, start, end, 128)
     nodes, weights = _gauss(order)

@@ -453,3 +453,10 @@ def test_bad_input(change, name):
 def test_what_does_not_broadcast():
     with pytest.raises(InvalidInput, match='broadcast'):
         bridge(1e-3, 0.073, [0.1, 0.2], filling_angle=[0.1, 0.2, 0.3], method='circle')
+
+
+def test_what_a_refusal_with_gravity_says_of_volumes_is_without_it():
+    with pytest.raises(
+        NoBridge, match=r'drowns the sphere \(without gravity; none was found with'
+    ):
+        bridge(1e-3, 0.073, math.pi / 3, volume=1e-6, method='young_laplace', gravity=9.81)
