@@ -324,7 +324,8 @@ def test_printed_flow_law_has_no_stable_step_and_ours_no_chatter(monkeypatch):
     assert not any(outcome.fails for outcome in calls[stability.CHANNEL])
 
 
-def test_radau_gets_stuck():
+def test_radau_gets_stuck(monkeypatch):
+    monkeypatch.setattr(stability, '_STUCK', 20_000)
     assert stability.adaptive_calls('Radau', 0.05) is None
 
 
