@@ -136,7 +136,8 @@ def _show(found: Calibration) -> None:
     print(f'\n{"measured":18} {"at":34} {"measured":>11} {"model":>11}   error')
     for row in found.residuals:
         mark = '' if row.used else '  (not fitted)'
-        error = 'no equilibrium' if math.isnan(row.error) else f'{100.0 * row.error:+6.1f} %'
+        none = 'not known there' if row.quantity == 'force_limit' else 'no equilibrium'
+        error = none if math.isnan(row.error) else f'{100.0 * row.error:+6.1f} %'
         print(
             f'{row.quantity:18} {row.setting:34} {row.measured:11.5g} {row.modelled:11.5g}'
             f'  {error}{mark}'

@@ -101,7 +101,7 @@ class Residual:
     pressure : float
         Pa gauge.
     measured, modelled : float
-        SI units; the model's is NaN where it has no equilibrium.
+        SI units; the model's is NaN where it has no equilibrium, or knows no force limit.
     used : bool
         In a fit; the others only show what the model makes of them.
     """
@@ -449,7 +449,8 @@ def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
     if not len(pressure):
         return []
     used = pad.measured_limit is not None
-    modelled = force_limit(pad, pressure)
+    known = pressure <= largest_pressure(pad)
+    modelled = np.where(known, force_limit(pad, np.where(known, pressure, 0.0)), np.nan)
     return [
         Residual('force_limit', f'{p:g} Pa', p, value, float(model), used)
         for p, value, model in zip(pressure, limit, modelled, strict=True)

@@ -343,3 +343,12 @@ def test_the_start_foot_may_have_any_path(tmp_path):
     assert Foot.load(tmp_path / 'mine.yaml').pad.stiffness == pytest.approx(
         found.foot.pad.stiffness, rel=1e-8
     )
+
+
+def test_a_single_force_limit_past_the_thesis_measurements_stops_no_fit(tmp_path):
+    text = 'pressure [kPa],height [mm],force_limit [N]\n100,0.9,\n130,1.2,\n120,,0.9\n'
+    found = calibrate(text_of(tmp_path, text), FOOT)
+    assert constants(found)['stiffness'].fitted
+    (limit,) = [row for row in found.residuals if row.quantity == 'force_limit']
+    assert math.isnan(limit.modelled)
+    assert not limit.used
