@@ -469,9 +469,8 @@ class PneumaticChannel:
         done = -math.expm1(-relaxation * h)
         lost = 0.0
         if hardware.leak:
-            mean = 0.5 * (self.pad_pressure + pad)
-            outflow = self._leaking(mean, hardware.leak)
-            lost = outflow * mean * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
+            flow = self._leaking(pad, hardware.leak) * pad
+            lost = flow * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
         self._fill(share * outlet + gap - (gap + ramp / relaxation) * done, lost)
 
         self._time += h

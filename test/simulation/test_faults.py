@@ -18,6 +18,7 @@ from ros_pad.simulation import Hose
 from ros_pad.simulation import PneumaticChannel
 from ros_pad.simulation import RegulatorModel
 from ros_pad.simulation import Scene
+from ros_pad.simulation import pneumatics
 from ros_pad.simulation.faults import KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import faults_of
@@ -91,6 +92,21 @@ def test_leaking_pad_against_scipy(dt):
         exact.y[0] - AMBIENT, abs=100.0
     )
     assert seen[-1] < 65e3
+
+
+@pytest.mark.parametrize('dt', [0.001, 0.005, 0.02])
+@pytest.mark.parametrize('conductance', [1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize('volume', [1e-9, 1e-6])
+def test_a_leak_does_not_make_the_pad_chatter(dt, conductance, volume, monkeypatch):
+    """Neither a pad that holds next to nothing, nor a hole wider than the hose, nor long steps."""
+    monkeypatch.setattr(pneumatics, 'MAX_STEP', 0.02)
+    leak = Fault('leak', start=1.0, conductance=conductance)
+    channel = channel_with(leak, hose=Hose(0.004, 0.0), volume=volume)
+    channel.step(75e3, 1.0)
+    pad = walk(channel, 75e3, 1.0, dt)
+    assert (np.diff(pad, prepend=75e3) <= 1e-6).all()
+    assert 0.0 < pad[-1] < 75e3
+    assert np.ptp(pad[-5:]) < 1e-3
 
 
 def test_air_lost_through_a_leak_is_air_used():
