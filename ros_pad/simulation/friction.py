@@ -2,33 +2,40 @@
 """One step of a planar body on frictional feet.
 
 The unknown is the twist q = (vx, vy, ω) at the end of the step. Each foot at lever arm (rx, ry)
-moves over the floor with s = (vx - ω ry + ux, vy + ω rx + uy), u being what the gait makes it do
-relative to the body. A step minimises the convex function
+slides over the floor with s = (vx - ω ry + ux, vy + ω rx + uy) and turns on it with ω + w, u and w
+being what the gait makes it do relative to the body. A step minimises the convex function
 
-    ½ (q - b)ᵀ M (q - b) + dt Σ φ_i(s_i),     b = twist before the step + dt M⁻¹ applied wrench
+    ½ (q - b)ᵀ M (q - b) + dt Σ φ_i(z_i),     b = twist before the step + dt M⁻¹ applied wrench
 
-so the twist is unique. What differs is φ, the potential of the foot's friction with cap c:
+so the twist is unique. Sliding and turning share the foot's grip through an ellipsoidal limit
+surface: the slip is z = (s, ρ (ω + w)), its force (F, T/ρ), and what is bounded is |(F, T/ρ)|.
+Howe and Cutkosky (Int. J. Robotics Research 15, 1996, 531) take this ellipsoid through the largest
+force and moment for the limit surface of a sliding contact; an evenly pressed disc of radius R has
+ρ = 2/3 R. What differs is φ, the potential of the foot's friction with cap c:
 
 ``elastic``
-    The pad shears with stiffness k up to the cap: φ' = min(K |z|, c) along z = s + e/dt, with e
-    the shear at the start and K = k dt (a Huber function). Feet that stick share the load by their
-    stiffness, so that forces are unique too, and there is no creep. The default.
+    The pad shears with stiffness k, and twists with k ρ², up to the cap: φ' = min(K |z|, c) along
+    z = slip + e/dt, with e the shear at the start and K = k dt (a Huber function). Feet that stick
+    share the load by their stiffness, so that forces are unique too, and there is no creep. The
+    default.
 ``creeping``
-    Pseudo-Huber on the slip speed, φ' = c |s| / √(s² + ε²): fast and smooth, creeps at
-    about ε; sticking feet share the load in proportion to their caps.
+    Pseudo-Huber on the slip, φ' = c |z| / √(z² + ε²): fast and smooth, creeps at about ε; sticking
+    feet share the load in proportion to their caps.
 ``exact_stick``
-    Rigid-plastic, φ' = c, by projected gradient on impulses in discs of radius c dt: feet stick
+    Rigid-plastic, φ' = c, by block Gauss-Seidel on impulses in balls of radius c dt: feet stick
     to rounding, and the twist comes with a bound of its error. The reference. The forces of three
-    or more sticking feet are not unique: started from zero and none at its cap, those reported
-    are the smallest (least norm).
+    or more sticking feet are not unique.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from collections.abc import Sequence
 from math import sqrt
+
+from ros_pad.simulation.planar_step import Pushed
+from ros_pad.simulation.planar_step import newton
+from ros_pad.simulation.planar_step import push
 
 Twist = tuple[float, float, float]
 
@@ -37,22 +44,25 @@ class Contact:
     """One foot, or a drag, in a step: lever arm, imposed motion, cap, and pad shear.
 
     All in world axes and SI units; lever arms from the centre of mass. After a step it holds the
-    force on the body, and how far its contact slid over the floor.
+    force and the moment on the body, how far its middle slid over the floor, and the work that it
+    lost there. Without a turning radius it turns on the spot freely.
     """
 
     __slots__ = (
-        'cap', 'force_x', 'force_y', 'lever_x', 'lever_y', 'motion_x', 'motion_y',
-        'shear_x', 'shear_y', 'slid', 'stiffness',
+        'cap', 'force_x', 'force_y', 'lever_x', 'lever_y', 'lost', 'moment', 'motion_turn',
+        'motion_x', 'motion_y', 'shear_x', 'shear_y', 'slid', 'stiffness', 'turning_radius',
+        'twist',
     )  # fmt: skip
 
-    def __init__(self, stiffness: float) -> None:
+    def __init__(self, stiffness: float, turning_radius: float = 0.0) -> None:
         self.stiffness = stiffness
+        self.turning_radius = turning_radius
         self.cap = 0.0
         self.lever_x = self.lever_y = 0.0
-        self.motion_x = self.motion_y = 0.0
-        self.shear_x = self.shear_y = 0.0
-        self.force_x = self.force_y = 0.0
-        self.slid = 0.0
+        self.motion_x = self.motion_y = self.motion_turn = 0.0
+        self.shear_x = self.shear_y = self.twist = 0.0
+        self.force_x = self.force_y = self.moment = 0.0
+        self.slid = self.lost = 0.0
 
     def slip(self, twist: Twist) -> tuple[float, float]:
         """Velocity of the foot over the floor, m/s."""
@@ -96,31 +106,28 @@ def elastic(
     ArithmeticError
         When Newton's method does not settle: pads of 1e8 N/m or more.
     """
-    active = []
+    holding = [contact for contact in contacts if contact.cap > 0.0]
+    pushed: list[Pushed] = [
+        (
+            c.lever_x, c.lever_y,
+            c.motion_x + c.shear_x / dt, c.motion_y + c.shear_y / dt,
+            c.motion_turn + c.twist / dt,
+            c.turning_radius, c.cap, c.stiffness * dt,
+        )
+        for c in holding
+    ]  # fmt: skip
+    vx, vy, turn, settled = newton(free, mass, inertia, pushed, dt, start, 0.0)
+    if not settled:
+        raise _unsettled(dt, holding)
     for contact in contacts:
-        if contact.cap > 0.0:
-            rate = contact.stiffness * dt
-            active.append((
-                contact.lever_x, contact.lever_y,
-                contact.motion_x + contact.shear_x / dt, contact.motion_y + contact.shear_y / dt,
-                contact.cap, rate, contact.cap / rate,
-            ))  # fmt: skip
-        else:
-            contact.shear_x = contact.shear_y = contact.force_x = contact.force_y = 0.0
-            contact.slid = 0.0
-    twist = _newton(free, mass, inertia, active, dt, start, _shear_law)
-    for contact, (rx, ry, ox, oy, cap, rate, edge) in zip(
-        [c for c in contacts if c.cap > 0.0], active, strict=True
-    ):
-        zx = twist[0] - twist[2] * ry + ox
-        zy = twist[1] + twist[2] * rx + oy
-        size = math.hypot(zx, zy)
-        gain = rate if size <= edge else cap / size
-        contact.slid = (size - edge) * dt if size > edge else 0.0
-        contact.force_x, contact.force_y = -gain * zx, -gain * zy
-        contact.shear_x = gain * zx / contact.stiffness
-        contact.shear_y = gain * zy / contact.stiffness
-    return twist
+        contact.force_x = contact.force_y = contact.moment = contact.slid = contact.lost = 0.0
+    for c, each in zip(holding, pushed, strict=True):
+        c.force_x, c.force_y, c.moment, c.slid, c.lost = push(vx, vy, turn, each, dt)
+    for c in contacts:
+        c.shear_x, c.shear_y = -c.force_x / c.stiffness, -c.force_y / c.stiffness
+        if c.turning_radius:
+            c.twist = -c.moment / (c.stiffness * c.turning_radius * c.turning_radius)
+    return vx, vy, turn
 
 
 def creeping(
@@ -133,18 +140,34 @@ def creeping(
     creep: float = 1e-5,
 ) -> Twist:
     """Step with pseudo-Huber friction of creep speed ε, m/s; sets each contact's force."""
-    active = [
-        (c.lever_x, c.lever_y, c.motion_x, c.motion_y, c.cap, c.cap / creep, creep)
+    pushed: list[Pushed] = [
+        (
+            c.lever_x, c.lever_y, c.motion_x, c.motion_y, c.motion_turn,
+            c.turning_radius, c.cap, c.cap / creep,
+        )
         for c in contacts
         if c.cap > 0.0
-    ]
-    twist = _newton(free, mass, inertia, active, dt, start, _pseudo_huber_law)
+    ]  # fmt: skip
+    vx, vy, turn, settled = newton(free, mass, inertia, pushed, dt, start, creep)
+    if not settled:
+        raise _unsettled(dt, pushed)
     for contact in contacts:
-        sx, sy = contact.slip(twist)
-        gain = contact.cap / sqrt(sx * sx + sy * sy + creep * creep)
+        sx, sy = contact.slip((vx, vy, turn))
+        turned = contact.turning_radius * (turn + contact.motion_turn)
+        square = sx * sx + sy * sy + turned * turned
+        gain = contact.cap / sqrt(square + creep * creep)
         contact.force_x, contact.force_y = -gain * sx, -gain * sy
+        contact.moment = -gain * contact.turning_radius * turned
         contact.slid = math.hypot(sx, sy) * dt
-    return twist
+        contact.lost = gain * square * dt
+    return vx, vy, turn
+
+
+def _unsettled(dt: float, contacts: Sequence[object]) -> ArithmeticError:
+    return ArithmeticError(
+        f'friction step of {dt:g} s with {len(contacts)} contacts does not settle: take less stiff'
+        ' pads or a shorter step'
+    )
 
 
 def exact_stick(
@@ -230,98 +253,3 @@ def exact_stick(
         contact.force_x, contact.force_y = px / dt, py / dt
         contact.slid = math.hypot(*contact.slip(twist)) * dt
     return twist
-
-
-def _newton(
-    free: Twist,
-    mass: float,
-    inertia: float,
-    active: Sequence[tuple[float, ...]],
-    dt: float,
-    start: Twist,
-    law: Callable[[float, float, float, float], tuple[float, float]],
-) -> Twist:
-    """Newton on the convex step, shortened where it overshoots; scalars throughout, for speed.
-
-    ``law`` gives the gain f / |z| of a contact, and by how much its slope along z differs from it.
-    """
-    bx, by, bw = free
-    vx, vy, w = start
-    # What the largest gains make of the rounding of a speed is no reason to go on.
-    scale = mass
-    for contact in active:
-        scale += 0.01 * dt * contact[5]
-    scale *= 1e-13 + 1e-12 * (abs(bx) + abs(by))
-    step_x = step_y = step_w = slope = 0.0
-    length = 1.0
-    for _ in range(200):
-        gx, gy, gw = mass * (vx - bx), mass * (vy - by), inertia * (w - bw)
-        hxx = hyy = mass
-        hww = inertia
-        hxy = hxw = hyw = 0.0
-        for rx, ry, ox, oy, cap, rate, edge in active:
-            zx = vx - w * ry + ox
-            zy = vy + w * rx + oy
-            size = sqrt(zx * zx + zy * zy)
-            gain, bend = law(size, cap, rate, edge)
-            gain *= dt
-            fx, fy = gain * zx, gain * zy
-            gx += fx
-            gy += fy
-            gw += rx * fy - ry * fx
-            kxx = kyy = gain
-            kxy = 0.0
-            if bend:
-                bend *= dt / (size * size)
-                kxx += bend * zx * zx
-                kxy = bend * zx * zy
-                kyy += bend * zy * zy
-            kxw, kyw = rx * kxy - ry * kxx, rx * kyy - ry * kxy
-            hxx += kxx
-            hxy += kxy
-            hyy += kyy
-            hxw += kxw
-            hyw += kyw
-            hww += rx * kyw - ry * kxw
-        # The function is convex: its slope along the step has grown since. Where it has turned
-        # to rise nearly as steeply as it fell, the step was too long: take half of it back.
-        rise = -(gx * step_x + gy * step_y + gw * step_w)
-        if rise > 0.9 * slope and length > 1e-9:
-            length *= 0.5
-            vx += length * step_x
-            vy += length * step_y
-            w += length * step_w
-            continue
-        if abs(gx) + abs(gy) + 10.0 * abs(gw) < scale:
-            return vx, vy, w
-        # Cholesky of the 3 x 3 Hessian, which the masses keep positive definite.
-        lyx, lwx = hxy / hxx, hxw / hxx
-        dy = hyy - lyx * hxy
-        lower = hyw - lyx * hxw
-        lwy = lower / dy
-        yy = gy - lyx * gx
-        step_w = (gw - lwx * gx - lwy * yy) / (hww - lwx * hxw - lwy * lower)
-        step_y = yy / dy - lwy * step_w
-        step_x = gx / hxx - lyx * step_y - lwx * step_w
-        slope = gx * step_x + gy * step_y + gw * step_w
-        length = 1.0
-        vx -= step_x
-        vy -= step_y
-        w -= step_w
-    raise ArithmeticError(
-        f'friction step of {dt:g} s with {len(active)} contacts does not settle: take less stiff'
-        ' pads or a shorter step'
-    )
-
-
-def _shear_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float]:
-    if size <= edge:
-        return rate, 0.0
-    gain = cap / size
-    return gain, -gain
-
-
-def _pseudo_huber_law(size: float, cap: float, rate: float, edge: float) -> tuple[float, float]:
-    square = size * size + edge * edge
-    gain = cap / sqrt(square)
-    return gain, -gain * size * size / square

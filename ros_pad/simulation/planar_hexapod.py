@@ -4,24 +4,38 @@
 The body has the three degrees of freedom of SE(2); the gait moves the feet under it; normal loads
 follow from balance of height, pitch and roll. What is left out: bouncing, swinging legs' inertia,
 servo compliance, scuffing at touch-down. Good for paths and Monte-Carlo runs, see docs/model.md.
+
+The step itself is :mod:`ros_pad.simulation.planar_step`, in plain Python or compiled.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
-from ros_pad.contact.film import Film
-from ros_pad.simulation.friction import Contact
-from ros_pad.simulation.friction import elastic
+import numpy as np
+
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation import compiled
+from ros_pad.simulation import planar_step
+from ros_pad.simulation.gait import TRIPODS
 from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.planar_step import Setting
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terrain import CELL
+from ros_pad.simulation.terrain import WIDTH
 from ros_pad.simulation.terrain import Floor
 
 GRAVITY = 9.81  # m/s²
+
+# Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 531, approximate the limit surface of a
+# sliding contact by an ellipsoid through its largest force and moment: of a disc that is pressed
+# evenly, μN and 2/3 R μN.
+DISC_TURNING_RADIUS = 2.0 / 3.0
 
 
 class PlanarHexapod:
@@ -35,225 +49,195 @@ class PlanarHexapod:
         The ground.
     period : float
         Step, s.
+    compile_steps : bool or None
+        Whether steps are compiled by numba. None compiles where that is sure to pay: when numba is
+        installed and the trial of the scene is long, or something was compiled before. The walk is
+        the same to the last bit.
+
+    Raises
+    ------
+    ImportError
+        To compile without numba.
     """
 
-    def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
+    def __init__(
+        self, scene: Scene, floor: Floor, period: float, compile_steps: bool | None = None
+    ) -> None:
         assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
-        gait, foot = scene.gait, scene.foot
+        if compile_steps is None:
+            compile_steps = compiled.worth_loading(scene.duration / period)
         self.legs: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
         self.period = period
         self.time = 0.0
-        self.feet = [FootState() for _ in self.legs]
         self.dissipation = 0.0
         self.verdict: str | None = None
-        self._body = scene.body
-        self._gait = gait
-        self._heading_gain = scene.heading_gain
-        self._settle = scene.settle
-        self._foot = foot
-        self._floor = floor
-        self._tow = scene.tow
-        self._steps = 0
-        self._x = self._y = self._heading = 0.0
-        self._twist: Vector = (0.0, 0.0, 0.0)
-        self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
-        self._contacts = [Contact(foot.shear_stiffness) for _ in self.legs]
-        self._sled = Contact(scene.tow.stiffness)
-        self._pull = (0.0, 0.0)
-        self._reach = gait.reach()
-        self._motions = [(0.0, 0.0)] * 6
-        # Where each foot is in the body now, relative to home, and where it left the ground.
-        self._offsets = [self._planned_offset(leg) for leg in self.legs]
-        self._lifted = list(self._offsets)
-        self._phases = [gait.phase(leg, 0.0) for leg in self.legs]
+        self._feet = [FootState() for _ in self.legs]
+        self._fresh = False
+        self._setting = setting(scene, floor, period)
+        self._body: Any = [0.0] * planar_step.BODY
+        self._table: Any = [[0.0] * 6 for _ in range(planar_step.FEET)]
+        self._plant()
+        self._walk: compiled.Walk = planar_step.walk
+        if compile_steps:
+            self._compile()
+        self._report()
+
+    def _plant(self) -> None:
+        """Place the feet as if the gait had been running before time zero."""
+        now, table = self._setting, self._table
         for index in range(6):
-            if self._phases[index] < gait.duty:
-                self._touch_down(index)
+            phase = (now.duty / 2.0 - now.middle[index]) % 1.0
+            offset = now.reach
+            if phase < now.duty:
+                offset += planar_step.body_advance(now, -phase * now.cycle)
+            else:
+                offset *= -math.cos(math.pi * (phase - now.duty) / (1.0 - now.duty))
+            table[planar_step.PHASE][index] = phase
+            table[planar_step.OFFSET_X][index] = table[planar_step.LIFTED_X][index] = offset
+            if phase < now.duty:
+                planar_step.touch_down(now, self._body, table, index)
+
+    def _compile(self) -> None:
+        now = self._setting
+        self._body, self._table = np.array(self._body), np.array(self._table)
+        self._setting = now._replace(
+            limits=np.array(now.limits), wet=np.array(now.wet), heights=np.array(now.heights)
+        )
+        self._walk = compiled.walk(self._setting, self._body, self._table, (0.0,) * 6, 1, True)
 
     @property
     def body(self) -> Vector:
         """Position x, y, m, and heading, rad, of the body in the world."""
-        return self._x, self._y, self._heading
-
-    def _planned_offset(self, leg: int) -> tuple[float, float]:
-        """Place a foot as if the gait had been running before time zero."""
-        gait = self._gait
-        phase = gait.phase(leg, 0.0)
-        if phase < gait.duty:
-            since = phase * gait.cycle
-            return self._reach - (gait.body_advance(0.0) - gait.body_advance(-since)), 0.0
-        progress, _ = gait.swing(phase)
-        return (2.0 * progress - 1.0) * self._reach, 0.0
-
-    def _touch_down(self, index: int) -> None:
-        x, y = self._foot_position(index)
-        self._films[index].touch_down(self._floor.depth(x, y))
-
-    def _foot_position(self, index: int) -> tuple[float, float]:
-        home_x, home_y = self._body.homes[index]
-        x, y = home_x + self._offsets[index][0], home_y + self._offsets[index][1]
-        cosine, sine = math.cos(self._heading), math.sin(self._heading)
-        return self._x + cosine * x - sine * y, self._y + sine * x + cosine * y
+        x, y, heading = self._body[planar_step.X : planar_step.HEADING + 1]
+        return float(x), float(y), float(heading)
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
-        dt, gait, foot = self.period, self._gait, self._foot
-        self._steps += 1
-        self.time = self._steps * dt
-        # The gait has its own clock, which starts when the robot has settled.
-        after = max(0.0, self.time - self._settle)
-        before = max(0.0, self.time - dt - self._settle)
-        advance = gait.body_advance(after) - gait.body_advance(before)
-        turn = -self._heading_gain * self._heading * dt
-        heights = self._move_feet(after, advance, turn)
-        loads = self._loads()
-        floor, contacts = self._floor, self._contacts
-        # Lever arms and motions are turned into world axes with the heading half-way.
-        middle = self._heading + 0.5 * self._twist[2] * dt
-        cosine, sine = math.cos(middle), math.sin(middle)
-        on_domes = [0.0] * 6
-        for index in range(6):
-            contact, load, state = contacts[index], loads[index], self.feet[index]
-            if load <= 0.0:
-                contact.cap = 0.0
-                state.grip = 0.0
-                continue
-            home_x, home_y = self._body.homes[index]
-            x, y = home_x + self._offsets[index][0], home_y + self._offsets[index][1]
-            lever_x, lever_y = cosine * x - sine * y, sine * x + cosine * y
-            step_x, step_y = self._motions[index]
-            contact.lever_x, contact.lever_y = lever_x, lever_y
-            contact.motion_x = (cosine * step_x - sine * step_y) / dt
-            contact.motion_y = (sine * step_x + cosine * step_y) / dt
-            pressure, film = pressures[index], self._films[index]
-            dome_load = foot.dome_load(load, pressure)
-            state.wet = floor.wet(self._x + lever_x, self._y + lever_y)
-            if state.wet:
-                film.drain(dome_load, load - dome_load, pressure, dt)
-                thickness = film.under_domes, film.under_sole
-            else:
-                thickness = 0.0, 0.0
-            contact.cap = foot.resistance_of(dome_load, load - dome_load, pressure, *thickness)
-            state.grip = contact.cap
-            on_domes[index] = dome_load
-        self._advance_body(dt, cosine, sine)
-        self._report(loads, on_domes, pressures, heights)
+        self._advance(pressures, 1, False)
 
-    def _move_feet(self, time: float, advance: float, turn: float) -> list[float]:
-        """Move the feet in the body as the gait wants; return their heights."""
-        gait = self._gait
-        heights = [0.0] * 6
-        self._motions = [(0.0, 0.0)] * 6
-        for index, leg in enumerate(self.legs):
-            phase = gait.phase(leg, time)
-            offset_x, offset_y = self._offsets[index]
-            if phase < gait.duty:
-                if self._phases[index] >= gait.duty:
-                    self._touch_down(index)
-                home_x, home_y = self._body.homes[index]
-                # Walking ahead and turning: the foot goes back and round the other way.
-                step_x = -advance + turn * (home_y + offset_y)
-                step_y = -turn * (home_x + offset_x)
-                self._motions[index] = (step_x, step_y)
-                self._offsets[index] = (offset_x + step_x, offset_y + step_y)
-            else:
-                if self._phases[index] < gait.duty:
-                    self._lifted[index] = (offset_x, offset_y)
-                progress, heights[index] = gait.swing(phase)
-                from_x, from_y = self._lifted[index]
-                self._offsets[index] = (
-                    from_x + progress * (self._reach - from_x),
-                    from_y * (1.0 - progress),
-                )
-            self._phases[index] = phase
-        return heights
+    def walk(self, pressures: Sequence[float], steps: int) -> int:
+        """Make many steps with the same gauge pressures, Pa, one for each leg.
 
-    def _loads(self) -> list[float]:
-        """Share the weight: least squares weighted with each foot's share, in balance.
+        The same as calling :meth:`step` so often, but it does not leave compiled code, and ends
+        when the robot tips over.
 
-        N_i = w_i (λ0 + λ1 x_i + λ2 y_i) with ΣN = W, ΣN x = W x_p, ΣN y = W y_p, where the
-        pressure point (x_p, y_p) lags behind the centre of mass when the body speeds up. The
-        horizontal forces are those of the step before.
+        Returns
+        -------
+        int
+            Steps that were made.
         """
-        gait, body = self._gait, self._body
-        weight = body.mass * GRAVITY
-        cosine, sine = math.cos(self._heading), math.sin(self._heading)
-        push_x = sum(contact.force_x for contact in self._contacts)
-        push_y = sum(contact.force_y for contact in self._contacts)
-        pull_x, pull_y = self._pull
-        lean_x = -body.height * push_x + (self._tow.height - body.height) * pull_x
-        lean_y = -body.height * push_y + (self._tow.height - body.height) * pull_y
-        moment_x = cosine * lean_x + sine * lean_y
-        moment_y = -sine * lean_x + cosine * lean_y
-        s = sx = sy = sxx = sxy = syy = 0.0
-        standing = []
-        for index in range(6):
-            share = gait.load_share(self._phases[index])
-            if share > 0.0:
-                home_x, home_y = body.homes[index]
-                x, y = home_x + self._offsets[index][0], home_y + self._offsets[index][1]
-                standing.append((index, share, x, y))
-                wx, wy = share * x, share * y
-                s += share
-                sx += wx
-                sy += wy
-                sxx += wx * x
-                sxy += wx * y
-                syy += wy * y
-        # Gauss elimination of the symmetric 3 x 3 system.
-        axx, axy, bx = sxx - sx * sx / s, sxy - sx * sy / s, moment_x - sx * weight / s
-        ayy, by = syy - sy * sy / s, moment_y - sy * weight / s
-        determinant = axx * ayy - axy * axy
-        slope_x = (bx * ayy - by * axy) / determinant
-        slope_y = (by * axx - bx * axy) / determinant
-        level = (weight - sx * slope_x - sy * slope_y) / s
-        loads = [0.0] * 6
-        for index, share, x, y in standing:
-            load = share * (level + slope_x * x + slope_y * y)
-            if load < 0.0 and self.verdict is None:
-                self.verdict = f'tip-over at {self.time:.3f} s: leg {index + 1} would have to pull'
-            loads[index] = load if load > 0.0 else 0.0
-        return loads
+        if isinstance(steps, bool) or not isinstance(steps, int) or steps < 0:
+            raise InvalidInput(f'steps = {steps!r}: a whole number from 0 is needed')
+        before = self._body[planar_step.STEPS]
+        self._advance(pressures, steps, True)
+        return round(self._body[planar_step.STEPS] - before)
 
-    def _advance_body(self, dt: float, cosine: float, sine: float) -> None:
-        tow, sled, body = self._tow, self._sled, self._body
-        behind_x, behind_y = self._x - tow.distance * cosine, self._y - tow.distance * sine
-        sled.cap = tow.weight * (
-            tow.friction_wet if self._floor.wet(behind_x, behind_y) else tow.friction_dry
+    def _advance(self, pressures: Sequence[float], steps: int, upright: bool) -> None:
+        if len(pressures) != 6 or not all(map(math.isfinite, pressures)):
+            raise InvalidInput(
+                f'pressures = {pressures!r} Pa: six finite numbers are needed, one for each leg'
+            )
+        settled = self._walk(
+            self._setting, self._body, self._table, tuple(pressures), steps, upright
         )
-        towed = tow.weight / GRAVITY
-        last = self._twist
-        twist = elastic(last, body.mass + towed, body.inertia, [*self._contacts, sled], dt, last)
-        # What the line does to the body: the load's friction, and its inertia.
-        self._pull = (
-            sled.force_x - towed * (twist[0] - last[0]) / dt,
-            sled.force_y - towed * (twist[1] - last[1]) / dt,
-        )
-        self._twist = twist
-        self._x += twist[0] * dt
-        self._y += twist[1] * dt
-        self._heading += twist[2] * dt
+        if not settled:
+            raise ArithmeticError(
+                f'friction step of {self.period:g} s does not settle: take less stiff pads or a'
+                ' shorter step'
+            )
+        self._report()
 
-    def _report(
-        self,
-        loads: list[float],
-        on_domes: list[float],
-        pressures: Sequence[float],
-        heights: list[float],
-    ) -> None:
-        dt = self.period
-        for index, state in enumerate(self.feet):
-            contact = self._contacts[index]
-            load = loads[index]
-            x, y = self._foot_position(index)
-            state.position = (x, y, heights[index])
-            state.force = (contact.force_x, contact.force_y, load)
+    def _report(self) -> None:
+        body = self._body
+        self.time = float(body[planar_step.STEPS] * self.period)
+        self.dissipation = float(body[planar_step.LOST])
+        self._fresh = False
+        if self.verdict is None and body[planar_step.TIPPED] > 0.0:
+            self.verdict = (
+                f'tip-over at {body[planar_step.TIPPED_AT]:.3f} s:'
+                f' leg {body[planar_step.TIPPED]:.0f} would have to pull'
+            )
+
+    def _show(self) -> list[FootState]:
+        if self._fresh:
+            return self._feet
+        self._fresh = True
+        table = self._table if isinstance(self._table, list) else self._table.tolist()
+        for state, (x, y, height, fx, fy, load, cap, wet, speed, path, overload) in zip(
+            self._feet, zip(*(table[row] for row in _SHOWN), strict=True), strict=True
+        ):
+            state.position = (x, y, height)
+            state.force = (fx, fy, load)
             state.standing = load > 0.0
-            state.slip_speed = 0.0
-            if not state.standing:
-                continue
-            state.slip_speed = contact.slid / dt
-            state.slip_path += contact.slid
-            self.dissipation += contact.cap * contact.slid
-            if pressures[index] > 0.0 and on_domes[index] < load:
-                state.overload_time += dt
+            state.wet = wet > 0.0
+            state.grip = cap
+            state.slip_speed, state.slip_path = speed, path
+            state.overload_time = overload
+        return self._feet
+
+    # Brought up to date when asked for; the protocol has a variable here.
+    feet: Any = property(_show, doc='State of each foot; the objects stay the same.')
+
+
+_SHOWN = (
+    planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
+    planar_step.FORCE_X, planar_step.FORCE_Y, planar_step.LOAD,
+    planar_step.CAP, planar_step.WET,
+    planar_step.SLIP_SPEED, planar_step.SLIP_PATH, planar_step.OVERLOAD,
+)  # fmt: skip
+
+
+def setting(scene: Scene, floor: Floor, period: float) -> Setting:
+    """Return what a planar step must know of a scene with a hexapod and of a floor."""
+    body, gait, tow, plan = scene.body, scene.gait, scene.tow, scene.floor
+    assert isinstance(body, HexapodBody) and isinstance(gait, TripodGait)
+    foot = scene.foot.on_rough(plan.roughness)
+    across, along = math.cos(plan.slope), math.sin(plan.slope)
+    heights = floor.heights
+    return Setting(
+        period=period,
+        settle=scene.settle,
+        cycle=gait.cycle,
+        stride=gait.stride,
+        duty=gait.duty,
+        lift=gait.lift,
+        reach=gait.reach(),
+        heading_gain=scene.heading_gain,
+        middle=tuple(0.25 if leg in TRIPODS[0] else 0.75 for leg in range(1, 7)),
+        home_x=tuple(x for x, _ in body.homes),
+        home_y=tuple(y for _, y in body.homes),
+        mass=body.mass,
+        inertia=body.inertia,
+        height=body.height,
+        weight=body.mass * GRAVITY * across,
+        downhill=GRAVITY * along,
+        leg_stiffness=body.leg_stiffness,
+        towed=tow.weight / GRAVITY,
+        tow_dry=tow.weight * tow.friction_dry * across,
+        tow_wet=tow.weight * tow.friction_wet * across,
+        tow_distance=tow.distance,
+        tow_height=tow.height,
+        tow_stiffness=tow.stiffness,
+        friction=foot.friction,
+        shear_strength=foot.shear_strength,
+        conforming_pressure=foot.conforming_pressure,
+        boundary_friction=foot.boundary_friction,
+        critical_film=foot.critical_film,
+        film_exponent=foot.film_exponent,
+        shear_stiffness=foot.shear_stiffness,
+        turning_radius=DISC_TURNING_RADIUS * foot.sole_radius,
+        sole_area=foot.sole_area,
+        dome_drain=4.0 * math.pi * foot.pads / (3.0 * plan.viscosity),
+        sole_drain=4.0 / (3.0 * plan.viscosity * foot.sole_radius**2),
+        limit_cell=foot._limit_cell,
+        limits=foot._limit_table,
+        puddle=floor.film_thickness**-2 if floor.film_thickness > 0.0 else math.inf,
+        wet=floor.wet_map.tolist(),
+        wet_cell=floor.cell,
+        wet_x=floor.origin[0],
+        wet_y=floor.origin[1],
+        heights=[[0.0]] if heights is None else heights.tolist(),
+        height_cell=CELL,
+        height_x=-1.0,
+        height_y=-WIDTH / 2.0,
+    )

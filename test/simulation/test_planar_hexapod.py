@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.simulation import Scene
+from ros_pad.simulation import planar_step
 from ros_pad.simulation.gait import TRIPODS
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.scene import FloorPlan
@@ -109,8 +110,9 @@ def test_braking_sideways_loads_the_feet_in_front_of_the_motion():
     """A body thrown to the left presses its left feet: ΣN y = -H ΣF_y, also when it is turned."""
     for heading in (0.0, 0.7):
         robot = robot_of(scene_of(settle=1.0))
-        robot._heading = heading
-        robot._twist = (-0.2 * math.sin(heading), 0.2 * math.cos(heading), 0.0)
+        robot._body[planar_step.HEADING] = heading
+        robot._body[planar_step.SPEED_X] = -0.2 * math.sin(heading)
+        robot._body[planar_step.SPEED_Y] = 0.2 * math.cos(heading)
         last = 0.0
         for _ in range(10):
             robot.step(FLAT)
@@ -207,7 +209,7 @@ def test_heading_hold_steers_back():
     assert abs(held[2]) < 0.5 * abs(free[2])
     # On grip, a heading decays as exp(-gain t): 0.2 rad, gain 0.5/s, 4 s.
     robot = robot_of(scene_of(friction=2.0, heading_gain=0.5))
-    robot._heading = 0.2
+    robot._body[planar_step.HEADING] = 0.2
     _, _, heading = walk(robot, 4.0)
     assert heading == pytest.approx(0.2 * math.exp(-2.0), rel=0.05)
 
@@ -215,7 +217,7 @@ def test_heading_hold_steers_back():
 def test_turned_robot_walks_where_it_points():
     straight = robot_of(scene_of(friction=0.5))
     turned = robot_of(scene_of(friction=0.5))
-    turned._heading = 0.7
+    turned._body[planar_step.HEADING] = 0.7
     for robot in (straight, turned):
         walk(robot, 2.0)
     x, y, heading = turned.body
@@ -251,7 +253,7 @@ def test_tow_feels_the_ground_behind_the_robot():
     foot = dataclasses.replace(scene.foot, boundary_friction=0.8)  # the feet do not mind water
     robot = robot_of(dataclasses.replace(scene, foot=foot), floor)
     caps = []
-    walk(robot, 4.0, lambda: caps.append((robot.body[0] - 0.3, robot._sled.cap)))
+    walk(robot, 4.0, lambda: caps.append((robot.body[0] - 0.3, robot._body[planar_step.SLED_CAP])))
     last = 0.0
     for behind, cap in caps:
         if abs(behind) > 1e-2:
@@ -266,7 +268,7 @@ def test_tow_feels_the_ground_behind_the_robot():
 def test_standing_feet_stay_where_they_are():
     """With grip to spare a marker moves by no more than its pads shear: 2 N / 5000 N/m."""
     robot = robot_of(scene_of(friction=2.0, heading_gain=1.0))
-    robot._heading = 0.1
+    robot._body[planar_step.HEADING] = 0.1
     tracks = [[] for _ in range(6)]
 
     def note():
@@ -293,8 +295,9 @@ def test_forces_and_grip():
 
     def check():
         nonlocal slipped
-        for foot in robot.feet:
-            pull = math.hypot(*foot.force[:2])
+        for foot, moment in zip(robot.feet, robot._table[planar_step.MOMENT], strict=True):
+            # Force and moment share the grip on an ellipsoid, with 2/3 of the sole's radius.
+            pull = math.hypot(*foot.force[:2], moment / (2.0 / 3.0 * SHIPPED.foot.sole_radius))
             assert foot.standing == (foot.force[2] > 0.0)
             assert pull <= foot.grip + 1e-12
             if foot.slip_speed > 0.0:
@@ -340,7 +343,8 @@ def test_dissipation():
         lost[0] += sum(foot.grip * foot.slip_speed * robot.period for foot in robot.feet)
 
     walk(robot, 2.0, note)
-    assert robot.dissipation == pytest.approx(lost[0], rel=1e-9)
+    # Soles that turn with the body lose a little more.
+    assert lost[0] < robot.dissipation < lost[0] * (1.0 + 1e-6)
     assert robot.dissipation > 0.1
     path = sum(foot.slip_path for foot in robot.feet)
     assert robot.dissipation < path * 0.12 * WEIGHT / 2.0
