@@ -60,11 +60,16 @@ setup(
             'ros-jazzy-std-msgs',
             'ros-jazzy-std-srvs',
         ],
+        # The hexapod with joints (L2), and compiled loops of the planar one.
+        'mujoco': ['mujoco>=3.2'],
+        'fast': ['numba>=0.60'],
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
         'test': [
             'colcon-common-extensions',
             'hypothesis',
+            'mujoco>=3.2',
             'mypy==2.4.*',
+            'numba>=0.60',
             'pytest>=7.4',
             'pytest-xdist',
             'rosbags',

@@ -124,10 +124,10 @@ def _run_in(
     folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, rung: str
 ) -> int:
     if options.no_ros:
-        trial, bag = _walk(scene, policy, options.seed, f'{policy}, without ROS'), None
+        trial, bag = _walk(scene, policy, options.seed, rung, f'{policy}, without ROS'), None
     else:
         bag = folder / 'bag'
-        trial = _walk_on_nodes(scene, policy, options.seed, bag, options.live)
+        trial = _walk_on_nodes(scene, policy, options.seed, rung, bag, options.live)
         if trial.settings['interrupted']:
             return complain(
                 f'stopped at {trial.metrics.duration_s:.1f} s of {scene.duration:.1f} s:'  # type: ignore[union-attr]
@@ -137,7 +137,7 @@ def _run_in(
     others = []
     if policy == 'adaptive' and not options.no_compare:
         others = [
-            _walk(scene, other, options.seed, f'{other:8} on the same ground')
+            _walk(scene, other, options.seed, rung, f'{other:8} on the same ground')
             for other in POLICIES
             if other != policy
         ]
@@ -174,12 +174,14 @@ def _run_in(
     return 0
 
 
-def _walk(scene: Scene, policy: str, seed: int, text: str) -> Trial:
+def _walk(scene: Scene, policy: str, seed: int, rung: str, text: str) -> Trial:
     with bar(text, scene.duration) as progress:
-        return loop.run(scene, policy, seed, progress=progress)
+        return loop.run(scene, policy, seed, rung, progress)
 
 
-def _walk_on_nodes(scene: Scene, policy: str, seed: int, bag: pathlib.Path, live: bool) -> Trial:
+def _walk_on_nodes(
+    scene: Scene, policy: str, seed: int, rung: str, bag: pathlib.Path, live: bool
+) -> Trial:
     try:
         from ros_pad.nodes import composed
     except ModuleNotFoundError as error:
@@ -191,7 +193,7 @@ def _walk_on_nodes(scene: Scene, policy: str, seed: int, bag: pathlib.Path, live
         contextlib.nullcontext() if live else _alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
-        return composed.run(scene, policy, seed, bag=bag, progress=progress)
+        return composed.run(scene, policy, seed, rung, bag=bag, progress=progress)
 
 
 @contextlib.contextmanager

@@ -62,6 +62,8 @@ class ComposedTrial:
         Folder of the bag to write; must not exist.
     context : rclpy.Context
         Initialised context that the nodes live in.
+    fidelity : str
+        ``auto`` or a rung of the ladder.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class ComposedTrial:
         seed: int,
         bag: str | os.PathLike[str],
         context: rclpy.Context,
+        fidelity: str = 'auto',
     ) -> None:
         self.scene = scene
         self.stopped = False
@@ -129,6 +132,7 @@ class ComposedTrial:
             self.simulator = add(
                 SimulatorNode,
                 foot=scene.foot.source,
+                fidelity=fidelity,
                 publish_clock=True,
                 free_running=False,
                 **ground,
@@ -176,7 +180,7 @@ class ComposedTrial:
         self._spin(settled, f'the nodes to answer to {now_ns * 1e-9:.3f} s')
         if control and self.scene.faults:
             # Messages carry what devices say; a robot stands on what is in its pads.
-            self.simulator._pressures[:] = [
+            self.simulator.pressures[:] = [
                 channel.regulator.pad_pressure for channel in self.regulator.channels.values()
             ]
 
@@ -305,7 +309,7 @@ def run(
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}') from error
     try:
-        trial = ComposedTrial(scene, policy, seed, bag, context)
+        trial = ComposedTrial(scene, policy, seed, bag, context, rung)
         started = time.perf_counter()
         try:
             with _interruptible(trial):

@@ -16,6 +16,7 @@ from rclpy.clock import ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
+from sensor_msgs.msg import JointState
 
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
@@ -41,6 +42,7 @@ PARAMETERS = (
         read=lambda name: Foot.load(name) if name else None,
     ),
     SEED,
+    Parameter('fidelity', 'auto', 'Rung of the simulation ladder.', choices=fidelity.FIDELITIES),
     Parameter(
         'rate', 0.0, "Samples a second, at least 50; 0 takes the scene's.", 'Hz', 0.0, 1000.0
     ),
@@ -73,15 +75,19 @@ class SimulatorNode(Node):
             self.scene = replace(self.scene, foot=values['foot'])
         self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
         self.floor = self.scene.floor.build(values['seed'])
-        self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9)
+        self.robot = fidelity.build(
+            self.scene, self.floor, self.period_ns * 1e-9, values['fidelity']
+        )
         self._sensors = Sensors(self.scene.sensors, len(self.scene.legs), values['seed'])
         self._ambient = values['ambient_pressure']
-        self._pressures = [0.0] * len(self.scene.legs)
+        self.pressures = [0.0] * len(self.scene.legs)
         self.pressure_stamps = [0] * len(self.scene.legs)
         self._simulated = values['publish_clock']
         self.time_ns = 0
         self._clock_publisher = topics.CLOCK.publisher(self) if self._simulated else None
         self._pose = topics.BODY_POSE.publisher(self)
+        # Only a robot with joints has any to show.
+        self._joints = topics.JOINT_STATES.publisher(self) if self.robot.joint_names else None
         self._wrenches = [topics.WRENCH.publisher(self, leg) for leg in self.scene.legs]
         self._positions = [topics.POSITION.publisher(self, leg) for leg in self.scene.legs]
         # Messages are reused: publishing copies them, and making them is slow.
@@ -91,6 +97,7 @@ class SimulatorNode(Node):
         self._wrench_message = WrenchStamped()
         self._position_message = PointStamped()
         self._position_message.header.frame_id = 'world'
+        self._joint_message = JointState(name=self.robot.joint_names)
         for index, leg in enumerate(self.scene.legs):
             topics.PRESSURE.subscription(self, self._pressure_callback(index), leg)
         if values['free_running']:
@@ -104,14 +111,14 @@ class SimulatorNode(Node):
             if not math.isfinite(gauge):
                 return
             # A sensor at rest may read a little below ambient; a pad cannot be sucked in.
-            self._pressures[index] = max(0.0, gauge)
+            self.pressures[index] = max(0.0, gauge)
             self.pressure_stamps[index] = nanoseconds(message.header.stamp)
 
         return callback
 
     def step(self) -> None:
         """Advance the robot by one sample and publish what its sensors say."""
-        self.robot.step(self._pressures)
+        self.robot.step(self.pressures)
         self.tick()
         stamp_ns = self.time_ns if self._simulated else self.get_clock().now().nanoseconds
         readings = self._sensors.read(self.robot)
@@ -130,6 +137,10 @@ class SimulatorNode(Node):
         pose.pose.orientation.z = math.sin(0.5 * heading)
         pose.pose.orientation.w = math.cos(0.5 * heading)
         self._pose.publish(pose)
+        if self._joints is not None:
+            self._joint_message.header.stamp = wrench.header.stamp
+            self._joint_message.position = self.robot.joint_positions
+            self._joints.publish(self._joint_message)
 
     def tick(self) -> None:
         """Let simulated time go on by one sample; :meth:`step` does it too."""

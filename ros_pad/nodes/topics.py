@@ -23,6 +23,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
 from std_msgs.msg import String
@@ -95,6 +96,7 @@ FRICTION_MARGIN = _measured('leg_{leg}/friction_margin', Float64)
 SLIPPING = _measured('leg_{leg}/slipping', Bool)
 MORPHOLOGY = Topic('leg_{leg}/morphology', String, qos.STATE, qos.STATE)
 BODY_POSE = _measured('body/pose', PoseStamped)
+JOINT_STATES = _measured('joint_states', JointState)
 CLOCK = Topic('/clock', Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
 
@@ -112,7 +114,7 @@ LEG_TOPICS = (
 )
 """The topics that every leg has."""
 
-COMMON_TOPICS = (CLOCK, BODY_POSE, DIAGNOSTICS)
+COMMON_TOPICS = (CLOCK, BODY_POSE, JOINT_STATES, DIAGNOSTICS)
 """The topics that there is one of."""
 
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 from ros_pad.contact import WATER
 from ros_pad.errors import InvalidInput
+from ros_pad.simulation.full_hexapod import FullHexapod
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
-FIDELITIES = ('auto', 'L0', 'L1')
-_RUNG = {'rail_leg': 'L0', 'hexapod': 'L1'}
+FIDELITIES = ('auto', 'L0', 'L1', 'L2')
+_RUNGS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Omission:
 
 
 def rung(scene: Scene, fidelity: str = 'auto') -> str:
-    """Return the rung for a scene; each robot has one rung so far.
+    """Return the rung for a scene.
 
     Raises
     ------
@@ -46,20 +47,33 @@ def rung(scene: Scene, fidelity: str = 'auto') -> str:
     """
     if fidelity not in FIDELITIES:
         raise InvalidInput(f'fidelity = {fidelity!r}: one of {", ".join(FIDELITIES)} is needed')
-    own = _RUNG[scene.robot]
-    if fidelity not in ('auto', own):
+    known = _RUNGS[scene.robot]
+    if fidelity == 'auto':
+        return known[0]
+    if fidelity not in known:
         raise InvalidInput(
             f'fidelity = {fidelity!r}: scene {scene.name!r} has a {scene.robot},'
-            f' which {own} models'
+            f' which {" and ".join(known)} model{"s" if len(known) == 1 else ""}'
         )
-    return own
+    return fidelity
 
 
-def build(scene: Scene, floor: Floor, period: float) -> Robot:
-    """Return the robot of a scene on a floor, with a step of ``period`` seconds."""
-    if scene.robot == 'rail_leg':
+def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> Robot:
+    """Return the robot of a scene on a floor, with a step of ``period`` seconds.
+
+    Raises
+    ------
+    InvalidInput
+        As :func:`rung`.
+    ConfigError
+        For L2 without MuJoCo, or with legs that cannot do what the scene wants of them.
+    """
+    name = rung(scene, fidelity)
+    if name == 'L0':
         return RailLeg(scene, floor, period)
-    return PlanarHexapod(scene, floor, period)
+    if name == 'L1':
+        return PlanarHexapod(scene, floor, period)
+    return FullHexapod(scene, floor, period)
 
 
 def omitted(scene: Scene) -> list[Omission]:

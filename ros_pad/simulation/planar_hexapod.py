@@ -71,6 +71,8 @@ class PlanarHexapod:
         self.time = 0.0
         self.dissipation = 0.0
         self.verdict: str | None = None
+        self.joint_names: tuple[str, ...] = ()
+        self.joint_positions: tuple[float, ...] = ()
         self._feet = [FootState() for _ in self.legs]
         self._fresh = False
         self._setting = setting(scene, floor, period)

@@ -41,6 +41,8 @@ class RailLeg:
         self.feet = [FootState()]
         self.dissipation = 0.0
         self.verdict: str | None = None
+        self.joint_names: tuple[str, ...] = ()
+        self.joint_positions: tuple[float, ...] = ()
         self._body = scene.body
         self._gait = scene.gait
         self._foot = scene.foot

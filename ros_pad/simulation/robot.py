@@ -64,6 +64,8 @@ class Robot(Protocol):
         Work lost in slipping feet, J.
     verdict : str or None
         Why the walk is no longer valid, for instance a tip-over; None while it is.
+    joint_names : tuple of str
+        Of the robot's joints; empty on rungs that have none.
     """
 
     legs: tuple[int, ...]
@@ -72,6 +74,7 @@ class Robot(Protocol):
     feet: list[FootState]
     dissipation: float
     verdict: str | None
+    joint_names: tuple[str, ...]
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
@@ -79,3 +82,7 @@ class Robot(Protocol):
     @property
     def body(self) -> Vector:
         """Position x, y, m, and heading, rad, of the body in the world."""
+
+    @property
+    def joint_positions(self) -> tuple[float, ...]:
+        """Angles of the joints, rad, in the order of ``joint_names``."""

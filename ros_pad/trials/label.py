@@ -70,6 +70,7 @@ def settings(scene: Scene) -> dict[str, Any]:
         'stride_m': scene.stride,
         'cycle_s': scene.gait.cycle,
         'settle_s': scene.settle,
+        'faults': [str(fault) for fault in scene.faults],
         'omitted': [asdict(omission) for omission in ladder.omitted(scene)],
         'version': ros_pad.__version__,
     }

@@ -71,6 +71,8 @@ class ClosedLoop:
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
     seed : int
         Of floor and noise, 0 or more.
+    fidelity : str
+        ``auto`` or a rung of the ladder.
 
     Raises
     ------
@@ -78,12 +80,12 @@ class ClosedLoop:
         For an unknown policy, or a seed that is no whole number from 0.
     """
 
-    def __init__(self, scene: Scene, policy: str, seed: int) -> None:
+    def __init__(self, scene: Scene, policy: str, seed: int, fidelity: str = 'auto') -> None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
         self.period_ns = sample_period_ns(scene)
         self.floor = scene.floor.build(seed)
-        self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9)
+        self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
         self.sensors = Sensors(scene.sensors, len(scene.legs), seed)
         tuning = tuning_for(scene)
         self.estimators = [
@@ -207,7 +209,7 @@ def run(
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
     rung = ladder.rung(scene, fidelity)
-    loop = ClosedLoop(scene, policy, seed)
+    loop = ClosedLoop(scene, policy, seed, rung)
     log = TrialLog(scene, policy, seed, rung)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns

@@ -149,7 +149,7 @@ def test_a_pressure_that_is_none_changes_nothing(start, robot, until):
         heard.clear()
         publisher.publish(FluidPressure(fluid_pressure=absolute))
         until(lambda: heard)
-        taken.append(node._pressures[1])
+        taken.append(node.pressures[1])
     # A sensor at rest reads a little below ambient: that is flat.
     assert taken == [50e3, 50e3, 50e3, 50e3, 0.0]
 
