@@ -144,4 +144,6 @@ def run(options: argparse.Namespace) -> int:
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
+        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad.radius:
+            print('  (wider than the pad: this balance does not hold, see docs/errata.md)')
     return 0

@@ -577,7 +577,9 @@ def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float =
         what += 'is needed'
     else:
         most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
-        if most <= 0.0:
+        if p == 0.0:
+            what += 'spreads the contact over the whole pad: it is flat without pressure'
+        elif most <= 0.0:
             what += (
                 'leaves the pad flat, for adhesion alone holds it there: more pressure is needed'
             )
