@@ -22,9 +22,9 @@ force and moment for the limit surface of a sliding contact; an evenly pressed d
     Pseudo-Huber on the slip, φ' = c |z| / √(z² + ε²): fast and smooth, creeps at about ε; sticking
     feet share the load in proportion to their caps.
 ``exact_stick``
-    Rigid-plastic, φ' = c, by block Gauss-Seidel on impulses in balls of radius c dt: feet stick
-    to rounding, and the twist comes with a bound of its error. The reference. The forces of three
-    or more sticking feet are not unique.
+    Rigid-plastic, φ' = c, by projected gradient or block Gauss-Seidel on impulses in balls of
+    radius c dt: feet stick to rounding, and the twist comes with a bound of its error. The
+    reference. The forces of three or more sticking feet are not unique.
 """
 
 from __future__ import annotations
@@ -32,12 +32,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from math import sqrt
+from operator import add
+from operator import mul
+from operator import sub
 
+from ros_pad.contact.pad import choice
 from ros_pad.simulation.planar_step import Pushed
 from ros_pad.simulation.planar_step import newton
 from ros_pad.simulation.planar_step import push
 
 Twist = tuple[float, float, float]
+_Row = tuple[float, float, float, float, float]
+
+# Sweeps of Gauss-Seidel after which a step counts as one that crawls.
+CRAWLING = 100
 
 
 class Contact:
@@ -163,13 +171,6 @@ def creeping(
     return vx, vy, turn
 
 
-def _unsettled(dt: float, contacts: Sequence[object]) -> ArithmeticError:
-    return ArithmeticError(
-        f'friction step of {dt:g} s with {len(contacts)} contacts does not settle: take less stiff'
-        ' pads or a shorter step'
-    )
-
-
 def exact_stick(
     free: Twist,
     mass: float,
@@ -178,6 +179,7 @@ def exact_stick(
     dt: float,
     tolerance: float = 1e-8,
     sweeps: int = 20000,
+    method: str = 'gradient',
 ) -> Twist:
     """Step with rigid-plastic friction, to a proven accuracy; sets each contact's force.
 
@@ -187,69 +189,198 @@ def exact_stick(
         As for :func:`elastic`.
     tolerance : float
         Bound on the error of the twist, √(v² + ω² inertia/mass), m/s. Rounding adds up to
-        3e-8 √(Σ c dt |s|/mass), which is less for bodies of a kilogram.
+        3e-8 √(Σ c dt |z|/mass), which is less for bodies of a kilogram.
     sweeps : int
         Most sweeps over the contacts.
+    method : str
+        ``gradient`` or ``gauss_seidel``. Both give the one twist. Of the forces of sticking feet
+        the first finds the smallest, if none is at its cap; the second those that come first in
+        the order of the contacts, as solvers in use do.
 
     Raises
     ------
     ArithmeticError
         When the bound is not met after all sweeps.
+    InvalidInput
+        For another method.
 
     Notes
     -----
-    Accelerated projected gradient on the impulses, begun anew wherever the last step turns back
-    (Nesterov 1983; O'Donoghue and Candès 2015). The primal function is strongly convex, so the
-    gap Σ (c dt |s| + p·s) between it and its dual bounds the error: ½ mass error² <= gap.
+    ``gradient`` is projected gradient on all impulses, accelerated and begun anew wherever its
+    last step turns back (Nesterov 1983; O'Donoghue and Candès 2015). ``gauss_seidel`` finds,
+    contact by contact, the impulse in its ball that minimises the energy while the others are
+    held, exactly. After each sweep it tries a secant step along the change of the last two
+    (Anderson's mixing of depth one), kept where it lowers the energy: plain sweeps crawl where
+    contacts nearly agree on a motion. The few steps that still crawl are handed to the gradient.
+
+    The primal function is strongly convex, so the gap Σ (c dt |z| + p·z) between it and its dual
+    bounds the error: ½ mass error² <= gap.
     """
-    limits = [contact.cap * dt for contact in contacts]
-    levers = [(contact.lever_x, contact.lever_y) for contact in contacts]
+    choice('method', method, ('gradient', 'gauss_seidel'))
+    holding = [contact for contact in contacts if contact.cap > 0.0]
+    limits = [contact.cap * dt for contact in holding]
+    rows = [row for contact in holding for row in _directions(contact, mass, inertia)]
     # No direction of impulses is stiffer than all contacts together: 1/rate is a safe step.
-    rate = len(levers) / mass + sum(rx * rx + ry * ry for rx, ry in levers) / inertia
-    impulses = ahead = [(0.0, 0.0)] * len(levers)
+    rate = sum(max(row[4] for row in rows[i : i + 3]) for i in range(0, len(rows), 3))
+    at_first = [jx * free[0] + jy * free[1] + jw * free[2] + m for jx, jy, jw, m, _ in rows]
 
-    def twist_after(pushes: Sequence[tuple[float, float]]) -> Twist:
+    along_x, along_y, along_turn = ([row[axis] for row in rows] for axis in range(3))
+
+    def twist_after(impulses: list[float]) -> Twist:
         return (
-            free[0] + sum(px for px, _ in pushes) / mass,
-            free[1] + sum(py for _, py in pushes) / mass,
-            free[2]
-            + sum(rx * py - ry * px for (px, py), (rx, ry) in zip(pushes, levers, strict=True))
-            / inertia,
+            free[0] + sum(map(mul, along_x, impulses)) / mass,
+            free[1] + sum(map(mul, along_y, impulses)) / mass,
+            free[2] + sum(map(mul, along_turn, impulses)) / inertia,
         )
 
-    age = 1.0
-    for _ in range(sweeps):
-        twist = twist_after(ahead)
-        last, impulses = impulses, []
-        turn = 0.0
-        for contact, limit, (ax, ay), (lx, ly) in zip(contacts, limits, ahead, last, strict=True):
-            sx, sy = contact.slip(twist)
-            px, py = ax - sx / rate, ay - sy / rate
-            size = math.hypot(px, py)
+    def slips(impulses: list[float]) -> list[float]:
+        vx, vy, turn = twist_after(impulses)
+        return [jx * vx + jy * vy + jw * turn + motion for jx, jy, jw, motion, _ in rows]
+
+    def energy(impulses: list[float]) -> float:
+        both = map(add, slips(impulses), at_first)
+        return 0.5 * sum(map(mul, impulses, both))
+
+    def sweep(impulses: list[float]) -> list[float]:
+        (vx, vy, turn), after = twist_after(impulses), list(impulses)
+        for place, limit in zip(range(0, len(rows), 3), limits, strict=True):
+            block = rows[place : place + 3]
+            pulls = [
+                (jx * vx + jy * vy + jw * turn + motion - stiffness * impulse, stiffness)
+                for (jx, jy, jw, motion, stiffness), impulse in zip(
+                    block, impulses[place:], strict=False
+                )
+            ]
+            for index, impulse in enumerate(_least_in_ball(pulls, limit), place):
+                after[index], added = impulse, impulse - impulses[index]
+                vx += along_x[index] * added / mass
+                vy += along_y[index] * added / mass
+                turn += along_turn[index] * added / inertia
+        return after
+
+    def in_balls(impulses: list[float]) -> list[float]:
+        inside = list(impulses)
+        for place, limit in zip(range(0, len(rows), 3), limits, strict=True):
+            size = math.hypot(*impulses[place : place + 3])
             if size > limit:
-                px, py = px * limit / size, py * limit / size
-            impulses.append((px, py))
-            turn += (ax - px) * (px - lx) + (ay - py) * (py - ly)
-        twist = twist_after(impulses)
-        gap = lost = 0.0
-        for contact, limit, (px, py) in zip(contacts, limits, impulses, strict=True):
-            sx, sy = contact.slip(twist)
-            loss = limit * math.hypot(sx, sy)
-            lost += loss
-            gap += loss + px * sx + py * sy
-        if gap <= 0.5 * mass * tolerance * tolerance + 4e-16 * lost:
-            break
-        age, older = (1.0, 1.0) if turn > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
+                inside[place : place + 3] = [
+                    each * limit / size for each in impulses[place : place + 3]
+                ]
+        return inside
+
+    gap = 0.0
+
+    def settled(impulses: list[float]) -> bool:
+        nonlocal gap
+        slip, lost = slips(impulses), 0.0
+        for place, limit in zip(range(0, len(rows), 3), limits, strict=True):
+            lost += limit * math.hypot(*slip[place : place + 3])
+        gap = lost + sum(map(mul, impulses, slip))
+        return gap <= 0.5 * mass * tolerance * tolerance + 4e-16 * lost
+
+    impulses = [0.0] * len(rows)
+    swept, change = impulses, impulses
+    count = 0
+    patience = min(sweeps, CRAWLING) if method == 'gauss_seidel' else 0
+    while count < patience and not settled(impulses):
+        count += 1
+        last, before = swept, change
+        swept = sweep(impulses)
+        change = list(map(sub, swept, impulses))
+        impulses = swept
+        bend = list(map(sub, change, before))
+        if count > 1 and any(bend):
+            share = sum(map(mul, change, bend)) / sum(map(mul, bend, bend))
+            ahead = in_balls([s - share * (s - o) for s, o in zip(swept, last, strict=True)])
+            if energy(ahead) < energy(swept):
+                impulses = ahead
+    ahead, age = impulses, 1.0
+    while not settled(impulses):
+        if count >= sweeps:
+            raise ArithmeticError(
+                f'twist is known to {sqrt(2.0 * gap / mass):g} m/s only after {sweeps} sweeps'
+            )
+        count += 1
+        last = impulses
+        impulses = in_balls([p - z / rate for p, z in zip(ahead, slips(ahead), strict=True)])
+        turned = sum((a - p) * (p - o) for a, p, o in zip(ahead, impulses, last, strict=True))
+        age, older = (1.0, 1.0) if turned > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
         pull = (older - 1.0) / age
-        ahead = [
-            (px + pull * (px - lx), py + pull * (py - ly))
-            for (px, py), (lx, ly) in zip(impulses, last, strict=True)
-        ]
-    else:
-        raise ArithmeticError(
-            f'twist is known to {sqrt(2.0 * gap / mass):g} m/s only after {sweeps} sweeps'
+        ahead = [p + pull * (p - o) for p, o in zip(impulses, last, strict=True)]
+    twist = twist_after(impulses)
+    for contact in contacts:
+        contact.force_x = contact.force_y = contact.moment = contact.slid = contact.lost = 0.0
+    for place, contact in zip(range(0, len(rows), 3), holding, strict=True):
+        for (jx, jy, jw, _, _), impulse in zip(
+            rows[place : place + 3], impulses[place:], strict=False
+        ):
+            contact.force_x += jx * impulse / dt
+            contact.force_y += jy * impulse / dt
+            # A direction's moment about the body less that of its force is the sole's own.
+            arm = contact.lever_x * jy - contact.lever_y * jx
+            contact.moment += (jw - arm) * impulse / dt
+        sx, sy = contact.slip(twist)
+        contact.slid = math.hypot(sx, sy) * dt
+        contact.lost = (
+            contact.cap
+            * dt
+            * math.hypot(sx, sy, contact.turning_radius * (twist[2] + contact.motion_turn))
         )
-    for contact, (px, py) in zip(contacts, impulses, strict=True):
-        contact.force_x, contact.force_y = px / dt, py / dt
-        contact.slid = math.hypot(*contact.slip(twist)) * dt
     return twist
+
+
+def _directions(contact: Contact, mass: float, inertia: float) -> list[_Row]:
+    """Three directions of a contact's slip in which an impulse moves it along itself only.
+
+    They are the eigenvectors of its compliance 1/mass + n nᵀ/inertia, n = (-ry, rx, ρ): along the
+    lever arm, and two in the plane of slip across it and turning. A row has what a twist makes of
+    it, the imposed motion along it, and its compliance.
+    """
+    rx, ry, radius = contact.lever_x, contact.lever_y, contact.turning_radius
+    arm = sqrt(rx * rx + ry * ry)
+    ux, uy = (rx / arm, ry / arm) if arm > 0.0 else (1.0, 0.0)
+    across = 1.0 / mass + arm * arm / inertia
+    mixed, turning = arm * radius / inertia, radius * radius / inertia
+    angle = 0.5 * math.atan2(2.0 * mixed, across - turning)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    rows = []
+    for ex, ey, et in (
+        (ux, uy, 0.0), (-cosine * uy, cosine * ux, sine), (sine * uy, -sine * ux, cosine)
+    ):  # fmt: skip
+        jw = rx * ey - ry * ex + radius * et
+        motion = ex * contact.motion_x + ey * contact.motion_y
+        compliance = (ex * ex + ey * ey) / mass + jw * jw / inertia
+        # Without a turning radius nothing moves along the last: any compliance will do.
+        rows.append((
+            ex, ey, jw, motion + et * radius * contact.motion_turn, compliance or 1.0
+        ))  # fmt: skip
+    return rows
+
+
+def _least_in_ball(pulls: Sequence[tuple[float, float]], limit: float) -> list[float]:
+    """Minimise Σ (½ d p² + g p) over |p| <= limit, for (g, d) in pulls.
+
+    On the sphere p = -g/(d + λ), λ the root of |p(λ)| = limit: Newton on 1/|p|, which is nearly
+    linear and concave, so that from below it never passes the root (Moré and Sorensen 1983).
+    """
+    found = [-g / d for g, d in pulls]
+    if sum(map(mul, found, found)) <= limit * limit:
+        return found
+    size = sqrt(sum(g * g for g, _ in pulls))
+    multiplier = max(0.0, size / limit - max(d for _, d in pulls))
+    for _ in range(100):
+        found = [-g / (d + multiplier) for g, d in pulls]
+        square = sum(map(mul, found, found))
+        size = sqrt(square)
+        if size <= limit * (1.0 + 1e-15):
+            break
+        slope = sum(p * p / (d + multiplier) for p, (_, d) in zip(found, pulls, strict=True))
+        multiplier += (size / limit - 1.0) * square / slope
+    return [p * limit / size for p in found]
+
+
+def _unsettled(dt: float, contacts: Sequence[object]) -> ArithmeticError:
+    return ArithmeticError(
+        f'friction step of {dt:g} s with {len(contacts)} contacts does not settle: take less stiff'
+        ' pads or a shorter step'
+    )
