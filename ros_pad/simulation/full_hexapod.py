@@ -531,9 +531,7 @@ def _legs(scene: Scene) -> list[Leg]:
     return legs
 
 
-def mjcf(
-    scene: Scene, legs: Sequence[Leg], uneven: bool, settings: Settings, dt: float
-) -> str:
+def mjcf(scene: Scene, legs: Sequence[Leg], uneven: bool, settings: Settings, dt: float) -> str:
     """Return the robot, its load and the ground of each foot, in MuJoCo's XML.
 
     Links are rods with the shares of the mass above; what is left makes the trunk, placed and
