@@ -189,7 +189,7 @@ def exact_stick(
         As for :func:`elastic`.
     tolerance : float
         Bound on the error of the twist, √(v² + ω² inertia/mass), m/s. Rounding adds up to
-        3e-8 √(Σ c dt |z|/mass), which is less for bodies of a kilogram.
+        3e-8 √(Σ c dt |z|/mass) + 1.5e-8 Σ c dt/mass, which is less for bodies of a kilogram.
     sweeps : int
         Most sweeps over the contacts.
     method : str
@@ -269,6 +269,7 @@ def exact_stick(
         return inside
 
     gap = 0.0
+    allowed = 0.5 * mass * tolerance * tolerance + 1e-16 * sum(limits) ** 2 / mass
 
     def settled(impulses: list[float]) -> bool:
         nonlocal gap
@@ -276,7 +277,7 @@ def exact_stick(
         for place, limit in zip(range(0, len(rows), 3), limits, strict=True):
             lost += limit * math.hypot(*slip[place : place + 3])
         gap = lost + sum(map(mul, impulses, slip))
-        return gap <= 0.5 * mass * tolerance * tolerance + 4e-16 * lost
+        return gap <= allowed + 4e-16 * lost
 
     impulses = [0.0] * len(rows)
     swept, change = impulses, impulses
