@@ -53,6 +53,9 @@ class PlanarHexapod:
         Whether steps are compiled by numba. None compiles where that is sure to pay: when numba is
         installed and the trial of the scene is long, or something was compiled before. The walk is
         the same to the last bit.
+    soles_turn : bool
+        Whether a sole turns with its leg about the hip, as on legs of three joints without an
+        ankle. Otherwise it turns with the body alone.
 
     Raises
     ------
@@ -61,7 +64,12 @@ class PlanarHexapod:
     """
 
     def __init__(
-        self, scene: Scene, floor: Floor, period: float, compile_steps: bool | None = None
+        self,
+        scene: Scene,
+        floor: Floor,
+        period: float,
+        compile_steps: bool | None = None,
+        soles_turn: bool = False,
     ) -> None:
         assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
         if compile_steps is None:
@@ -75,7 +83,7 @@ class PlanarHexapod:
         self.joint_positions: tuple[float, ...] = ()
         self._feet = [FootState() for _ in self.legs]
         self._fresh = False
-        self._setting = setting(scene, floor, period)
+        self._setting = setting(scene, floor, period, soles_turn)
         self._body: Any = [0.0] * planar_step.BODY
         self._table: Any = [[0.0] * 6 for _ in range(planar_step.FEET)]
         self._plant()
@@ -189,13 +197,13 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def setting(scene: Scene, floor: Floor, period: float) -> Setting:
+def setting(scene: Scene, floor: Floor, period: float, soles_turn: bool = False) -> Setting:
     """Return what a planar step must know of a scene with a hexapod and of a floor."""
     body, gait, tow, plan = scene.body, scene.gait, scene.tow, scene.floor
     assert isinstance(body, HexapodBody) and isinstance(gait, TripodGait)
     foot = scene.foot.on_rough(plan.roughness)
     across, along = math.cos(plan.slope), math.sin(plan.slope)
-    heights = floor.heights
+    heights, leg = floor.heights, body.coxa + body.femur
     return Setting(
         period=period,
         settle=scene.settle,
@@ -208,6 +216,10 @@ def setting(scene: Scene, floor: Floor, period: float) -> Setting:
         middle=tuple(0.25 if leg in TRIPODS[0] else 0.75 for leg in range(1, 7)),
         home_x=tuple(x for x, _ in body.homes),
         home_y=tuple(y for _, y in body.homes),
+        soles_turn=soles_turn,
+        # Hips are where a leg ends that points straight out and whose shin stands upright.
+        hip_x=tuple(x * (1.0 - leg / math.hypot(x, y)) for x, y in body.homes),
+        hip_y=tuple(y * (1.0 - leg / math.hypot(x, y)) for x, y in body.homes),
         mass=body.mass,
         inertia=body.inertia,
         height=body.height,

@@ -28,7 +28,7 @@ from typing import NamedTuple
 Pushed = tuple[float, float, float, float, float, float, float, float]
 
 # Rows of the table of feet; a column is a foot. World axes where not said otherwise.
-FEET = 27
+FEET = 28
 (
     PHASE,  # since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
@@ -45,7 +45,7 @@ FEET = 27
     OVERLOAD,  # time, s
     WET,  # 1 or 0
     MARKER_X, MARKER_Y,  # m
-    STEP_X, STEP_Y,  # what the gait moved the foot in the body in this step, m
+    STEP_X, STEP_Y, STEP_TURN,  # what the gait moved the foot in the body in this step, m and rad
 ) = range(FEET)  # fmt: skip
 
 # Entries of the body.
@@ -75,6 +75,9 @@ class Setting(NamedTuple):
     middle: tuple[float, ...]  # of a leg's push, share of the cycle
     home_x: tuple[float, ...]
     home_y: tuple[float, ...]
+    soles_turn: bool
+    hip_x: tuple[float, ...]
+    hip_y: tuple[float, ...]
     mass: float
     inertia: float
     height: float
@@ -203,6 +206,12 @@ def move_feet(setting: Setting, body: Any, feet: Any, before: float, time: float
             step_y[index] = -turn * (setting.home_x[index] + x)
             offset_x[index] = x + step_x[index]
             offset_y[index] = y + step_y[index]
+            if setting.soles_turn:
+                # With the leg about its hip: the angle that the step is seen under from there.
+                arm_x = setting.home_x[index] - setting.hip_x[index] + x + 0.5 * step_x[index]
+                arm_y = setting.home_y[index] - setting.hip_y[index] + y + 0.5 * step_y[index]
+                across = arm_x * step_y[index] - arm_y * step_x[index]
+                feet[STEP_TURN][index] = across / (arm_x * arm_x + arm_y * arm_y)
         else:
             if stood:
                 lifted_x[index], lifted_y[index] = x, y
@@ -368,7 +377,7 @@ def grip(
                 x, y,
                 (cosine * step_x - sine * step_y + feet[SHEAR_X][index]) / dt,
                 (sine * step_x + cosine * step_y + feet[SHEAR_Y][index]) / dt,
-                feet[TWIST][index] / dt,
+                (feet[STEP_TURN][index] + feet[TWIST][index]) / dt,
                 radius, cap, stiffness * dt,
             ))  # fmt: skip
     return contacts
