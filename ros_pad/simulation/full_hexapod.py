@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import sub
 from typing import Any
 
 import numpy as np
@@ -65,13 +66,16 @@ CLEAR = 2e-3
 """m above the ground, at which a foot has left it and its film is whole again."""
 
 TIPPED = 0.5
-"""rad off the vertical, at which the walk ends with a verdict."""
+"""rad off the vertical of the floor, at which the walk ends with a verdict."""
+
+_UPRIGHT = math.cos(TIPPED)
 
 LOST = 0.3
 """rad between a joint and its set-point, at which the walk ends with a verdict."""
 
 # The sole is a point: a ball so small that it does not roll noticeably under a tilting tibia.
 _POINT = 1e-4  # m
+_FAR = 1e6  # m: no walk, but numbers that overflow
 _SHALLOW = 5e-3  # m above the ground, below which a foot's block no longer moves
 
 
@@ -310,6 +314,7 @@ class FullHexapod:
         self._heading_gain = scene.heading_gain
         self._settle = scene.settle
         self._foot = foot = scene.foot.on_rough(scene.floor.roughness)
+        self._lever = 2.0 / 3.0 * foot.sole_radius
         self._floor = floor
         self._tow = scene.tow
         self._steps = 0
@@ -328,8 +333,13 @@ class FullHexapod:
         # MuJoCo makes a new array each time it is asked for one: these are kept.
         first = self.model.geom('foot_1').id
         self._index = {first + index: index for index in range(6)}
+        self._state = self.data.qpos[:25]
+        self._ctrl = self.data.ctrl
         self._places = self.data.geom_xpos[first : first + 6]
-        self._frictions = [self.model.pair(f'foot_{leg}').friction for leg in self.legs]
+        # Scalars go through a memoryview faster than through an array.
+        self._frictions: list[Any] = [
+            memoryview(self.model.pair(f'foot_{leg}').friction) for leg in self.legs
+        ]
         if scene.tow.weight:
             self._sled_place = self.data.geom('sled').xpos[:2]
             self._sled_friction = self.model.pair('sled').friction
@@ -344,13 +354,13 @@ class FullHexapod:
     @property
     def body(self) -> Vector:
         """Position x, y, m, and heading, rad, of the body in the world."""
-        x, y, _, a, b, c, d = self.data.qpos[:7].tolist()
+        x, y, _, a, b, c, d = self._state[:7].tolist()
         return x, y, math.atan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
 
     @property
     def joint_positions(self) -> tuple[float, ...]:
         """Angles of the eighteen joints, rad, in the order of ``joint_names``."""
-        return tuple(self.data.qpos[7:25].tolist())
+        return tuple(self._state[7:].tolist())
 
     def _place(self, height: float) -> None:
         """Put the robot on its planned feet, with nothing moving, and the load behind it."""
@@ -371,14 +381,24 @@ class FullHexapod:
         self._report([0.0] * 6)
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
+        """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
+
+        Where MuJoCo loses the solution the robot's feet stay as they were last.
+        """
         self._steps += 1
         self.time = self._steps * self.period
+        model, data, state = self.model, self.data, self._state
+        mj_step = self._mujoco.mj_step
+        if not abs(state.item(0)) < _FAR:
+            return
         self._aim()
-        model, data, mj_step = self.model, self.data, self._mujoco.mj_step
         for _ in range(self._substeps):
             self._set_friction(pressures)
             mj_step(model, data)
+            # The solver couples all joints: one that is lost takes the body with it.
+            if not abs(state.item(0)) < _FAR:
+                self._end('MuJoCo has lost the solution')
+                return
             self._read_contacts()
         self._report(pressures)
         self._judge()
@@ -398,17 +418,13 @@ class FullHexapod:
             self._end(f'leg {len(targets) // 3 + 1}: {error}')
             return
         self._targets = targets
-        self.data.ctrl[:] = targets
+        self._ctrl[:] = targets
 
     def _set_friction(self, pressures: Sequence[float]) -> None:
         """Write what each standing foot resists in the next step, from its load in the last."""
         for index, load in enumerate(self._loads):
             if load > LIGHT:
-                if self.feet[index].wet:
-                    foot, pressure = self._foot, pressures[index]
-                    dome_load = foot.dome_load(load, pressure)
-                    self._films[index].drain(dome_load, load - dome_load, pressure, self._dt)
-                self._write_friction(index, load, pressures[index])
+                self._write_friction(index, load, pressures[index], self._dt)
         tow = self._tow
         if tow.weight:
             x, y = self._sled_place.tolist()
@@ -416,19 +432,24 @@ class FullHexapod:
                 tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
             )
 
-    def _write_friction(self, index: int, load: float, pressure: float) -> None:
+    def _write_friction(self, index: int, load: float, pressure: float, drained: float) -> None:
+        """Write what a foot resists with a load, N, after its film has drained for a time, s."""
         foot = self._foot
-        dome_load = foot.dome_load(load, pressure)
-        films = 0.0, 0.0
+        dome_load = foot.dome_load(load, pressure) if pressure > 0.0 else 0.0
+        sole_load = load - dome_load
         if self.feet[index].wet:
             film = self._films[index]
-            films = film.under_domes, film.under_sole
-        ratio = foot.resistance_of(dome_load, load - dome_load, pressure, *films) / load
-        self._ratios[index] = ratio
+            film.drain(dome_load, sole_load, pressure, drained)
+            grip = foot.resistance_of(
+                dome_load, sole_load, pressure, film.under_domes, film.under_sole
+            )
+        else:
+            grip = foot.resistance_of(dome_load, sole_load, pressure, 0.0, 0.0)
+        self._ratios[index] = ratio = grip / load
         row = self._frictions[index]
-        row[0] = row[1] = ratio
         # A round sole that presses evenly resists twisting with 2/3 of its radius as lever.
-        row[2] = 2.0 / 3.0 * foot.sole_radius * ratio
+        row[0] = row[1] = ratio
+        row[2] = self._lever * ratio
 
     def _read_contacts(self) -> None:
         model, data, wrench = self.model, self.data, self._wrench
@@ -479,20 +500,19 @@ class FullHexapod:
                 block[2] = self._floor.height(x, y)
         if z > ground + CLEAR:
             self._films[index].touch_down(self._floor.depth(x, y))
-        self._write_friction(index, LIGHT, pressure)
+        self._write_friction(index, LIGHT, pressure, 0.0)
 
     def _judge(self) -> None:
         """Note why the walk is no longer valid, the first time that it is not."""
-        state = self.data.qpos[:25].tolist()
+        state = self._state.tolist()
         upright = 1.0 - 2.0 * (state[4] * state[4] + state[5] * state[5])
-        if not math.isfinite(sum(state)):
-            self._end('MuJoCo has lost the solution')
-        elif upright < math.cos(TIPPED):
+        if upright < _UPRIGHT:
             self._end(f'tip-over: the body leans {math.acos(max(-1.0, upright)):.2f} rad')
         else:
-            errors = [abs(a - b) for a, b in zip(self._targets, state[7:], strict=True)]
-            if (worst := max(errors)) > LOST:
-                name = self.joint_names[errors.index(worst)]
+            worst = max(map(abs, map(sub, self._targets, state[7:])))
+            if worst > LOST:
+                lost = [abs(a - b) == worst for a, b in zip(self._targets, state[7:], strict=True)]
+                name = self.joint_names[lost.index(True)]
                 self._end(f'servo {name} is {worst:.2f} rad off its set-point')
 
     def _end(self, why: str) -> None:
@@ -621,7 +641,7 @@ def mjcf(scene: Scene, legs: Sequence[Leg], uneven: bool, settings: Settings, dt
 <mujoco>
   <compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
   <option timestep="{dt!r}" integrator="{settings.integrator}" cone="{settings.cone}"
-          impratio="{settings.impratio!r}" jacobian="sparse"
+          impratio="{settings.impratio!r}" tolerance="1e-6" jacobian="sparse"
           noslip_iterations="{settings.noslip_iterations}"
           gravity="{-GRAVITY * math.sin(slope)!r} 0 {-GRAVITY * math.cos(slope)!r}">
     <flag autoreset="disable"/>
