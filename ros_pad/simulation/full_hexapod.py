@@ -122,7 +122,7 @@ class Settings:
 
 
 RECOMMENDED = Settings()
-"""Creep below 0.1 mm/s at 0.8 of the friction limit."""
+"""Creep below 0.1 mm/s at 0.8 of the friction limit; longer steps give way before the limit."""
 
 DEFAULTS = Settings(integrator='Euler', cone='pyramidal', impratio=1.0)
 """What MuJoCo does unless told."""
@@ -452,12 +452,14 @@ class FullHexapod:
         row[2] = self._lever * ratio
 
     def _read_contacts(self) -> None:
+        """Note the ground's force on each foot in the step that is over."""
         model, data, wrench = self.model, self.data, self._wrench
+        contact_force = self._mujoco.mj_contactForce
         loads, pushes = [0.0] * 6, [(0.0, 0.0)] * 6
         for contact, (_, geom) in enumerate(data.contact.geom.tolist()):
             index = self._index.get(geom)
             if index is not None:
-                self._mujoco.mj_contactForce(model, data, contact, wrench)
+                contact_force(model, data, contact, wrench)
                 # The axes of a contact with level ground are z, y, -x.
                 normal, left, back, _, _, _ = wrench.tolist()
                 loads[index], pushes[index] = normal, (-back, left)
