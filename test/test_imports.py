@@ -36,10 +36,14 @@ ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
 }
+# What an extra brings: imported inside the functions that need it, missing where it is not asked
+# for.
+EXTRAS = {'mujoco': 'mujoco', 'numba': 'fast'}
 FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'errors': set(),
+    'simulation': NUMERICS | set(EXTRAS),
     'trials': NUMERICS | FILES,
-    'ladders': NUMERICS | FILES | {'mpmath'},
+    'ladders': NUMERICS | FILES | {'mpmath', 'mujoco'},
     'figures': NUMERICS | FILES,
     'nodes': NUMERICS | FILES | ROS,
     'commands': NUMERICS | FILES,
@@ -97,17 +101,17 @@ def test_the_reader_of_imports_sees_them_all(tmp_path: pathlib.Path):
     assert imports(path) == {'a.b', 'c.d', 'g.h.i'}
 
 
-WITHOUT_ROS = """
+WITHOUT = """
 import importlib
 import pkgutil
 import sys
 
-class NoRos:
+class Missing:
     def find_spec(self, name, path=None, target=None):
-        if name.split('.')[0] in {ros}:
+        if name.split('.')[0] in {missing}:
             raise ModuleNotFoundError(f'there is no {{name}} here')
 
-sys.meta_path.insert(0, NoRos())
+sys.meta_path.insert(0, Missing())
 import ros_pad
 
 for module in pkgutil.walk_packages(ros_pad.__path__, 'ros_pad.'):
@@ -121,9 +125,9 @@ except ModuleNotFoundError:
 """
 
 
-def test_everything_but_the_nodes_imports_without_ros():
+def test_everything_but_the_nodes_imports_without_ros_and_extras():
     child = subprocess.run(
-        [sys.executable, '-c', WITHOUT_ROS.format(ros=sorted(ROS))],
+        [sys.executable, '-c', WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))],
         cwd=SOURCE.parent,
         capture_output=True,
         text=True,
@@ -157,8 +161,10 @@ def test_what_is_imported_is_declared():
         name.split('.')[0] for part in MAY_IMPORT for path in files(part) for name in imports(path)
     }
     foreign = names - sys.stdlib_module_names - {'ros_pad'}
-    assert {'numpy', 'rclpy'} <= foreign
-    for name in foreign:
+    assert {'numpy', 'rclpy', *EXTRAS} <= foreign
+    for name, extra in EXTRAS.items():
+        assert re.search(rf"'{extra}': \['{name}>=", setup_py)
+    for name in foreign - set(EXTRAS):
         key = name if name in ROS else ROSDEP_KEY.get(name, f'python3-{name}')
         assert f'<exec_depend>{key}</exec_depend>' in package_xml
         pip_name = (

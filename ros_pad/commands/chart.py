@@ -35,7 +35,7 @@ def add(commands: Commands) -> None:
     part.add_argument(
         'ladder',
         choices=(*LADDERS, 'all'),
-        help='contact takes about 15 seconds, meniscus a minute and a half',
+        help='contact takes about 15 s, meniscus a minute and a half, stability 10 s',
     )
     part.add_argument(
         '--out',

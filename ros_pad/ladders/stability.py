@@ -125,9 +125,9 @@ def measure(progress: Progress | None = None) -> list[Outcome]:
 
 def figures(outcomes: list[Outcome], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the picture by its name: a panel for each case."""
-    from ros_pad.figures import stability as pictures
+    from ros_pad.ladders import stability_chart
 
-    return {'stability': pictures.draw(outcomes)}
+    return {'stability': stability_chart.draw(outcomes)}
 
 
 def table(outcomes: Sequence[Outcome]) -> str:

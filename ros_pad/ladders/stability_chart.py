@@ -12,9 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ros_pad.figures.thesis import ORANGE
-from ros_pad.figures.thesis import PURPLE
-from ros_pad.figures.thesis import STYLE
 from ros_pad.ladders.stability import ILL
 from ros_pad.ladders.stability import KICK
 from ros_pad.ladders.stability import NEEDS_MUJOCO
@@ -26,7 +23,18 @@ from ros_pad.trials.report import BLACK
 from ros_pad.trials.report import BLUE
 from ros_pad.trials.report import GREEN
 from ros_pad.trials.report import PALE
+from ros_pad.trials.report import STYLE as PAGE_STYLE
 from ros_pad.trials.report import VERMILION
+
+ORANGE, PURPLE = '#E69F00', '#CC79A7'
+
+STYLE: dict[Any, Any] = PAGE_STYLE | {
+    'font.size': 9.0,
+    'axes.titlesize': 9.0,
+    'legend.fontsize': 8.5,
+    'lines.linewidth': 1.6,
+    'lines.markersize': 6.0,
+}
 
 # Naive methods in the order in which a case names them, and ours.
 _NAIVE = ((VERMILION, 'o'), (ORANGE, 's'), (PURPLE, 'D'), (BLUE, '^'), (PALE, 'v'))
