@@ -10,9 +10,9 @@ from typing import Any
 
 from ros_pad.simulation import planar_step
 
-# Steps that take about as long in plain Python as loading numba and its compiled copy from disk
-# (0.3 s) three times over.
-WORTH_LOADING = 30_000
+# Steps that take as long in plain Python as compiling does (4 s; a copy kept on disk loads in
+# 0.3 s): a trial that compiles is never slower for it, not even the first.
+WORTH_LOADING = 150_000
 
 Walk = Callable[..., bool]
 

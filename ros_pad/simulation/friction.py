@@ -171,6 +171,38 @@ def creeping(
     return vx, vy, turn
 
 
+def viscous(contacts: Sequence[Contact]) -> Twist:
+    """Twist of a body without inertia on feet whose friction is viscous; one linear system.
+
+    The cheapest rung: a force in proportion to slip, and to the foot's cap, instead of Coulomb's;
+    feet then slip such that Σ c s and Σ c (r × s + ρ² (ω + w)) vanish, whatever the viscosity. It
+    is exact where a twist exists at which no foot slips, and tells nothing of forces. Walkers that
+    slip are modelled like this in arXiv 2310.20669. Where feet fight it takes the mean of their
+    motions where Coulomb takes the median.
+
+    Raises
+    ------
+    ArithmeticError
+        When no foot has a grip, or a single point contact leaves the body free to turn.
+    """
+    s = sx = sy = turning = ux = uy = uw = 0.0
+    for c in contacts:
+        s += c.cap
+        sx += c.cap * c.lever_x
+        sy += c.cap * c.lever_y
+        radius = c.turning_radius * c.turning_radius
+        turning += c.cap * (c.lever_x * c.lever_x + c.lever_y * c.lever_y + radius)
+        ux += c.cap * c.motion_x
+        uy += c.cap * c.motion_y
+        uw += c.cap * (c.lever_x * c.motion_y - c.lever_y * c.motion_x + radius * c.motion_turn)
+    # About the middle of the grip the system falls apart into three.
+    spin = turning - (sx * sx + sy * sy) / s if s > 0.0 else 0.0
+    if spin <= 1e-12 * turning:
+        raise ArithmeticError(f'{len(contacts)} contacts with a grip of {s:g} N leave a body free')
+    turn = -(uw - (sx * uy - sy * ux) / s) / spin
+    return (turn * sy - ux) / s, -(turn * sx + uy) / s, turn
+
+
 def exact_stick(
     free: Twist,
     mass: float,
