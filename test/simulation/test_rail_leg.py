@@ -7,9 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
+from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.simulation import Scene
 from ros_pad.simulation.rail_leg import RailLeg
+from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
@@ -263,3 +265,84 @@ def test_wet_domes_and_their_limit():
         assert (leg.feet[0].overload_time > 0.0) == (pressure == 60e3)
     assert grips[0.0] == pytest.approx(0.12 * 2.5, rel=1e-3)
     assert grips[0.0] < grips[60e3] < grips[75e3]
+
+
+# --- slopes, and many legs at once --------------------------------------------------------------
+
+
+def on_slope(scene, slope):
+    return dataclasses.replace(scene, floor=dataclasses.replace(scene.floor, slope=slope))
+
+
+def test_wheels_hold_up_to_their_drag_and_roll_above():
+    """No grip at all: M g sin(slope) against F; above, a = g sin(slope) - F/M downhill."""
+    limit = math.asin(DRAG / (MASS * 9.81))
+    assert walk(leg_of(on_slope(scene_of(0.0), 0.99 * limit)), 2.0) == 0.0
+    steep = 3.0 * limit
+    fallen = walk(leg_of(on_slope(scene_of(0.0), steep), 1e-4), 0.5)
+    expected = -0.5 * (9.81 * math.sin(steep) - DRAG / MASS) * 0.5**2
+    assert fallen == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_slope_is_a_drag_while_the_body_goes_ahead():
+    """Uphill, wheels of drag F are as wheels of F + M g sin on the level, until they stop."""
+    slope = 0.02
+    weight = MASS * 9.81 * math.sin(slope)
+    uphill = leg_of(on_slope(scene_of(0.9), slope), 2.5e-4)
+    level = leg_of(scene_of(0.9, drag=DRAG + weight), 2.5e-4)
+    for _ in range(round(0.25 / 2.5e-4)):
+        uphill.step([0.0])
+        level.step([0.0])
+    assert uphill.body[0] > 1e-3
+    assert uphill.body[0] == pytest.approx(level.body[0], rel=1e-9)
+
+
+def mixed_legs():
+    """Dry, wet, drained, patched, rough, sloping, fast and slow legs."""
+    patched = FloorPlan('patches', 3e-4, 1e-3, 0.45, 1.0, slope=-0.01, roughness=5e-7)
+    scenes = [Scene.load(f'leg_{name}') for name in ('dry_flat', 'wet_flat', 'wet_dome_60')]
+    scenes.append(dataclasses.replace(scenes[1], floor=patched))
+    scenes.append(on_slope(scene_of(0.7, settle=0.3, stance=0.4), 0.005))
+    pressures = [0.0, 0.0, 60e3, 75e3, 40e3]
+    return scenes, [scene.floor.build(3) for scene in scenes], pressures
+
+
+def test_many_legs_walk_as_each_does_alone():
+    scenes, floors, pressures = mixed_legs()
+    period, duration = 0.004, 12.0
+    walks = walk_many(scenes, floors, pressures, period, duration)
+    for index, (scene, floor, pressure) in enumerate(zip(scenes, floors, pressures, strict=True)):
+        leg, arrival = RailLeg(scene, floor, period), math.nan
+        for _ in range(round(duration / period)):
+            leg.step([pressure])
+            if math.isnan(arrival) and leg.body[0] >= scene.body.goal:
+                arrival = leg.time - scene.settle
+        assert walks.position[index] == pytest.approx(leg.body[0], abs=1e-10)
+        assert walks.slip_path[index] == pytest.approx(leg.feet[0].slip_path, abs=1e-10)
+        assert walks.dissipation[index] == pytest.approx(leg.dissipation, abs=1e-10)
+        assert walks.arrival[index] == pytest.approx(arrival, abs=1e-9, nan_ok=True)
+    assert np.isnan(walks.arrival).any() and not np.isnan(walks.arrival).all()
+    assert len(set(np.round(walks.position, 4))) == len(scenes)
+
+
+def test_many_legs_against_the_closed_form_of_a_glide():
+    """Without a grip, on slopes of many angles: -½ (g sin - F/M) t², or rest."""
+    slopes = np.linspace(0.0, 0.3, 60)
+    scenes = [on_slope(scene_of(0.0), slope) for slope in slopes.tolist()]
+    floor = scenes[0].floor.build(0)
+    walks = walk_many(scenes, [floor] * 60, [0.0] * 60, 1e-4, 0.5)
+    expected = -0.5 * np.maximum(0.0, 9.81 * np.sin(slopes) - DRAG / MASS) * 0.25
+    assert walks.position == pytest.approx(expected, rel=1e-3)
+
+
+def test_many_legs_refuse():
+    scenes, floors, pressures = mixed_legs()
+    with pytest.raises(InvalidInput, match='one of each is needed'):
+        walk_many(scenes, floors, pressures[1:], 0.004, 1.0)
+    with pytest.raises(InvalidInput, match=r'pressure = 200000.* Pa'):
+        walk_many(scenes[:1], floors[:1], [200e3], 0.004, 1.0)
+    with pytest.raises(InvalidInput, match='a rail_leg is needed'):
+        walk_many([Scene.load('hexapod_patches')], floors[:1], [0.0], 0.004, 1.0)
+    for period, duration in ((0.0, 1.0), (0.004, -1.0), (math.nan, 1.0)):
+        with pytest.raises(InvalidInput, match=r'(period|duration) = '):
+            walk_many(scenes, floors, pressures, period, duration)
