@@ -271,17 +271,15 @@ def share_loads(setting: Setting, body: Any, feet: Any) -> None:
     N_i = w_i max(0, λ0 + λ1 x_i + λ2 y_i + k z_i) with w_i the gait's share and z_i the height of
     what foot i stands on, such that ΣN = W, ΣN x = W x_p, ΣN y = W y_p; the pressure point
     (x_p, y_p) lags behind the centre of mass when the body speeds up. The horizontal forces are
-    those of the step before. Who stands is found by Newton's method on the convex function whose
-    slope this is: feet that would pull are let go, and called back when they would press. Where no
-    loads balance the weight, a foot would have to pull: the robot tips over.
+    those of the step before. Feet that would pull are let go, and called back when they would
+    press. Where no loads balance the weight, a foot would have to pull: the robot tips over.
     """
-    weight, duty = setting.weight, setting.duty
+    duty = setting.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     lift = setting.tow_height - setting.height
     lean_x = lift * body[PULL_X] - setting.height * body[PUSH_X]
     lean_y = lift * body[PULL_Y] - setting.height * body[PUSH_Y]
-    moment_x = cosine * lean_x + sine * lean_y
-    moment_y = cosine * lean_y - sine * lean_x
+    wanted = setting.weight, cosine * lean_x + sine * lean_y, cosine * lean_y - sine * lean_x
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
@@ -292,48 +290,73 @@ def share_loads(setting: Setting, body: Any, feet: Any) -> None:
             x = setting.home_x[index] + offset_x[index]
             y = setting.home_y[index] + offset_y[index]
             legs.append((index, share, x, y, setting.leg_stiffness * ground[index]))
-    presses = [True] * 6
+    presses = 63  # a bit for each foot
     pulling = 0
-    for _ in range(20):
-        s = sx = sy = sxx = sxy = syy = 0.0
-        total, mx, my = weight, moment_x, moment_y
-        for index, share, x, y, preload in legs:
-            if presses[index]:
-                wx, wy = share * x, share * y
-                s += share
-                sx += wx
-                sy += wy
-                sxx += wx * x
-                sxy += wx * y
-                syy += wy * y
-                total -= share * preload
-                mx -= wx * preload
-                my -= wy * preload
-        if s <= 0.0:
-            break
-        # Gauss elimination of the symmetric 3 x 3 system.
-        axx, axy, bx = sxx - sx * sx / s, sxy - sx * sy / s, mx - sx * total / s
-        ayy, by = syy - sy * sy / s, my - sy * total / s
-        determinant = axx * ayy - axy * axy
-        if determinant <= 1e-12 * axx * ayy:
-            break  # two feet, or feet in a line
-        slope_x = (bx * ayy - by * axy) / determinant
-        slope_y = (by * axx - bx * axy) / determinant
-        level = (total - sx * slope_x - sy * slope_y) / s
-        same = True
-        for index, share, x, y, preload in legs:
-            load = share * (level + slope_x * x + slope_y * y + preload)
-            loads[index] = load if load > 0.0 and presses[index] else 0.0
-            if (load > 0.0) != presses[index]:
-                same = False
-                if load < 0.0 and pulling == 0:
-                    pulling = index + 1
-                presses[index] = load > 0.0
-        if same:
+    # One foot after another is let go or called back, the worst first; it nearly always gets
+    # there. Else every set of feet is tried.
+    for attempt in range(12 + 64):
+        if attempt >= 12:
+            presses = attempt - 12
+        wrong = balance(legs, presses, wanted, loads)
+        if wrong == 0:
             return
+        if pulling == 0:
+            pulling = wrong
+        if attempt < 12:
+            presses ^= 1 << (wrong - 1)
     if body[TIPPED] == 0.0:
         body[TIPPED] = pulling
         body[TIPPED_AT] = body[STEPS] * setting.period
+
+
+def balance(
+    legs: Sequence[tuple[int, float, float, float, float]],
+    presses: int,
+    wanted: tuple[float, float, float],
+    loads: Any,
+) -> int:
+    """Set the loads in balance of the feet that press; return the foot that most belies that.
+
+    From 1, or 0 where each foot that presses does and no other would; 7 without a balance.
+    """
+    total, mx, my = wanted
+    s = sx = sy = sxx = sxy = syy = 0.0
+    for index, share, x, y, preload in legs:
+        if presses >> index & 1:
+            wx, wy = share * x, share * y
+            s += share
+            sx += wx
+            sy += wy
+            sxx += wx * x
+            sxy += wx * y
+            syy += wy * y
+            total -= share * preload
+            mx -= wx * preload
+            my -= wy * preload
+    if s <= 0.0:
+        return 7
+    # Gauss elimination of the symmetric 3 x 3 system.
+    axx, axy, bx = sxx - sx * sx / s, sxy - sx * sy / s, mx - sx * total / s
+    ayy, by = syy - sy * sy / s, my - sy * total / s
+    determinant = axx * ayy - axy * axy
+    if determinant <= 1e-12 * sxx * syy:
+        return 7  # two feet, or feet in a line
+    slope_x = (bx * ayy - by * axy) / determinant
+    slope_y = (by * axx - bx * axy) / determinant
+    level = (total - sx * slope_x - sy * slope_y) / s
+    pulls = misses = 0
+    pull = miss = 0.0
+    for index, share, x, y, preload in legs:
+        load = share * (level + slope_x * x + slope_y * y + preload)
+        if presses >> index & 1:
+            loads[index] = load if load > 0.0 else 0.0
+            if load < pull:
+                pulls, pull = index + 1, load
+        else:
+            loads[index] = 0.0
+            if load > miss:
+                misses, miss = index + 1, load
+    return pulls if pulls else misses
 
 
 # --- friction ---------------------------------------------------------------------------------
@@ -589,6 +612,6 @@ def report(
 
 # What `walk` calls, for a compiler.
 PARTS = (
-    step, move_feet, body_advance, load_share, touch_down, is_wet, share_loads, grip, dome_load,
-    drain, resistance, on_film, newton, push, report,
+    step, move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
+    dome_load, drain, resistance, on_film, newton, push, report,
 )  # fmt: skip

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The flat step: the same physics as the objects it stands for, plain and compiled to the bit."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_pad.contact import Foot
+from ros_pad.contact.film import Film
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation import Scene
+from ros_pad.simulation import compiled
+from ros_pad.simulation import planar_step
+from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.planar_hexapod import setting
+
+SCENE = Scene.load('hexapod_patches')
+FLOOR = SCENE.floor.build(0)
+SETTING = setting(SCENE, FLOOR, 0.004)
+UNEVEN = FLOOR.uneven(2e-3, 1)
+BUMPY = setting(SCENE, UNEVEN, 0.004)
+LEGS = (1, 2, 3, 4, 5, 6)
+
+
+def table():
+    return [[0.0] * 6 for _ in range(planar_step.FEET)]
+
+
+# --- the same as gait, foot, film and floor -----------------------------------------------------
+
+
+@given(
+    st.floats(0.0, 500.0),
+    st.floats(0.1, 20.0),
+    st.floats(0.51, 0.9),
+    st.floats(1e-3, 1.0),
+)
+def test_gait(time, cycle, duty, stride):
+    gait = TripodGait(cycle, stride, duty, 0.03)
+    own = SETTING._replace(
+        cycle=cycle, stride=stride, duty=duty, lift=0.03, reach=gait.reach(), heading_gain=0.0
+    )
+    feet, body = table(), [0.0] * planar_step.BODY
+    planar_step.move_feet(own, body, feet, time, time)
+    assert planar_step.body_advance(own, time) == gait.body_advance(time)
+    for index, leg in enumerate(LEGS):
+        phase = gait.phase(leg, time)
+        assert feet[planar_step.PHASE][index] == phase
+        assert planar_step.load_share(duty, phase) == gait.load_share(phase)
+        if phase >= duty:
+            progress, height = gait.swing(phase)
+            assert feet[planar_step.HEIGHT][index] == height
+            assert feet[planar_step.OFFSET_X][index] == pytest.approx(
+                progress * gait.reach(), abs=1e-15
+            )
+
+
+@given(
+    st.floats(0.0, 40.0),
+    st.floats(0.0, 90e3),
+    st.sampled_from(['large37', 'large19']),
+    st.floats(1e-8, 1e-3),
+    st.floats(0.0, 1e-3),
+)
+def test_foot(load, pressure, name, dome_film, sole_film):
+    foot = Foot.load(name)
+    own = SETTING._replace(
+        **{
+            each: getattr(foot, each)
+            for each in (
+                'friction', 'shear_strength', 'conforming_pressure', 'boundary_friction',
+                'critical_film', 'film_exponent', 'sole_area',
+            )
+        },
+        limit_cell=foot._limit_cell,
+        limits=foot._limit_table,
+    )  # fmt: skip
+    on_domes = foot.dome_load(load, pressure)
+    assert planar_step.dome_load(own, load, pressure) == on_domes
+    films = on_domes, load - on_domes, pressure, dome_film, sole_film
+    assert planar_step.resistance(own, *films) == foot.resistance_of(*films)
+
+
+@given(
+    st.lists(
+        st.tuples(st.just(0.0) | st.floats(1e-6, 20.0), st.floats(0.0, 90e3)),
+        min_size=1,
+        max_size=30,
+    ),
+    st.sampled_from([0.0, 1e-5, 3e-4]),
+)
+def test_film(presses, depth):
+    film, feet = Film(SCENE.foot, SCENE.floor.viscosity), table()
+    film.touch_down(depth)
+    fresh = depth**-2 if depth else math.inf
+    for row in (planar_step.FRESH, planar_step.DOME_FILM, planar_step.SOLE_FILM):
+        feet[row][2] = fresh
+    for load, pressure in presses:
+        on_domes = SCENE.foot.dome_load(load, pressure)
+        film.drain(on_domes, load - on_domes, pressure, SETTING.period)
+        planar_step.drain(SETTING, feet, 2, on_domes, load - on_domes, pressure)
+        assert feet[planar_step.DOME_FILM][2] ** -0.5 == film.under_domes
+        assert feet[planar_step.SOLE_FILM][2] ** -0.5 == pytest.approx(film.under_sole, rel=1e-14)
+
+
+@given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
+def test_floor(x, y):
+    assert planar_step.is_wet(BUMPY, x, y) == UNEVEN.wet(x, y)
+    feet, body = table(), [0.0] * planar_step.BODY
+    body[planar_step.X], body[planar_step.Y] = x, y
+    planar_step.touch_down(BUMPY, body, feet, 4)
+    home_x, home_y = SCENE.body.homes[4]
+    assert feet[planar_step.GROUND][4] == UNEVEN.height(x + home_x, y + home_y)
+
+
+# --- loads --------------------------------------------------------------------------------------
+
+
+def balanced(weights, places, preloads, wanted):
+    """Return loads w max(0, λ·(1, x, y) + k z) in balance by trying every set of feet, or None."""
+    rows = np.column_stack([np.ones(len(places)), places])
+    for size in range(len(weights), 2, -1):
+        for chosen in itertools.combinations(range(len(weights)), size):
+            some = list(chosen)
+            share = rows[some].T * weights[some]
+            matrix, right = share @ rows[some], wanted - share @ preloads[some]
+            if np.linalg.cond(matrix) > 1e12:
+                continue
+            pressed = rows @ np.linalg.solve(matrix, right) + preloads
+            others = np.delete(pressed, some)
+            if (pressed[some] > 0.0).all() and (others <= 0.0).all():
+                return np.where(pressed > 0.0, weights * pressed, 0.0)
+    return None
+
+
+def test_loads_by_trying_every_set_of_feet():
+    """Six feet on uneven ground, pushed about: those that would pull are let go, no others."""
+    rng = np.random.default_rng(4)
+    seen = {'all': 0, 'some': 0, 'tipped': 0}
+    own = SETTING._replace(leg_stiffness=3000.0)
+    for _ in range(400):
+        feet, body = table(), [0.0] * planar_step.BODY
+        # All stand, some with less than a full share.
+        feet[planar_step.PHASE] = rng.uniform(0.02, own.duty - 0.02, 6).tolist()
+        feet[planar_step.OFFSET_X] = rng.uniform(-0.04, 0.04, 6).tolist()
+        feet[planar_step.GROUND] = (rng.choice([0.0, 1e-3, 4e-3]) * rng.normal(size=6)).tolist()
+        lean = rng.choice([0.0, 10.0, 60.0]) * rng.uniform(-1.0, 1.0, 2)
+        body[planar_step.PUSH_X], body[planar_step.PUSH_Y] = lean
+        planar_step.share_loads(own, body, feet)
+        weights = np.array([planar_step.load_share(own.duty, p) for p in feet[planar_step.PHASE]])
+        places = np.array(SCENE.body.homes) + np.column_stack(
+            [feet[planar_step.OFFSET_X], np.zeros(6)]
+        )
+        wanted = np.array([own.weight, *(-own.height * lean)])
+        expected = balanced(weights, places, 3000.0 * np.array(feet[planar_step.GROUND]), wanted)
+        if expected is None:
+            seen['tipped'] += 1
+            assert body[planar_step.TIPPED] in LEGS
+            continue
+        seen['all' if (expected > 0.0).all() else 'some'] += 1
+        assert body[planar_step.TIPPED] == 0.0
+        assert feet[planar_step.LOAD] == pytest.approx(expected, abs=1e-7)
+    assert min(seen.values()) > 20
+
+
+def test_three_feet_do_not_feel_the_ground():
+    """Only redundant feet share by height: a tripod's loads follow from balance alone."""
+    loads = []
+    for height in (0.0, 5e-3):
+        feet, body = table(), [0.0] * planar_step.BODY
+        feet[planar_step.PHASE] = [0.3, 0.9, 0.3, 0.9, 0.3, 0.9]
+        feet[planar_step.GROUND] = [height, 0.0, 0.0, 0.0, -height, 0.0]
+        planar_step.share_loads(SETTING, body, feet)
+        loads.append(feet[planar_step.LOAD])
+    assert loads[0] == pytest.approx(loads[1], abs=1e-9)
+    # Middle foot against two corners: half the weight, and the corners equal.
+    half = SETTING.weight * 0.112 / (0.112 + 0.224)
+    assert loads[0] == pytest.approx([SETTING.weight / 3, 0, SETTING.weight / 3, 0, half, 0])
+
+
+# --- compiled -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', ['hexapod_patches', 'hexapod_rough_wet_flat'])
+@pytest.mark.parametrize('soles_turn', [False, True])
+def test_compiled_walk_is_the_same_to_the_bit(name, soles_turn):
+    pytest.importorskip('numba')
+    scene = Scene.load(name)
+    floor = scene.floor.build(1)
+    plain, fast = (
+        PlanarHexapod(scene, floor, 0.004, compile_steps, soles_turn)
+        for compile_steps in (False, True)
+    )
+    # Pads fill and empty, full domes, pressed domes, flat feet.
+    for step in range(1500):
+        pressures = [max(0.0, 80e3 * math.sin(0.01 * step + leg)) for leg in LEGS]
+        plain.step(pressures)
+        fast.step(pressures)
+        if step % 50 == 0:
+            assert plain.body == fast.body
+            for one, other in zip(plain.feet, fast.feet, strict=True):
+                for each in one.__slots__:
+                    assert getattr(one, each) == getattr(other, each), each
+                    assert type(getattr(one, each)) is type(getattr(other, each)), each
+    assert fast._table.tolist() == plain._table
+    assert fast._body.tolist() == plain._body
+    assert plain.dissipation == fast.dissipation > 0.0
+
+
+def test_compiled_tip_over_and_refusals_are_the_same():
+    pytest.importorskip('numba')
+    from dataclasses import replace
+
+    tall = replace(SCENE, body=replace(SCENE.body, height=1.5), settle=0.0)
+    robots = [PlanarHexapod(tall, FLOOR, 0.004, each) for each in (False, True)]
+    steps = [robot.walk([0.0] * 6, 1000) for robot in robots]
+    assert steps[0] == steps[1] < 1000
+    assert robots[0].verdict == robots[1].verdict
+    assert 'would have to pull' in robots[0].verdict
+    for robot in robots:
+        for bad in ([0.0] * 5, [0.0] * 7, [math.nan] + [0.0] * 5, [math.inf] * 6):
+            with pytest.raises(InvalidInput, match='six finite numbers'):
+                robot.step(bad)
+        robot.step([0] * 6)
+
+
+@pytest.mark.parametrize('fast', [False, True])
+def test_walk_is_as_many_steps(fast):
+    if fast:
+        pytest.importorskip('numba')
+    one, other = (PlanarHexapod(SCENE, FLOOR, 0.004, fast) for _ in range(2))
+    assert one.walk([70e3] * 6, 700) == 700
+    for _ in range(700):
+        other.step([70e3] * 6)
+    assert one.body == other.body and one.time == other.time == pytest.approx(2.8)
+    assert [foot.force for foot in one.feet] == [foot.force for foot in other.feet]
+    for steps in (-1, 1.5, True):
+        with pytest.raises(InvalidInput, match='steps = '):
+            one.walk([0.0] * 6, steps)
+
+
+def test_without_numba_an_extra_is_named(monkeypatch):
+    monkeypatch.setitem(__import__('sys').modules, 'numba', None)
+    with pytest.raises(ImportError, match=r'pip install ros_pad\[numba\]'):
+        compiled._dispatcher.__wrapped__()
+
+
+def test_short_trials_do_not_wait_for_a_compiler(monkeypatch):
+    class Cold:
+        @staticmethod
+        def cache_info():
+            return type('Info', (), {'currsize': 0})
+
+    monkeypatch.setattr(compiled, '_dispatcher', Cold)
+    assert not compiled.worth_loading(SCENE.duration * 250.0)
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: object())
+    assert compiled.worth_loading(1e6)
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    assert not compiled.worth_loading(1e6)
