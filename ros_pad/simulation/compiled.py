@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planar step as machine code, where numba is installed (``pip install ros_pad[numba]``)."""
+"""The planar step as machine code, where numba is installed (``pip install ros_pad[fast]``)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _dispatcher() -> tuple[Any, Callable[[Any], Any]]:
     try:
         import numba
     except ImportError as error:
-        raise ImportError('compiled steps need numba: pip install ros_pad[numba]') from error
+        raise ImportError('compiled steps need numba: pip install ros_pad[fast]') from error
     for function in planar_step.PARTS:
         numba.extending.register_jitable(error_model='numpy')(function)
     try:

@@ -246,7 +246,7 @@ def test_walk_is_as_many_steps(fast):
 
 def test_without_numba_an_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'numba', None)
-    with pytest.raises(ImportError, match=r'pip install ros_pad\[numba\]'):
+    with pytest.raises(ImportError, match=r'pip install ros_pad\[fast\]'):
         compiled._dispatcher.__wrapped__()
 
 
