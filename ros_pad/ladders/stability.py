@@ -845,15 +845,14 @@ ILL = 3.0  # per cent of distance for one per cent of friction
 
 
 def rail_distance(ratio: float, dt: float) -> float:
-    """Return how far the shipped rail leg goes when its foot holds so many times the drag, m."""
+    """Return how far a rail leg of 1 kg goes when its foot holds so many times the drag, m."""
     scene = Scene.load('leg_dry_flat')
     assert isinstance(scene.body, RailBody)
+    body = dataclasses.replace(scene.body, mass=1.0, rolling_drag=0.23)
     foot = dataclasses.replace(
-        scene.foot,
-        friction=ratio * scene.body.rolling_drag / scene.body.load,
-        shear_strength=0.0,
+        scene.foot, friction=ratio * body.rolling_drag / body.load, shear_strength=0.0
     )
-    scene = dataclasses.replace(scene, foot=foot, settle=0.0)
+    scene = dataclasses.replace(scene, body=body, foot=foot, settle=0.0)
     leg = RailLeg(scene, scene.floor.build(0), dt)
     for _ in range(round(_RAIL_CYCLES * scene.gait.cycle / dt)):
         leg.step([0.0])
@@ -861,13 +860,13 @@ def rail_distance(ratio: float, dt: float) -> float:
 
 
 def condition(ratio: float, dt: float) -> float:
-    """Return d ln distance / d ln friction of the shipped rail leg."""
+    """Return d ln distance / d ln friction of that leg."""
     low, high = rail_distance(0.995 * ratio, dt), rail_distance(1.005 * ratio, dt)
     return math.log(high / low) / math.log(1.005 / 0.995)
 
 
 def threshold() -> list[Outcome]:
-    """Change the friction of the rail leg by one per cent: no step makes the answer surer.
+    """Change the friction of a rail leg by one per cent: no step makes the answer surer.
 
     While the foot slips the body gains in proportion to c - F, so that the law of small c - F is
     c/(c - F).

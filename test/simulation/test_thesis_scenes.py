@@ -48,7 +48,7 @@ def test_higher_pressure_walks_faster(goal_times):
 
 def test_dome_on_wet_ground_is_quite_similar_to_flat_on_dry_ground(goal_times):
     """Thesis 5.2: cases 1 and 5 "were quite similar"."""
-    assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.3
+    assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.15
 
 
 def test_seed_does_not_move_the_leg(goal_times):
@@ -63,19 +63,20 @@ def test_dry_leg_advances_by_its_stroke():
 
 
 def test_slipping_leg_advances_as_its_forces_say():
-    """By hand: the floating foot pushes with 0.12 * 2.5 N, the wheels hold with 0.23 N, 1 kg.
+    """By hand: the floating foot pushes with 0.12 * 2.5 N, the wheels hold with 0.235 N, 0.85 kg.
 
-    The body gains speed at (0.30 - 0.23)/1 until the foot, which goes back at (pi S/2T) sin(pi
+    The body gains speed at (0.30 - 0.235)/0.85 until the foot, which goes back at (pi S/2T) sin(pi
     t/T), has become slower than it; from there foot and wheels brake; after lift-off the wheels.
     """
-    stroke, stance, grip, drag = 0.05, 0.5, 0.30, 0.23
+    stroke, stance, mass = 0.05, 0.5, 0.85
+    grip, drag = 0.30 / mass, 0.235 / mass  # m/s²
     times = np.linspace(0.25, stance, 250001)
     foot = math.pi * stroke / (2.0 * stance) * np.sin(math.pi * times / stance)
     meets = times[np.argmax(foot < (grip - drag) * times)]
     speed, rest = (grip - drag) * meets, stance - meets
     leaves = speed - (grip + drag) * rest
     way = 0.5 * speed * meets + 0.5 * (speed + leaves) * rest + leaves**2 / (2.0 * drag)
-    assert way == pytest.approx(0.0089, rel=0.01)
+    assert way == pytest.approx(0.00938, rel=0.01)
     trial = run('leg_wet_flat')
     assert trial.metrics.distance_per_cycle_m == pytest.approx(way, rel=0.01)
 
