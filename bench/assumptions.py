@@ -8,8 +8,8 @@ over the better of the two fixed shapes. Writes docs/charts/assumptions.json and
 Constants of the world (friction, floor, towed load, noise) change in the simulated world alone:
 estimator and controller go on believing the shipped files, as they would if the files were wrong.
 What an owner knows of a robot (mass, pads, sole, sensor rate) changes for both.
-Probabilities change in their odds, counts are rounded, the sole grows with its pads, and of the
-margin the part above one is halved or doubled.
+Probabilities change in their odds, counts are rounded, the sole grows with its pads, the body's
+inertia with its mass, and of the margin the part above one is halved or doubled.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ from ros_pad.trials.loop import ClosedLoop
 
 CHARTS = pathlib.Path(__file__).resolve().parent.parent / 'docs' / 'charts'
 SCENE = 'hexapod_patches'
+RUNG = 'L2'
 CYCLES = 20
 SEEDS = (0, 1, 2, 3)
 FIXED = ('flat', 'dome')
@@ -134,8 +135,7 @@ ASSUMPTIONS = (
     Assumption(FOOT + 'film_exponent', 'world.foot.film_exponent', 'film exponent', ''),
     Assumption(FOOT + 'shear_stiffness', 'world.foot.shear_stiffness', 'shear stiffness', 'N/m'),
     Assumption(FOOT + 'chamber_volume', 'world.foot.chamber_volume', 'chamber volume', 'm3'),
-    Assumption(PATCHES + 'body.mass', 'both.body.mass', 'robot mass', 'kg'),
-    Assumption(PATCHES + 'body.inertia', 'both.body.inertia', 'yaw inertia', 'kg m2'),
+    Assumption(PATCHES + 'body.mass', 'both.body.mass', 'robot mass', 'kg', 'mass'),
     Assumption(PATCHES + 'body.height', 'both.body.height', 'height of the mass', 'm'),
     Assumption(PATCHES + 'gait.cycle', 'both.gait.cycle', 'gait cycle', 's'),
     Assumption(PATCHES + 'gait.heading_gain', 'both.heading_gain', 'heading gain', '1/s'),
@@ -244,6 +244,10 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
         foot = setup.world.foot
         radius = foot.sole_radius * math.sqrt(value / foot.pads)
         rest, value = 'foot', replace(foot, pads=value, sole_radius=radius)
+    if assumption.rule == 'mass':  # a heavier robot of the same shape
+        body = setup.world.body
+        inertia = body.inertia * value / body.mass
+        rest, value = 'body', replace(body, mass=value, inertia=inertia)
     if place == 'both':
         setup = changed(setup, f'told.{rest}', value)
         return changed(setup, f'world.{rest}', value)
@@ -259,7 +263,8 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         table = tuple(setup.limit_error * limit for limit in foot._limit_table)
         object.__setattr__(foot, '_limit_table', table)
         world = replace(world, foot=foot)
-    loop = ClosedLoop(world, policy, seed)
+    # One rung for all: how the choice of it would change is not the question here.
+    loop = ClosedLoop(world, policy, seed, RUNG)
     load = told.expected_load * setup.load_error
     tuning = replace(
         setup.tuning, position_noise=told.sensors.position, force_noise=told.sensors.force
@@ -286,7 +291,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     )
     loop.controller._footprints = Footprints(**setup.footprints)
     loop._pace = Pace(round(setup.control_period * 1e9))
-    log = TrialLog(world, policy, seed, 'L1')
+    log = TrialLog(world, policy, seed, RUNG)
     for _ in range(round(world.duration * 1e9) // loop.period_ns):
         loop.tick(log)
         if loop.robot.verdict:

@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
             f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
         )
     policy = options.policy or scene.policy
-    rung = ladder.rung(scene, options.fidelity)
+    rung = ladder.rung(scene, options.fidelity, policy)
     folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
     try:
         return _run_in(folder, options, scene, policy, rung)
@@ -217,6 +217,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         'policy': trial.policy,
         'seed': trial.seed,
         'fidelity': trial.fidelity,
+        'fidelity_bound': trial.settings['fidelity_bound'],
         'foot': trial.settings['foot'],
         **trial.metrics.as_dict(),
         'real_time_factor': trial.real_time_factor,
@@ -255,6 +256,7 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         )
     for refusal in own.refusals:
         print(f'stayed flat: {refusal}')
+    print(f'fidelity: {trial.settings["fidelity_note"]}')
     for omission in trial.settings['omitted']:
         bound = '' if omission['bound'] is None else f' (at most {100 * omission["bound"]:.1f} %)'
         print(f'left out: {omission["term"]}{bound}')

@@ -301,7 +301,7 @@ def run(
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = policy or scene.policy
-    rung = ladder.rung(scene, fidelity)
+    rung = ladder.rung(scene, fidelity, policy)
     context = rclpy.Context()
     # Signals are ours: rclpy's handlers would cut the nodes off before the pads are vented.
     try:

@@ -1,21 +1,64 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which rung of the simulation ladder a scene is run on, and what that leaves out."""
+"""Which rung of the simulation ladder a scene is run on, and what that leaves out.
+
+How far the rungs are from the top one was measured on random scenes (``bench/fidelity.py``) and is
+kept in ``config/fidelity.yaml``. What decides is a scene's *reserve*: the grip of its feet on the
+ground where they hold least, over what the walk asks of them. Well above one, feet stick and all
+rungs agree; near one they slip on some rungs and not on others.
+"""
 
 from __future__ import annotations
 
+import bisect
+import functools
+import importlib.util
+import math
 from dataclasses import dataclass
 
+import yaml
+
+from ros_pad import configuration
 from ros_pad.contact import WATER
+from ros_pad.contact import pressure_for
+from ros_pad.contact.film import Film
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation.full_hexapod import FullHexapod
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
 _RUNGS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
+_MARGIN = 1.2  # of the pads' force limit over the load: a dome that a controller would choose
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A rung for a scene, and what it promises.
+
+    Attributes
+    ----------
+    rung : str
+        ``L0``, ``L1`` or ``L2``.
+    bound : float
+        Largest error of the distance that was measured on scenes with such a reserve, with a
+        margin: relative, against the top rung. Infinite where that rung cannot be trusted.
+    reserve : float
+        See :func:`reserve`.
+    note : str
+        The same in words, and whether the scene asks for more.
+    """
+
+    rung: str
+    bound: float
+    reserve: float
+    note: str
 
 
 @dataclass(frozen=True)
@@ -37,25 +80,108 @@ class Omission:
     reason: str
 
 
-def rung(scene: Scene, fidelity: str = 'auto') -> str:
-    """Return the rung for a scene.
+@dataclass(frozen=True)
+class Ladder:
+    """Errors of the rungs by reserve, as ``bench/fidelity.py`` measured them.
+
+    Attributes
+    ----------
+    reserves : tuple of float
+        Lower ends of the classes of reserve, rising from 0.
+    bounds : dict of tuple
+        For each rung its bound in each class.
+    """
+
+    reserves: tuple[float, ...]
+    bounds: dict[str, tuple[float, ...]]
+
+    @classmethod
+    @functools.cache
+    def load(cls) -> Ladder:
+        """Read ``config/fidelity.yaml``.
+
+        Raises
+        ------
+        ConfigError
+            When the file is missing or has not the shape that the bench gives it.
+        """
+        path = configuration.shared_folder() / 'fidelity.yaml'
+        try:
+            values = yaml.safe_load(path.read_text(encoding='utf-8'))
+            reserves = tuple(float(value) for value in values['reserves'])
+            bounds = {
+                rung: tuple(float(value) for value in values['bounds'][rung])
+                for rung in FIDELITIES[1:]
+            }
+            assert reserves[0] == 0.0 and list(reserves) == sorted(reserves)
+            assert all(len(row) == len(reserves) for row in bounds.values())
+        except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
+            raise ConfigError(f'{path}: no table of rungs ({e!r}): run bench/fidelity.py') from e
+        return cls(reserves, bounds)
+
+    def bound(self, rung: str, reserve: float) -> float:
+        """Return what a rung promises for a reserve."""
+        return self.bounds[rung][bisect.bisect_right(self.reserves, reserve) - 1]
+
+
+def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> Choice:
+    """Return the rung for a scene, and what it promises.
+
+    ``auto`` takes the cheapest rung whose bound is within ``scene.accuracy``, else the best one
+    that there is; without MuJoCo that is L1.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to walk on, with what.
+    fidelity : str
+        ``auto`` or a rung.
+    policy : str or None
+        Which shapes the feet take; None takes the scene's own policy.
 
     Raises
     ------
     InvalidInput
         When the rung does not exist, or does not know the scene's robot.
     """
+    known = _rungs(scene, fidelity)
+    own, ladder = reserve(scene, policy), Ladder.load()
+    bounds = {rung: ladder.bound(rung, own) for rung in known}
+    missing = 'L2' in known and importlib.util.find_spec('mujoco') is None
+    if fidelity != 'auto':
+        rung = fidelity
+    else:
+        there = known[:1] if missing else known
+        enough = [each for each in there if bounds[each] <= scene.accuracy]
+        rung = (enough or there[-1:])[0]
+    note = f'at a reserve of {own:.2g} the distance on {rung} is '
+    note += f'within {100.0 * bounds[rung]:.0f} %' if bounds[rung] < math.inf else 'not to be trusted'
+    if bounds[rung] > scene.accuracy:
+        note += f', and the scene asks for {100.0 * scene.accuracy:.0f} %'
+        if missing and rung == 'L1':
+            note += '; pip install "ros_pad[mujoco]" brings L2'
+    return Choice(rung, bounds[rung], own, note)
+
+
+def rung(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> str:
+    """Return the rung of :func:`choose`."""
+    if fidelity == 'auto':
+        return choose(scene, fidelity, policy).rung
+    _rungs(scene, fidelity)
+    return fidelity
+
+
+def _rungs(scene: Scene, fidelity: str) -> tuple[str, ...]:
+    """Return the rungs that know a scene's robot; InvalidInput if the one asked for does not."""
     if fidelity not in FIDELITIES:
         raise InvalidInput(f'fidelity = {fidelity!r}: one of {", ".join(FIDELITIES)} is needed')
     known = _RUNGS[scene.robot]
-    if fidelity == 'auto':
-        return known[0]
-    if fidelity not in known:
+    if fidelity not in ('auto', *known):
         raise InvalidInput(
             f'fidelity = {fidelity!r}: scene {scene.name!r} has a {scene.robot},'
             f' which {" and ".join(known)} model{"s" if len(known) == 1 else ""}'
         )
-    return fidelity
+    return known
 
 
 def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> Robot:
@@ -64,7 +190,7 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
     Raises
     ------
     InvalidInput
-        As :func:`rung`.
+        As :func:`choose`.
     ConfigError
         For L2 without MuJoCo, or with legs that cannot do what the scene wants of them.
     """
@@ -76,9 +202,68 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
     return FullHexapod(scene, floor, period)
 
 
-def omitted(scene: Scene) -> list[Omission]:
-    """Return what a trial of this scene leaves out, with bounds on its effect."""
-    foot, load = scene.foot, scene.expected_load
+def reserve(scene: Scene, policy: str | None = None) -> float:
+    """Return the grip of the feet over what the walk asks of them, where that is least.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to walk on, with what.
+    policy : str or None
+        ``flat``, ``dome``, or one that makes feet domes on wet ground alone; None takes the
+        scene's own.
+
+    Returns
+    -------
+    float
+        From 0. Grip is that of a foot with its expected load in mid-stance, when its film has
+        drained for half of it. Asked for are the gait's peak acceleration of body and load, the
+        drag of the load or of the wheels, and the slope. Feet and load may stand on different
+        ground.
+    """
+    policy = scene.policy if policy is None else policy
+    wets = {'dry': (False,), 'wet': (True,)}.get(scene.floor.kind, (False, True))
+    grip = min(_grip(scene, policy == 'dome' or (policy != 'flat' and wet), wet) for wet in wets)
+    body, gait, slope = scene.body, scene.gait, scene.floor.slope
+    if isinstance(gait, RailGait) or not isinstance(body, HexapodBody):
+        assert isinstance(gait, RailGait) and not isinstance(body, HexapodBody)
+        peak = 0.5 * gait.stroke * (math.pi / gait.stance) ** 2
+        demand = body.mass * (peak + 9.81 * abs(math.sin(slope))) + body.rolling_drag
+        return grip * body.load / demand
+    tow = scene.tow
+    weight = body.mass * 9.81 * math.cos(slope)
+    drag = max(tow.friction_wet if wet else tow.friction_dry for wet in wets)
+    demand = (body.mass + tow.weight / 9.81) * (
+        gait.peak_acceleration + 9.81 * abs(math.sin(slope))
+    ) + drag * tow.weight * math.cos(slope)
+    return grip * weight / demand
+
+
+def _grip(scene: Scene, dome: bool, wet: bool) -> float:
+    """Return the resistance of a foot in mid-stance over its load."""
+    foot, load = scene.foot.on_rough(scene.floor.roughness), scene.expected_load
+    pressure = 0.0
+    if dome:
+        try:
+            wanted = pressure_for(foot.pad, load / foot.pads, foot.limit, margin=_MARGIN)
+        except NoEquilibrium:
+            wanted = foot.ceiling
+        pressure = scene.dome_pressure or min(foot.ceiling, float(wanted))
+    on_domes = foot.dome_load(load, pressure)
+    thickness = 0.0, 0.0
+    if wet:
+        gait = scene.gait
+        stance = gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
+        film = Film(foot, scene.floor.viscosity)
+        film.touch_down(scene.floor.film_thickness)
+        film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
+        thickness = film.under_domes, film.under_sole
+    return foot.resistance_of(on_domes, load - on_domes, pressure, *thickness) / load
+
+
+def omitted(scene: Scene, fidelity: str = 'auto') -> list[Omission]:
+    """Return what a trial of this scene leaves out on a rung, with bounds on its effect."""
+    foot, load, name = scene.foot, scene.expected_load, rung(scene, fidelity)
     # A meniscus resists sliding by hysteresis at most: γ w (cos θ_rec - cos θ_adv) <= 2 γ w, with
     # w = 2 r0 a pad; only domes have one.
     capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
@@ -92,17 +277,33 @@ def omitted(scene: Scene) -> list[Omission]:
             'liquid dragged under a slipping foot', None, 'film taken to travel with the foot'
         ),
     ]
-    if scene.robot == 'hexapod':
+    if scene.floor.roughness:
+        terms.append(
+            Omission(
+                'liquid held in the valleys of a rough floor',
+                None,
+                'roughness enters as one composite height of pad and floor',
+            )
+        )
+    if name == 'L1':
         terms += [
             Omission(
                 'scuffing at touch-down and servo compliance',
                 None,
-                'only a model with joints (L2) has them: foot slip is underestimated',
+                'only L2 has joints: there feet slip 3 to 4 mm a cycle on dry flat ground,'
+                ' here 0.1 mm',
+            ),
+            Omission('inertia of swinging legs', None, 'the body is one rigid mass'),
+        ]
+    if name == 'L2':
+        terms += [
+            Omission(
+                'what soft pads do to the motion of the body',
+                None,
+                'shear of the pads moves the markers, not the feet',
             ),
             Omission(
-                'inertia of swinging legs',
-                None,
-                'the body is one rigid mass',
+                'size of the sole', None, 'the foot is a point on an ankle that tilts freely'
             ),
         ]
     return terms

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -52,7 +53,7 @@ def label(
                 'ambient_pressure': AMBIENT_PRESSURE,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,
-                'settings': settings(scene)
+                'settings': settings(scene, policy, fidelity)
                 | {
                     'interrupted': interrupted,
                     'comparison': list(comparison),
@@ -62,8 +63,9 @@ def label(
     }
 
 
-def settings(scene: Scene) -> dict[str, Any]:
-    """Return what a reader of a trial needs to know of its scene."""
+def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
+    """Return what a reader of a trial needs to know of its scene, and of the rung it ran on."""
+    choice = ladder.choose(scene, fidelity, policy)
     return {
         'foot': scene.foot.source,
         'expected_load': scene.expected_load,
@@ -71,6 +73,9 @@ def settings(scene: Scene) -> dict[str, Any]:
         'cycle_s': scene.gait.cycle,
         'settle_s': scene.settle,
         'faults': [str(fault) for fault in scene.faults],
-        'omitted': [asdict(omission) for omission in ladder.omitted(scene)],
+        # JSON knows no infinity.
+        'fidelity_bound': choice.bound if choice.bound < math.inf else None,
+        'fidelity_note': choice.note,
+        'omitted': [asdict(omission) for omission in ladder.omitted(scene, choice.rung)],
         'version': ros_pad.__version__,
     }

@@ -106,7 +106,7 @@ class TrialLog:
             slipping=slow[:, :, 6].astype(bool),
             dome=slow[:, :, 7].astype(bool),
             floor=floor,
-            settings=settings(self._scene),
+            settings=settings(self._scene, self._policy, self._fidelity),
             real_time_factor=real_time_factor,
         )
         trial.metrics = summarise(self._scene, trial, robot, controller)

@@ -208,7 +208,7 @@ def run(
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
-    rung = ladder.rung(scene, fidelity)
+    rung = ladder.rung(scene, fidelity, policy)
     loop = ClosedLoop(scene, policy, seed, rung)
     log = TrialLog(scene, policy, seed, rung)
     started = time.perf_counter()

@@ -1,34 +1,158 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import importlib.util
+import math
+import pathlib
 
 import pytest
 
 from ros_pad import configuration
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from ros_pad.simulation import fidelity
+from ros_pad.simulation.full_hexapod import FullHexapod
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
 
 HEXAPOD, LEG = Scene.load('hexapod_patches'), Scene.load('leg_wet_flat')
+BENCH = pathlib.Path(__file__).resolve().parents[2] / 'bench' / 'fidelity.py'
 
 
 def test_rungs():
-    assert fidelity.rung(HEXAPOD) == fidelity.rung(HEXAPOD, 'L1') == 'L1'
+    assert fidelity.rung(HEXAPOD, 'L1') == 'L1'
+    assert fidelity.rung(HEXAPOD, 'L2') == 'L2'
     assert fidelity.rung(LEG) == fidelity.rung(LEG, 'L0') == 'L0'
     with pytest.raises(InvalidInput, match=r"'L1': scene 'leg_wet_flat' has a rail_leg, which L0"):
         fidelity.rung(LEG, 'L1')
-    with pytest.raises(InvalidInput, match='one of auto, L0, L1'):
+    with pytest.raises(InvalidInput, match=r"'L0': scene 'hexapod_patches' .* L1 and L2 model"):
+        fidelity.rung(HEXAPOD, 'L0')
+    with pytest.raises(InvalidInput, match='one of auto, L0, L1, L2'):
         fidelity.rung(HEXAPOD, 'L9')
 
 
-@pytest.mark.parametrize('scene, kind', [(HEXAPOD, PlanarHexapod), (LEG, RailLeg)])
-def test_robots(scene, kind):
-    robot = fidelity.build(scene, scene.floor.build(0), 0.004)
+@pytest.mark.parametrize(
+    'scene, name, kind',
+    [(HEXAPOD, 'L1', PlanarHexapod), (HEXAPOD, 'L2', FullHexapod), (LEG, 'auto', RailLeg)],
+)
+def test_robots(scene, name, kind):
+    if kind is FullHexapod:
+        pytest.importorskip('mujoco')
+    robot = fidelity.build(scene, scene.floor.build(0), 0.004, name)
     assert isinstance(robot, kind)
     assert robot.legs == scene.legs
     assert len(robot.feet) == len(scene.legs)
+    assert len(robot.joint_names) == len(robot.joint_positions)
     robot.step([0.0] * len(scene.legs))
     assert robot.time == pytest.approx(0.004)
+
+
+# --- the choice -------------------------------------------------------------------------------
+
+
+def with_table(monkeypatch, **bounds):
+    """Put a table with two classes, below and above a reserve of 2, in place of the measured."""
+    table = fidelity.Ladder((0.0, 2.0), {'L0': (0.5, 0.01)} | bounds)
+    monkeypatch.setattr(fidelity.Ladder, 'load', lambda: table)
+
+
+def test_auto_takes_the_cheapest_rung_that_is_accurate_enough(monkeypatch):
+    monkeypatch.setattr(fidelity, 'reserve', lambda scene, policy: 3.0)
+    for l1, l2, expected in [(0.2, 0.1, 'L1'), (0.21, 0.1, 'L2'), (math.inf, 0.3, 'L2')]:
+        with_table(monkeypatch, L1=(math.inf, l1), L2=(math.inf, l2))
+        choice = fidelity.choose(dataclasses.replace(HEXAPOD, accuracy=0.2))
+        assert choice.rung == expected
+        assert choice.bound == (l1 if expected == 'L1' else l2)
+        assert ('asks for' in choice.note) == (choice.bound > 0.2)
+    # One that is asked for is taken, whatever it promises, and says so.
+    forced = fidelity.choose(HEXAPOD, 'L1')
+    assert (forced.rung, forced.bound) == ('L1', math.inf)
+    assert 'not to be trusted, and the scene asks for 20 %' in forced.note
+
+
+def test_classes_begin_at_their_lower_end(monkeypatch):
+    with_table(monkeypatch, L1=(0.5, 0.1), L2=(0.2, 0.1))
+    for own, expected in [(0.0, 0.5), (1.999, 0.5), (2.0, 0.1), (1e9, 0.1)]:
+        monkeypatch.setattr(fidelity, 'reserve', lambda scene, policy, own=own: own)
+        assert fidelity.choose(HEXAPOD, 'L1').bound == expected
+
+
+def test_without_mujoco_auto_takes_l1_and_says_what_it_is_worth(monkeypatch):
+    monkeypatch.setattr(fidelity, 'reserve', lambda scene, policy: 1.0)
+    monkeypatch.setattr(fidelity.importlib.util, 'find_spec', lambda name: None)
+    with_table(monkeypatch, L1=(0.5, 0.1), L2=(0.2, 0.1))
+    choice = fidelity.choose(HEXAPOD)
+    assert choice.rung == 'L1'
+    assert choice.note.endswith('asks for 20 %; pip install "ros_pad[mujoco]" brings L2')
+
+
+def test_a_broken_table_is_told_of(monkeypatch, tmp_path):
+    (tmp_path / 'fidelity.yaml').write_text('reserves: [0, 1]\nbounds: {L0: [1], L1: [1, 2]}\n')
+    monkeypatch.setattr(fidelity.configuration, 'shared_folder', lambda: tmp_path)
+    with pytest.raises(ConfigError, match=r'fidelity.yaml: no table of rungs .* bench/fidelity'):
+        fidelity.Ladder.load.__wrapped__(fidelity.Ladder)
+
+
+def test_reserve_by_hand():
+    """Flat on dry ground: 0.8 against 4π stride/cycle² and a tenth of the weight of a load."""
+    tow = dataclasses.replace(HEXAPOD.tow, weight=5.0, friction_dry=0.4)
+    floor = dataclasses.replace(HEXAPOD.floor, kind='dry')
+    gait = dataclasses.replace(HEXAPOD.gait, stride=0.1, cycle=1.0)
+    scene = dataclasses.replace(HEXAPOD, tow=tow, floor=floor, gait=gait)
+    mass, towed = 2.09, 5.0 / 9.81
+    asked = (mass + towed) * 4.0 * math.pi * 0.1 + 0.4 * 5.0
+    assert fidelity.reserve(scene, 'flat') == pytest.approx(0.8 * mass * 9.81 / asked, rel=1e-3)
+    # Uphill by 0.1 rad asks for more, and presses less.
+    steep = dataclasses.replace(scene, floor=dataclasses.replace(floor, slope=0.1))
+    asked = (mass + towed) * (0.4 * math.pi + 9.81 * math.sin(0.1)) + 2.0 * math.cos(0.1)
+    expected = 0.8 * mass * 9.81 * math.cos(0.1) / asked
+    assert fidelity.reserve(steep, 'flat') == pytest.approx(expected, rel=1e-3)
+
+
+def test_reserve_of_the_rail_leg_by_hand():
+    """The floating foot holds 0.12 · 2.5 N; 0.85 kg gain π² S/2T² = 0.987 m/s² against 0.235 N."""
+    assert fidelity.reserve(LEG) == pytest.approx(0.30 / (0.85 * 0.98696 + 0.235), rel=1e-3)
+
+
+def test_reserve_is_least_where_feet_hold_least():
+    patches = {
+        policy: fidelity.reserve(HEXAPOD, policy) for policy in ('flat', 'dome', 'adaptive')
+    }
+    assert patches['flat'] < 0.5 * patches['dome']
+    # Adaptive feet are domes where it is wet, which is where they hold least.
+    assert patches['adaptive'] == patches['dome']
+    assert fidelity.reserve(HEXAPOD) == fidelity.reserve(HEXAPOD, HEXAPOD.policy)
+
+
+@pytest.fixture(scope='module')
+def bench():
+    spec = importlib.util.spec_from_file_location('bench_fidelity', BENCH)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize('robot', ['hexapod', 'rail_leg'])
+def test_what_is_promised_is_kept_on_scenes_that_nobody_measured(robot, bench):
+    """The error of the chosen rung is within its bound, for ten scenes the table was not made of.
+
+    The scenes are asked for an accuracy that makes the choice come out both ways.
+    """
+    pytest.importorskip('mujoco')
+    taken = set()
+    for seed in range(100000, 100010):
+        scene, policy = getattr(bench, robot)(seed)
+        scene = dataclasses.replace(scene, cycles=4, accuracy=0.08)
+        choice = fidelity.choose(scene, policy=policy)
+        taken.add(choice.rung)
+        best = 'L2' if robot == 'hexapod' else 'L0'
+        top = bench.way(scene, policy, seed, best, top=True)
+        here = bench.way(scene, policy, seed, choice.rung)
+        assert bench.apart(scene, here, top) <= choice.bound, (seed, choice.note)
+    assert taken == ({'L1', 'L2'} if robot == 'hexapod' else {'L0'})
+
+
+# --- what is left out -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_series_have_a_row_for_each_sample_and_each_control_step():
     assert trial.force.shape == trial.position.shape == (samples, 6, 3)
     for name in SERIES[5:]:
         assert getattr(trial, name).shape == (steps, 6), name
-    assert (trial.legs, trial.policy, trial.fidelity) == ((1, 2, 3, 4, 5, 6), 'adaptive', 'L1')
+    assert (trial.legs, trial.policy, trial.fidelity) == ((1, 2, 3, 4, 5, 6), 'adaptive', 'L2')
     assert set(trial.slow_time) <= set(trial.time)
 
 
@@ -174,7 +174,7 @@ def test_progress_is_told_the_simulated_time_each_second():
 
 def test_a_walk_that_is_no_longer_valid_ends_with_its_verdict():
     body = dataclasses.replace(PATCHES.body, height=1.5)
-    trial = run(dataclasses.replace(short(4), body=body), 'flat')
+    trial = run(dataclasses.replace(short(4), body=body), 'flat', fidelity='L1')
     assert 'tip-over' in trial.metrics.verdict
     assert trial.time[-1] < 5.0 - 0.1
     assert len(trial.time) == len(trial.force) == len(trial.body)
@@ -183,12 +183,17 @@ def test_a_walk_that_is_no_longer_valid_ends_with_its_verdict():
 # --- what adapting is worth ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('seed', [0, 1, 2])
-def test_adaptive_beats_both_fixed_shapes_on_patches(seed):
-    """The main job as shipped, 60 cycles."""
-    flat, dome, adapted = (per_cycle(PATCHES, each, seed) for each in ('flat', 'dome', 'adaptive'))
-    assert adapted > 1.05 * max(flat, dome)
-    assert min(flat, dome) > 0.02  # nobody is stuck: the comparison is not with a wreck
+def test_adaptive_beats_both_fixed_shapes_on_patches():
+    """The main job as shipped, but 40 cycles, with joints (L2), three floors."""
+    ways = {
+        policy: [per_cycle(short(40), policy, seed) for seed in (0, 1, 2)]
+        for policy in ('flat', 'dome', 'adaptive')
+    }
+    mean = {policy: np.mean(way) for policy, way in ways.items()}
+    assert mean['adaptive'] > 1.08 * max(mean['flat'], mean['dome'])
+    for flat, dome, adapted in zip(*ways.values(), strict=True):
+        assert adapted > max(flat, dome)
+        assert min(flat, dome) > 0.02  # nobody is stuck: the comparison is not with a wreck
 
 
 def test_on_dry_ground_adapting_costs_nothing():
@@ -213,8 +218,11 @@ def test_on_wet_ground_adapting_costs_the_first_steps_and_the_probes():
 
 def test_the_information_trap_on_patches():
     """Without probes wet patches make domes of all feet, and then no foot ever learns of dry."""
-    scene, seed = short(40), 1
-    trapped = ClosedLoop(scene, 'adaptive', seed)
+    seed = 1
+    # A load that domes on dry ground do not pull without slip.
+    tow = dataclasses.replace(PATCHES.tow, weight=12.0, distance=0.4)
+    scene = dataclasses.replace(short(40), tow=tow)
+    trapped = ClosedLoop(scene, 'adaptive', seed, 'L1')
     trapped.controller = MorphologyController(
         scene.foot, scene.legs, adaptive(probe_below=0.0), scene.expected_load
     )
@@ -227,7 +235,7 @@ def test_the_information_trap_on_patches():
     assert trial.dome[first:].all()
     # There was dry ground after that, where domes hold less than flat feet.
     assert 0.2 < np.mean(~trial.wet()[first:]) < 0.9
-    free = run(scene, 'adaptive', seed=seed)
+    free = run(scene, 'adaptive', seed=seed, fidelity='L1')
     assert not free.dome[first:].all(axis=1).all()
     assert free.metrics.distance_m > 1.05 * trial.metrics.distance_m
 
@@ -238,7 +246,7 @@ def test_the_information_trap_on_patches():
 def watched(policy, seed, cycles=10):
     """Walk; return rows of (true friction, mean, sd, quantile, domed) and of flat stance ends."""
     scene = short(cycles)
-    loop = ClosedLoop(scene, policy, seed)
+    loop = ClosedLoop(scene, policy, seed, 'L1')
     log = TrialLog(scene, policy, seed, 'L1')
     rows, ends, last = [], [], {}
     for _ in range(round(scene.duration / 0.004)):
@@ -266,7 +274,8 @@ def watched(policy, seed, cycles=10):
 def test_estimates_are_as_sure_as_they_may_be(policy, seed):
     """Measured over 30 cycles: coverage 0.96 to 1.00, accuracy 1.00, below the quantile 0 to 6 %.
 
-    The estimator knows the foot's contact model here; that is the best case.
+    The estimator knows the foot's contact model here, and L1 has neither scuffing nor feet that
+    fight: that is the best case.
     """
     rows, ends = watched(policy, seed)
     truth, mean, sd, quantile, _ = rows.T

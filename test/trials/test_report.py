@@ -161,7 +161,7 @@ def test_a_report_needs_no_other_file_and_no_script(walk, tmp_path):
         ]
         assert all(value.startswith(('#', 'data:image/png')) for value in references)
         assert len(image['alt']) > 20
-    for words in ('hexapod_patches', 'seed 0', 'simulation L1', 'What the model leaves out'):
+    for words in ('hexapod_patches', 'seed 0', 'simulation L2', 'What the model leaves out'):
         assert words in seen.text
 
 
