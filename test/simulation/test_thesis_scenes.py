@@ -91,46 +91,99 @@ def test_domes_are_overloaded_below_their_force_limit():
     assert run('leg_wet_dome_75').metrics.overload_s[0] < 0.1  # only while they fill
 
 
-@pytest.fixture(scope='module')
-def walks():
-    names = ('dry_flat', 'wet_flat', 'wet_dome')
-    return {name: [run(f'hexapod_smooth_{name}', seed=s).metrics for s in SEEDS] for name in names}
+NAMES = ('dry_flat', 'wet_flat', 'wet_dome')
 
 
-def test_dry_hexapod_walks_straight_without_slip(walks):
-    """Thesis 5.3: "no signs of slippage"."""
-    for walk in walks['dry_flat']:
-        assert walk.verdict is None
-        assert walk.distance_per_cycle_m == pytest.approx(0.12, rel=0.01)
-        assert max(walk.slip_path_m) / walk.cycles < 1e-3
-        assert abs(walk.lateral_drift_m) < 1e-3
-        assert abs(walk.yaw_drift_rad) < math.radians(0.1)
+@pytest.fixture(scope='module', params=['smooth', 'rough'])
+def walks(request):
+    """Walks on three floors of each kind, with joints and servos (L2)."""
+    pytest.importorskip('mujoco')
+    return {
+        name: [run(f'hexapod_{request.param}_{name}', seed=seed, fidelity='L2') for seed in SEEDS]
+        for name in NAMES
+    }
 
 
-def test_wet_flat_hexapod_slips_and_deviates(walks):
+def middle_slip(walks, name):
+    """Return how far legs 2 and 5 slip in a cycle, m, in the mean of the floors."""
+    return np.mean([
+        (trial.metrics.slip_path_m[1] + trial.metrics.slip_path_m[4]) / 2.0 / trial.metrics.cycles
+        for trial in walks[name]
+    ])  # fmt: skip
+
+
+def bend(trial):
+    """Return how far the path strays sideways, relative to its length ahead."""
+    return np.abs(trial.body[:, 1]).max() / trial.body[-1, 0]
+
+
+def test_walks_are_valid(walks):
+    assert [trial.metrics.verdict for name in NAMES for trial in walks[name]] == [None] * 9
+
+
+def test_dry_hexapod_goes_its_way(walks):
+    """Thesis 5.3: "robust performance in both smooth and rough terrains", "no signs of slippage".
+
+    Feet on joints scuff a little when they land: a few millimetres in a stride of 120.
+    """
+    for trial in walks['dry_flat']:
+        assert trial.metrics.distance_per_cycle_m == pytest.approx(0.12, rel=0.05)
+        assert max(trial.metrics.slip_path_m) / trial.metrics.cycles < 0.1 * 0.12
+        assert bend(trial) < 0.01
+
+
+def test_middle_legs_slip_on_wet_ground_and_domes_help(walks):
+    """Thesis 5.3, figures 41 and 42: legs 2 and 5 slip on flat pads, on domes much less."""
+    assert middle_slip(walks, 'wet_flat') > 3.0 * middle_slip(walks, 'dry_flat')
+    assert middle_slip(walks, 'wet_flat') > 2.0 * middle_slip(walks, 'wet_dome')
+
+
+def test_middle_legs_slip_more_than_the_others(walks):
+    """Thesis 5.3: "legs 2 and 5 carry a higher risk of slipping". So they do where feet stick."""
+    for name in ('dry_flat', 'wet_dome'):
+        every = np.mean(
+            [np.sum(t.metrics.slip_path_m) / 6 / t.metrics.cycles for t in walks[name]]
+        )
+        assert middle_slip(walks, name) > 1.1 * every
+
+
+def test_wet_flat_hexapod_struggles_and_deviates(walks):
     """Thesis 5.3: "struggles to maintain a straight trajectory, leading to deviations"."""
-    straight = max(abs(walk.lateral_drift_m) for walk in walks['dry_flat'] + walks['wet_dome'])
-    for walk in walks['wet_flat']:
-        assert walk.verdict is None
-        assert walk.distance_per_cycle_m < 0.8 * 0.12
-        assert min(walk.slip_path_m) / walk.cycles > 0.01
-        assert abs(walk.lateral_drift_m) > 20.0 * straight
+    for trial in walks['wet_flat']:
+        assert trial.metrics.distance_per_cycle_m < 0.7 * 0.12
+        assert bend(trial) > 0.03
 
 
 def test_wet_dome_hexapod_is_like_the_dry_one(walks):
     """Thesis 5.3: its "trajectory on wet surfaces closely resembles its performance on dry"."""
     for wet, dry in zip(walks['wet_dome'], walks['dry_flat'], strict=True):
-        assert wet.verdict is None
-        assert wet.distance_per_cycle_m == pytest.approx(dry.distance_per_cycle_m, rel=0.01)
-        assert max(wet.slip_path_m) < 0.05 * min(walks['wet_flat'][0].slip_path_m)
-        assert abs(wet.lateral_drift_m) < 1e-3
-        assert max(wet.overload_s) < 0.1 * wet.duration_s
+        ahead = dry.metrics.distance_per_cycle_m
+        assert wet.metrics.distance_per_cycle_m == pytest.approx(ahead, rel=0.03)
+        assert bend(wet) < 0.02
+        assert max(wet.metrics.overload_s) < 0.15 * wet.metrics.duration_s
+
+
+@pytest.mark.parametrize('kind', ['smooth', 'rough'])
+def test_in_the_plane_the_thesis_statements_hold_too(kind):
+    """L1, with neither servos nor scuffing: slip is all or nothing, and so is the bend."""
+    trials = {
+        name: [run(f'hexapod_{kind}_{name}', seed=seed, fidelity='L1') for seed in SEEDS]
+        for name in NAMES
+    }
+    for name, slips in (('dry_flat', False), ('wet_flat', True), ('wet_dome', False)):
+        for trial in trials[name]:
+            per_cycle = np.array(trial.metrics.slip_path_m) / trial.metrics.cycles
+            assert trial.metrics.verdict is None
+            assert (per_cycle > 0.01).all() if slips else (per_cycle < 1e-3).all()
+            assert (bend(trial) > 0.01) if slips else (bend(trial) < 1e-3)
+            ahead = trial.metrics.distance_per_cycle_m
+            assert ahead < 0.8 * 0.12 if slips else ahead == pytest.approx(0.12, rel=0.01)
 
 
 def test_a_floor_wet_all_over_slows_but_does_not_turn():
     """Deviation needs ground that differs from side to side: thesis' liquid spread at random."""
     scene = Scene.load('hexapod_smooth_wet_flat')
     floor = dataclasses.replace(scene.floor, kind='wet')
-    walk = run(dataclasses.replace(scene, floor=floor)).metrics
+    walk = run(dataclasses.replace(scene, floor=floor), fidelity='L1').metrics
     assert walk.distance_per_cycle_m < 0.8 * 0.12
     assert abs(walk.lateral_drift_m) < 1e-3
