@@ -154,8 +154,9 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         there = known[:1] if missing else known
         enough = [each for each in there if bounds[each] <= scene.accuracy]
         rung = (enough or there[-1:])[0]
-    note = f'at a reserve of {own:.2g} the distance on {rung} is '
-    note += f'within {100.0 * bounds[rung]:.0f} %' if bounds[rung] < math.inf else 'not to be trusted'
+    known_bound = bounds[rung] < math.inf
+    within = f'within {100.0 * bounds[rung]:.0f} %' if known_bound else 'not to be trusted'
+    note = f'at a reserve of {own:.2g} the distance on {rung} is {within}'
     if bounds[rung] > scene.accuracy:
         note += f', and the scene asks for {100.0 * scene.accuracy:.0f} %'
         if missing and rung == 'L1':
