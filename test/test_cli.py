@@ -266,7 +266,8 @@ def test_domes_that_cannot_carry_the_robot_are_reported(
     tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
 ):
     heavy = tmp_path / 'heavy.yaml'
-    heavy.write_text(SCENE.read_text().replace('mass: 2.09 ', 'mass: 5.0 '))
+    text = SCENE.read_text().replace('mass: 2.09 ', 'mass: 5.0 ')
+    heavy.write_text(text.replace('inertia: 0.03 ', 'inertia: 0.08 '))
     out = tmp_path / 'walk'
     arguments = ['run', str(heavy), '--no-ros', '--cycles', '1', '--policy', 'dome']
     assert cli.main([*arguments, '--out', str(out)]) == 0

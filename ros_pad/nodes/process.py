@@ -48,17 +48,19 @@ def run(
         stopped = True
         signal.signal(number, before[number])  # a second signal is not waited for
 
-    # Signals end the spin, not the context: what a node does in destroy_node, such as venting,
-    # is done whole and can be heard of. rclpy's own handlers would take the context away.
+    # Signals end the spin, not the context: what a node does in destroy_node, such as venting or
+    # closing a bag, is done whole and can be heard of. rclpy's own handlers would take the context away.
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    node = None
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
-        executor = executor_type()
-        executor.add_node(node)
-        while not stopped:
-            executor.spin_once(timeout_sec=0.1)
+        try:
+            executor = executor_type()
+            executor.add_node(node)
+            while not stopped:
+                executor.spin_once(timeout_sec=0.1)
+        finally:
+            node.destroy_node()
     except (ConfigError, InvalidInput) as error:
         return _complain(error, 2)
     except PadError as error:
@@ -68,8 +70,6 @@ def run(
             raise
         return _complain(error, 2)  # rclpy cannot read its arguments or their file
     finally:
-        if node is not None:
-            node.destroy_node()
         rclpy.try_shutdown()
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -11,21 +11,17 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from typing import Any
 
-import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.process import run
 from ros_pad.trials.bag import BagWriter
 
 PARAMETERS = (
@@ -76,7 +72,7 @@ class RecorderNode(Node):
             self._clock_ns = 0
             self._bag = BagWriter(folder, custom_data)
         except BaseException:
-            self.destroy_node()
+            super().destroy_node()
             raise
         self._recordings: dict[str, Subscription] = {}
         # The clock comes first: an executor that finds several messages waiting takes them in
@@ -109,6 +105,13 @@ class RecorderNode(Node):
             self.destroy_subscription(subscription)
         self._recordings.clear()
         self._bag.close(custom_data)
+
+    def destroy_node(self) -> None:
+        """Close the bag, if nobody has, and the node; raises as :meth:`close` does."""
+        try:
+            self.close()
+        finally:
+            super().destroy_node()
 
     def _record(self, name: str, topic: topics.Topic, profile: QoSProfile) -> None:
         """Subscribe to a topic so that each message goes into the bag."""
@@ -167,29 +170,7 @@ def main(args: list[str] | None = None) -> int:
     int
         0 when the bag was closed, 1 when it could not be written, 2 for a bad parameter.
     """
-    rclpy.init(args=args)
-    try:
-        node = RecorderNode()
-        try:
-            # Takes several times as many messages as the default executor, and is safe here, as
-            # nothing in this process publishes from another thread. Its spin() hears no signal.
-            executor = EventsExecutor()
-            executor.add_node(node)
-            while rclpy.ok():
-                executor.spin_once(timeout_sec=0.1)
-        finally:
-            node.close()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except BagError as error:
-        print(f'recorder: {error}', file=sys.stderr)
-        return 1
-    except ConfigError as error:
-        print(f'recorder: {error}', file=sys.stderr)
-        return 2
-    finally:
-        rclpy.try_shutdown()
-    return 0
+    return run(RecorderNode, args)
 
 
 if __name__ == '__main__':

@@ -583,8 +583,9 @@ def mjcf(scene: Scene, legs: Sequence[Leg], uneven: bool, settings: Settings, dt
         yaw -= masses[2] * (home[0] ** 2 + home[1] ** 2)
     if yaw <= 0.0:
         raise ConfigError(
-            f'scene {scene.name!r}: inertia = {body.inertia:g} kg m2 is not allowed: legs that'
-            f' have {6.0 * sum(masses) / body.mass:.0%} of the mass make {body.inertia - yaw:.3g}'
+            f'scene {scene.name!r}: body.inertia = {body.inertia:g} kg m2 is not allowed with'
+            f' body.mass = {body.mass:g} kg: the legs have {6.0 * sum(masses) / body.mass:.0%} of'
+            f' it, and alone make {body.inertia - yaw:.3g} kg m2'
         )
     roll = ROLL_SHARE * yaw
 

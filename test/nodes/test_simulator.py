@@ -51,7 +51,7 @@ def found(observer, clock):
 
 
 def test_a_step_is_one_message_of_everything(start, observer, until):
-    node = start(free_running=False, publish_clock=True, rate=100.0)
+    node = start(free_running=False, publish_clock=True, rate=100.0, fidelity='L1')
     until(found(observer, clock=True))
     for number in range(1, 6):
         node.step()
@@ -71,6 +71,25 @@ def test_a_step_is_one_message_of_everything(start, observer, until):
     points = {leg: observer.heard[f'leg_{leg}/position'][0].point for leg in LEGS}
     assert [leg for leg in LEGS if points[leg].y > 0.0] == [1, 2, 3]
     assert [leg for leg in LEGS if points[leg].x > 0.1] == [1, 6]
+
+
+def test_full_dynamics_publish_the_joints(start, robot, until):
+    heard = []
+    topics.JOINT_STATES.subscription(robot, heard.append)
+    node = start(free_running=False, publish_clock=True, fidelity='L2')
+    until(lambda: robot.count_publishers('joint_states'))
+    seen = []
+    for number in range(1, 501):
+        node.step()
+        seen.append(node.robot.joint_positions)
+        until(lambda n=number: len(heard) == n)
+    assert [nanoseconds(each.header.stamp) for each in heard[:2]] == [4_000_000, 8_000_000]
+    assert {tuple(each.name) for each in heard} == {tuple(node.robot.joint_names)}
+    assert len(set(node.robot.joint_names)) == 18
+    assert [tuple(each.position) for each in heard] == seen
+    # It stands first, and walks then: each joint swings, none by more than a leg can.
+    travel = np.ptp(seen, axis=0)
+    assert np.all(travel > 0.001) and np.all(travel < 1.5)
 
 
 def test_free_running_keeps_its_rate_and_the_time_of_day(start, observer, until):
