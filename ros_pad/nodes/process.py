@@ -49,7 +49,8 @@ def run(
         signal.signal(number, before[number])  # a second signal is not waited for
 
     # Signals end the spin, not the context: what a node does in destroy_node, such as venting or
-    # closing a bag, is done whole and can be heard of. rclpy's own handlers would take the context away.
+    # closing a bag, is done whole and can be heard of. rclpy's own handlers would take the
+    # context away.
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
