@@ -230,7 +230,7 @@ def test_the_bench_changes_what_it_names():
             altered = module.wrong_by(setup, assumption, factor)
             assert altered != setup
             got = module.baseline(altered, assumption)
-            if assumption.rule == 'factor':
+            if assumption.rule in ('factor', 'mass'):
                 assert got == pytest.approx(factor * value)
             elif assumption.rule == 'odds':
                 assert got / (1.0 - got) == pytest.approx(factor * value / (1.0 - value))
@@ -238,6 +238,9 @@ def test_the_bench_changes_what_it_names():
                 assert got - 1.0 == pytest.approx(factor * (value - 1.0))
             else:
                 assert got == int(factor * value)
-            if not assumption.path.startswith('both'):
+            if assumption.rule == 'mass':
+                ratio = altered.world.body.inertia / setup.world.body.inertia
+                assert ratio == pytest.approx(factor)
+            elif not assumption.path.startswith('both'):
                 back = module.changed(altered, assumption.path, value)
                 assert back == setup
