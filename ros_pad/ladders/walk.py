@@ -7,6 +7,9 @@ is the row with half of them; without MuJoCo they are those of L1 with steps of 
 nothing of what L1 leaves out. The rail leg is compared with an event-driven integration of its
 equations of motion, phase by phase, to 1e-11.
 
+Times are those of the steps: neither of making the robot nor of reading its feet, which L2 sees to
+in every step, L1 only when asked.
+
 Only the elastic law of :mod:`ros_pad.simulation.friction` is here: the hexapod does not walk with
 the others, which :mod:`ros_pad.ladders.stability` compares.
 """
@@ -391,8 +394,10 @@ def _full(family: str, settings: Settings, ours: bool = True) -> Walker:
 def _walked(robot: Any, scene: Scene, steps: int, seconds: float) -> Walked:
     x, y, heading = robot.body
     slip = sum(foot.slip_path for foot in robot.feet) / len(robot.feet)
-    each = (value / scene.cycles for value in (x, slip, y, heading))
-    return Walked(*each, robot.verdict, steps, seconds)
+    count = scene.cycles
+    return Walked(
+        x / count, slip / count, y / count, heading / count, robot.verdict, steps, seconds
+    )
 
 
 # --- rail leg ------------------------------------------------------------------------------------
@@ -431,8 +436,8 @@ def rail_walkers() -> list[Walker]:
     ):
         walkers.append(Walker(family, family, None, _by_events(method, tolerance), ours=False))
     for family, method in (
-        ('solve_ivp, smooth friction, LSODA', 'LSODA'),
-        ('solve_ivp, smooth friction, RK45', 'RK45'),
+        ('solve_ivp, smoothed, LSODA', 'LSODA'),
+        ('solve_ivp, smoothed, RK45', 'RK45'),
     ):
         walkers.append(Walker(family, family, None, _by_smoothing(method), ours=False))
     return walkers
@@ -558,7 +563,7 @@ def walk_by_events(case: Walk, method: str, tolerance: float) -> tuple[float, fl
         )
         over = [name for name, hits in zip(ends[phase], found.t_events, strict=True) if len(hits)]
         way, speed = found.y[:, -1].tolist()
-        return (over or [None])[0], float(found.t[-1]), way, speed, len(found.t) - 1
+        return over[0] if over else None, float(found.t[-1]), way, speed, len(found.t) - 1
 
     way = slip = speed = 0.0
     steps = 0
@@ -649,6 +654,8 @@ def table(rungs: Sequence[WalkRung]) -> str:
         lines += [*_block(robot, part), '']
         if robot == HEXAPOD:
             lines += [*_walk_by_walk(part), '']
+            if any(rung.family == STIFF for rung in part):
+                lines.append(f'{STIFF}: impratio 10 and noslip_iterations 5, not impratio 100')
             lines += [f'left out: {why}' for why in _missing(part)]
             lines.append('')
     return '\n'.join(lines)
@@ -730,11 +737,20 @@ _LOOKS: dict[str, dict[str, Any]] = {
     'RailLeg': {'color': GREEN, 'marker': 'o'},
     f'walk_many, {_LEGS} legs': {'color': GREEN, 'marker': 's'},
     'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
-    'solve_ivp, events, 1e-3': {'color': BLUE, 'marker': 'D', 'mfc': 'white'},
-    'solve_ivp, smooth friction, LSODA': {'color': VERMILION, 'marker': 'X'},
-    'solve_ivp, smooth friction, RK45': {'color': VERMILION, 'marker': 'P'},
+    'solve_ivp, events, 1e-3': {'color': BLUE, 'marker': 'D'},
+    'solve_ivp, smoothed, LSODA': {'color': VERMILION, 'marker': 'X'},
+    'solve_ivp, smoothed, RK45': {'color': VERMILION, 'marker': 'P'},
 }
-_AXES = {
+# Where steps are written beside their marks, points.
+_STEP_PLACES = {
+    'L1': (6, 4),
+    'L1, compiled, walk': (0, 7),
+    'L2': (-9, -3),
+    STIFF: (9, -4),
+    'MuJoCo defaults': (9, 3),
+}
+_LEGEND = {STIFF: 'L2, impratio 10 and noslip 5'}
+_PANELS = {
     'distance': ('distance', 'error, %'),
     'slip': ('slip path of a foot', 'error, %'),
     'lateral': ('drift aside', 'error, mm a cycle'),
@@ -747,64 +763,96 @@ def draw(rungs: Sequence[WalkRung]) -> Figure:
     hexapod = [rung for rung in rungs if rung.robot == HEXAPOD]
     rail = [rung for rung in rungs if rung.robot == RAIL]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.5, 8.2))
+        figure = Figure(figsize=(11.5, 8.0))
         figure.set_layout_engine('constrained', w_pad=0.08, h_pad=0.08)
         panels = figure.subplots(2, 3).ravel()
-        places = zip('abce', (0, 1, 2, 4), _AXES.items(), strict=True)
-        for letter, place, (name, (what, _)) in places:
-            _climb(panels[place], hexapod, name, f'{letter}  hexapod: {what}')
+        places = zip('abce', (0, 1, 2, 4), _PANELS, strict=True)
+        for letter, place, name in places:
+            _climb(panels[place], hexapod, name, f'{letter}  hexapod: {_PANELS[name][0]}')
         _strips(panels[3], hexapod, 'd  hexapod: distance, walk by walk')
-        _climb(panels[5], rail, 'distance', 'f  rail leg: distance')
-        handles = []
-        for family, look in _LOOKS.items():
-            if any(rung.family == family for rung in rungs):
-                handles.append(Line2D([], [], ls='', ms=6, label=family, **look))
+        _climb(panels[5], rail, 'distance', 'f  rail leg: distance (blue and red: solve_ivp)')
+        _write_names(panels[5], rail)
+        families = {rung.family for rung in hexapod}
+        handles = [
+            Line2D([], [], ls='', ms=6, label=_LEGEND.get(family, family), **look)
+            for family, look in _LOOKS.items()
+            if family in families
+        ]
         handles.append(
             Line2D([], [], color=PALE, ls='--', lw=0.9, label='top rung against half its step')
         )
-        figure.legend(handles=handles, loc='outside lower center', ncol=5)
+        figure.legend(
+            handles=handles,
+            loc='outside lower center',
+            ncol=4,
+            title='Mark: median of the walks; whisker: the worst; number: step, ms.',
+        )
     return figure
 
 
 def _climb(panel: Axes, part: Sequence[WalkRung], name: str, title: str) -> None:
-    """Draw time against the error called ``name``: disc the median, whisker the worst walk."""
+    """Draw time against the error called ``name``: mark the median, whisker the worst walk."""
     scale = _UNITS[name][1]
-    panel.set(xscale='log', yscale='log', title=title, ylabel=_AXES[name][1])
+    panel.set(xscale='log', yscale='log', title=title, ylabel=_PANELS[name][1])
     panel.set_xlabel('time for a simulated second, ms')
     for family, look in _LOOKS.items():
         mine = [rung for rung in part if rung.family == family]
-        if not mine:
-            continue
         x = [rung.ms_per_second for rung in mine]
         y = [scale * rung.errors[name] for rung in mine]
-        panel.plot(x, y, ls='-', lw=1.0, ms=6, mec=look['color'], zorder=3, **look)
+        panel.plot(x, y, ls='-', lw=1.0, ms=6, zorder=3, **look)
         for rung, at, error in zip(mine, x, y, strict=True):
-            panel.plot([at, at], [error, scale * rung.worst[name]], '-_', color=look['color'],
-                       lw=1.0, ms=5, alpha=0.45)  # fmt: skip
+            # Compiled walks are those of plain Python.
+            if 'compiled' not in family:
+                ends = [error, scale * rung.worst[name]]
+                panel.plot([at, at], ends, '-_', color=look['color'], lw=1.0, ms=5, alpha=0.5)
             if name == 'distance' and rung.step_s is not None:
                 panel.annotate(
-                    f'{1e3 * rung.step_s:g}', (at, error), xytext=(0.0, -11.0),
-                    textcoords='offset points', ha='center', fontsize=7, color=look['color'],
-                )  # fmt: skip
+                    f'{1e3 * rung.step_s:g}',
+                    (at, error),
+                    xytext=_STEP_PLACES.get(family, (0, -12)),
+                    textcoords='offset points',
+                    ha='center',
+                    fontsize=7,
+                    color=look['color'],
+                )
     for rung in part:
         if rung.family == TOP and rung.method != rung.top:
-            panel.axhline(scale * rung.errors[name], color=PALE, ls='--', lw=0.9, zorder=1)
+            own = scale * rung.errors[name]
+            panel.axhline(own, color=PALE, ls='--', lw=0.9, zorder=1)
+            # Nothing below means anything.
+            panel.set_ylim(bottom=0.6 * own)
+    panel.xaxis.set_major_formatter('{x:g}')
+    panel.yaxis.set_major_formatter('{x:g}')
     panel.grid(color=PALE, alpha=0.25, lw=0.5)
+
+
+def _write_names(panel: Axes, part: Sequence[WalkRung]) -> None:
+    """Write beside the marks of the rail leg whose they are."""
+    # The first of a family has the shortest step.
+    first = {rung.family: rung for rung in reversed(part) if rung.family in _LOOKS}
+    for family, rung in first.items():
+        panel.annotate(
+            family.removesuffix(f', {_LEGS} legs').removeprefix('solve_ivp, '),
+            (rung.ms_per_second, 1e2 * rung.errors['distance']),
+            xytext=(-34, -24) if 'walk_many' in family else (8, -3),
+            textcoords='offset points',
+            fontsize=8,
+            color=_LOOKS[family]['color'],
+        )
+    panel.set_xlim(right=8.0 * max(rung.ms_per_second for rung in part))
 
 
 def _strips(panel: Axes, part: Sequence[WalkRung], title: str) -> None:
     """Draw by how much each walk's distance is off, a row for each walk."""
-    shown = [rung for rung in part if rung.method in SHOWN]
     names = [walk['walk'] for walk in part[0].walks]
-    for rung in shown:
-        panel.plot(
-            [1e2 * walk['distance_error'] for walk in rung.walks],
-            range(len(names)),
-            ls='', ms=6, alpha=0.85, **_LOOKS[rung.family],
-        )  # fmt: skip
+    shown = [rung for rung in part if rung.method in SHOWN]
+    for rung, shift in zip(shown, np.linspace(-0.28, 0.28, len(shown)), strict=True):
+        off = [1e2 * walk['distance_error'] for walk in rung.walks]
+        look = _LOOKS[rung.family]
+        panel.plot(off, shift + np.arange(len(names)), ls='', ms=5, **look)
     panel.axvline(0.0, color=BLACK, lw=0.8, zorder=1)
     for limit in (-1e2 * FAILED, 1e2 * FAILED):
-        panel.axvline(limit, color=PALE, lw=0.9, ls='--', zorder=1)
+        panel.axvline(limit, color=PALE, lw=0.9, ls=':', zorder=1)
     panel.set_yticks(range(len(names)), names)
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.set(title=title, xlabel='distance off by, %')
