@@ -770,7 +770,7 @@ def draw(rungs: Sequence[WalkRung]) -> Figure:
         for letter, place, name in places:
             _climb(panels[place], hexapod, name, f'{letter}  hexapod: {_PANELS[name][0]}')
         _strips(panels[3], hexapod, 'd  hexapod: distance, walk by walk')
-        _climb(panels[5], rail, 'distance', 'f  rail leg: distance (blue and red: solve_ivp)')
+        _climb(panels[5], rail, 'distance', 'f  rail leg: distance')
         _write_names(panels[5], rail)
         families = {rung.family for rung in hexapod}
         handles = [
@@ -785,7 +785,8 @@ def draw(rungs: Sequence[WalkRung]) -> Figure:
             handles=handles,
             loc='outside lower center',
             ncol=4,
-            title='Mark: median of the walks; whisker: the worst; number: step, ms.',
+            title='Mark: median of the walks; whisker: the worst; number: step, ms.'
+            ' In f, events and smoothed friction are those of solve_ivp.',
         )
     return figure
 
