@@ -34,7 +34,7 @@ test: .venv/test.stamp
 # A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
 STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
 
-.venv/ros.stamp: EXTRAS := ros
+.venv/ros.stamp: EXTRAS := ros,mujoco
 .venv/test.stamp: EXTRAS := ros,test
 .venv/ros.stamp .venv/test.stamp: setup.py setup.cfg $(STALE)
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { $(MAKE_VENV); }

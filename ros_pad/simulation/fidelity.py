@@ -14,6 +14,7 @@ import functools
 import importlib.util
 import math
 from dataclasses import dataclass
+from dataclasses import replace
 
 import yaml
 
@@ -27,6 +28,7 @@ from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation.full_hexapod import FullHexapod
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.rail_leg import RailLeg
+from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import RailGait
@@ -70,9 +72,9 @@ class Omission:
     term : str
         What it is.
     bound : float or None
-        How large it can be, relative to the friction of a loaded foot; None where nobody knows.
+        How large its effect can be, relative; None where nobody knows.
     reason : str
-        Where the bound comes from.
+        Relative to what, and where the bound comes from.
     """
 
     term: str
@@ -243,13 +245,7 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
 def _grip(scene: Scene, dome: bool, wet: bool) -> float:
     """Return the resistance of a foot in mid-stance over its load."""
     foot, load = scene.foot.on_rough(scene.floor.roughness), scene.expected_load
-    pressure = 0.0
-    if dome:
-        try:
-            wanted = pressure_for(foot.pad, load / foot.pads, foot.limit, margin=_MARGIN)
-        except NoEquilibrium:
-            wanted = foot.ceiling
-        pressure = scene.dome_pressure or min(foot.ceiling, float(wanted))
+    pressure = _dome_pressure(scene) if dome else 0.0
     on_domes = foot.dome_load(load, pressure)
     thickness = 0.0, 0.0
     if wet:
@@ -262,49 +258,128 @@ def _grip(scene: Scene, dome: bool, wet: bool) -> float:
     return foot.resistance_of(on_domes, load - on_domes, pressure, *thickness) / load
 
 
-def omitted(scene: Scene, fidelity: str = 'auto') -> list[Omission]:
-    """Return what a trial of this scene leaves out on a rung, with bounds on its effect."""
-    foot, load, name = scene.foot, scene.expected_load, rung(scene, fidelity)
-    # A meniscus resists sliding by hysteresis at most: γ w (cos θ_rec - cos θ_adv) <= 2 γ w, with
-    # w = 2 r0 a pad; only domes have one.
-    capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
-    terms = [
-        Omission(
-            'capillary force of the pads',
-            capillary / (foot.friction * load),
-            'full contact-angle hysteresis (180 to 0 degrees) on every pad',
-        ),
-        Omission(
-            'liquid dragged under a slipping foot', None, 'film taken to travel with the foot'
-        ),
-    ]
-    if scene.floor.roughness:
+def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> list[Omission]:
+    """Return what a trial of this scene leaves out on a rung, with bounds on its effect.
+
+    Parameters
+    ----------
+    scene, fidelity, policy
+        As for :func:`choose`.
+
+    Raises
+    ------
+    InvalidInput
+        When the rung does not exist, or does not know the scene's robot.
+    """
+    foot, load, gait = scene.foot, scene.expected_load, scene.gait
+    name, terms = rung(scene, fidelity, policy), []
+    if scene.floor.kind != 'dry':
+        # A meniscus resists sliding by hysteresis at most: γ w (cos θ_rec - cos θ_adv) <= 2 γ w,
+        # with w = 2 r0 a pad; only domes have one.
+        capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
+        terms += [
+            Omission(
+                'capillary force of the pads',
+                capillary / (foot.friction * load),
+                'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0'
+                ' degrees) on every pad',
+            ),
+            Omission(
+                'liquid dragged under a slipping foot',
+                None,
+                'the film is taken to travel with the foot; at 10 mm/s a plane wedge drags at most'
+                f' {1e6 * _dragged_film(scene, 0.01):.2g} um under a dome, where'
+                f' {1e6 * foot.critical_film:.2g} um leave 1/e of dry contact',
+            ),
+        ]
+        if scene.floor.roughness:
+            terms.append(
+                Omission(
+                    'liquid held in the valleys of a rough floor',
+                    None,
+                    'roughness enters as one composite height of pad and floor',
+                )
+            )
+    if name == 'L0':
+        terms.append(_doubt_of_the_rail(scene, policy))
+    if name == 'L1':
+        bound = choose(scene, name, policy).bound
         terms.append(
             Omission(
-                'liquid held in the valleys of a rough floor',
-                None,
-                'roughness enters as one composite height of pad and floor',
+                'joints, servos, scuffing at touch-down, swinging legs, pitch and roll',
+                bound if bound < math.inf else None,
+                'of the distance: L1 against L2 on random scenes with such a reserve; on dry flat'
+                ' ground feet slip 3 to 4 mm a cycle on L2, 0.1 mm here',
             )
         )
-    if name == 'L1':
-        terms += [
-            Omission(
-                'scuffing at touch-down and servo compliance',
-                None,
-                'only L2 has joints: there feet slip 3 to 4 mm a cycle on dry flat ground,'
-                ' here 0.1 mm',
-            ),
-            Omission('inertia of swinging legs', None, 'the body is one rigid mass'),
-        ]
-    if name == 'L2':
-        terms += [
+    else:
+        grip = max(_grip(scene, False, False), _grip(scene, True, False))
+        steps, length = (1.0, gait.stroke) if isinstance(gait, RailGait) else (2.0, gait.stride)
+        terms.append(
             Omission(
                 'what soft pads do to the motion of the body',
-                None,
-                'shear of the pads moves the markers, not the feet',
-            ),
-            Omission(
-                'size of the sole', None, 'the foot is a point on an ankle that tilts freely'
-            ),
-        ]
+                steps * grip * load / foot.shear_stiffness / length,
+                'of the distance: at each step the feet give way by their whole grip over the'
+                ' shear stiffness of their pads, and get nothing back',
+            )
+        )
+    if name == 'L2':
+        terms.append(
+            Omission('size of the sole', None, 'the foot is a point on an ankle that tilts freely')
+        )
     return terms
+
+
+def _dragged_film(scene: Scene, speed: float) -> float:
+    """Return the thickest film, m, that a plane wedge can drag under sliding domes.
+
+    The optimum slider of Reynolds' equation (Rayleigh 1918; Hamrock, Fundamentals of Fluid Film
+    Lubrication, ch. 8) carries a mean pressure of 0.160 η U L / h².
+    """
+    pressure = _dome_pressure(scene)
+    width = math.sqrt(scene.expected_load / pressure / scene.foot.pads / math.pi)
+    return math.sqrt(0.160 * scene.floor.viscosity * speed * 2.0 * width / pressure)
+
+
+def _doubt_of_the_rail(scene: Scene, policy: str | None) -> Omission:
+    """Return what one per cent of friction is worth on the rail, which is ill-conditioned."""
+    foot, policy = scene.foot, scene.policy if policy is None else policy
+    scenes = [
+        replace(
+            scene,
+            foot=replace(
+                foot,
+                friction=factor * foot.friction,
+                shear_strength=factor * foot.shear_strength,
+                boundary_friction=factor * foot.boundary_friction,
+            ),
+        )
+        for factor in (0.995, 1.005)
+    ]
+    wet = scene.floor.kind != 'dry'
+    domed = policy == 'dome' or (policy != 'flat' and wet)
+    pressure = _dome_pressure(scene) if domed else 0.0
+    gait = scene.gait
+    assert isinstance(gait, RailGait)
+    duration = scene.settle + 10.0 * gait.cycle
+    floor = Floor.uniform(wet, scene.floor.film_thickness)
+    walks = walk_many(scenes, [floor, floor], [pressure, pressure], 0.004, duration)
+    less, more = walks.position
+    return Omission(
+        'friction off by one per cent',
+        (more - less) / less if less > 0.0 else None,
+        'of the distance, on a uniform floor: near the drag of the wheels a little more or less'
+        ' friction moves the body much further, or not at all',
+    )
+
+
+def _dome_pressure(scene: Scene) -> float:
+    """Return the pressure of a dome, Pa: the scene's, or what a controller would choose."""
+    foot, load = scene.foot, scene.expected_load
+    if scene.dome_pressure:
+        return scene.dome_pressure
+    try:
+        wanted = pressure_for(foot.pad, load / foot.pads, foot.limit, margin=_MARGIN)
+    except NoEquilibrium:
+        wanted = foot.ceiling
+    return min(foot.ceiling, float(wanted))

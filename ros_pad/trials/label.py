@@ -76,6 +76,6 @@ def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
         # JSON knows no infinity.
         'fidelity_bound': choice.bound if choice.bound < math.inf else None,
         'fidelity_note': choice.note,
-        'omitted': [asdict(omission) for omission in ladder.omitted(scene, choice.rung)],
+        'omitted': [asdict(each) for each in ladder.omitted(scene, choice.rung, policy)],
         'version': ros_pad.__version__,
     }

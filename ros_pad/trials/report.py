@@ -762,7 +762,7 @@ def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
         ]
         for each in omitted
     ]
-    head = ['left out', 'share of the friction of a loaded foot', 'where the bound comes from']
+    head = ['left out', 'bound on its effect', 'of what, and where it comes from']
     return table(head, rows, range(1, 2))
 
 

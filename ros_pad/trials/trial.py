@@ -13,6 +13,8 @@ import numpy as np
 
 from ros_pad.simulation.terrain import Floor
 
+BOUNCE = 0.03  # s without load that end no stance
+
 
 @dataclass(frozen=True)
 class Metrics:
@@ -130,8 +132,16 @@ class Trial:
     real_time_factor: float | None = None
 
     def standing(self, load_gate: float) -> np.ndarray:
-        """Whether each foot carries more than ``load_gate`` newtons: bool (n, legs)."""
-        return self.force[:, :, 2] > load_gate
+        """Whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).
+
+        A foot that is without load for less than ``BOUNCE``, as when the other tripod lands, has
+        not stepped: it stands all the while.
+        """
+        loaded = self.force[:, :, 2] > load_gate
+        time = self.time[:, None]
+        since = np.maximum.accumulate(np.where(loaded, time, -np.inf), axis=0)
+        until = np.minimum.accumulate(np.where(loaded, time, np.inf)[::-1], axis=0)[::-1]
+        return until - since < BOUNCE
 
     def wet(self) -> np.ndarray:
         """Whether the true ground below each foot is wet at each control step: (m, legs) bool.

@@ -35,8 +35,8 @@ def written(load, x, wet_probability, pressure=None, floor=None):
     force[:, :, 2], position[:, :, 0] = load, x
     return Trial(
         scene='written', policy='flat', fidelity='L1', seed=0, legs=tuple(range(1, legs + 1)),
-        time=0.01 * np.arange(1, samples + 1), body=np.zeros((samples, 3)),
-        force=force, position=position, slow_time=0.01 * np.arange(1, samples + 1, 2),
+        time=0.1 * np.arange(1, samples + 1), body=np.zeros((samples, 3)),
+        force=force, position=position, slow_time=0.1 * np.arange(1, samples + 1, 2),
         pressure=zeros if pressure is None else np.array(pressure, dtype=float),
         setpoint=zeros, wet_probability=belief, friction=zeros, margin=zeros, slip_speed=zeros,
         slipping=zeros > 1.0, dome=zeros > 1.0, floor=floor,
@@ -62,6 +62,15 @@ def test_stances_end_at_the_first_control_step_after_the_last_loaded_sample():
     # Control steps at samples 1, 3, 5, 7, 9. The first stance ends with sample 4: row 2 is the
     # next. The second ends with sample 9, after which there is none.
     assert [rows.tolist() for rows in stance_ends(trial, GATE)] == [[2]]
+
+
+def test_a_bounce_ends_no_stance():
+    trial = one_leg([0.5] * 5)
+    fast = dataclasses.replace(trial, time=0.05 * trial.time, slow_time=0.05 * trial.slow_time)
+    # Samples 5 and 6 are then 10 ms without load, between two that are 15 ms apart.
+    assert fast.standing(GATE)[:, 0].tolist() == [True] * 9 + [False]
+    assert trial.standing(GATE)[:, 0].tolist() == [load > GATE for load in LOADS[0]]
+    assert [rows.tolist() for rows in stance_ends(fast, GATE)] == [[]]
 
 
 def test_a_stance_that_is_cut_off_by_the_end_does_not_count():
