@@ -36,7 +36,7 @@ class SlipAlarm:
         self,
         noise: float,
         correlation_time: float,
-        speed: float = 0.03,
+        speed: float = 0.01,
         threshold: float = 4.0,
     ) -> None:
         self._noise = number('noise', noise, 'm/s', above=True)

@@ -36,7 +36,8 @@ class Tuning:
     force_noise : float
         Standard deviation of a force component, N, 0 or more.
     load_gate : float
-        Share of the expected load above which a foot stands, above 0 up to 1.
+        Share of the expected load above which a foot stands, above 0 up to 1. Feet slide most as
+        they land and lift off, lightly loaded.
     smoothing : float
         Time constant of the speed, s, above 0.
     filter_period : float
@@ -50,6 +51,9 @@ class Tuning:
     speed_noise : float
         Model error of the slip speed, m/s, added to the sensors', above 0: feet also roll and
         bend.
+    turning_rate : float
+        Root mean square of the rate at which a standing foot turns about the vertical, rad/s, 0 or
+        more: of legs without an ankle the speed of the body over the length of the leg.
 
     Raises
     ------
@@ -59,13 +63,14 @@ class Tuning:
 
     position_noise: float = 1.5e-4
     force_noise: float = 0.03
-    load_gate: float = 0.3
+    load_gate: float = 0.1
     smoothing: float = 0.02
     filter_period: float = 0.04
     wet_prior: float = 0.5
     patch_length: float = 1.5
     ratio_noise: float = 0.03
     speed_noise: float = 2e-3
+    turning_rate: float = 4.0
 
     def __post_init__(self) -> None:
         number('position_noise', self.position_noise, 'm')
@@ -77,6 +82,7 @@ class Tuning:
         number('patch_length', self.patch_length, 'm', above=True)
         number('ratio_noise', self.ratio_noise, '(ratio)', above=True)
         number('speed_noise', self.speed_noise, 'm/s', above=True)
+        number('turning_rate', self.turning_rate, 'rad/s')
 
 
 class Estimate(NamedTuple):
@@ -153,6 +159,8 @@ class FootEstimator:
             FrictionPrior.of(foot, expected_load),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
+            rim_speed=2.0 / 3.0 * foot.sole_radius * tuning.turning_rate,
+            model_error=tuning.ratio_noise,
         )
         self._time = -math.inf
         self._standing = False
@@ -164,8 +172,7 @@ class FootEstimator:
         self._first_window = True
         self._samples = 0
         self._sum_load = self._sum_tangential = self._sum_speed = 0.0
-        mean, spread = self._ground.friction
-        sd = math.hypot(spread, tuning.ratio_noise)
+        mean, sd = self._ground.friction
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
             self._ground.wet_probability, mean, sd, self._ground.quantile(0.05), True,
@@ -248,10 +255,7 @@ class FootEstimator:
         if fresh:
             self._filter(time - self._window_start)
             self._window_start = time
-            friction_mean, spread = self._ground.friction
-            # The error of the model of T/N is the same in every sample: no number of them
-            # averages it out.
-            friction_sd = math.hypot(spread, self._tuning.ratio_noise)
+            friction_mean, friction_sd = self._ground.friction
             wet = self._ground.wet_probability
             quantile = self._ground.quantile(0.05)
             self._quantile = quantile

@@ -2,10 +2,10 @@
 """Belief about the ground below one foot: wet or dry, and its friction coefficient.
 
 A Bayes filter on {dry, wet} x a grid of friction coefficients. A foot that sticks at T/N only
-says that friction is larger (censored evidence); a foot that slips shows it. Whether it sticks is
-itself uncertain, so each sample is a mixture of both, weighed by the slip speed. Ground changes
-with the way that the foot steps or slides, not with time: a foot that stands still knows what it
-knows.
+says that friction is larger (censored evidence); a foot that slips shows it, or what its turning
+leaves of it. Whether it sticks is itself uncertain, so each sample is a mixture of both, weighed by
+the slip speed. Ground changes with the way that the foot steps or slides, not with time: a foot
+that stands still knows what it knows.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ SLIP_SPEED = 0.04
 """Most frequent speed v of slips, m/s; their density is taken to go as x exp(-x), x = speed / v.
 It starts at zero, so that the noise of a foot at rest does not add up to slow slip."""
 
+# Middles of six equally likely shares of the half-normal distribution.
+_HALF_NORMAL = math.sqrt(2.0) * special.erfinv((np.arange(6.0) + 0.5) / 6.0)
 _UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
 
@@ -92,6 +94,14 @@ class GroundFilter:
         Over which friction under domes may change within a stance, s.
     temper : float
         Weight of a sample, in (0, 1]: successive samples are not independent.
+    rim_speed : float
+        Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
+        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while its
+        rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe and
+        Cutkosky 1996); nobody measures s.
+    model_error : float
+        Standard deviation of what T/N shows of friction, > 0. It is the same in every sample: no
+        number of them averages it out.
     """
 
     def __init__(
@@ -100,13 +110,18 @@ class GroundFilter:
         wet_prior: float = 0.5,
         patch_length: float = 1.5,
         forgetting_time: float = 1.0,
-        temper: float = 0.8,
+        temper: float = 0.5,
+        rim_speed: float = 0.0,
+        model_error: float = 0.03,
     ) -> None:
         self._tables = {dome: prior.table(dome) for dome in (False, True)}
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
+        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / model_error) ** 2)
+        self._blur = blur / blur.sum(axis=0)
         self._dome = False
         self._settle(self._grounds * self._tables[False])
 
@@ -138,9 +153,13 @@ class GroundFilter:
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
         # Stick: T/N is what the gait demands, and μ is above it. Slip: more is demanded than μ,
-        # and T/N shows μ.
+        # and T/N shows as much of μ as turning leaves.
         likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
-        likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * np.exp(-0.5 * away * away)
+        if slip > 0.0:
+            shown = speed / np.hypot(speed, self._rim_speeds)
+            away = (shown * GRID - ratio) / ratio_noise
+            likely = np.exp(-0.5 * away * away).mean(axis=0)
+            likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * likely
         self._belief = self._belief * (likelihood + 1e-6) ** self._temper
         self._belief /= self._belief.sum()
         if speed > 0.0:
@@ -172,7 +191,7 @@ class GroundFilter:
         dry, wet = (belief @ _ONES).tolist()
         self._belief = belief
         self.wet_probability = wet / (dry + wet)
-        self._marginal = (belief[0] + belief[1]) / (dry + wet)
+        self._marginal = self._blur @ ((belief[0] + belief[1]) / (dry + wet))
 
     @property
     def friction(self) -> tuple[float, float]:
