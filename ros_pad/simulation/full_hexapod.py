@@ -31,6 +31,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -193,7 +194,8 @@ class Leg:
             )
         # In the axes of the femur the foot is at (femur + tibia sin t, -tibia cos t).
         side = tibia * math.sqrt(1.0 - bend * bend)
-        return coxa, math.atan2(z, out) + math.atan2(side, femur + tibia * bend), math.asin(bend)
+        lift = math.atan2(z, out) + math.atan2(side, femur + tibia * bend)
+        return coxa, math.remainder(lift, math.tau), math.asin(bend)
 
 
 class FootPath:
@@ -281,6 +283,8 @@ class FullHexapod:
     ------
     ConfigError
         When the legs cannot do what the scene wants of them, or MuJoCo is missing.
+    InvalidInput
+        When the period is not above zero.
 
     Notes
     -----
@@ -384,7 +388,13 @@ class FullHexapod:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
 
         Where MuJoCo loses the solution the robot's feet stay as they were last.
+
+        Raises
+        ------
+        InvalidInput
+            When there are not six finite pressures.
         """
+        check_pressures(pressures, 6)
         self._steps += 1
         self.time = self._steps * self.period
         model, data, state = self.model, self.data, self._state

@@ -21,6 +21,7 @@ from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
@@ -39,11 +40,17 @@ class RailLeg:
     floor : Floor
         The ground.
     period : float
-        Step, s.
+        Step, s, > 0.
+
+    Raises
+    ------
+    InvalidInput
+        When the period is not above zero.
     """
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
+        number('period', period, 's', above=True)
         self.legs: tuple[int, ...] = (1,)
         self.period = period
         self.time = 0.0
@@ -81,7 +88,14 @@ class RailLeg:
         return False, -0.5 * gait.stroke * math.cos(math.pi * share), height
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with the pad's gauge pressure, Pa, in a sequence of one."""
+        """Advance by ``period`` with the pad's gauge pressure, Pa, in a sequence of one.
+
+        Raises
+        ------
+        InvalidInput
+            When there is not one finite pressure.
+        """
+        check_pressures(pressures, 1)
         dt, state, foot = self.period, self.feet[0], self._foot
         self._steps += 1
         self.time = self._steps * dt

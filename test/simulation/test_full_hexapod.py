@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import example
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -87,6 +88,7 @@ def test_home_of_the_ch3_r():
     st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-1.5, 1.5), st.integers(0, 5),
     st.floats(0.01, 0.1), st.floats(0.02, 0.2), st.floats(0.02, 0.2),
 )  # fmt: skip
+@example(0.0, -1.0, -1.5, 0, 0.0625, 0.03125, 0.0625)  # behind the femur's axis and above it
 def test_inverse_kinematics_inverts(turn, lift, bend, which, coxa, femur, tibia):
     leg = Leg(0.1, -0.2, BEARINGS[which], coxa, femur, tibia)
     if femur * math.cos(lift) + tibia * math.sin(lift + bend) < -0.9 * coxa:
@@ -464,3 +466,11 @@ def test_lost_solution(tmp_path, monkeypatch):
     push(robot, x=1e30)
     advance(robot, 0.1)
     assert 'MuJoCo has lost the solution' in robot.verdict
+
+
+@pytest.mark.parametrize('pressures', [[0.0] * 5, [0.0] * 7, [math.nan] * 6, [math.inf] * 6])
+def test_bad_pressures(pressures):
+    robot = FullHexapod(scene_of(), DRY, 0.004)
+    with pytest.raises(InvalidInput, match='six finite numbers'):
+        robot.step(pressures)
+    assert robot.time == 0.0

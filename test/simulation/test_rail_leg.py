@@ -346,3 +346,17 @@ def test_many_legs_refuse():
     for period, duration in ((0.0, 1.0), (0.004, -1.0), (math.nan, 1.0)):
         with pytest.raises(InvalidInput, match=r'(period|duration) = '):
             walk_many(scenes, floors, pressures, period, duration)
+
+
+@pytest.mark.parametrize('period', [0.0, -0.004, math.nan, math.inf])
+def test_bad_period(period):
+    with pytest.raises(InvalidInput, match=r'period = .* s is not allowed'):
+        leg_of(SHIPPED, period)
+
+
+@pytest.mark.parametrize('pressures', [[], [75e3] * 2, [math.nan], [math.inf]])
+def test_bad_pressures(pressures):
+    leg = leg_of(SHIPPED)
+    with pytest.raises(InvalidInput, match=r'pressures = .* Pa: one finite number'):
+        leg.step(pressures)
+    assert leg.time == 0.0
