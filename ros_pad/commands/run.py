@@ -58,8 +58,8 @@ def add(commands: Commands) -> None:
         '--fidelity',
         choices=ladder.FIDELITIES,
         default='auto',
-        help='L0 is the leg on its rail, L1 the hexapod in the plane; auto (default) takes the '
-        'one that models the scene',
+        help='L0 is the leg on its rail, L1 the hexapod in the plane, L2 the hexapod with joints '
+        '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
     )
     part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
     part.add_argument(

@@ -950,6 +950,7 @@ def _warnings(trial: Trial) -> list[str]:
     found = []
     if trial.settings.get('interrupted'):
         found.append('The trial was cut short: its metrics are of what was walked until then.')
+    found += [f'Fault on the schedule: {fault}' for fault in trial.settings.get('faults', ())]
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
     if trial.settings.get('problem'):
