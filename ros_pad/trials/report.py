@@ -937,8 +937,9 @@ def write(
     if 'fidelity_note' in view.settings:
         note = html.escape(view.settings['fidelity_note'])
         parts.append(
-            f'<p>{note[:1].upper()}{note[1:]}: the largest error against the top rung '
-            'on random scenes with such a reserve of grip, with a margin.</p>'
+            f'<p>{note[:1].upper()}{note[1:]}. What is promised is the largest error against the '
+            'top rung with short steps, on random scenes with such a reserve of grip, and a '
+            'margin.</p>'
         )
     parts.append(_omitted_table(view.settings.get('omitted', [])))
     save(path, page(f'{name}: ros_pad', parts).encode())

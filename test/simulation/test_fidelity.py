@@ -86,6 +86,32 @@ def test_without_mujoco_auto_takes_l1_and_says_what_it_is_worth(monkeypatch):
     assert choice.note.endswith('asks for 20 %; pip install "ros_pad[mujoco]" brings L2')
 
 
+def test_nothing_is_promised_on_floors_that_nobody_measured(bench):
+    """L1 has no pitch: on 5 mm of unevenness it walks a tenth too far or more, on 10 mm L2 is stuck."""
+    dry = Scene.load('hexapod_smooth_dry_flat')
+    assert fidelity.choose(dry).rung == 'L1'
+    for name, value, unit in [('slope', -0.081, 'rad'), ('unevenness', 5e-3, 'm'),
+                              ('roughness', 3e-6, 'm')]:  # fmt: skip
+        most = bench.FLOORS[name]
+        assert fidelity.Ladder.load().floors[name] == most
+        within = dataclasses.replace(dry.floor, **{name: math.copysign(most, value)})
+        assert fidelity.choose(dataclasses.replace(dry, floor=within)).bound < math.inf
+        beyond = dataclasses.replace(dry.floor, **{name: value})
+        for rung in ('L1', 'L2'):
+            choice = fidelity.choose(dataclasses.replace(dry, floor=beyond), rung)
+            assert choice.bound == math.inf
+            assert (
+                f'of unknown error ({name} {abs(value):g} {unit}, measured up to {most:g})'
+                in choice.note
+            )
+    uneven = dataclasses.replace(dry, floor=dataclasses.replace(dry.floor, unevenness=5e-3))
+    if importlib.util.find_spec('mujoco'):
+        assert fidelity.choose(uneven).rung == 'L2'
+    # The rail leg rides on springs, over any floor.
+    leg = dataclasses.replace(LEG, floor=dataclasses.replace(LEG.floor, unevenness=5e-3))
+    assert fidelity.choose(leg).bound == fidelity.choose(LEG).bound
+
+
 def test_a_broken_table_is_told_of(monkeypatch, tmp_path):
     (tmp_path / 'fidelity.yaml').write_text('reserves: [0, 1]\nbounds: {L0: [1], L1: [1, 2]}\n')
     monkeypatch.setattr(fidelity.configuration, 'shared_folder', lambda: tmp_path)
