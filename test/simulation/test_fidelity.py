@@ -87,7 +87,7 @@ def test_without_mujoco_auto_takes_l1_and_says_what_it_is_worth(monkeypatch):
 
 
 def test_nothing_is_promised_on_floors_that_nobody_measured(bench):
-    """L1 has no pitch: on 5 mm of unevenness it walks a tenth too far or more, on 10 mm L2 is stuck."""
+    """L1 has no pitch: it walks a tenth too far on 5 mm of unevenness; on 10 mm L2 is stuck."""
     dry = Scene.load('hexapod_smooth_dry_flat')
     assert fidelity.choose(dry).rung == 'L1'
     for name, value, unit in [('slope', -0.081, 'rad'), ('unevenness', 5e-3, 'm'),
