@@ -265,6 +265,29 @@ def test_torsional_limit():
         assert (abs(robot.data.qvel[5]) > 0.2) == (share > 1.0)
 
 
+def test_light_feet_do_not_slip():
+    """Up to 1 N a contact counts as one that has not landed, however far it is dragged."""
+    robot = standing()
+    for load, way in ((1.0, 0.0), (1.01, 5e-3)):
+        before = robot.feet[0].slip_path
+        x, y, z = robot._last[0]
+        robot._last[0] = [x - 3e-3, y + 4e-3, z]
+        robot._loads[0] = load
+        robot._report(FLAT)
+        assert robot.feet[0].slip_path - before == pytest.approx(way, rel=1e-9)
+
+
+@pytest.mark.parametrize('axis', ['x', 'y'])
+def test_work_lost_is_friction_times_way(axis):
+    robot = standing(0.1)
+    push(robot, **{axis: 1.3 * 0.1 * WEIGHT})
+    advance(robot, 0.3)
+    ways = [foot.slip_path for foot in robot.feet]
+    assert min(ways) > 5e-3
+    # Loads shift as the body leans, their sum does not.
+    assert robot.dissipation == pytest.approx(0.1 * WEIGHT * np.mean(ways), rel=0.05)
+
+
 def test_grip_is_the_cone_of_the_step():
     robot = FullHexapod(scene_of(tow=SHIPPED.tow), WET, 0.004)
     slipped = 0

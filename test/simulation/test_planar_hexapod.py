@@ -437,6 +437,15 @@ def test_a_sled_presses_less_on_a_slope(floor, friction):
     assert robot._body[planar_step.SLED_CAP] == pytest.approx(drag, rel=1e-12)
 
 
+def test_sled_is_behind_a_robot_that_has_turned():
+    tow = Tow(weight=5.0, friction_dry=0.4, friction_wet=0.2, distance=0.4)
+    robot = robot_of(scene_of(tow=tow), RIGHT_WET)
+    # 0.1 m left of the edge, headed away from it: the sled is 0.3 m right of it.
+    robot._body[planar_step.Y], robot._body[planar_step.HEADING] = 0.1, math.pi / 2.0
+    robot.step(FLAT)
+    assert robot._body[planar_step.SLED_CAP] == 0.2 * 5.0
+
+
 def test_sliding_down_a_slope():
     """Steeper than its friction: a = g (sin - μ cos)."""
     slope, friction = 0.3, 0.1
