@@ -215,7 +215,9 @@ def walk_many(
         mass, drag, goal, stroke, stance, swing, settle, downhill,
         dome_dry, dome_wet, dome_drain, sole_dry, sole_wet, sole_drain, critical, exponent,
     ) = np.array(rows).reshape(-1, 16).T  # fmt: skip
-    puddle = np.array([floor.film_thickness or math.nan for floor in floors]) ** -2.0
+    # A depth of zero is dry ground: no film at all, 1/h² is infinite.
+    depths = [floor.film_thickness for floor in floors]
+    puddle = np.array([depth**-2.0 if depth else math.inf for depth in depths])
     kinds = [
         (floor, np.array([index for index, each in enumerate(floors) if each is floor]))
         for floor in {id(floor): floor for floor in floors}.values()

@@ -431,6 +431,21 @@ def test_line_only_pulls():
     assert robot.data.geom('sled').xpos[0] == pytest.approx(rest, abs=1e-3)
 
 
+def test_stiff_lines_take_shorter_steps():
+    """At 2 ms a sled of 0.5 N on 1 MN/m throws the robot over; it can only drag."""
+    ways = {}
+    for stiffness in (2e3, 1e6):
+        tow = Tow(0.5, 0.5, 0.5, 0.25, 0.03, stiffness)
+        robot = FullHexapod(scene_of(tow=tow), DRY, 0.004)
+        ways[stiffness] = advance(robot, 2.5)[0]
+        assert robot.verdict is None
+        reduced = 1.0 / (9.81 / 0.5 + 1.0 / 2.09)
+        assert robot.model.opt.timestep < 2.0 * math.sqrt(reduced / stiffness)
+    assert ways[1e6] == pytest.approx(ways[2e3], rel=0.01)
+    with pytest.raises(ConfigError, match=r'tow.weight = 1e-09 N on a line of .* 2000 N/m needs'):
+        FullHexapod(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
+
+
 def test_steering():
     robot = FullHexapod(scene_of(heading_gain=1.0), DRY, 0.004)
     robot.data.qpos[3:7] = (math.cos(0.1), 0.0, 0.0, math.sin(0.1))

@@ -15,6 +15,7 @@ from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
+from ros_pad.simulation.terrain import Floor
 
 SHIPPED = Scene.load('leg_dry_flat')
 MASS, DRAG, LOAD = 1.0, 0.5, 2.0
@@ -323,6 +324,17 @@ def test_many_legs_walk_as_each_does_alone():
         assert walks.arrival[index] == pytest.approx(arrival, abs=1e-9, nan_ok=True)
     assert np.isnan(walks.arrival).any() and not np.isnan(walks.arrival).all()
     assert len(set(np.round(walks.position, 4))) == len(scenes)
+
+
+def test_liquid_without_depth_is_dry_ground():
+    scene = Scene.load('leg_wet_flat')
+    floors = [Floor.uniform(True, 0.0), Floor.uniform(False, 3e-4)]
+    walks = walk_many([scene] * 2, floors, [0.0] * 2, 0.004, 3.0)
+    leg = RailLeg(scene, floors[0], 0.004)
+    for _ in range(750):
+        leg.step([0.0])
+    assert leg.body[0] == pytest.approx(walks.position[0], abs=1e-10)
+    assert walks.position[0] == walks.position[1] > 0.05
 
 
 def test_many_legs_against_the_closed_form_of_a_glide():
