@@ -71,8 +71,13 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         stride=draw.uniform(0.06, 0.15),
         duty=draw.uniform(0.55, 0.75),
     )
+    heavier = draw.uniform(0.5, 1.5)
+    body = replace(
+        scene.body, mass=heavier * scene.body.mass, inertia=heavier * scene.body.inertia
+    )
     scene = replace(
         scene,
+        body=body,
         floor=floor,
         tow=tow,
         gait=gait,

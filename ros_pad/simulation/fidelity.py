@@ -175,10 +175,14 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         enough = [each for each in there if bounds[each] <= scene.accuracy]
         rung = (enough or there[-1:])[0]
     known_bound = bounds[rung] < math.inf
-    within = f'within {100.0 * bounds[rung]:.0f} %' if known_bound else 'not to be trusted'
+    within = (
+        f'within {100.0 * bounds[rung]:.0f} % of the top rung'
+        if known_bound
+        else 'not to be trusted'
+    )
     if beyond:
         within = f'of unknown error ({beyond})'
-    note = f'at a reserve of {own:.2g} the distance on {rung} is {within}'
+    note = f'feet hold {own:.2g} times what the walk asks; then the distance on {rung} is {within}'
     if bounds[rung] > scene.accuracy:
         note += f', and the scene asks for {100.0 * scene.accuracy:.0f} %'
         if missing and rung == 'L1':

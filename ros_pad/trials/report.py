@@ -30,6 +30,7 @@ from matplotlib.patches import Patch
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.trials.label import promise
 from ros_pad.trials.metrics import LOAD_GATE
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.trial import Trial
@@ -935,7 +936,7 @@ def write(
             )
     parts.append('<h2>What the model leaves out</h2>')
     if 'fidelity_note' in view.settings:
-        note = html.escape(view.settings['fidelity_note'])
+        note = html.escape(promise(view.trial))
         parts.append(
             f'<p>{note[:1].upper()}{note[1:]}. What is promised is the largest error against the '
             'top rung with short steps, on random scenes with such a reserve of grip, and a '

@@ -120,7 +120,7 @@ def test_left_alone_it_says_on_which_rung_and_when_the_walk_is_over(start, until
     until(lambda: node.robot.verdict)
     until(lambda end=node.robot.time + 0.1: node.robot.time > end)
     told = capfd.readouterr().err
-    assert 'top_heavy on L1: at a reserve of' in told
+    assert 'top_heavy on L1: feet hold ' in told
     assert told.count('the walk is not valid from here on: tip-over at') == 1
 
 
