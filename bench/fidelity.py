@@ -35,6 +35,7 @@ from ros_pad.trials.loop import ClosedLoop
 TABLE = pathlib.Path(__file__).resolve().parent.parent / 'config' / 'fidelity.yaml'
 RESERVES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 MARGIN = 1.25
+FLOORS = {'slope': 0.08, 'roughness': 2e-6, 'unevenness': 5e-4}  # rad, m, m: at most
 CYCLES = 8
 TOP_STEP = {'hexapod': 5e-4, 'rail_leg': 1e-4}
 # A robot that is stuck has no distance to be off by; errors are then of a tenth of the full way.
@@ -52,9 +53,9 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         kind=str(draw.choice(['dry', 'wet', 'patches'])),
         wet_fraction=share,
         patch_length=draw.uniform(max(0.3, shortest), min(2.0, longest)),
-        slope=float(draw.choice([0.0, draw.uniform(-0.08, 0.08)])),
-        roughness=float(draw.choice([0.0, 2e-6])),
-        unevenness=float(draw.choice([0.0, 5e-4])),
+        slope=float(draw.choice([0.0, draw.uniform(-FLOORS['slope'], FLOORS['slope'])])),
+        roughness=float(draw.choice([0.0, FLOORS['roughness']])),
+        unevenness=float(draw.choice([0.0, FLOORS['unevenness']])),
     )
     tow = replace(
         scene.tow,
@@ -70,8 +71,13 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         stride=draw.uniform(0.06, 0.15),
         duty=draw.uniform(0.55, 0.75),
     )
+    heavier = draw.uniform(0.5, 1.5)
+    body = replace(
+        scene.body, mass=heavier * scene.body.mass, inertia=heavier * scene.body.inertia
+    )
     scene = replace(
         scene,
+        body=body,
         floor=floor,
         tow=tow,
         gait=gait,
@@ -189,6 +195,8 @@ def main() -> int:
         f'scenes: {options.scenes}  # of each robot, {CYCLES} gait cycles each',
         f'margin: {MARGIN}  # on the largest error found in a class or above',
         f'reserves: [{", ".join(f"{low:g}" for low in RESERVES)}]  # from here on',
+        f'floors: {{{", ".join(f"{name}: {most!r}" for name, most in FLOORS.items())}}}'
+        '  # of hexapods, at most: rad, m, m',
         'bounds:',
     ]
     for rung in ('L0', 'L1', 'L2'):

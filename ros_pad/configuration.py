@@ -119,6 +119,8 @@ class Table:
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
             problem = getattr(error, 'problem', None) or str(error)
             raise ConfigError(f'{os.fspath(path)}{place}: not valid YAML: {problem}') from error
+        except ValueError as error:  # of a date or a number that only looks like one: 2026-99-99
+            raise ConfigError(f'{os.fspath(path)}: not valid YAML: {error}') from error
         return cls(values, os.fspath(path))
 
     def __contains__(self, key: str) -> bool:

@@ -150,6 +150,8 @@ def test_unknown_key_in_a_nested_table(tmp_path):
         ('a: !!python/object/apply:os.system [ls]', 'not valid YAML'),
         ('{[1]: 2}', 'not valid YAML'),
         ('a: \x01', 'not valid YAML'),
+        ('a: 2026-99-99', 'not valid YAML: month must be in 1..12'),
+        ('a: 0x_', 'not valid YAML: invalid literal'),
         ('', 'expected a table of keys, found None'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),

@@ -58,8 +58,8 @@ def add(commands: Commands) -> None:
         '--fidelity',
         choices=ladder.FIDELITIES,
         default='auto',
-        help='L0 is the leg on its rail, L1 the hexapod in the plane; auto (default) takes the '
-        'one that models the scene',
+        help='L0 is the leg on its rail, L1 the hexapod in the plane, L2 the hexapod with joints '
+        '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
     )
     part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
     part.add_argument(
@@ -211,15 +211,18 @@ def _alone() -> Iterator[None]:
 
 
 def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict[str, Any]:
-    assert trial.metrics is not None
+    own = trial.metrics
+    assert own is not None
     return {
         'scene': trial.scene,
         'policy': trial.policy,
         'seed': trial.seed,
         'fidelity': trial.fidelity,
-        'fidelity_bound': trial.settings['fidelity_bound'],
+        'fidelity_bound': None if own.verdict else trial.settings['fidelity_bound'],
+        'fidelity_note': labels.promise(trial),
         'foot': trial.settings['foot'],
-        **trial.metrics.as_dict(),
+        'faults': trial.settings['faults'],
+        **own.as_dict(),
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,
         'report': str(page),
@@ -233,8 +236,9 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
     assert own is not None
     print(
         f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
-        f' {own.cycles:.0f} cycles, {trial.real_time_factor:.1f} times real time\n'
+        f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time'
     )
+    print(f'fidelity: {labels.promise(trial)}\n')
     rows = [{'policy': trial.policy, **own.as_dict()}, *trial.settings['comparison']]
     for row in rows:
         if row.get('goal_m') is not None:
@@ -256,10 +260,10 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         )
     for refusal in own.refusals:
         print(f'stayed flat: {refusal}')
-    print(f'fidelity: {trial.settings["fidelity_note"]}')
     for omission in trial.settings['omitted']:
-        bound = '' if omission['bound'] is None else f' (at most {100 * omission["bound"]:.1f} %)'
-        print(f'left out: {omission["term"]}{bound}')
+        bound = omission['bound']
+        most = 'no bound known' if bound is None else f'at most {100.0 * bound:.1f} %'
+        print(f'left out: {omission["term"]} ({most})')
     if bag:
         print(f'bag:      {bag}')
     print(f'report:   {page}')

@@ -79,7 +79,7 @@ class Foot:
     boundary_friction : float
         Friction coefficient on a film that does not drain.
     critical_film : float
-        Film thickness that leaves 1/e of dry contact (exponent 1), m.
+        Film thickness that leaves 1/e of dry contact, whatever the exponent, m.
     film_exponent : float
         How sharply contact is lost with film thickness.
     shear_stiffness : float

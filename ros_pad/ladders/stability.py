@@ -39,6 +39,7 @@ from ros_pad.simulation.pneumatics import REFERENCE_PRESSURE
 from ros_pad.simulation.pneumatics import Hose
 from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.pneumatics import conductance
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import RailBody
@@ -730,6 +731,15 @@ def iso_flow(first: float, second: float) -> float:
     return math.copysign(flow, first - second)
 
 
+def linear_flow(first: float, second: float) -> float:
+    """Return the mass flow of ISO 6358 with its linear range, kg/s (absolute Pa).
+
+    The flow of :class:`Hose` is less where Poiseuille's is, which it is here near equal pressures.
+    """
+    sonic, critical = _LINE.sonic_conductance, _LINE.critical_ratio
+    return conductance(sonic, critical, first, second) * (first - second)
+
+
 def _flow_slope() -> float:
     """Return A of dp/dt = A √|Δp| near equal pressures, √Pa/s."""
     up = FILL + ATMOSPHERE
@@ -742,7 +752,8 @@ def _flow_slope() -> float:
 def linear_limit() -> float:
     """Return the longest step of explicit Euler with ISO's linear range, s: 2/rate."""
     supply = FILL + ATMOSPHERE
-    return 2.0 * _CAPACITY / _LINE.conductance(supply, supply)
+    rate = conductance(_LINE.sonic_conductance, _LINE.critical_ratio, supply, supply) / _CAPACITY
+    return 2.0 / rate
 
 
 def fill_law(dt: float) -> float:
@@ -812,7 +823,7 @@ def filling() -> list[Outcome]:
     """Fill a pad to 75 kPa; chatter is what its pressure does when it is full."""
     ways: dict[str, Callable[[float], float]] = {
         ISO: partial(filled, iso_flow),
-        ISO_LINEAR: partial(filled, _LINE.mass_flow),
+        ISO_LINEAR: partial(filled, linear_flow),
         CHANNEL: filled_by_channel,
     }
     outcomes = []

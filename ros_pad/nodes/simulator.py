@@ -100,7 +100,12 @@ class SimulatorNode(Node):
         self._joint_message = JointState(name=self.robot.joint_names)
         for index, leg in enumerate(self.scene.legs):
             topics.PRESSURE.subscription(self, self._pressure_callback(index), leg)
-        if values['free_running']:
+        # One that is stepped has somebody to ask the robot, and to tell the user.
+        self._alone = values['free_running']
+        self._ended = False
+        if self._alone:
+            choice = fidelity.choose(self.scene, values['fidelity'])
+            self.get_logger().info(f'{self.scene.name} on {choice.rung}: {choice.note}')
             # Its own timer cannot wait for the clock that it publishes itself.
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(self.period_ns * 1e-9, self.step, clock=steady)
@@ -120,6 +125,9 @@ class SimulatorNode(Node):
         """Advance the robot by one sample and publish what its sensors say."""
         self.robot.step(self.pressures)
         self.tick()
+        if self._alone and self.robot.verdict and not self._ended:
+            self._ended = True
+            self.get_logger().error(f'the walk is not valid from here on: {self.robot.verdict}')
         stamp_ns = self.time_ns if self._simulated else self.get_clock().now().nanoseconds
         readings = self._sensors.read(self.robot)
         wrench, position = self._wrench_message, self._position_message

@@ -174,7 +174,7 @@ class Fault:
         """
         try:
             return cls.read(Table(yaml.safe_load(text), f'fault {text!r}'))
-        except yaml.YAMLError as error:
+        except (yaml.YAMLError, ValueError) as error:  # ValueError: no such date or number
             raise ConfigError(f'fault {text!r}: not valid YAML') from error
 
     def __str__(self) -> str:

@@ -14,6 +14,7 @@ import functools
 import importlib.util
 import math
 from dataclasses import dataclass
+from dataclasses import field
 from dataclasses import replace
 
 import yaml
@@ -37,6 +38,7 @@ from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
 _RUNGS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
+_FLOORS = {'slope': 'rad', 'roughness': 'm', 'unevenness': 'm'}
 _MARGIN = 1.2  # of the pads' force limit over the load: a dome that a controller would choose
 
 
@@ -50,7 +52,8 @@ class Choice:
         ``L0``, ``L1`` or ``L2``.
     bound : float
         Largest error of the distance that was measured on scenes with such a reserve, with a
-        margin: relative, against the top rung. Infinite where that rung cannot be trusted.
+        margin: relative, against the top rung. Infinite where that rung cannot be trusted, and on
+        floors like which none was measured.
     reserve : float
         See :func:`reserve`.
     note : str
@@ -92,10 +95,13 @@ class Ladder:
         Lower ends of the classes of reserve, rising from 0.
     bounds : dict of tuple
         For each rung its bound in each class.
+    floors : dict of float
+        Largest slope, roughness and unevenness of the floors on which hexapods were measured.
     """
 
     reserves: tuple[float, ...]
     bounds: dict[str, tuple[float, ...]]
+    floors: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     @functools.cache
@@ -115,15 +121,26 @@ class Ladder:
                 rung: tuple(float(value) for value in values['bounds'][rung])
                 for rung in FIDELITIES[1:]
             }
+            floors = {name: float(values['floors'][name]) for name in _FLOORS}
             assert reserves[0] == 0.0 and list(reserves) == sorted(reserves)
             assert all(len(row) == len(reserves) for row in bounds.values())
         except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
             raise ConfigError(f'{path}: no table of rungs ({e!r}): run bench/fidelity.py') from e
-        return cls(reserves, bounds)
+        return cls(reserves, bounds, floors)
 
     def bound(self, rung: str, reserve: float) -> float:
         """Return what a rung promises for a reserve."""
         return self.bounds[rung][bisect.bisect_right(self.reserves, reserve) - 1]
+
+    def beyond(self, scene: Scene) -> str:
+        """Return what of a hexapod's floor is more than was measured; empty if nothing is."""
+        if scene.robot != 'hexapod':
+            return ''
+        return ', '.join(
+            f'{name} {abs(getattr(scene.floor, name)):g} {unit}, measured up to {most:g}'
+            for name, unit in _FLOORS.items()
+            if abs(getattr(scene.floor, name)) > (most := self.floors.get(name, math.inf))
+        )
 
 
 def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> Choice:
@@ -148,7 +165,8 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
     """
     known = _rungs(scene, fidelity)
     own, ladder = reserve(scene, policy), Ladder.load()
-    bounds = {rung: ladder.bound(rung, own) for rung in known}
+    beyond = ladder.beyond(scene)
+    bounds = {rung: math.inf if beyond else ladder.bound(rung, own) for rung in known}
     missing = 'L2' in known and importlib.util.find_spec('mujoco') is None
     if fidelity != 'auto':
         rung = fidelity
@@ -157,8 +175,14 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         enough = [each for each in there if bounds[each] <= scene.accuracy]
         rung = (enough or there[-1:])[0]
     known_bound = bounds[rung] < math.inf
-    within = f'within {100.0 * bounds[rung]:.0f} %' if known_bound else 'not to be trusted'
-    note = f'at a reserve of {own:.2g} the distance on {rung} is {within}'
+    within = (
+        f'within {100.0 * bounds[rung]:.0f} % of the top rung'
+        if known_bound
+        else 'not to be trusted'
+    )
+    if beyond:
+        within = f'of unknown error ({beyond})'
+    note = f'feet hold {own:.2g} times what the walk asks; then the distance on {rung} is {within}'
     if bounds[rung] > scene.accuracy:
         note += f', and the scene asks for {100.0 * scene.accuracy:.0f} %'
         if missing and rung == 'L1':

@@ -31,6 +31,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -77,6 +78,7 @@ LOST = 0.3
 _POINT = 1e-4  # m
 _FAR = 1e6  # m: no walk, but numbers that overflow
 _SHALLOW = 5e-3  # m above the ground, below which a foot's block no longer moves
+_SHORTEST = 1e-4  # s: a towed load that needs shorter steps is refused
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,8 @@ class Settings:
     Parameters
     ----------
     timestep : float
-        Longest step, s, 1e-5 to 0.01; it is shortened to divide the robot's period.
+        Longest step, s, 1e-5 to 0.01; it is shortened to divide the robot's period, and for a
+        towed load that swings on its line faster than that.
     integrator : str
         ``Euler``, ``implicit`` or ``implicitfast``.
     cone : str
@@ -193,7 +196,8 @@ class Leg:
             )
         # In the axes of the femur the foot is at (femur + tibia sin t, -tibia cos t).
         side = tibia * math.sqrt(1.0 - bend * bend)
-        return coxa, math.atan2(z, out) + math.atan2(side, femur + tibia * bend), math.asin(bend)
+        lift = math.atan2(z, out) + math.atan2(side, femur + tibia * bend)
+        return coxa, math.remainder(lift, math.tau), math.asin(bend)
 
 
 class FootPath:
@@ -280,7 +284,10 @@ class FullHexapod:
     Raises
     ------
     ConfigError
-        When the legs cannot do what the scene wants of them, or MuJoCo is missing.
+        When the legs cannot do what the scene wants of them, when the towed load is too light for
+        so stiff a line, or when MuJoCo is missing.
+    InvalidInput
+        When the period is not above zero.
 
     Notes
     -----
@@ -318,7 +325,8 @@ class FullHexapod:
         self._floor = floor
         self._tow = scene.tow
         self._steps = 0
-        self._substeps = max(1, math.ceil(period / settings.timestep - 1e-9))
+        longest = min(settings.timestep, _line_step(scene))
+        self._substeps = max(1, math.ceil(period / longest - 1e-9))
         self._dt = period / self._substeps
         self._geometry = _legs(scene)
         self._path = FootPath(scene.gait, scene.body.homes)
@@ -384,7 +392,13 @@ class FullHexapod:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
 
         Where MuJoCo loses the solution the robot's feet stay as they were last.
+
+        Raises
+        ------
+        InvalidInput
+            When there are not six finite pressures.
         """
+        check_pressures(pressures, 6)
         self._steps += 1
         self.time = self._steps * self.period
         model, data, state = self.model, self.data, self._state
@@ -520,6 +534,26 @@ class FullHexapod:
     def _end(self, why: str) -> None:
         if self.verdict is None:
             self.verdict = f'{why}, at {self.time:.3f} s'
+
+
+def _line_step(scene: Scene) -> float:
+    """Return the longest step, s, at which the line of a scene's towed load is sure to be stable.
+
+    MuJoCo takes springs explicitly: an undamped one grows from 2/ω on, ω that of load and trunk.
+    """
+    tow = scene.tow
+    if not tow.weight:
+        return math.inf
+    assert isinstance(scene.body, HexapodBody)
+    trunk = scene.body.mass * (1.0 - 6.0 * (COXA_SHARE + FEMUR_SHARE + TIBIA_SHARE))
+    longest = 1.0 / math.sqrt(tow.stiffness * (GRAVITY / tow.weight + 1.0 / trunk))
+    if longest < _SHORTEST:
+        raise ConfigError(
+            f'scene {scene.name!r}: tow.weight = {tow.weight:g} N on a line of tow.stiffness ='
+            f' {tow.stiffness:g} N/m needs steps of {longest:.2g} s, and {_SHORTEST:g} s is the'
+            ' shortest: take a heavier load, none (weight 0), or a softer line'
+        )
+    return longest
 
 
 def _legs(scene: Scene) -> list[Leg]:

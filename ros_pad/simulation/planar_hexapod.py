@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import compiled
 from ros_pad.simulation import planar_step
@@ -24,6 +25,7 @@ from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.planar_step import Setting
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL
@@ -48,7 +50,7 @@ class PlanarHexapod:
     floor : Floor
         The ground.
     period : float
-        Step, s.
+        Step, s, > 0.
     compile_steps : bool or None
         Whether steps are compiled by numba. None compiles where that is sure to pay: when numba is
         installed and the trial of the scene is long, or something was compiled before. The walk is
@@ -61,6 +63,8 @@ class PlanarHexapod:
     ------
     ImportError
         To compile without numba.
+    InvalidInput
+        When the period is not above zero.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class PlanarHexapod:
         soles_turn: bool = False,
     ) -> None:
         assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
+        number('period', period, 's', above=True)
         if compile_steps is None:
             compile_steps = compiled.worth_loading(scene.duration / period)
         self.legs: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
@@ -143,10 +148,7 @@ class PlanarHexapod:
         return round(self._body[planar_step.STEPS] - before)
 
     def _advance(self, pressures: Sequence[float], steps: int, upright: bool) -> None:
-        if len(pressures) != 6 or not all(map(math.isfinite, pressures)):
-            raise InvalidInput(
-                f'pressures = {pressures!r} Pa: six finite numbers are needed, one for each leg'
-            )
+        check_pressures(pressures, 6)
         settled = self._walk(
             self._setting, self._body, self._table, tuple(pressures), steps, upright
         )

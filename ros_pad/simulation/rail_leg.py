@@ -21,6 +21,7 @@ from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
@@ -39,11 +40,17 @@ class RailLeg:
     floor : Floor
         The ground.
     period : float
-        Step, s.
+        Step, s, > 0.
+
+    Raises
+    ------
+    InvalidInput
+        When the period is not above zero.
     """
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
+        number('period', period, 's', above=True)
         self.legs: tuple[int, ...] = (1,)
         self.period = period
         self.time = 0.0
@@ -81,7 +88,14 @@ class RailLeg:
         return False, -0.5 * gait.stroke * math.cos(math.pi * share), height
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with the pad's gauge pressure, Pa, in a sequence of one."""
+        """Advance by ``period`` with the pad's gauge pressure, Pa, in a sequence of one.
+
+        Raises
+        ------
+        InvalidInput
+            When there is not one finite pressure.
+        """
+        check_pressures(pressures, 1)
         dt, state, foot = self.period, self.feet[0], self._foot
         self._steps += 1
         self.time = self._steps * dt
@@ -201,7 +215,9 @@ def walk_many(
         mass, drag, goal, stroke, stance, swing, settle, downhill,
         dome_dry, dome_wet, dome_drain, sole_dry, sole_wet, sole_drain, critical, exponent,
     ) = np.array(rows).reshape(-1, 16).T  # fmt: skip
-    puddle = np.array([floor.film_thickness or math.nan for floor in floors]) ** -2.0
+    # A depth of zero is dry ground: no film at all, 1/h² is infinite.
+    depths = [floor.film_thickness for floor in floors]
+    puddle = np.array([depth**-2.0 if depth else math.inf for depth in depths])
     kinds = [
         (floor, np.array([index for index, each in enumerate(floors) if each is floor]))
         for floor in {id(floor): floor for floor in floors}.values()

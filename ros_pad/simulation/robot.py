@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
+
+from ros_pad.errors import InvalidInput
 
 Vector = tuple[float, float, float]
 
@@ -21,7 +24,7 @@ class FootState:
     standing : bool
         Whether the foot carries load.
     wet : bool
-        Whether the ground below it is wet.
+        Whether the ground below it is wet; in swing, on rungs without joints, what it was last.
     grip : float
         Tangential force that the foot could hold now, N.
     slip_speed : float
@@ -77,7 +80,15 @@ class Robot(Protocol):
     joint_names: tuple[str, ...]
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
+        """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
+
+        A pad at zero or below is flat. Above the foot's ceiling domes carry what they carry there.
+
+        Raises
+        ------
+        InvalidInput
+            When there is not one finite pressure for each leg.
+        """
 
     @property
     def body(self) -> Vector:
@@ -86,3 +97,11 @@ class Robot(Protocol):
     @property
     def joint_positions(self) -> tuple[float, ...]:
         """Angles of the joints, rad, in the order of ``joint_names``."""
+
+
+def check_pressures(pressures: Sequence[float], legs: int) -> None:
+    """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg, 1 or 6."""
+    # What is not finite makes the sum so, too.
+    if len(pressures) != legs or not math.isfinite(sum(pressures)):
+        needed = 'six finite numbers are' if legs == 6 else 'one finite number is'
+        raise InvalidInput(f'pressures = {pressures!r} Pa: {needed} needed, one for each leg')

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import ndimage
 from scipy import special
 
+from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 
 FLOORS = ('dry', 'wet', 'patches', 'drawn')
@@ -73,6 +74,11 @@ class Floor:
     heights : ndarray of float, (rows along y, columns along x), or None
         Height of the ground where a foot may stand, m, about zero; None for an even floor. Its
         cells have an edge of ``CELL``, its corner is at (-1 m, -WIDTH/2).
+
+    Raises
+    ------
+    InvalidInput
+        When the cell is not above zero, or the depth below it or not finite.
     """
 
     wet_map: np.ndarray
@@ -83,6 +89,8 @@ class Floor:
     _rows: list[list[bool]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        number('cell', self.cell, 'm', above=True)
+        number('film_thickness', self.film_thickness, 'm')
         object.__setattr__(self, '_rows', self.wet_map.tolist())
 
     @classmethod
@@ -114,7 +122,7 @@ class Floor:
         Raises
         ------
         InvalidInput
-            When wet fraction, patch length or seed is out of its range.
+            When wet fraction, patch length, depth or seed is out of its range.
         """
         if not 0.0 < wet_fraction < 1.0:
             raise InvalidInput(f'wet_fraction = {wet_fraction!r}: must be between 0 and 1')
@@ -146,18 +154,19 @@ class Floor:
         Raises
         ------
         InvalidInput
-            When rows differ in length or there are other characters, or no rows at all.
+            When rows differ in length or there are other characters, or no rows at all; or when
+            cell or depth is out of its range.
         """
         if not drawing or not drawing[0]:
             raise InvalidInput('drawing is empty: rows of # (wet) and . (dry) are needed')
-        for number, row in enumerate(drawing, 1):
+        for place, row in enumerate(drawing, 1):
             if len(row) != len(drawing[0]):
                 raise InvalidInput(
-                    f'drawing: row {number} has {len(row)} characters, the first {len(drawing[0])}'
+                    f'drawing: row {place} has {len(row)} characters, the first {len(drawing[0])}'
                 )
             if odd := set(row) - set('#.'):
                 raise InvalidInput(
-                    f'drawing: row {number} has {min(odd)!r}: # (wet) and . (dry) are known'
+                    f'drawing: row {place} has {min(odd)!r}: # (wet) and . (dry) are known'
                 )
         # Rows of the map go along +y, those of a drawing against it.
         wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
@@ -172,7 +181,13 @@ class Floor:
             Root mean square of the heights, m, >= 0.
         seed : int
             Whole number from 0; the same seed gives the same heights.
+
+        Raises
+        ------
+        InvalidInput
+            When one of them is out of its range.
         """
+        number('unevenness', unevenness, 'm')
         if not unevenness:
             return self
         # Smoothing noise with a Gaussian of s.d. s makes it correlated as exp(-d²/4s²).

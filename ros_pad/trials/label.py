@@ -13,6 +13,7 @@ import ros_pad
 from ros_pad.simulation import fidelity as ladder
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.trial import Metrics
+from ros_pad.trials.trial import Trial
 
 KEY = 'ros_pad'
 AMBIENT_PRESSURE = 101325.0  # Pa, that simulated trials add to gauge pressures
@@ -61,6 +62,13 @@ def label(
             }
         )
     }
+
+
+def promise(trial: Trial) -> str:
+    """Return in words how far the distance of a trial can be trusted."""
+    if trial.metrics is not None and trial.metrics.verdict:
+        return f'the walk on {trial.fidelity} ended early, and nothing is promised for such walks'
+    return str(trial.settings['fidelity_note'])
 
 
 def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:

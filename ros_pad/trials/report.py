@@ -30,6 +30,7 @@ from matplotlib.patches import Patch
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.trials.label import promise
 from ros_pad.trials.metrics import LOAD_GATE
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.trial import Trial
@@ -935,10 +936,11 @@ def write(
             )
     parts.append('<h2>What the model leaves out</h2>')
     if 'fidelity_note' in view.settings:
-        note = html.escape(view.settings['fidelity_note'])
+        note = html.escape(promise(view.trial))
         parts.append(
-            f'<p>{note[:1].upper()}{note[1:]}: the largest error against the top rung '
-            'on random scenes with such a reserve of grip, with a margin.</p>'
+            f'<p>{note[:1].upper()}{note[1:]}. What is promised is the largest error against the '
+            'top rung with short steps, on random scenes with such a reserve of grip, and a '
+            'margin.</p>'
         )
     parts.append(_omitted_table(view.settings.get('omitted', [])))
     save(path, page(f'{name}: ros_pad', parts).encode())
@@ -950,6 +952,7 @@ def _warnings(trial: Trial) -> list[str]:
     found = []
     if trial.settings.get('interrupted'):
         found.append('The trial was cut short: its metrics are of what was walked until then.')
+    found += [f'Fault on the schedule: {fault}' for fault in trial.settings.get('faults', ())]
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
     if trial.settings.get('problem'):

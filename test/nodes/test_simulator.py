@@ -8,6 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad import configuration
 from ros_pad.nodes import topics
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.nodes.stamps import nanoseconds
@@ -108,6 +109,19 @@ def test_free_running_keeps_its_rate_and_the_time_of_day(start, observer, until)
 def test_it_does_not_wait_for_its_own_clock(start, observer, until):
     start(rate=100.0, publish_clock=True, use_sim_time=True)
     until(lambda: len(observer.heard['/clock']) > 5 and len(observer.heard['leg_1/wrench']) > 5)
+
+
+def test_left_alone_it_says_on_which_rung_and_when_the_walk_is_over(start, until, tmp_path, capfd):
+    """On topics a robot that lies on its back looks like one that walks badly."""
+    text = (configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml').read_text()
+    top_heavy = tmp_path / 'top_heavy.yaml'
+    top_heavy.write_text(text.replace('height: 0.12 ', 'height: 0.9 '))
+    node = start(scene=str(top_heavy), fidelity='L1')
+    until(lambda: node.robot.verdict)
+    until(lambda end=node.robot.time + 0.1: node.robot.time > end)
+    told = capfd.readouterr().err
+    assert 'top_heavy on L1: feet hold ' in told
+    assert told.count('the walk is not valid from here on: tip-over at') == 1
 
 
 def test_the_scene_gives_rate_and_legs(start, observer, until):

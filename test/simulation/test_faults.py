@@ -324,6 +324,7 @@ BAD = [
     ('{kind: supply_loss, time_constant: x}', "time_constant = 'x' is not allowed"),
     ('silence', "expected a table of keys, found 'silence'"),
     ('{kind: leak', 'not valid YAML'),
+    ('{kind: silence, start: 2026-99-99}', 'not valid YAML'),
 ]
 
 

@@ -4,6 +4,7 @@ import importlib.util
 import math
 import pathlib
 
+import numpy as np
 import pytest
 
 from ros_pad import configuration
@@ -86,6 +87,32 @@ def test_without_mujoco_auto_takes_l1_and_says_what_it_is_worth(monkeypatch):
     assert choice.note.endswith('asks for 20 %; pip install "ros_pad[mujoco]" brings L2')
 
 
+def test_nothing_is_promised_on_floors_that_nobody_measured(bench):
+    """L1 has no pitch: it walks a tenth too far on 5 mm of unevenness; on 10 mm L2 is stuck."""
+    dry = Scene.load('hexapod_smooth_dry_flat')
+    assert fidelity.choose(dry).rung == 'L1'
+    for name, value, unit in [('slope', -0.081, 'rad'), ('unevenness', 5e-3, 'm'),
+                              ('roughness', 3e-6, 'm')]:  # fmt: skip
+        most = bench.FLOORS[name]
+        assert fidelity.Ladder.load().floors[name] == most
+        within = dataclasses.replace(dry.floor, **{name: math.copysign(most, value)})
+        assert fidelity.choose(dataclasses.replace(dry, floor=within)).bound < math.inf
+        beyond = dataclasses.replace(dry.floor, **{name: value})
+        for rung in ('L1', 'L2'):
+            choice = fidelity.choose(dataclasses.replace(dry, floor=beyond), rung)
+            assert choice.bound == math.inf
+            assert (
+                f'of unknown error ({name} {abs(value):g} {unit}, measured up to {most:g})'
+                in choice.note
+            )
+    uneven = dataclasses.replace(dry, floor=dataclasses.replace(dry.floor, unevenness=5e-3))
+    if importlib.util.find_spec('mujoco'):
+        assert fidelity.choose(uneven).rung == 'L2'
+    # The rail leg rides on springs, over any floor.
+    leg = dataclasses.replace(LEG, floor=dataclasses.replace(LEG.floor, unevenness=5e-3))
+    assert fidelity.choose(leg).bound == fidelity.choose(LEG).bound
+
+
 def test_a_broken_table_is_told_of(monkeypatch, tmp_path):
     (tmp_path / 'fidelity.yaml').write_text('reserves: [0, 1]\nbounds: {L0: [1], L1: [1, 2]}\n')
     monkeypatch.setattr(fidelity.configuration, 'shared_folder', lambda: tmp_path)
@@ -112,6 +139,37 @@ def test_reserve_by_hand():
 def test_reserve_of_the_rail_leg_by_hand():
     """The floating foot holds 0.12 · 2.5 N; 0.85 kg gain π² S/2T² = 0.987 m/s² against 0.235 N."""
     assert fidelity.reserve(LEG) == pytest.approx(0.30 / (0.85 * 0.98696 + 0.235), rel=1e-3)
+
+
+def test_reserve_of_the_rail_leg_on_a_slope():
+    for slope in (-0.1, 0.1):
+        steep = dataclasses.replace(LEG, floor=dataclasses.replace(LEG.floor, slope=slope))
+        asked = 0.85 * (0.98696 + 9.81 * math.sin(0.1)) + 0.235
+        assert fidelity.reserve(steep) == pytest.approx(0.30 / asked, rel=1e-3)
+
+
+@pytest.mark.parametrize('dry, wet', [(0.2, 0.5), (0.5, 0.2)])
+def test_reserve_where_feet_and_load_stand_on_the_worse_ground(dry, wet):
+    """Feet float, 0.12 of 20.50 N, and 5 N drag with the larger of their frictions."""
+    tow = dataclasses.replace(HEXAPOD.tow, weight=5.0, friction_dry=dry, friction_wet=wet)
+    gait = dataclasses.replace(HEXAPOD.gait, stride=0.1, cycle=1.0)
+    scene = dataclasses.replace(HEXAPOD, tow=tow, gait=gait)
+    asked = (2.09 + 5.0 / 9.81) * 0.4 * math.pi + 0.5 * 5.0
+    assert fidelity.reserve(scene, 'flat') == pytest.approx(0.12 * 20.503 / asked, rel=1e-3)
+
+
+def test_reserve_on_a_film_in_mid_stance():
+    """1/h² = 4 π n p² t/(3 η N) after half a stance, 0.09 s: that film, not the one at the end."""
+    gait = dataclasses.replace(HEXAPOD.gait, cycle=0.3, duty=0.6)
+    floor = dataclasses.replace(HEXAPOD.floor, kind='wet', viscosity=1e-3)
+    scene = dataclasses.replace(HEXAPOD, gait=gait, floor=floor, dome_pressure=75e3)
+    load, foot = 2.09 * 9.81 / 3.0, HEXAPOD.foot
+    film = math.sqrt(3e-3 * load / (4.0 * math.pi * 37 * 75e3**2 * 0.09))
+    touching = math.exp(-((film / foot.critical_film) ** foot.film_exponent))
+    dry = foot.friction + foot.shear_strength / 75e3
+    expected = touching * dry + (1.0 - touching) * foot.boundary_friction
+    assert expected < 0.95 * dry
+    assert fidelity._grip(scene, True, True) == pytest.approx(expected, rel=1e-3)
 
 
 def test_reserve_is_least_where_feet_hold_least():
@@ -176,6 +234,21 @@ def bound(scene, word):
 def test_bound_of_the_capillary_force():
     # By hand: 37 pads, 2 · 0.073 N/m · 3 mm each, against 0.35 · 6.834 N.
     assert bound(HEXAPOD, 'capillary') == pytest.approx(37 * 0.000438 / 2.392, rel=1e-3)
+
+
+def test_film_that_a_dome_can_drag():
+    """The best plane wedge: Reynolds' equation in closed form, over all inclinations.
+
+    With h from h1 (1 + k) to h1 over a length L the mean pressure is η U L/h1² times
+    6/k² (ln(1 + k) - 2k/(2 + k)).
+    """
+    k = np.linspace(0.01, 10.0, 100001)
+    best = np.max(6.0 / k**2 * (np.log1p(k) - 2.0 * k / (2.0 + k)))
+    floor = dataclasses.replace(HEXAPOD.floor, viscosity=2e-3)
+    scene = dataclasses.replace(HEXAPOD, floor=floor, dome_pressure=75e3)
+    across = 2.0 * math.sqrt(2.09 * 9.81 / 3.0 / 37 / 75e3 / math.pi)
+    film = math.sqrt(best * 2e-3 * 0.01 * across / 75e3)
+    assert fidelity._dragged_film(scene, 0.01) == pytest.approx(film, rel=2e-3)
 
 
 def test_bound_of_soft_pads():

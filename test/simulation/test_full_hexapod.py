@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import example
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -87,6 +88,7 @@ def test_home_of_the_ch3_r():
     st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-1.5, 1.5), st.integers(0, 5),
     st.floats(0.01, 0.1), st.floats(0.02, 0.2), st.floats(0.02, 0.2),
 )  # fmt: skip
+@example(0.0, -1.0, -1.5, 0, 0.0625, 0.03125, 0.0625)  # behind the femur's axis and above it
 def test_inverse_kinematics_inverts(turn, lift, bend, which, coxa, femur, tibia):
     leg = Leg(0.1, -0.2, BEARINGS[which], coxa, femur, tibia)
     if femur * math.cos(lift) + tibia * math.sin(lift + bend) < -0.9 * coxa:
@@ -263,6 +265,29 @@ def test_torsional_limit():
         assert (abs(robot.data.qvel[5]) > 0.2) == (share > 1.0)
 
 
+def test_light_feet_do_not_slip():
+    """Up to 1 N a contact counts as one that has not landed, however far it is dragged."""
+    robot = standing()
+    for load, way in ((1.0, 0.0), (1.01, 5e-3)):
+        before = robot.feet[0].slip_path
+        x, y, z = robot._last[0]
+        robot._last[0] = [x - 3e-3, y + 4e-3, z]
+        robot._loads[0] = load
+        robot._report(FLAT)
+        assert robot.feet[0].slip_path - before == pytest.approx(way, rel=1e-9)
+
+
+@pytest.mark.parametrize('axis', ['x', 'y'])
+def test_work_lost_is_friction_times_way(axis):
+    robot = standing(0.1)
+    push(robot, **{axis: 1.3 * 0.1 * WEIGHT})
+    advance(robot, 0.3)
+    ways = [foot.slip_path for foot in robot.feet]
+    assert min(ways) > 5e-3
+    # Loads shift as the body leans, their sum does not.
+    assert robot.dissipation == pytest.approx(0.1 * WEIGHT * np.mean(ways), rel=0.05)
+
+
 def test_grip_is_the_cone_of_the_step():
     robot = FullHexapod(scene_of(tow=SHIPPED.tow), WET, 0.004)
     slipped = 0
@@ -406,6 +431,21 @@ def test_line_only_pulls():
     assert robot.data.geom('sled').xpos[0] == pytest.approx(rest, abs=1e-3)
 
 
+def test_stiff_lines_take_shorter_steps():
+    """At 2 ms a sled of 0.5 N on 1 MN/m throws the robot over; it can only drag."""
+    ways = {}
+    for stiffness in (2e3, 1e6):
+        tow = Tow(0.5, 0.5, 0.5, 0.25, 0.03, stiffness)
+        robot = FullHexapod(scene_of(tow=tow), DRY, 0.004)
+        ways[stiffness] = advance(robot, 2.5)[0]
+        assert robot.verdict is None
+        reduced = 1.0 / (9.81 / 0.5 + 1.0 / 2.09)
+        assert robot.model.opt.timestep < 2.0 * math.sqrt(reduced / stiffness)
+    assert ways[1e6] == pytest.approx(ways[2e3], rel=0.01)
+    with pytest.raises(ConfigError, match=r'tow.weight = 1e-09 N on a line of .* 2000 N/m needs'):
+        FullHexapod(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
+
+
 def test_steering():
     robot = FullHexapod(scene_of(heading_gain=1.0), DRY, 0.004)
     robot.data.qpos[3:7] = (math.cos(0.1), 0.0, 0.0, math.sin(0.1))
@@ -464,3 +504,11 @@ def test_lost_solution(tmp_path, monkeypatch):
     push(robot, x=1e30)
     advance(robot, 0.1)
     assert 'MuJoCo has lost the solution' in robot.verdict
+
+
+@pytest.mark.parametrize('pressures', [[0.0] * 5, [0.0] * 7, [math.nan] * 6, [math.inf] * 6])
+def test_bad_pressures(pressures):
+    robot = FullHexapod(scene_of(), DRY, 0.004)
+    with pytest.raises(InvalidInput, match='six finite numbers'):
+        robot.step(pressures)
+    assert robot.time == 0.0

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from ros_pad.simulation import planar_step
 from ros_pad.simulation.gait import TRIPODS
@@ -427,6 +428,24 @@ def test_standing_on_a_slope(tow):
     assert robot.verdict is None
 
 
+@pytest.mark.parametrize('floor, friction', [(DRY, 0.4), (WET, 0.2)])
+def test_a_sled_presses_less_on_a_slope(floor, friction):
+    tow = Tow(weight=5.0, friction_dry=0.4, friction_wet=0.2)
+    robot = robot_of(sloping(0.5, tow=tow), floor)
+    robot.step(FLAT)
+    drag = friction * 5.0 * math.cos(0.5)
+    assert robot._body[planar_step.SLED_CAP] == pytest.approx(drag, rel=1e-12)
+
+
+def test_sled_is_behind_a_robot_that_has_turned():
+    tow = Tow(weight=5.0, friction_dry=0.4, friction_wet=0.2, distance=0.4)
+    robot = robot_of(scene_of(tow=tow), RIGHT_WET)
+    # 0.1 m left of the edge, headed away from it: the sled is 0.3 m right of it.
+    robot._body[planar_step.Y], robot._body[planar_step.HEADING] = 0.1, math.pi / 2.0
+    robot.step(FLAT)
+    assert robot._body[planar_step.SLED_CAP] == 0.2 * 5.0
+
+
 def test_sliding_down_a_slope():
     """Steeper than its friction: a = g (sin - μ cos)."""
     slope, friction = 0.3, 0.1
@@ -514,3 +533,9 @@ def test_soles_that_turn_scrub_the_floor():
     for foot, moment in zip(turning.feet, turning._table[planar_step.MOMENT], strict=True):
         radius = 2.0 / 3.0 * SHIPPED.foot.sole_radius
         assert math.hypot(*foot.force[:2], moment / radius) <= foot.grip + 1e-12
+
+
+@pytest.mark.parametrize('period', [0.0, -0.004, math.nan, math.inf])
+def test_bad_period(period):
+    with pytest.raises(InvalidInput, match=r'period = .* s is not allowed'):
+        robot_of(SHIPPED, period=period)

@@ -15,6 +15,7 @@ from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
+from ros_pad.simulation.terrain import Floor
 
 SHIPPED = Scene.load('leg_dry_flat')
 MASS, DRAG, LOAD = 1.0, 0.5, 2.0
@@ -325,6 +326,17 @@ def test_many_legs_walk_as_each_does_alone():
     assert len(set(np.round(walks.position, 4))) == len(scenes)
 
 
+def test_liquid_without_depth_is_dry_ground():
+    scene = Scene.load('leg_wet_flat')
+    floors = [Floor.uniform(True, 0.0), Floor.uniform(False, 3e-4)]
+    walks = walk_many([scene] * 2, floors, [0.0] * 2, 0.004, 3.0)
+    leg = RailLeg(scene, floors[0], 0.004)
+    for _ in range(750):
+        leg.step([0.0])
+    assert leg.body[0] == pytest.approx(walks.position[0], abs=1e-10)
+    assert walks.position[0] == walks.position[1] > 0.05
+
+
 def test_many_legs_against_the_closed_form_of_a_glide():
     """Without a grip, on slopes of many angles: -½ (g sin - F/M) t², or rest."""
     slopes = np.linspace(0.0, 0.3, 60)
@@ -346,3 +358,17 @@ def test_many_legs_refuse():
     for period, duration in ((0.0, 1.0), (0.004, -1.0), (math.nan, 1.0)):
         with pytest.raises(InvalidInput, match=r'(period|duration) = '):
             walk_many(scenes, floors, pressures, period, duration)
+
+
+@pytest.mark.parametrize('period', [0.0, -0.004, math.nan, math.inf])
+def test_bad_period(period):
+    with pytest.raises(InvalidInput, match=r'period = .* s is not allowed'):
+        leg_of(SHIPPED, period)
+
+
+@pytest.mark.parametrize('pressures', [[], [75e3] * 2, [math.nan], [math.inf]])
+def test_bad_pressures(pressures):
+    leg = leg_of(SHIPPED)
+    with pytest.raises(InvalidInput, match=r'pressures = .* Pa: one finite number'):
+        leg.step(pressures)
+    assert leg.time == 0.0

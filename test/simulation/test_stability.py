@@ -303,6 +303,8 @@ def test_no_verdict_for_the_shipped_robot():
 def test_printed_flow_law_has_no_stable_step_and_ours_no_chatter(monkeypatch):
     monkeypatch.setattr(stability, 'TIMES', (0.05, 0.1))
     monkeypatch.setattr(stability, 'SOLVERS', ('RK45', 'BDF'))
+    # The limit is 0.438 ms; that of laminar flow, which the hose itself has here, is 0.479.
+    monkeypatch.setattr(stability, 'FILL_STEPS', (*stability.FILL_STEPS, 4.3e-4, 4.6e-4))
     outcomes = stability.filling()
     found = by_method(outcomes, stability.HOSE.name)
     # (A dt/2)²: a tenth of the step leaves a hundredth of the chatter, at any step.
@@ -322,6 +324,24 @@ def test_printed_flow_law_has_no_stable_step_and_ours_no_chatter(monkeypatch):
     # Implicit steps with error control are a fair way, too.
     assert not any(outcome.fails for outcome in calls['solve_ivp (BDF)'])
     assert not any(outcome.fails for outcome in calls[stability.CHANNEL])
+
+
+def test_step_limit_of_the_linear_range_by_hand():
+    """4 mm x 1 m: C = 1.196e-8 m³/(s Pa), b = 0.3543; the line of r = 0.999 to equal pressures.
+
+    It joins 0 to C ρ √(1 - x²) p at Δp = p/1000, x = (0.999 - b)/(1 - b) = 0.998451.
+    """
+    conductance = 1.1958e-8 * 1.185 * math.sqrt(1.0 - 0.998451**2) / 1e-3
+    volume = stability._SCENE.foot.chamber_volume + math.pi / 4.0 * 0.004**2
+    limit = 2.0 * volume * 1.185 / 100e3 / conductance
+    assert stability.linear_limit() == pytest.approx(limit, rel=2e-3)
+    supply = 75e3 + 101325.0
+    for drop, flow in ((1.0, conductance), (100.0, 100.0 * conductance)):
+        assert stability.linear_flow(supply, supply - drop) == pytest.approx(flow, rel=2e-3)
+    # The growth of a small error over a step passes -1 there.
+    for share, chatters in ((0.99, False), (1.01, True)):
+        chatter = stability.filled(stability.linear_flow, share * stability.linear_limit())
+        assert (chatter > 1.0) == chatters
 
 
 def test_radau_gets_stuck(monkeypatch):

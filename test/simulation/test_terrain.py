@@ -204,3 +204,23 @@ def test_height_at_a_place_is_that_of_its_cell():
     assert floor.height(-1.0 + 0.01, -4.0 + 0.01) == floor.heights[0, 0]
     assert floor.height(0.51, 0.13) == floor.heights[206, 75]
     assert floor.height(0.51 + 16.0, 0.13 - 8.0) == floor.height(0.51, 0.13)
+
+
+@pytest.mark.parametrize('depth', [-1e-9, math.nan, math.inf])
+def test_bad_depth(depth):
+    for make in (
+        lambda: Floor.uniform(True, depth),
+        lambda: Floor.patches(0.5, 0.5, depth, 0),
+        lambda: Floor.drawn(['#.'], 0.5, depth),
+    ):
+        with pytest.raises(InvalidInput, match=r'film_thickness = .* m is not allowed'):
+            make()
+
+
+@pytest.mark.parametrize('value', [-1e-3, math.nan, math.inf])
+def test_bad_cell_and_unevenness(value):
+    for cell in (value, 0.0):
+        with pytest.raises(InvalidInput, match=r'cell = .* m is not allowed'):
+            Floor.drawn(['#.'], cell, FILM)
+    with pytest.raises(InvalidInput, match=r'unevenness = .* m is not allowed'):
+        Floor.uniform(False, FILM).uneven(value, 0)

@@ -225,6 +225,16 @@ def test_a_walk_that_is_not_valid_says_so(tmp_path):
     assert re.search(r'sideways drift *mm *0\.0', text)
 
 
+def test_faults_are_told_of(tmp_path):
+    trial = made_up()
+    report.write(trial, tmp_path / 'sound.html')
+    assert 'Fault' not in page(tmp_path / 'sound.html').text
+    trial.settings['faults'] = ['{"kind": "leak", "start": 5.0, "legs": [2]}']
+    report.write(trial, tmp_path / 'faulty.html')
+    told = 'Fault on the schedule: {"kind": "leak", "start": 5.0, "legs": [2]}'
+    assert told in page(tmp_path / 'faulty.html').text
+
+
 def test_footprints_window_and_omissions(tmp_path):
     report.write(made_up(), tmp_path / 'r.html')
     seen = page(tmp_path / 'r.html')
