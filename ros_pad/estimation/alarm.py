@@ -54,5 +54,5 @@ class SlipAlarm:
         variance = self._noise**2 * max(1.0, self._correlation_time / dt)
         gain = self._speed / variance * (speed - 0.5 * self._speed)
         # Bounded above so that the alarm ends soon after the slip does.
-        self.statistic = min(max(0.0, self.statistic + gain), 2.0 * self._threshold)
+        self.statistic = min(max(0.0, self.statistic + gain), 1.25 * self._threshold)
         return self.statistic > self._threshold

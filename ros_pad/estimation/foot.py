@@ -19,7 +19,13 @@ LONGEST_GAP = 0.15
 """Between samples of one stance, s: after a longer silence the foot may have stepped."""
 
 AIRBORNE = 0.01
-"""Height above its last stance from which a foot surely touches nothing, m."""
+"""Height above its last stance from which a foot surely touches nothing, m ..."""
+
+AIRBORNE_LOAD = 0.3
+"""... unless it carries this share of the expected load: what else it reads is its offset."""
+
+NEW_PLACE = 5e-4
+"""Way over which a sliding foot has something new to tell, m."""
 
 TARE_TIME = 0.5
 """Over which the force of a foot in the air is averaged, s."""
@@ -170,6 +176,7 @@ class FootEstimator:
         self._footprint: tuple[float, float] | None = None
         self._window_start = 0.0
         self._first_window = True
+        self._told: tuple[float, ...] | None = None
         self._samples = 0
         self._sum_load = self._sum_tangential = self._sum_speed = 0.0
         mean, sd = self._ground.friction
@@ -222,9 +229,11 @@ class FootEstimator:
         if time <= self._time:
             raise InvalidInput(f'time = {time!r} s: must be later than the last, {self._time!r} s')
         dt, self._time = time - self._time, time
-        if fz - self._offset_z < self._gate:
-            if z > self._height + AIRBORNE:
-                self._tare(dt, fx, fy, fz)
+        load = fz - self._offset_z
+        if z > self._height + AIRBORNE and load < AIRBORNE_LOAD * self._expected_load:
+            self._tare(dt, fx, fy, fz)
+            return self._swing(time)
+        if load < self._gate:
             return self._swing(time)
         self._height = z
         fx, fy, fz = fx - self._offset_x, fy - self._offset_y, fz - self._offset_z
@@ -295,6 +304,7 @@ class FootEstimator:
         self._quantile = self._ground.quantile(0.05)
         self._window_start = time
         self._first_window = True
+        self._told = None
         self._clear_window()
 
     def _clear_window(self) -> None:
@@ -318,8 +328,26 @@ class FootEstimator:
         speed_noise = math.hypot(
             tuning.speed_noise, self._contact_noise * math.sqrt(spread) / duration
         )
-        self._ground.update(ratio, noise, self._sum_speed / count, speed_noise, duration)
+        weight = self._news(ratio, noise)
+        self._ground.update(ratio, noise, self._sum_speed / count, speed_noise, duration, weight)
         self._clear_window()
+
+    def _news(self, ratio: float, noise: float) -> float:
+        """Return how much of what a foot tells is new, 0 to 1.
+
+        One that stands where it stood, pulled as it was, repeats itself: windows are evidence as
+        far as T/N or the place has changed since they were last counted.
+        """
+        now = (ratio, self._smooth_x, self._smooth_y)
+        if self._told is None:
+            self._told = now
+            return 1.0
+        pull, x, y = (after - before for after, before in zip(now, self._told, strict=True))
+        change = (pull / noise) ** 2 + (x * x + y * y) / NEW_PLACE**2
+        weight = -math.expm1(-0.5 * change)
+        told = zip(self._told, (pull, x, y), strict=True)
+        self._told = tuple(before + weight * step for before, step in told)
+        return weight
 
 
 def _not_finite(

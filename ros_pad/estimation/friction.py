@@ -3,8 +3,8 @@
 
 A Bayes filter on {dry, wet} x a grid of friction coefficients. A foot that sticks at T/N only
 says that friction is larger (censored evidence); a foot that slips shows it, or what its turning
-leaves of it. Whether it sticks is itself uncertain, so each sample is a mixture of both, weighed by
-the slip speed. Ground changes with the way that the foot steps or slides, not with time: a foot
+leaves of it. Whether it sticks is itself uncertain, so each sample is a mixture of both, weighed
+by the slip speed. Ground changes with the way that the foot steps or slides, not with time: a foot
 that stands still knows what it knows.
 """
 
@@ -33,8 +33,9 @@ SLIP_SPEED = 0.04
 """Most frequent speed v of slips, m/s; their density is taken to go as x exp(-x), x = speed / v.
 It starts at zero, so that the noise of a foot at rest does not add up to slow slip."""
 
-# Middles of six equally likely shares of the half-normal distribution.
-_HALF_NORMAL = math.sqrt(2.0) * special.erfinv((np.arange(6.0) + 0.5) / 6.0)
+# The half-normal distribution in eight shares, finer in its tail, each by its middle.
+_SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
+_HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
 _UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
 
@@ -96,9 +97,9 @@ class GroundFilter:
         Weight of a sample, in (0, 1]: successive samples are not independent.
     rim_speed : float
         Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
-        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while its
-        rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe and
-        Cutkosky 1996); nobody measures s.
+        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
+        its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
+        and Cutkosky 1996); nobody measures s.
     model_error : float
         Standard deviation of what T/N shows of friction, > 0. It is the same in every sample: no
         number of them averages it out.
@@ -135,7 +136,13 @@ class GroundFilter:
         self._settle(self._belief)
 
     def update(
-        self, ratio: float, ratio_noise: float, speed: float, speed_noise: float, dt: float
+        self,
+        ratio: float,
+        ratio_noise: float,
+        speed: float,
+        speed_noise: float,
+        dt: float,
+        weight: float = 1.0,
     ) -> None:
         """Take one sample of T/N and of slip speed.
 
@@ -147,6 +154,8 @@ class GroundFilter:
             Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
         dt : float
             Time that the sample stands for, s.
+        weight : float
+            How much of it is new, 0 to 1.
         """
         away = (GRID - ratio) / ratio_noise
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
@@ -158,9 +167,9 @@ class GroundFilter:
         if slip > 0.0:
             shown = speed / np.hypot(speed, self._rim_speeds)
             away = (shown * GRID - ratio) / ratio_noise
-            likely = np.exp(-0.5 * away * away).mean(axis=0)
+            likely = _SHARES @ np.exp(-0.5 * away * away)
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * likely
-        self._belief = self._belief * (likelihood + 1e-6) ** self._temper
+        self._belief = self._belief * (likelihood + 1e-6) ** (weight * self._temper)
         self._belief /= self._belief.sum()
         if speed > 0.0:
             self._move(speed * dt)

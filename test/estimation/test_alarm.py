@@ -69,24 +69,24 @@ def test_between_false_alarms_pass_at_least_exp_threshold_samples():
 
 
 def test_a_slip_of_50_mm_a_second_takes_8_ms_without_noise():
-    alarm = SlipAlarm(0.0075, 0.02)
+    alarm = SlipAlarm(0.0075, 0.02, speed=0.03)
     # σ'² = 5 · 7.5² mm²/s²; each sample adds 30/281 · (50 - 15) = 3.7 nats, two are above 4.
     assert [alarm.update(0.05, 0.004) for _ in range(3)] == [False, True, True]
-    assert alarm.statistic == 8.0  # no higher than twice the threshold
+    assert alarm.statistic == 5.0  # no higher than a quarter above the threshold
 
 
 def test_it_ends_soon_after_the_slip():
     alarm = SlipAlarm(0.0075, 0.02)
     for _ in range(10_000):
         assert alarm.update(0.3, 0.004) or alarm.statistic < 4.0
-    # Each sample at rest takes 30/281 · 15 = 1.6 nats off 8.
-    assert [alarm.update(0.0, 0.004) for _ in range(4)] == [True, True, False, False]
+    # Each sample at rest takes 10/281 · 5 = 0.18 nats off 5: the sixth is below 4.
+    assert [alarm.update(0.0, 0.004) for _ in range(7)] == [True] * 5 + [False] * 2
 
 
 def test_it_hears_no_creep_below_half_the_speed():
     alarm = SlipAlarm(0.0075, 0.02)
-    assert not any(alarm.update(0.0149, 0.004) for _ in range(10_000))
-    assert any(alarm.update(0.0151, 0.004) for _ in range(10_000))
+    assert not any(alarm.update(0.0049, 0.004) for _ in range(10_000))
+    assert any(alarm.update(0.0051, 0.004) for _ in range(10_000))
 
 
 def test_reset_forgets():

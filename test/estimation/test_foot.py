@@ -113,7 +113,7 @@ def test_a_slip_of_50_mm_a_second_is_heard_within_3_mm(seed):
     for _ in range(50):
         stance.sample(0.3, slip=0.05)
     quiet = next(k for k in range(1, 200) if not stance.sample(0.3).slipping) * PERIOD
-    assert quiet < 0.08
+    assert quiet < 0.1
 
 
 def test_reported_speed_noise_covers_the_scatter():
@@ -145,8 +145,8 @@ def test_slip_before_lift_off_is_forgotten_at_touch_down():
 @pytest.mark.parametrize('load', [0.5, 6.8, 68.0])
 def test_the_gate_is_a_share_of_the_expected_load(load):
     stance = Stance(load=load, noise=False)
-    assert not stance.sample(0.1, share=0.29).standing
-    assert stance.sample(0.1, share=0.31).standing
+    assert not stance.sample(0.1, share=0.09).standing
+    assert stance.sample(0.1, share=0.11).standing
 
 
 # --- wetness and friction -----------------------------------------------------------------------
@@ -193,6 +193,25 @@ def test_standing_about_tells_nothing_of_the_ground(wet_prior, ratio):
     for _ in range(2350):
         estimate = stance.sample(ratio)
     assert estimate.wet_probability == pytest.approx(wet_prior, abs=0.15)
+
+
+def test_repeating_itself_is_no_evidence():
+    """A foot that holds 0.3 for a minute says no more than one that has held it for half a second;
+    one that slides on goes on telling."""
+    stance = Stance(noise=False)
+    for _ in range(125):
+        first = stance.sample(0.3)
+    for _ in range(15_000):
+        last = stance.sample(0.3)
+    assert last.wet_probability == pytest.approx(first.wet_probability, abs=0.01)
+    assert last.friction_mean == pytest.approx(first.friction_mean, abs=0.01)
+    assert wet_slip(stance).friction_mean < 0.2
+
+
+def test_a_foot_in_the_air_tares_though_its_sensor_reads_more_than_the_gate():
+    told = Offset((0.0, 0.0, 0.25 * LOAD), lift=0.03, swings=5)
+    assert not told.feel(50, (0.0, 0.0, 0.0), 0.03).standing
+    assert told.feel(125, (-0.12 * LOAD, 0.0, LOAD), 0.0, slip=0.05).friction_mean < 0.2
 
 
 def test_a_domed_foot_keeps_what_it_knew_but_for_fading():
@@ -303,10 +322,10 @@ def test_an_offset_of_1_newton_is_taken_off_in_the_air(offset):
 
 
 def test_the_load_of_a_foot_that_hardly_stands_is_no_offset():
-    """Ten seconds with a quarter of the load: below the gate, but not in the air."""
+    """Ten seconds with an eleventh of the load: below the gate, but not in the air."""
     foot = Offset((0.0, 0.0, 0.0), lift=0.03, swings=1)
-    assert not foot.feel(2500, (-0.2, 0.0, 0.25 * LOAD), 0.0).standing
-    assert foot.feel(1, (0.0, 0.0, 0.31 * LOAD), 0.0).standing
+    assert not foot.feel(2500, (-0.2, 0.0, 0.09 * LOAD), 0.0).standing
+    assert foot.feel(1, (0.0, 0.0, 0.11 * LOAD), 0.0).standing
 
 
 def test_a_foot_that_lands_on_a_step_stands_there():
@@ -427,7 +446,7 @@ def test_estimates_are_finite_whatever_comes(samples):
         # The velocity lies along the force, and the speed against it.
         vx, vy = estimate.slip_velocity
         assert math.hypot(vx, vy) == pytest.approx(abs(estimate.slip_speed), rel=1e-6, abs=1e-12)
-        assert estimate.standing == (force[2] >= 0.3 * LOAD)
+        assert estimate.standing == (force[2] >= 0.1 * LOAD)
 
 
 # --- what it is told ----------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from ros_pad.estimation.friction import GroundFilter
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
 STILL = 0.0  # m/s
 DT = 0.04
+EXACT = 1e-3  # a model error that is none on a grid of 0.02
 
 
 def flat(**options):
@@ -58,7 +59,7 @@ def test_prior_tables_are_probabilities_with_heavy_tails():
 
 
 def test_nothing_felt_is_the_prior():
-    ground = GroundFilter(PRIOR, wet_prior=0.3)
+    ground = GroundFilter(PRIOR, wet_prior=0.3, model_error=EXACT)
     dry, wet = PRIOR.table(dome=False)
     marginal = 0.7 * dry + 0.3 * wet
     mean = marginal @ GRID
@@ -71,7 +72,7 @@ def test_nothing_felt_is_the_prior():
 @pytest.mark.parametrize('ratio', [0.1, 0.3, 0.6])
 def test_stick_excludes_friction_below_and_says_nothing_else(ratio):
     """Censored: the prior cut off by Φ((μ - ρ)/σ) and normalised, by SciPy's normal."""
-    ground = stick(flat(wet_prior=0.4, temper=1.0), ratio, noise=0.02)
+    ground = stick(flat(wet_prior=0.4, temper=1.0, model_error=EXACT), ratio, noise=0.02)
     dry, wet = PRIOR.table(dome=False)
     cut = stats.norm.cdf(GRID, ratio, 0.02)
     on_dry, on_wet = 0.6 * dry * cut, 0.4 * wet * cut
@@ -203,7 +204,7 @@ def test_fading_over_many_steps_ends_at_the_prior():
 
 
 def test_friction_of_one_shape_says_nothing_of_the_other():
-    ground = slip(flat(), 0.12)
+    ground = slip(flat(model_error=EXACT), 0.12)
     ground.touch_down(0.0, dome=True)
     table = PRIOR.table(dome=True)[0]
     assert ground.friction[0] == pytest.approx(table @ GRID, abs=1e-6)
@@ -244,3 +245,37 @@ def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
     # And it recovers.
     slip(ground, 0.12, 40)
     assert ground.friction[0] == pytest.approx(0.12, abs=0.03)
+
+
+def test_no_number_of_samples_averages_the_model_error_out():
+    """Variances add up; what is surely known lies 1.64 errors below the mean."""
+    exact, blurred = (slip(flat(model_error=e), 0.5, 200) for e in (EXACT, 0.06))
+    assert blurred.friction[0] == pytest.approx(exact.friction[0], abs=1e-3)
+    assert blurred.friction[1] == pytest.approx(math.hypot(exact.friction[1], 0.06), rel=0.01)
+    sd = blurred.friction[1]
+    assert blurred.quantile(0.05) == pytest.approx(blurred.friction[0] - 1.64 * sd, abs=0.02)
+
+
+@pytest.mark.parametrize('rim_speed', [0.02, 0.05])
+def test_a_foot_that_turns_shows_no_more_than_a_part_of_its_friction(rim_speed):
+    """Howe and Cutkosky: at v of slip and s of scrub T/N is μ v/hypot(v, s), s half-normal."""
+    straight, turning = (slip(flat(rim_speed=s), 0.2, 1, 0.02) for s in (0.0, rim_speed))
+    table = PRIOR.table(dome=False)
+    draws = np.abs(np.random.default_rng(0).normal(0.0, rim_speed, 20_000))
+    shown = 0.02 / np.hypot(0.02, draws)
+    likelihood = [np.exp(-0.5 * ((mu * shown - 0.2) / 0.03) ** 2).mean() for mu in GRID]
+    # A slip at 20 mm/s, many times the noise: nothing else explains it. Tempered as the filter.
+    slipped = (np.exp(-GRID / 0.3) * likelihood) ** 0.5 * table
+    wet = slipped[1].sum() / slipped.sum()
+    assert turning.wet_probability == pytest.approx(wet, abs=0.05)
+    assert turning.friction[0] > straight.friction[0] + 0.05
+    # Fast slips leave no doubt.
+    fast = slip(flat(rim_speed=rim_speed), 0.12, 5, 0.5)
+    assert fast.friction[0] == pytest.approx(0.12, abs=0.03)
+
+
+def test_what_is_not_new_weighs_nothing():
+    ground = flat()
+    before = (*ground.friction, ground.wet_probability)
+    ground.update(0.6, 0.03, STILL, 0.003, DT, weight=0.0)
+    assert (*ground.friction, ground.wet_probability) == pytest.approx(before)
