@@ -279,3 +279,12 @@ def test_what_is_not_new_weighs_nothing():
     before = (*ground.friction, ground.wet_probability)
     ground.update(0.6, 0.03, STILL, 0.003, DT, weight=0.0)
     assert (*ground.friction, ground.wet_probability) == pytest.approx(before)
+
+
+@pytest.mark.parametrize('dome', [False, True])
+def test_a_thousand_touch_downs_without_a_word_leave_a_belief(dome):
+    ground = slip(flat(), 0.12)
+    for _ in range(1000):
+        ground.touch_down(1e-3, dome)
+    assert 0.6 < ground.wet_probability < 0.8  # a metre on, at 1.5 m between changes
+    assert 0.0 < ground.friction[0] < 1.6
