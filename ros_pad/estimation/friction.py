@@ -169,8 +169,10 @@ class GroundFilter:
         return self._belief.sum(axis=1, keepdims=True)
 
     def _settle(self, belief: np.ndarray) -> None:
+        # Moving on squares the rounding of the sum: a foot that bounces a hundred times would be
+        # left without a belief.
+        self._belief = belief = belief / belief.sum()
         dry, wet = (belief @ _ONES).tolist()
-        self._belief = belief
         self.wet_probability = wet / (dry + wet)
         self._marginal = (belief[0] + belief[1]) / (dry + wet)
 

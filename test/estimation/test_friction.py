@@ -244,3 +244,12 @@ def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
     # And it recovers.
     slip(ground, 0.12, 40)
     assert ground.friction[0] == pytest.approx(0.12, abs=0.03)
+
+
+@pytest.mark.parametrize('dome', [False, True])
+def test_a_thousand_touch_downs_without_a_word_leave_a_belief(dome):
+    ground = slip(flat(), 0.12)
+    for _ in range(1000):
+        ground.touch_down(1e-3, dome)
+    assert 0.6 < ground.wet_probability < 0.8  # a metre on, at 1.5 m between changes
+    assert 0.0 < ground.friction[0] < 1.6
