@@ -87,7 +87,7 @@ class Foot:
     chamber_volume : float
         Air in the foot besides that under the pads, m³.
     ceiling : float
-        Gauge pressure that is never exceeded, Pa.
+        Highest gauge pressure that may be commanded, Pa.
     limit : str
         Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
     """

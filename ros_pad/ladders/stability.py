@@ -287,7 +287,7 @@ def explicit_friction() -> list[Outcome]:
 # --- b: creep in MuJoCo --------------------------------------------------------------------------
 
 CREEP = Case('creep in MuJoCo', 'step, s', 'creep, m/s')
-NEEDS_MUJOCO = 'not measured, pip install ros_pad[mujoco]'
+NEEDS_MUJOCO = 'not measured, pip install "ros_pad[mujoco]"'
 PUSH = 0.8  # of the friction limit
 CREEP_STEPS = (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)
 CREEP_LIMIT = 1e-4  # m/s

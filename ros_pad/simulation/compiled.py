@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planar step as machine code, where numba is installed (``pip install ros_pad[fast]``)."""
+"""The planar step as machine code, where numba is installed (``pip install "ros_pad[fast]"``)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from ros_pad.errors import ConfigError
 from ros_pad.simulation import planar_step
 
 # Steps that take as long in plain Python as compiling does (4 s; a copy kept on disk loads in
@@ -33,7 +34,7 @@ def walk(*arguments: Any) -> Walk:
 
     Raises
     ------
-    ImportError
+    ConfigError
         Without numba, naming the extra that brings it.
     """
     dispatcher, typeof = _dispatcher()
@@ -46,7 +47,7 @@ def _dispatcher() -> tuple[Any, Callable[[Any], Any]]:
     try:
         import numba
     except ImportError as error:
-        raise ImportError('compiled steps need numba: pip install ros_pad[fast]') from error
+        raise ConfigError('compiled steps need numba: pip install "ros_pad[fast]"') from error
     for function in planar_step.PARTS:
         numba.extending.register_jitable(error_model='numpy')(function)
     try:

@@ -13,6 +13,7 @@ import bisect
 import functools
 import importlib.util
 import math
+import operator
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
@@ -38,7 +39,6 @@ from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
 _RUNGS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
-_FLOORS = {'slope': 'rad', 'roughness': 'm', 'unevenness': 'm'}
 _MARGIN = 1.2  # of the pads' force limit over the load: a dome that a controller would choose
 
 
@@ -52,8 +52,8 @@ class Choice:
         ``L0``, ``L1`` or ``L2``.
     bound : float
         Largest error of the distance that was measured on scenes with such a reserve, with a
-        margin: relative, against the top rung. Infinite where that rung cannot be trusted, and on
-        floors like which none was measured.
+        margin: relative to the way on the top rung, or to half of the full way where that is
+        less. Infinite where the rung cannot be trusted, and for scenes unlike those measured.
     reserve : float
         See :func:`reserve`.
     note : str
@@ -95,13 +95,13 @@ class Ladder:
         Lower ends of the classes of reserve, rising from 0.
     bounds : dict of tuple
         For each rung its bound in each class.
-    floors : dict of float
-        Largest slope, roughness and unevenness of the floors on which hexapods were measured.
+    ranges : dict of dict
+        For each robot, by dotted name, the ends between which the measured scenes were drawn.
     """
 
     reserves: tuple[float, ...]
     bounds: dict[str, tuple[float, ...]]
-    floors: dict[str, float] = field(default_factory=dict)
+    ranges: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
 
     @classmethod
     @functools.cache
@@ -121,25 +121,29 @@ class Ladder:
                 rung: tuple(float(value) for value in values['bounds'][rung])
                 for rung in FIDELITIES[1:]
             }
-            floors = {name: float(values['floors'][name]) for name in _FLOORS}
+            ranges = {
+                robot: {
+                    name: (float(low), float(high))
+                    for name, (low, high) in values['ranges'][robot].items()
+                }
+                for robot in _RUNGS
+            }
             assert reserves[0] == 0.0 and list(reserves) == sorted(reserves)
             assert all(len(row) == len(reserves) for row in bounds.values())
         except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
             raise ConfigError(f'{path}: no table of rungs ({e!r}): run bench/fidelity.py') from e
-        return cls(reserves, bounds, floors)
+        return cls(reserves, bounds, ranges)
 
     def bound(self, rung: str, reserve: float) -> float:
         """Return what a rung promises for a reserve."""
         return self.bounds[rung][bisect.bisect_right(self.reserves, reserve) - 1]
 
     def beyond(self, scene: Scene) -> str:
-        """Return what of a hexapod's floor is more than was measured; empty if nothing is."""
-        if scene.robot != 'hexapod':
-            return ''
+        """Return what of a scene is outside of what was measured; empty if nothing is."""
         return ', '.join(
-            f'{name} {abs(getattr(scene.floor, name)):g} {unit}, measured up to {most:g}'
-            for name, unit in _FLOORS.items()
-            if abs(getattr(scene.floor, name)) > (most := self.floors.get(name, math.inf))
+            f'{name} = {value:g}, measured from {low:g} to {high:g}'
+            for name, (low, high) in self.ranges.get(scene.robot, {}).items()
+            if not low <= (value := operator.attrgetter(name)(scene)) <= high
         )
 
 
@@ -246,11 +250,15 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
         From 0. Grip is that of a foot with its expected load in mid-stance, when its film has
         drained for half of it. Asked for are the gait's peak acceleration of body and load, the
         drag of the load or of the wheels, and the slope. Feet and load may stand on different
-        ground.
+        ground. With faults on its schedule a foot may have the other shape as well.
     """
     policy = scene.policy if policy is None else policy
     wets = {'dry': (False,), 'wet': (True,)}.get(scene.floor.kind, (False, True))
-    grip = min(_grip(scene, policy == 'dome' or (policy != 'flat' and wet), wet) for wet in wets)
+    grip = math.inf
+    for wet in wets:
+        dome = policy == 'dome' or (policy != 'flat' and wet)
+        shapes = (False, True) if scene.faults else (dome,)
+        grip = min(grip, *(_grip(scene, shape, wet) for shape in shapes))
     body, gait, slope = scene.body, scene.gait, scene.floor.slope
     if isinstance(gait, RailGait) or not isinstance(body, HexapodBody):
         assert isinstance(gait, RailGait) and not isinstance(body, HexapodBody)

@@ -214,6 +214,8 @@ class FootPath:
     ----------
     feet : list of tuple
         Fore, left, and above the ground, m; legs 1 to 6.
+    swings : tuple of bool
+        Which of them swing.
     """
 
     def __init__(self, gait: TripodGait, homes: Sequence[tuple[float, float]]) -> None:
@@ -230,7 +232,7 @@ class FootPath:
                 ahead = (2.0 * gait.swing(phase)[0] - 1.0) * self._reach
             self._offsets.append((ahead, 0.0))
         self._lifted = list(self._offsets)
-        self._swings = [gait.phase(leg, 0.0) >= gait.duty for leg in range(1, 7)]
+        self.swings = tuple(gait.phase(leg, 0.0) >= gait.duty for leg in range(1, 7))
         self.feet: list[Vector] = []
         self.move(0.0, 0.0)
 
@@ -239,14 +241,14 @@ class FootPath:
         gait = self._gait
         advance = gait.body_advance(time) - gait.body_advance(self._time)
         self._time = time
-        feet = []
+        feet, swinging = [], []
         for index, (home_x, home_y) in enumerate(self._homes):
             phase = gait.phase(index + 1, time)
             x, y = self._offsets[index]
             height = 0.0
             swings = phase >= gait.duty
             if swings:
-                if not self._swings[index]:
+                if not self.swings[index]:
                     self._lifted[index] = (x, y)
                 progress, height = gait.swing(phase)
                 from_x, from_y = self._lifted[index]
@@ -254,10 +256,10 @@ class FootPath:
             else:
                 # Walking ahead and turning: the foot goes back and round the other way.
                 x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
-            self._swings[index] = swings
+            swinging.append(swings)
             self._offsets[index] = (x, y)
             feet.append((home_x + x, home_y + y, height))
-        self.feet = feet
+        self.feet, self.swings = feet, tuple(swinging)
 
 
 class FullHexapod:
@@ -331,6 +333,7 @@ class FullHexapod:
         self._geometry = _legs(scene)
         self._path = FootPath(scene.gait, scene.body.homes)
         self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
+        self._cleared = [True] * 6  # the ground, in the swing that is on or was last
         self._loads = [0.0] * 6
         self._pushes = [(0.0, 0.0)] * 6
         self._ratios = [0.0] * 6
@@ -421,9 +424,13 @@ class FullHexapod:
         """Give the servos their set-points; they keep the last where a foot is out of reach."""
         # The gait has its own clock, which starts when the robot has settled.
         heading = self.body[2]
-        self._path.move(
-            max(0.0, self.time - self._settle), -self._heading_gain * heading * self.period
-        )
+        path, swung = self._path, self._path.swings
+        path.move(max(0.0, self.time - self._settle), -self._heading_gain * heading * self.period)
+        for index, (before, now) in enumerate(zip(swung, path.swings, strict=True)):
+            if now and not before:
+                self._cleared[index] = False
+            elif before and not now and not self._cleared[index]:
+                self._end(f'leg {index + 1} does not clear the ground in its swing')
         targets: list[float] = []
         try:
             for leg, (x, y, height) in zip(self._geometry, self._path.feet, strict=True):
@@ -508,14 +515,17 @@ class FullHexapod:
 
     def _approach(self, index: int, x: float, y: float, z: float, pressure: float) -> None:
         """Prepare the ground below a foot that carries nothing yet."""
-        ground = 0.0
+        ground, clear = 0.0, CLEAR
         if self._floor.heights is not None:
+            clear = _SHALLOW
             block = self.data.mocap_pos[index]
             ground = float(block[2])
             if z > ground + _SHALLOW:
                 block[2] = self._floor.height(x, y)
         if z > ground + CLEAR:
             self._films[index].touch_down(self._floor.depth(x, y))
+        if z > ground + clear:
+            self._cleared[index] = True
         self._write_friction(index, LIGHT, pressure, 0.0)
 
     def _judge(self) -> None:

@@ -61,7 +61,7 @@ class PlanarHexapod:
 
     Raises
     ------
-    ImportError
+    ConfigError
         To compile without numba.
     InvalidInput
         When the period is not above zero.

@@ -101,8 +101,11 @@ class ClosedLoop:
         )
         self._now = 0.0
         self.regulators = [simulated_regulator(scene, leg, self._clock) for leg in scene.legs]
-        for regulator in self.regulators:
-            regulator.open()
+        for leg, regulator in zip(scene.legs, self.regulators, strict=True):
+            try:
+                regulator.open()
+            except TransportError as error:
+                raise TransportError(f'scene {scene.name!r}, leg {leg}: {error}') from error
         self.pressures = [0.0] * len(scene.legs)  # as reported last
         self.pads = [0.0] * len(scene.legs)  # as they are
         self._commanded = [0] * len(scene.legs)  # when each last took a command, ns

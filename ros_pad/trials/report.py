@@ -215,7 +215,8 @@ def _draw_ground(ax: Axes, view: _View, left: float, right: float) -> None:
     floor = view.trial.floor
     if floor is None:
         return
-    cell = min(0.01, floor.cell)
+    # A walk that got lost may have ended anywhere.
+    cell = max(min(0.01, floor.cell), (right - left) / 4000.0, (top - bottom) / 4000.0)
     x = np.arange(left, right, cell) + 0.5 * cell
     y = np.arange(bottom, top, cell) + 0.5 * cell
     wet = floor.wet_along(*np.meshgrid(x, y))

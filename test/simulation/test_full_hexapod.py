@@ -512,3 +512,23 @@ def test_bad_pressures(pressures):
     with pytest.raises(InvalidInput, match='six finite numbers'):
         robot.step(pressures)
     assert robot.time == 0.0
+
+
+@pytest.mark.parametrize(('lift', 'unevenness', 'clears'), [
+    (0.03, 0.0, True), (0.03, 5e-4, True), (0.006, 0.0, True),
+    (0.003, 0.0, False), (0.006, 5e-4, False), (0.015, 5e-3, False),
+])  # fmt: skip
+def test_a_foot_that_does_not_clear_the_ground_ends_the_walk(lift, unevenness, clears):
+    """It would stand on the film and the height of its last step."""
+    scene = Scene.load('hexapod_rough_wet_flat')
+    scene = dataclasses.replace(
+        scene,
+        cycles=3,
+        gait=dataclasses.replace(scene.gait, lift=lift),
+        floor=dataclasses.replace(scene.floor, unevenness=unevenness),
+    )
+    robot = FullHexapod(scene, scene.floor.build(0), 0.004)
+    while robot.verdict is None and robot.time < scene.duration:
+        robot.step([0.0] * 6)
+    assert (robot.verdict is None) == clears
+    assert clears or 'does not clear the ground in its swing' in robot.verdict

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from ros_pad.contact import Foot
 from ros_pad.contact.film import Film
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from ros_pad.simulation import compiled
@@ -246,7 +247,7 @@ def test_walk_is_as_many_steps(fast):
 
 def test_without_numba_an_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'numba', None)
-    with pytest.raises(ImportError, match=r'pip install ros_pad\[fast\]'):
+    with pytest.raises(ConfigError, match=r'pip install "ros_pad\[fast\]"'):
         compiled._dispatcher.__wrapped__()
 
 

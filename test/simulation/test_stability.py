@@ -395,7 +395,7 @@ def test_chart_without_mujoco(monkeypatch, tmp_path):
         stability.FALLING.name,
     }
     text = stability.table(outcomes)
-    assert 'creep in MuJoCo: not measured, pip install ros_pad[mujoco]' in text
+    assert 'creep in MuJoCo: not measured, pip install "ros_pad[mujoco]"' in text
     picture = stability.figures(outcomes)['stability']
     picture.savefig(tmp_path / 'stability.png')
     assert (tmp_path / 'stability.png').stat().st_size > 20_000
