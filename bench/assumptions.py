@@ -177,6 +177,7 @@ ASSUMPTIONS = (
     Assumption(TUNING + 'patch_length', 'tuning.patch_length', 'patch length believed', 'm'),
     Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
     Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
+    Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
     Assumption(FILTER + 'FrictionPrior.spread', 'prior.spread', 'spread of friction', ''),
     Assumption(FILTER + 'GroundFilter.forgetting_time',
                'ground.forgetting_time', 'forgetting time', 's'),
@@ -275,6 +276,8 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
             FrictionPrior.of(told.foot, load, **setup.prior),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
+            rim_speed=tuning.rim_speed(told.foot),
+            model_error=tuning.ratio_noise,
             **setup.ground,
         )
     choose = policy_named(policy, loop.floor.wet)

@@ -90,6 +90,10 @@ class Tuning:
         number('speed_noise', self.speed_noise, 'm/s', above=True)
         number('turning_rate', self.turning_rate, 'rad/s')
 
+    def rim_speed(self, foot: Foot) -> float:
+        """Return how fast the sole of a turning foot scrubs, m/s: at 2/3 of its radius."""
+        return 2.0 / 3.0 * foot.sole_radius * self.turning_rate
+
 
 class Estimate(NamedTuple):
     """What is known of a foot after a sample.
@@ -165,7 +169,7 @@ class FootEstimator:
             FrictionPrior.of(foot, expected_load),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
-            rim_speed=2.0 / 3.0 * foot.sole_radius * tuning.turning_rate,
+            rim_speed=tuning.rim_speed(foot),
             model_error=tuning.ratio_noise,
         )
         self._time = -math.inf

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import struct
 import sys
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
@@ -96,17 +96,21 @@ class ControllerNode(Node):
             self._serve(leg)
 
     def _serve(self, leg: int) -> None:
-        # Wrenches and positions come at the rate of the sensors, and only the last one counts
-        # when an estimate comes: they are kept as they travelled, and read then.
-        wrench = position = b''
+        # Wrenches and positions come at the rate of the sensors. Of positions only the last one
+        # counts when an estimate comes: it is kept as it travelled, and read then. Of loads the
+        # heaviest since the last estimate counts: feet that bounce have not stepped.
+        position = b''
+        load, heaviest = math.nan, -math.inf
         shape = ''
         setpoints: Publisher = topics.PRESSURE_SETPOINT.publisher(self, leg)
         shapes: Publisher = topics.MORPHOLOGY.publisher(self, leg)
         frame = f'leg_{leg}_pad'
 
         def on_wrench(data: bytes) -> None:
-            nonlocal wrench
-            wrench = data
+            nonlocal load, heaviest
+            load = normal_force(data)
+            if load > heaviest:
+                heaviest = load
             self.wrenches += 1
 
         def on_position(data: bytes) -> None:
@@ -114,16 +118,17 @@ class ControllerNode(Node):
             position = data
 
         def on_wetness(message: Float64) -> None:
-            nonlocal shape
-            if not wrench or not position:
+            nonlocal shape, heaviest
+            if not position:
                 return
-            load = deserialize_message(wrench, WrenchStamped).wrench.force.z
             point = deserialize_message(position, PointStamped).point
             if not math.isfinite(load + message.data + point.x + point.y):
                 # A load that is no number is no lift-off. No set-point follows from it either:
                 # if it stays so, the regulators vent.
                 return
-            gauge = self.controller.update(leg, load, message.data, (point.x, point.y))
+            weight = max(heaviest, load)  # the load where no wrench came since
+            heaviest = -math.inf
+            gauge = self.controller.update(leg, weight, message.data, (point.x, point.y))
             if leg in self.controller.refusals:
                 self.get_logger().warning(
                     f'leg {leg} stays flat: {self.controller.refusals[leg]}',
@@ -140,6 +145,19 @@ class ControllerNode(Node):
         topics.WRENCH.subscription(self, on_wrench, leg, raw=True)
         topics.POSITION.subscription(self, on_position, leg, raw=True)
         topics.WETNESS.subscription(self, on_wetness, leg)
+
+
+def normal_force(data: bytes) -> float:
+    """Return force.z, N, of a WrenchStamped as it travels: twenty times as fast as reading all.
+
+    CDR: four bytes of encapsulation, a stamp of eight, the frame's length and text, and then,
+    aligned to eight, six doubles.
+    """
+    order = '<' if data[1] & 1 else '>'
+    (length,) = struct.unpack_from(order + 'I', data, 12)
+    force: float
+    (force,) = struct.unpack_from(order + 'd', data, 4 + (12 + length + 7) // 8 * 8 + 16)
+    return force
 
 
 def main(args: list[str] | None = None) -> int:

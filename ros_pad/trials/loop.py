@@ -7,6 +7,7 @@ here once, in :meth:`ClosedLoop.tick`.
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -111,6 +112,8 @@ class ClosedLoop:
         self._commanded = [0] * len(scene.legs)  # when each last took a command, ns
         self._unheard: set[int] = set()  # whose last command was not taken
         self._legs = scene.legs
+        # Since the last control step: feet that bounce as the other tripod lands have not stepped.
+        self._heaviest = [-math.inf] * len(scene.legs)
         self._pace = Pace(CONTROL_PERIOD_NS)
         self._stamp_ns = 0
 
@@ -131,9 +134,10 @@ class ClosedLoop:
         readings = self.sensors.read(self.robot)
         controller = self.controller
         due = self._pace.due(self._stamp_ns)
-        estimates = []
+        estimates, heaviest = [], self._heaviest
         for index in range(len(self._legs)):
             force, position = readings[index]
+            heaviest[index] = max(heaviest[index], force[2])
             estimates.append(
                 self.estimators[index].update(now, force, position, self.pressures[index])
             )
@@ -144,12 +148,12 @@ class ClosedLoop:
                     self.pressures[index] = regulator.read().pressure
             self.pads = [regulator.pad_pressure for regulator in self.regulators]
             for index, leg in enumerate(self._legs):
-                force, position = readings[index]
                 setpoint = controller.update(
-                    leg, force[2], estimates[index].wet_probability, position
+                    leg, heaviest[index], estimates[index].wet_probability, readings[index][1]
                 )
                 self._command(index, setpoint)
             log.control(now, self.pressures, estimates, controller)
+            self._heaviest = [-math.inf] * len(heaviest)
 
     def _command(self, index: int, setpoint: float) -> None:
         try:

@@ -5,12 +5,17 @@ from itertools import pairwise
 import pytest
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
+from ros_pad.nodes.controller import normal_force
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 
@@ -213,3 +218,25 @@ def test_what_is_no_number_moves_no_foot(robot, case):
     assert robot.estimate(0.98).fluid_pressure == before
     assert robot.controller.controller.switches == switches
     assert robot.shapes[1] == ['flat']
+
+
+@settings(deadline=None)
+@given(st.text(max_size=20).filter(lambda text: '\0' not in text), st.floats(-1e3, 1e3))
+def test_the_normal_force_is_read_from_a_message_as_it_travels(frame, load):
+    message = WrenchStamped()
+    message.header.frame_id = frame
+    message.header.stamp.sec, message.header.stamp.nanosec = 7, 9
+    message.wrench.force.x, message.wrench.force.y = 1.0, 2.0
+    message.wrench.force.z, message.wrench.torque.x = load, 3.0
+    assert normal_force(serialize_message(message)) == load
+
+
+def test_a_foot_that_bounces_has_not_stepped(robot):
+    """Without load when an estimate comes, but loaded since the one before."""
+    robot.start(policy='adaptive')
+    for _ in range(10):
+        robot.sense(LOAD)
+        robot.sense(0.0)
+        assert robot.estimate(0.98).fluid_pressure == AMBIENT
+    shapes = [robot.step(0.98) for _ in range(4)]
+    assert shapes[-1] > 30e3

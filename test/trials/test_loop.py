@@ -218,7 +218,7 @@ def test_on_wet_ground_adapting_costs_the_first_steps_and_the_probes():
 
 def test_the_information_trap_on_patches():
     """Without probes wet patches make domes of all feet, and then no foot ever learns of dry."""
-    seed = 1
+    seed = 0
     # A load that domes on dry ground do not pull without slip.
     tow = dataclasses.replace(PATCHES.tow, weight=12.0, distance=0.4)
     scene = dataclasses.replace(short(40), tow=tow)
