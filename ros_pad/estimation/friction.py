@@ -36,6 +36,10 @@ It starts at zero, so that the noise of a foot at rest does not add up to slow s
 # The half-normal distribution in eight shares, finer in its tail, each by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+MODEL_SHARE = 0.05
+"""Share of friction by which what a slip shows is off, on the average over a walk: windows hold
+some stick, and feet turn more or less than is believed."""
+
 _UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
 
@@ -101,8 +105,8 @@ class GroundFilter:
         its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
         and Cutkosky 1996); nobody measures s.
     model_error : float
-        Standard deviation of what T/N shows of friction, > 0. It is the same in every sample: no
-        number of them averages it out.
+        Standard deviation of what T/N shows of friction, > 0, besides :data:`MODEL_SHARE` of it.
+        It is the same in every sample: no number of them averages it out.
     """
 
     def __init__(
@@ -121,7 +125,8 @@ class GroundFilter:
         self._forgetting_time = forgetting_time
         self._temper = temper
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / model_error) ** 2)
+        error = np.hypot(model_error, MODEL_SHARE * GRID)
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2)
         self._blur = blur / blur.sum(axis=0)
         self._dome = False
         self._settle(self._grounds * self._tables[False])

@@ -19,6 +19,12 @@ DT = 0.04
 EXACT = 1e-3  # a model error that is none on a grid of 0.02
 
 
+@pytest.fixture
+def exact(monkeypatch):
+    """No error of the model: beliefs are what Bayes' rule makes of the samples."""
+    monkeypatch.setattr('ros_pad.estimation.friction.MODEL_SHARE', 0.0)
+
+
 def flat(**options):
     ground = GroundFilter(PRIOR, **options)
     ground.touch_down(0.0, dome=False)
@@ -58,7 +64,7 @@ def test_prior_tables_are_probabilities_with_heavy_tails():
     assert np.array_equal(on_dry, on_wet)
 
 
-def test_nothing_felt_is_the_prior():
+def test_nothing_felt_is_the_prior(exact):
     ground = GroundFilter(PRIOR, wet_prior=0.3, model_error=EXACT)
     dry, wet = PRIOR.table(dome=False)
     marginal = 0.7 * dry + 0.3 * wet
@@ -70,7 +76,7 @@ def test_nothing_felt_is_the_prior():
 
 
 @pytest.mark.parametrize('ratio', [0.1, 0.3, 0.6])
-def test_stick_excludes_friction_below_and_says_nothing_else(ratio):
+def test_stick_excludes_friction_below_and_says_nothing_else(ratio, exact):
     """Censored: the prior cut off by Φ((μ - ρ)/σ) and normalised, by SciPy's normal."""
     ground = stick(flat(wet_prior=0.4, temper=1.0, model_error=EXACT), ratio, noise=0.02)
     dry, wet = PRIOR.table(dome=False)
@@ -203,7 +209,7 @@ def test_fading_over_many_steps_ends_at_the_prior():
     assert ground.wet_probability == pytest.approx(0.3, abs=1e-3)
 
 
-def test_friction_of_one_shape_says_nothing_of_the_other():
+def test_friction_of_one_shape_says_nothing_of_the_other(exact):
     ground = slip(flat(model_error=EXACT), 0.12)
     ground.touch_down(0.0, dome=True)
     table = PRIOR.table(dome=True)[0]
@@ -247,13 +253,21 @@ def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
     assert ground.friction[0] == pytest.approx(0.12, abs=0.03)
 
 
-def test_no_number_of_samples_averages_the_model_error_out():
+def test_no_number_of_samples_averages_the_model_error_out(monkeypatch):
     """Variances add up; what is surely known lies 1.64 errors below the mean."""
-    exact, blurred = (slip(flat(model_error=e), 0.5, 200) for e in (EXACT, 0.06))
-    assert blurred.friction[0] == pytest.approx(exact.friction[0], abs=1e-3)
-    assert blurred.friction[1] == pytest.approx(math.hypot(exact.friction[1], 0.06), rel=0.01)
-    sd = blurred.friction[1]
-    assert blurred.quantile(0.05) == pytest.approx(blurred.friction[0] - 1.64 * sd, abs=0.02)
+    before = {}
+    for share in (0.0, 0.05):
+        monkeypatch.setattr('ros_pad.estimation.friction.MODEL_SHARE', share)
+        for error in (EXACT, 0.06):
+            before[share, error] = slip(flat(model_error=error), 0.5, 200)
+    exact = before[0.0, EXACT].friction
+    for (share, error), ground in before.items():
+        mean, sd = ground.friction
+        assert mean == pytest.approx(exact[0], abs=2e-3)
+        expected = math.hypot(exact[1], share * exact[0], error if error > EXACT else 0.0)
+        assert sd == pytest.approx(expected, rel=0.02)
+        if error > EXACT:  # else the belief is as narrow as the grid
+            assert ground.quantile(0.05) == pytest.approx(mean - 1.64 * sd, abs=0.02)
 
 
 @pytest.mark.parametrize('rim_speed', [0.02, 0.05])

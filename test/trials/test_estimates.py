@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What estimators are worth on walks with full dynamics, where feet scuff, fight and turn."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.log import TrialLog
+from ros_pad.trials.loop import ClosedLoop
+
+PERIOD = 0.004  # s
+LATE = 15  # samples after the end of a slip in which an alarm still tells of it
+SLIP = 3e-3  # m of the contact that must be told of
+STILL = 5e-4  # m of the contact that are none
+LOOK_BACK = 75  # samples
+
+WALKS = [(policy, seed) for policy in ('flat', 'adaptive') for seed in (10, 11, 12)]
+
+
+def walked(policy, seed, cycles=12):
+    """Return arrays (samples, feet): the truth, and what the estimators made of it."""
+    scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
+    loop = ClosedLoop(scene, policy, seed, 'L2')
+    log = TrialLog(scene, policy, seed, 'L2')
+    rows = []
+    for _ in range(round(scene.duration / PERIOD)):
+        loop.tick(log)
+        row = []
+        for foot, estimator in zip(loop.robot.feet, loop.estimators, strict=True):
+            told, load = estimator.estimate, foot.force[2]
+            ratio = math.hypot(*foot.force[:2]) / load if load > 0.0 else 0.0
+            row.append((
+                load, foot.grip / load if load > 0.0 else math.nan, foot.slip_speed, foot.wet,
+                told.standing, told.fresh, told.slipping, told.wet_probability,
+                told.friction_mean, told.friction_sd, told.margin + ratio,
+            ))  # fmt: skip
+        row.append((*loop.pressures, *[0.0] * 5))
+        rows.append(row)
+    assert loop.robot.verdict is None
+    feet = np.array(rows, dtype=float)[round(scene.settle / PERIOD) :]
+    names = ('load', 'grip', 'speed', 'wet', 'standing', 'fresh', 'alarm', 'wetness', 'mean', 'sd',
+             'quantile')  # fmt: skip
+    series = {name: feet[:, :6, column] for column, name in enumerate(names)}
+    return series | {'pressure': feet[:, 6, :6]}
+
+
+@pytest.fixture(scope='module')
+def walks():
+    return [walked(*walk) for walk in WALKS]
+
+
+def stretches(true):
+    """Return (first, last) of each run of True, gaps of up to five samples bridged."""
+    places = np.flatnonzero(true)
+    if not len(places):
+        return []
+    breaks = np.flatnonzero(np.diff(places) > 6)
+    return list(zip(places[[0, *breaks + 1]], places[[*breaks, -1]], strict=True))
+
+
+def test_slips_of_3_mm_are_heard_and_sticks_are_not(walks):
+    slips = missed = false = 0
+    stuck = 0.0
+    for walk in walks:
+        for foot in range(6):
+            loaded = walk['load'][:, foot] > 0.15 * 6.83
+            speed = np.where(loaded, walk['speed'][:, foot], 0.0)
+            alarm = walk['alarm'][:, foot] > 0.0
+            moving = np.zeros(len(speed), dtype=bool)
+            for first, last in stretches(speed > 5e-3):
+                moving[first : last + 1] = True
+                if speed[first : last + 1].sum() * PERIOD > SLIP:
+                    slips += 1
+                    missed += not alarm[first : last + 1 + LATE].any()
+            stuck += (loaded & ~moving).sum() * PERIOD / 60.0
+            way = np.concatenate([[0.0], np.cumsum(walk['speed'][:, foot])]) * PERIOD
+            for raised in np.flatnonzero(alarm[1:] & ~alarm[:-1]) + 1:
+                slid = way[min(raised + LATE, len(speed))] - way[max(raised - LOOK_BACK, 0)]
+                false += slid < STILL
+    assert slips > 500 and stuck > 1.5
+    assert missed <= 0.01 * slips
+    assert false <= stuck  # one a minute
+
+
+def test_wet_and_dry_are_told_apart_at_the_end_of_a_flat_stance(walks):
+    right = []
+    for walk in walks:
+        for foot in range(6):
+            standing = walk['standing'][:, foot] > 0.0
+            for first, last in stretches(standing):
+                middle = (first + last) // 2
+                # Touching the floor is no stance, and a foot that is cut off has not ended one.
+                if last - first < 25 or last + 1 == len(standing):
+                    continue
+                if walk['pressure'][middle, foot] < 30e3:
+                    wet = walk['wet'][middle, foot] > 0.0
+                    right.append((walk['wetness'][last, foot] > 0.5) == wet)
+    assert len(right) > 300
+    assert np.mean(right) >= 0.97
+
+
+def test_the_true_friction_is_within_two_sigma_nine_times_in_ten(walks):
+    """And no more than 99 times in a hundred: who is never wrong claims too little."""
+    covered, below, spread = [], [], []
+    for walk in walks:
+        use = (walk['fresh'] > 0.0) & (walk['standing'] > 0.0) & np.isfinite(walk['grip'])
+        covered.append(np.abs(walk['grip'] - walk['mean'])[use] <= 2.0 * walk['sd'][use])
+        below.append((walk['grip'] < walk['quantile'])[use])
+        spread.append(walk['sd'][use])
+    covered, below, spread = map(np.concatenate, (covered, below, spread))
+    assert len(covered) > 5000
+    assert 0.90 <= np.mean(covered) <= 0.99
+    assert all(np.mean(part) > 0.85 for part in np.array_split(covered, len(WALKS)))
+    assert np.mean(below) < 0.05
+    assert np.mean(spread) < 0.1
