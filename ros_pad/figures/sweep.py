@@ -103,25 +103,28 @@ def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]
     ends = min(place.values()), max(place.values())
     reach = (ends[1] - ends[0]) or 1.0
     for number, policy in enumerate(policies):
-        colour, mark = LOOKS[policy]
+        colour = LOOKS[policy][0]
         # Side by side, so that no interval hides another.
-        aside = 0.012 * reach * (number - 0.5 * (len(policies) - 1))
+        aside = (0.06 if words else 0.012) * reach * (number - 0.5 * (len(policies) - 1))
         own = [
             each for each in points if each.labels['policy'] == policy and each.mean is not None
         ]
-        for point in own:
-            if point.labels[axis] is None:
-                _band(axes, point, colour)
+        # A policy that the axis means nothing to: a level line, with its interval at the end.
+        level = [each for each in own if each.labels[axis] is None]
+        for point in level:
+            axes.axhline(1e3 * point.mean, color=colour, lw=1.4)
+            _mark(axes, ends[1] + 0.08 * reach + aside, point, policy)
         own = [each for each in own if each.labels[axis] is not None]
         own.sort(key=lambda point: place[point.labels[axis]])
         x = [place[point.labels[axis]] + aside for point in own]
         axes.plot(x, [1e3 * each.mean for each in own], color=colour, lw=0 if words else 1.4)
         for at, point in zip(x, own, strict=True):
-            if point.low is not None:
-                axes.plot([at, at], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
-            inside = 'white' if point.left_out else colour
-            axes.plot(at, 1e3 * point.mean, mark, color=colour, mfc=inside, ms=4.5)
-    axes.set_xlim(ends[0] - 0.06 * reach, ends[1] + 0.06 * reach)
+            _mark(axes, at, point, policy)
+    if all(point.mean is None for point in points):
+        axes.text(0.5, 0.5, 'no walk that counts', ha='center', transform=axes.transAxes)
+    axes.set_xlim(ends[0] - 0.06 * reach, ends[1] + 0.14 * reach)
+    if len(values) <= 5:
+        axes.set_xticks(list(place.values()))
     if words:
         axes.set_xlim(-0.5, len(values) - 0.5)
         axes.set_xticks(range(len(values)), [str(value) for value in values])
@@ -130,10 +133,12 @@ def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]
     axes.set_axisbelow(True)
 
 
-def _band(axes: Axes, point: Point, colour: str) -> None:
-    axes.axhline(1e3 * point.mean, color=colour, lw=1.4)
+def _mark(axes: Axes, x: float, point: Point, policy: str) -> None:
+    colour, mark = LOOKS[policy]
     if point.low is not None:
-        axes.axhspan(1e3 * point.low, 1e3 * point.high, color=colour, alpha=0.12, lw=0)
+        axes.plot([x, x], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
+    inside = 'white' if point.left_out else colour
+    axes.plot(x, 1e3 * point.mean, mark, color=colour, mfc=inside, ms=4.5)
 
 
 def _legend(figure: Figure, points: Sequence[Point]) -> None:
