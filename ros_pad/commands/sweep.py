@@ -238,12 +238,11 @@ def _notes(rows: list[sweeps.Row]) -> list[str]:
             f'{len(ended)} of {len(rows)} walks ended early and are in no mean;'
             f' the first: {ended[0]["verdict"]}'
         )
-    rungs = sorted({row['rung'] for row in rows})
     for scene in dict.fromkeys(row['scene'] for row in rows):
         own = sorted({row['rung'] for row in rows if row['scene'] == scene})
         if len(own) > 1:
             notes.append(
-                f'{scene} was walked on {" and ".join(own)}: --fidelity {rungs[-1]} keeps to one'
+                f'{scene} was walked on {" and ".join(own)}: --fidelity {own[-1]} keeps to one'
             )
     return notes
 
