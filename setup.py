@@ -63,13 +63,17 @@ setup(
         # The hexapod with joints (L2), and compiled loops of the planar one.
         'mujoco': ['mujoco>=3.2'],
         'fast': ['numba>=0.60'],
+        # Sweeps on a Dask cluster, and Parquet beside their CSV.
+        'sweep': ['distributed>=2024.1', 'pyarrow>=14'],
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
         'test': [
             'colcon-common-extensions',
+            'distributed>=2024.1',
             'hypothesis',
             'mujoco>=3.2',
             'mypy==2.4.*',
             'numba>=0.60',
+            'pyarrow>=14',
             'pytest>=7.4',
             'pytest-xdist',
             'rosbags',

@@ -19,6 +19,7 @@ from ros_pad.commands import design
 from ros_pad.commands import report
 from ros_pad.commands import run
 from ros_pad.commands import scenes
+from ros_pad.commands import sweep
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import complain
 from ros_pad.errors import ConfigError
@@ -29,6 +30,7 @@ from ros_pad.errors import PadError
 COMMANDS = (
     run,
     scenes,
+    sweep,
     report,
     bag,
     contact,

@@ -7,14 +7,20 @@ here once, in :meth:`ClosedLoop.tick`.
 
 from __future__ import annotations
 
+import difflib
+import inspect
 import math
 import os
 import time
 from collections.abc import Callable
+from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 from ros_pad.control import MorphologyController
+from ros_pad.control import adaptive
 from ros_pad.control import policy_named
+from ros_pad.control.morphology import Policy
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
 from ros_pad.estimation import FootEstimator
@@ -26,12 +32,16 @@ from ros_pad.simulation import fidelity as ladder
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.trial import Trial
 
 CONTROL_PERIOD_NS = 20_000_000  # 50 Hz: what a regulator on a serial line manages
 
 COMMAND_TIMEOUT_NS = 500_000_000  # without a command for so long, the regulator node vents a pad
+
+POLICY_PARAMETERS = tuple(inspect.signature(adaptive).parameters)
+"""Names of the parameters of the adaptive policy."""
 
 Progress = Callable[[float], None]
 
@@ -44,6 +54,43 @@ def sample_period_ns(scene: Scene) -> int:
 def tuning_for(scene: Scene) -> Tuning:
     """Return what an estimator is told of a scene: its sensors, not its ground."""
     return Tuning(position_noise=scene.sensors.position, force_noise=scene.sensors.force)
+
+
+def adaptive_with(parameters: Mapping[str, Any]) -> Policy:
+    """Return the adaptive policy with parameters by name, see :func:`ros_pad.control.adaptive`.
+
+    Raises
+    ------
+    InvalidInput
+        For a parameter that it has not, or that is outside its range.
+    """
+    for name in parameters:
+        if name not in POLICY_PARAMETERS:
+            near = difflib.get_close_matches(name, POLICY_PARAMETERS, n=1)
+            hint = f' Did you mean {near[0]!r}?' if near else ''
+            raise InvalidInput(
+                f'the adaptive policy has no parameter {name!r}.{hint}'
+                f' Allowed: {", ".join(POLICY_PARAMETERS)}'
+            )
+    return adaptive(**parameters)
+
+
+def policy_for(policy: str, floor: Floor, parameters: Mapping[str, Any] | None = None) -> Policy:
+    """Return a policy on a floor, which an oracle sees; parameters are for ``adaptive`` alone.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown policy, or a parameter that is unknown or outside its range.
+    """
+    if not parameters:
+        return policy_named(policy, floor.wet)
+    if policy != 'adaptive':
+        raise InvalidInput(
+            f'policy = {policy!r} has no parameters, and {", ".join(parameters)} was given:'
+            ' only adaptive has'
+        )
+    return adaptive_with(parameters)
 
 
 def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:
@@ -74,28 +121,40 @@ class ClosedLoop:
         Of floor and noise, 0 or more.
     fidelity : str
         ``auto`` or a rung of the ladder.
+    tuning : Tuning or None
+        Of the estimators; None is :func:`tuning_for` the scene.
+    policy_parameters : mapping or None
+        See :func:`policy_for`.
 
     Raises
     ------
     InvalidInput
-        For an unknown policy, or a seed that is no whole number from 0.
+        For an unknown policy or parameter, or a seed that is no whole number from 0.
     """
 
-    def __init__(self, scene: Scene, policy: str, seed: int, fidelity: str = 'auto') -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        policy: str,
+        seed: int,
+        fidelity: str = 'auto',
+        tuning: Tuning | None = None,
+        policy_parameters: Mapping[str, Any] | None = None,
+    ) -> None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
         self.period_ns = sample_period_ns(scene)
         self.floor = scene.floor.build(seed)
         self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
         self.sensors = Sensors(scene.sensors, len(scene.legs), seed)
-        tuning = tuning_for(scene)
+        tuning = tuning or tuning_for(scene)
         self.estimators = [
             FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs
         ]
         self.controller = MorphologyController(
             scene.foot,
             scene.legs,
-            policy_named(policy, self.floor.wet),
+            policy_for(policy, self.floor, policy_parameters),
             scene.expected_load,
             start='dome' if policy == 'dome' else 'flat',
             fixed_pressure=scene.dome_pressure,
@@ -186,6 +245,8 @@ def run(
     seed: int = 0,
     fidelity: str = 'auto',
     progress: Progress | None = None,
+    tuning: Tuning | None = None,
+    policy_parameters: Mapping[str, Any] | None = None,
 ) -> Trial:
     """Run a trial without ROS.
 
@@ -201,6 +262,10 @@ def run(
         ``auto`` or a rung of the ladder.
     progress : callable or None
         Called now and then with the simulated time, s.
+    tuning : Tuning or None
+        Of the estimators; None is :func:`tuning_for` the scene, what they are told of its sensors.
+    policy_parameters : mapping or None
+        Parameters of :func:`ros_pad.control.adaptive`, by name.
 
     Returns
     -------
@@ -216,7 +281,7 @@ def run(
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
     rung = ladder.rung(scene, fidelity, policy)
-    loop = ClosedLoop(scene, policy, seed, rung)
+    loop = ClosedLoop(scene, policy, seed, rung, tuning, policy_parameters)
     log = TrialLog(scene, policy, seed, rung)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns

@@ -14,6 +14,7 @@ from ros_pad.trials import loop as loop_module
 from ros_pad.trials import run
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.loop import tuning_for
 
 PATCHES = Scene.load('hexapod_patches')
 SERIES = (
@@ -125,6 +126,37 @@ def test_a_seed_is_a_whole_number(seed):
 def test_without_a_policy_the_scene_has_its_own():
     scene = dataclasses.replace(short(1), policy='dome')
     assert run(scene).policy == 'dome'
+
+
+def test_estimators_can_be_tuned():
+    scene = short(3)
+    plain, told = (run(scene, 'flat', tuning=each) for each in (None, tuning_for(scene)))
+    assert np.array_equal(plain.wet_probability, told.wet_probability)
+    sure = run(scene, 'flat', tuning=dataclasses.replace(tuning_for(scene), wet_prior=0.9))
+    # Before the first step nothing but the prior is known.
+    assert plain.wet_probability[0] == pytest.approx(0.5, abs=0.02)
+    assert sure.wet_probability[0] == pytest.approx(0.9, abs=0.02)
+    assert np.array_equal(plain.force, sure.force)  # a fixed shape does not listen
+
+
+def test_policies_take_their_parameters():
+    scene = short(6, 'wet')
+    shy = run(scene, 'adaptive', policy_parameters={'wet_above': 1.0})
+    assert sum(shy.metrics.switches) == 0  # no ground is more than surely wet
+    assert sum(run(scene, 'adaptive').metrics.switches) > 0
+
+
+@pytest.mark.parametrize(
+    ('policy', 'parameters', 'message'),
+    [
+        ('adaptive', {'wet_abov': 0.5}, "no parameter 'wet_abov'. Did you mean 'wet_above'"),
+        ('adaptive', {'wet_above': 1.5}, 'wet_above = 1.5 .* to 1'),
+        ('flat', {'wet_above': 0.5}, "policy = 'flat' has no parameters, and wet_above"),
+    ],
+)
+def test_parameters_that_a_policy_has_not_are_refused(policy, parameters, message):
+    with pytest.raises(InvalidInput, match=message):
+        run(short(1), policy, policy_parameters=parameters)
 
 
 @pytest.fixture

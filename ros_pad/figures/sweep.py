@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figure of a sweep: distance a cycle over the first parameter, a line a policy."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Mapping
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ros_pad.errors import InvalidInput
+from ros_pad.figures.design import _STYLE
+from ros_pad.trials.report import BLACK
+from ros_pad.trials.report import BLUE
+from ros_pad.trials.report import GREEN
+from ros_pad.trials.report import PALE
+from ros_pad.trials.report import VERMILION
+from ros_pad.trials.sweep import Point
+from ros_pad.trials.sweep import Sweep
+
+LOOKS = {
+    'adaptive': (GREEN, 'o'),
+    'flat': (VERMILION, 's'),
+    'dome': (BLUE, '^'),
+    'oracle': (BLACK, 'D'),
+}
+PANELS = 48
+
+
+def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) -> None:
+    """Draw the means of a sweep with their 95 % intervals over seeds.
+
+    The first parameter that has several values is the axis, the second gives columns, and scenes
+    and all other parameters rows.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .png, .svg or .pdf. An existing file is replaced.
+    points : sequence of Point
+        Of :func:`ros_pad.trials.sweep.points`.
+    sweep : Sweep
+        Whose they are.
+
+    Raises
+    ------
+    InvalidInput
+        For another ending, or for more panels than 48.
+    """
+    text = os.fspath(path)
+    if not text.endswith(('.png', '.svg', '.pdf')):
+        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    several = {name: list(each) for name, each in sweep.parameters.items() if len(each) > 1}
+    scenes = {'scene': list(sweep.scenes)}
+    # Without a parameter, scenes are what is compared.
+    axis, *others = several or scenes
+    across = others[:1]
+    down = [*(['scene'] if axis != 'scene' and len(sweep.scenes) > 1 else []), *others[1:]]
+    values = several | scenes
+    columns = _combinations(values, across)
+    rows = _combinations(values, down)
+    if len(rows) * len(columns) > PANELS:
+        raise InvalidInput(
+            f'{len(rows) * len(columns)} panels are more than {PANELS}: draw trials.csv yourself'
+        )
+    with matplotlib.rc_context(_STYLE):
+        size = (1.3 + 2.6 * max(len(columns), 1.6), 0.9 + 2.1 * len(rows))
+        figure = Figure(figsize=size, layout='constrained')
+        grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+        for axes_row, row in zip(grid, rows, strict=True):
+            for axes, column in zip(axes_row, columns, strict=True):
+                wanted = row | column
+                own = [each for each in points if _belongs(each, wanted)]
+                _panel(axes, own, axis, values[axis])
+                axes.set_title('\n'.join(f'{name} = {_text(v)}' for name, v in wanted.items()))
+        for axes in grid[-1]:
+            axes.set_xlabel(axis)
+        figure.supylabel('distance a cycle, mm', fontsize=9)
+        _legend(figure, points)
+        figure.savefig(text, dpi=150)
+
+
+def _combinations(values: Mapping[str, list[Any]], names: Sequence[str]) -> list[dict[str, Any]]:
+    chosen = itertools.product(*(values[name] for name in names))
+    return [dict(zip(names, each, strict=True)) for each in chosen]
+
+
+def _belongs(point: Point, wanted: Mapping[str, Any]) -> bool:
+    # None: a policy without this parameter is the same whatever its value.
+    return all(point.labels[name] in (value, None) for name, value in wanted.items())
+
+
+def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]) -> None:
+    words = any(isinstance(value, str) for value in values)
+    place = {value: index if words else value for index, value in enumerate(values)}
+    policies = list(dict.fromkeys(point.labels['policy'] for point in points))
+    ends = min(place.values()), max(place.values())
+    reach = (ends[1] - ends[0]) or 1.0
+    for number, policy in enumerate(policies):
+        colour = LOOKS[policy][0]
+        # Side by side, so that no interval hides another.
+        aside = (0.06 if words else 0.012) * reach * (number - 0.5 * (len(policies) - 1))
+        own = [
+            each for each in points if each.labels['policy'] == policy and each.mean is not None
+        ]
+        # A policy that the axis means nothing to: a level line, with its interval at the end.
+        level = [each for each in own if each.labels[axis] is None]
+        for point in level:
+            axes.axhline(1e3 * point.mean, color=colour, lw=1.4)
+            _mark(axes, ends[1] + 0.08 * reach + aside, point, policy)
+        own = [each for each in own if each.labels[axis] is not None]
+        own.sort(key=lambda point: place[point.labels[axis]])
+        x = [place[point.labels[axis]] + aside for point in own]
+        axes.plot(x, [1e3 * each.mean for each in own], color=colour, lw=0 if words else 1.4)
+        for at, point in zip(x, own, strict=True):
+            _mark(axes, at, point, policy)
+    if all(point.mean is None for point in points):
+        axes.text(0.5, 0.5, 'no walk that counts', ha='center', transform=axes.transAxes)
+    axes.set_xlim(ends[0] - 0.06 * reach, ends[1] + 0.14 * reach)
+    if len(values) <= 5:
+        axes.set_xticks(list(place.values()))
+    if words:
+        axes.set_xlim(-0.5, len(values) - 0.5)
+        axes.set_xticks(range(len(values)), [str(value) for value in values])
+        axes.tick_params(axis='x', rotation=20 if len(values) > 1 else 0)
+    axes.grid(axis='y', color=PALE, alpha=0.3, lw=0.6)
+    axes.set_axisbelow(True)
+
+
+def _mark(axes: Axes, x: float, point: Point, policy: str) -> None:
+    colour, mark = LOOKS[policy]
+    if point.low is not None:
+        axes.plot([x, x], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
+    inside = 'white' if point.left_out else colour
+    axes.plot(x, 1e3 * point.mean, mark, color=colour, mfc=inside, ms=4.5)
+
+
+def _legend(figure: Figure, points: Sequence[Point]) -> None:
+    policies = dict.fromkeys(point.labels['policy'] for point in points)
+    lines = [
+        Line2D([], [], color=LOOKS[each][0], marker=LOOKS[each][1], ms=4.5, lw=1.4, label=each)
+        for each in policies
+    ]
+    seeds = sorted({point.walks + point.left_out for point in points})
+    said = f'mean and 95 % interval over {seeds[0]}{f" to {seeds[-1]}" if seeds[1:] else ""} seeds'
+    if any(point.left_out for point in points):
+        lines.append(
+            Line2D([], [], color=PALE, marker='o', mfc='white', lw=0, label='some walks left out')
+        )
+    figure.legend(
+        handles=lines, loc='outside upper left', ncols=len(lines), fontsize=8, title=said,
+        title_fontsize=8, alignment='left',
+    )  # fmt: skip
+
+
+def _text(value: object) -> str:
+    return f'{value:.4g}' if isinstance(value, float) else str(value)
