@@ -473,7 +473,7 @@ class Row:
         Whether this is the estimator as shipped, under ordinary conditions.
     delay, way : float or None
         Medians of time, s, and way slipped, m, before the alarm, over slips that did not begin in
-        one; None where more than half of these are missed.
+        one; None where more than half of these are missed, or of all began in one.
     misses : float or None
         Share of slips.
     already : float or None
@@ -523,11 +523,12 @@ class Row:
 def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Row:
     """Return the row that a tally makes."""
     minutes = tally.stick_time / 60.0
+    timed = 2 * len(tally.delays) >= tally.slips
     probabilities = np.array(tally.wet_ends, dtype=np.float64).reshape(-1, 2)
     wet, said = probabilities.T
     return Row(
-        delay=_median(tally.delays),
-        way=_median(tally.ways),
+        delay=_median(tally.delays) if timed else None,
+        way=_median(tally.ways) if timed else None,
         misses=tally.missed / tally.slips if tally.slips else None,
         already=1.0 - len(tally.delays) / tally.slips if tally.slips else None,
         slips=tally.slips,
@@ -1043,7 +1044,7 @@ _HEADINGS = (
     '2 sigma: dry', 'wet', 'dome',
 )  # fmt: skip
 _UNITS = ('ms', 'mm', '%', 'minute', 'us', '', 'right', '2 sigma', 'below 5 %', '', '', '')
-_WIDTHS = [max(8, len(a) + 2, len(b) + 2) for a, b in zip(_HEADINGS, _UNITS, strict=True)]
+_WIDTHS = [max(10, len(a) + 2, len(b) + 2) for a, b in zip(_HEADINGS, _UNITS, strict=True)]
 
 
 def table(rows: Sequence[Row]) -> str:
