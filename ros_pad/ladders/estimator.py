@@ -268,7 +268,7 @@ def _record_all(
 
     walks = [record(scene_of(name), policy, seed, rung) for name, policy, seed in plan]
     dry = scene_of('smooth_dry_flat')
-    return [*walks, record(dry, 'flat', SEEDS[0], 'L1'), pull(dry, 3.0 * cycles, SEEDS[0])]
+    return [*walks, record(dry, 'flat', SEEDS[0], 'L1'), pull(dry, 2.0 * cycles, SEEDS[0])]
 
 
 # --- what an estimator says ----------------------------------------------------------------------
@@ -423,8 +423,8 @@ def believe(tally: Tally, walk: Recording, said: Said) -> None:
     tip = 0.5 * walk.expected_load
     for leg in range(walk.load.shape[1]):
         load = walk.load[:, leg]
-        pressures = walk.pressure[:, leg].tolist()
-        domed = np.array([walk.foot.dome_load(2.0 * tip, p) > tip for p in pressures])
+        pressures, of = np.unique(walk.pressure[:, leg], return_inverse=True)
+        domed = np.array([walk.foot.dome_load(2.0 * tip, p) > tip for p in pressures.tolist()])[of]
         asked = said.standing[:, leg] & said.fresh[:, leg] & (load > 1e-6)
         asked[:settled] = False
         friction = walk.grip[:, leg] / np.maximum(load, 1e-6)

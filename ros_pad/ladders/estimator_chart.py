@@ -70,8 +70,17 @@ def draw_methods(rows: Sequence[Row]) -> Figure:
             ['0', '0.3', '1', '3', '10', '30', '100'],
         )
         _costs(d, rows)
-        text = 'No median where most slips are missed, or begin\nin an alarm, as with T/N.'
-        a.text(0.98, 0.97, text, transform=a.transAxes, ha='right', va='top', fontsize=8)
+        text = 'No median where most slips are missed,\nor begin in an alarm: T/N, most margins.'
+        a.text(
+            0.98,
+            0.97,
+            text,
+            transform=a.transAxes,
+            in_layout=False,
+            ha='right',
+            va='top',
+            fontsize=8,
+        )
         handles = [
             Line2D([], [], **{'lw': 1.2, 'ms': 5.0, **look}, label=_LABELS[name].format(variant))
             for (name, variant), look in _LOOKS.items()
@@ -92,6 +101,8 @@ def _against_false(
             and getattr(row, name) is not None
             and row.false_per_minute is not None
         ]
+        if not mine:
+            continue  # a line of no points would spoil the layout
         x = [row.false_per_minute or _NONE * _ASIDE[method, variant] for row in mine]
         y = [scale * getattr(row, name) for row in mine]
         style = {'lw': 1.2, 'ms': 5.0, 'clip_on': False, 'zorder': 3, **look}
@@ -138,7 +149,16 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
     across = panel.get_yaxis_transform()
     heads = {0.6: 'missed', 0.78: 'false a min.', 0.98: 'way, median'}
     for place, head in heads.items():
-        panel.text(place, -0.75, head, transform=across, ha='right', fontsize=8, color='#666666')
+        panel.text(
+            place,
+            -0.75,
+            head,
+            transform=across,
+            in_layout=False,
+            ha='right',
+            fontsize=8,
+            color='#666666',
+        )
     for place, row in enumerate(chosen):
         look = _LOOKS[row.name, row.variant]
         panel.plot(row.us_per_update, place, **{'ms': 7.0, **look, 'ls': ''})
@@ -149,7 +169,16 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
             '-' if row.way is None else f'{1e3 * row.way:.1f} mm',
         )
         for at, text in zip(heads, texts, strict=True):
-            panel.text(at, place, text, transform=across, ha='right', va='center', fontsize=8.5)
+            panel.text(
+                at,
+                place,
+                text,
+                transform=across,
+                in_layout=False,
+                ha='right',
+                va='center',
+                fontsize=8.5,
+            )
     panel.axvline(TARGETS['us_per_update'], ymax=0.92, **_TARGET)
     panel.set(
         xscale='log',
