@@ -73,7 +73,7 @@ def draw_methods(rows: Sequence[Row]) -> Figure:
         text = 'No median where most slips are missed,\nor begin in an alarm: T/N, most margins.'
         a.text(
             0.98,
-            0.97,
+            0.8,
             text,
             transform=a.transAxes,
             in_layout=False,
@@ -306,7 +306,13 @@ def _cell(
     values = _TICKS.get(name) or sorted({across * row.value for row in rows})
     panel.set_xticks(values, [f'{value:g}' for value in values])
     panel.tick_params(axis='x', labelsize=6.5, length=2.5)
-    panel.margins(x=0.12)
+    # The same in the whole column, also where a measure has no value.
+    ends = [across * row.value for row in rows]
+    if logarithmic:
+        panel.set_xlim(min(ends) / 1.3, 1.3 * max(ends))
+    else:
+        room = 0.12 * (max(ends) - min(ends)) or 1.0
+        panel.set_xlim(min(ends) - room, max(ends) + room)
     if what == 'false_per_minute':
         panel.set_yscale('symlog', linthresh=1.0)
         panel.set_yticks([0.0, 1.0, 10.0, 100.0], ['0', '1', '10', '100'])
