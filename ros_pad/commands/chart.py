@@ -13,15 +13,22 @@ from ros_pad.commands.command import add_command
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.ladders import contact
+from ros_pad.ladders import estimator
 from ros_pad.ladders import meniscus
 from ros_pad.ladders import stability
 from ros_pad.ladders import walk
 from ros_pad.ladders.ladder import machine
 from ros_pad.ladders.ladder import table
 
-LADDERS = {'contact': contact, 'meniscus': meniscus, 'stability': stability, 'walk': walk}
+LADDERS = {
+    'contact': contact,
+    'estimator': estimator,
+    'meniscus': meniscus,
+    'stability': stability,
+    'walk': walk,
+}
 # What is no ladder of time against one error has a table of its own.
-TABLES = {'stability': stability.table, 'walk': walk.table}
+TABLES = {'estimator': estimator.table, 'stability': stability.table, 'walk': walk.table}
 
 
 def add(commands: Commands) -> None:
@@ -36,8 +43,8 @@ def add(commands: Commands) -> None:
     part.add_argument(
         'ladder',
         choices=(*LADDERS, 'all'),
-        help='contact takes about 15 s, meniscus a minute and a half, stability 10 s,'
-        ' walk a minute',
+        help='contact takes about 15 s, estimator and meniscus a minute and a half each,'
+        ' stability 10 s, walk a minute',
     )
     part.add_argument(
         '--out',
