@@ -239,7 +239,8 @@ class FootEstimator:
             return self._swing(time)
         if load < self._gate:
             return self._swing(time)
-        self._height = z
+        if load >= AIRBORNE_LOAD * self._expected_load:  # else its sensor may only say so
+            self._height = z
         fx, fy, fz = fx - self._offset_x, fy - self._offset_y, fz - self._offset_z
         # The marker rides on a soft pad: take its shear off to see the contact itself.
         contact_x = x + fx / self._foot.shear_stiffness

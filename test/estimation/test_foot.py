@@ -214,6 +214,19 @@ def test_a_foot_in_the_air_tares_though_its_sensor_reads_more_than_the_gate():
     assert told.feel(125, (-0.12 * LOAD, 0.0, LOAD), 0.0, slip=0.05).friction_mean < 0.2
 
 
+@pytest.mark.parametrize('bias', [1.0, 2.0])
+def test_a_biased_sensor_does_not_make_a_foot_stand_all_the_way_up(bias):
+    """It rises slowly, reading more than the gate: the height of its stance stays where it was."""
+    foot = Offset((0.0, 0.0, bias), lift=0.03, swings=1)
+    foot.feel(50, (0.0, 0.0, LOAD), 0.0)
+    for step in range(100):
+        rising = foot.feel(1, (0.0, 0.0, 0.0), 0.0003 * step)
+    assert not rising.standing
+    foot.feel(100, (0.0, 0.0, 0.0), 0.03)
+    slid = foot.feel(125, (-0.12 * LOAD, 0.0, LOAD), 0.0, slip=0.05)
+    assert slid.friction_mean == pytest.approx(0.12, abs=0.03)
+
+
 def test_a_domed_foot_keeps_what_it_knew_but_for_fading():
     stance = Stance()
     before = wet_slip(stance).wet_probability
