@@ -6,6 +6,7 @@ import sys
 import mpmath as mp
 import numpy as np
 import pytest
+from hypothesis import assume
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -16,6 +17,8 @@ from ros_pad.contact import SMALL_PAD
 from ros_pad.contact import Pad
 from ros_pad.contact import inflate
 from ros_pad.contact import press
+from ros_pad.contact.membrane import LARGEST_PRESSURE
+from ros_pad.contact.membrane import LARGEST_SHARE
 from ros_pad.contact.membrane import press_membrane
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -236,6 +239,8 @@ class TestLimits:
     @given(states, st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
     def test_one_pad_is_every_pad(self, state, radius, stiffness):
         pressure, share = state
+        # At the bounds themselves the rounding of the scaled numbers decides.
+        assume(abs(pressure - LARGEST_PRESSURE) > 1e-9 and abs(share - LARGEST_SHARE) > 1e-9)
         force = math.pi * pressure * share
         one = press_membrane(UNIT, pressure, force)
         pad = Pad(radius, stiffness, adhesion_energy=1.0)  # which has no say
