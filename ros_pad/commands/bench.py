@@ -20,6 +20,7 @@ from ros_pad.figures import bench as bench_page
 from ros_pad.figures import thesis
 from ros_pad.simulation.bench import BenchScene
 from ros_pad.trials import bench
+from ros_pad.trials.report import PAPER_STYLE
 from ros_pad.trials.report import rendered
 from ros_pad.trials.report import save
 
@@ -88,7 +89,7 @@ def _write(
     """Write figures and page; return the page and the figures."""
     page = folder / 'report.html'
     files = []
-    with bar('drawing', 100.0, '%') as reach, matplotlib.rc_context(thesis.STYLE):
+    with bar('drawing', 100.0, '%') as reach, matplotlib.rc_context(PAPER_STYLE):
         drawn = thesis.draw(trial)
         for done, (name, each) in enumerate(drawn.items(), start=1):
             for kind in ('png', 'pdf'):

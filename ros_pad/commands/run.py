@@ -249,7 +249,7 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
     for row in rows:
         advance = row['distance_per_cycle_m']
         gain = (
-            f'{100.0 * (advance / own.distance_per_cycle_m - 1.0):+.0f} %'
+            f'{round(100.0 * (advance / own.distance_per_cycle_m - 1.0)):+d} %'
             if row is not rows[0] and own.distance_per_cycle_m
             else ''
         )

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import matplotlib
 
 import ros_pad
-from ros_pad.figures.thesis import STYLE
 from ros_pad.figures.thesis import WIDE
 from ros_pad.figures.thesis import Drawn
 from ros_pad.trials.bench import FIDELITY
 from ros_pad.trials.bench import BenchTrial
 from ros_pad.trials.bench import Claim
 from ros_pad.trials.bench import Row
+from ros_pad.trials.report import PAPER_STYLE
 from ros_pad.trials.report import embedded
 from ros_pad.trials.report import page
 from ros_pad.trials.report import save
@@ -75,7 +75,7 @@ def write(trial: BenchTrial, drawn: Mapping[str, Drawn], path: str | os.PathLike
             range(0),
         ),
     ]
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(PAPER_STYLE):
         for each in drawn.values():
             caption = html.escape(each.caption)
             parts.append(f'<h2>{html.escape(each.title)}</h2>')

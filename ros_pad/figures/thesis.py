@@ -35,21 +35,13 @@ from ros_pad.trials.report import BLACK
 from ros_pad.trials.report import BLUE
 from ros_pad.trials.report import GREEN
 from ros_pad.trials.report import PALE
+from ros_pad.trials.report import PAPER_STYLE
 from ros_pad.trials.report import STANCE
-from ros_pad.trials.report import STYLE as PAGE_STYLE
 from ros_pad.trials.report import VERMILION
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)
 WIDE = 7.2  # inches: both columns of a paper
-STYLE: dict[Any, Any] = PAGE_STYLE | {
-    'font.size': 9.0,
-    'axes.titlesize': 9.0,
-    'legend.fontsize': 8.5,
-    'lines.linewidth': 1.6,
-    'lines.markersize': 6.0,
-    'pdf.fonttype': 42,  # text that an editor can change
-}
 
 
 class Drawn(NamedTuple):
@@ -74,9 +66,9 @@ class Drawn(NamedTuple):
 def draw(trial: BenchTrial) -> dict[str, Drawn]:
     """Draw all figures of a bench: file name without ending, and figure, in the thesis' order.
 
-    Save them under ``matplotlib.rc_context(STYLE)``, which fonts and identifiers come from.
+    Save them under ``matplotlib.rc_context(PAPER_STYLE)``, which fonts and identifiers come from.
     """
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(PAPER_STYLE):
         return {name: figure(trial) for name, figure in _FIGURES[trial.scene.setup.kind].items()}
 
 

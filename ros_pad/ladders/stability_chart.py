@@ -23,18 +23,10 @@ from ros_pad.trials.report import BLACK
 from ros_pad.trials.report import BLUE
 from ros_pad.trials.report import GREEN
 from ros_pad.trials.report import PALE
-from ros_pad.trials.report import STYLE as PAGE_STYLE
+from ros_pad.trials.report import PAPER_STYLE
 from ros_pad.trials.report import VERMILION
 
 ORANGE, PURPLE = '#E69F00', '#CC79A7'
-
-STYLE: dict[Any, Any] = PAGE_STYLE | {
-    'font.size': 9.0,
-    'axes.titlesize': 9.0,
-    'legend.fontsize': 8.5,
-    'lines.linewidth': 1.6,
-    'lines.markersize': 6.0,
-}
 
 # Naive methods in the order in which a case names them, and ours.
 _NAIVE = ((VERMILION, 'o'), (ORANGE, 's'), (PURPLE, 'D'), (BLUE, '^'), (PALE, 'v'))
@@ -44,7 +36,7 @@ _LAW: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'zorder': 1.5}
 
 def draw(outcomes: Sequence[Outcome]) -> Figure:
     """Return the picture; a case that was not measured is an empty panel that says so."""
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(PAPER_STYLE):
         figure = Figure(figsize=(11.0, 6.0))
         figure.set_layout_engine('constrained', w_pad=0.06, h_pad=0.08)
         panels = figure.subplots(2, 4).ravel()

@@ -109,7 +109,7 @@ class ControllerNode(Node):
         def on_wrench(data: bytes) -> None:
             nonlocal load, heaviest
             load = normal_force(data)
-            if load > heaviest:
+            if heaviest < load < math.inf:  # an infinite one is no load, and refused below
                 heaviest = load
             self.wrenches += 1
 

@@ -24,6 +24,7 @@ from ros_pad import configuration
 from ros_pad.contact import WATER
 from ros_pad.contact import pressure_for
 from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -263,13 +264,13 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
     if isinstance(gait, RailGait) or not isinstance(body, HexapodBody):
         assert isinstance(gait, RailGait) and not isinstance(body, HexapodBody)
         peak = 0.5 * gait.stroke * (math.pi / gait.stance) ** 2
-        demand = body.mass * (peak + 9.81 * abs(math.sin(slope))) + body.rolling_drag
+        demand = body.mass * (peak + GRAVITY * abs(math.sin(slope))) + body.rolling_drag
         return grip * body.load / demand
     tow = scene.tow
-    weight = body.mass * 9.81 * math.cos(slope)
+    weight = body.mass * GRAVITY * math.cos(slope)
     drag = max(tow.friction_wet if wet else tow.friction_dry for wet in wets)
-    demand = (body.mass + tow.weight / 9.81) * (
-        gait.peak_acceleration + 9.81 * abs(math.sin(slope))
+    demand = (body.mass + tow.weight / GRAVITY) * (
+        gait.peak_acceleration + GRAVITY * abs(math.sin(slope))
     ) + drag * tow.weight * math.cos(slope)
     return grip * weight / demand
 

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import number
 from ros_pad.errors import ConfigError
@@ -35,8 +36,6 @@ from ros_pad.simulation.robot import check_pressures
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
-
-GRAVITY = 9.81  # m/s²
 
 # Servos: HS-645MG at 6 V, the class that the CH3-R is built with.
 STALL_TORQUE = 0.94  # N m

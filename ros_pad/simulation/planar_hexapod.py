@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import compiled
@@ -31,8 +32,6 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL
 from ros_pad.simulation.terrain import WIDTH
 from ros_pad.simulation.terrain import Floor
-
-GRAVITY = 9.81  # m/s²
 
 # Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 531, approximate the limit surface of a
 # sliding contact by an ellipsoid through its largest force and moment: of a disc that is pressed

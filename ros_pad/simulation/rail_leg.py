@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.robot import FootState
@@ -26,8 +27,6 @@ from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
-
-GRAVITY = 9.81  # m/s²
 
 
 class RailLeg:

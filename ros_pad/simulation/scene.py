@@ -11,6 +11,7 @@ from typing import Any
 from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -262,7 +263,7 @@ class Scene:
     def expected_load(self) -> float:
         """Normal force that a foot carries in stance on average, N."""
         if isinstance(self.body, HexapodBody):
-            return self.body.mass * 9.81 / 3.0
+            return self.body.mass * GRAVITY / 3.0
         return self.body.load
 
     @property

@@ -55,6 +55,14 @@ STYLE: dict[Any, Any] = {
     'svg.hashsalt': 'ros_pad',  # the same trial gives the same file
     'path.simplify': True,
 }
+PAPER_STYLE: dict[Any, Any] = STYLE | {
+    'font.size': 9.0,
+    'axes.titlesize': 9.0,
+    'legend.fontsize': 8.5,
+    'lines.linewidth': 1.6,
+    'lines.markersize': 6.0,
+    'pdf.fonttype': 42,  # text that an editor can change
+}
 # What a file says of its making, by kind: left out.
 _MARKS = {
     'svg': ('Date', 'Creator'),

@@ -12,6 +12,7 @@ from ros_pad.figures import bench as page
 from ros_pad.figures import thesis
 from ros_pad.simulation.bench import BENCHES
 from ros_pad.trials import bench
+from ros_pad.trials.report import PAPER_STYLE
 from ros_pad.trials.report import rendered
 
 TRIALS = {kind: bench.run(f'bench_{kind}') for kind in BENCHES}
@@ -49,7 +50,7 @@ def test_the_thesis_figures_are_all_there():
 def test_nothing_is_cut_off(name):
     figure = FIGURES[name].figure
     canvas = FigureCanvasAgg(figure)
-    with matplotlib.rc_context(thesis.STYLE):
+    with matplotlib.rc_context(PAPER_STYLE):
         canvas.draw()
         box = figure.get_tightbbox(canvas.get_renderer())
     width, height = figure.get_size_inches()
@@ -61,7 +62,7 @@ def test_nothing_is_cut_off(name):
 def test_no_two_labels_of_a_panel_overlap(name):
     figure = FIGURES[name].figure
     canvas = FigureCanvasAgg(figure)
-    with matplotlib.rc_context(thesis.STYLE):
+    with matplotlib.rc_context(PAPER_STYLE):
         canvas.draw()
         renderer = canvas.get_renderer()
         for ax in figure.axes:
@@ -159,7 +160,7 @@ def test_rises_with_their_optima():
 @pytest.mark.parametrize('kind', ['svg', 'pdf'])
 def test_the_same_bench_gives_the_same_file(kind):
     def file():
-        with matplotlib.rc_context(thesis.STYLE):
+        with matplotlib.rc_context(PAPER_STYLE):
             drawn = thesis.draw(TRIALS['inflation'])['figure_14']
             return rendered(drawn.figure, kind)
 

@@ -135,6 +135,7 @@ def test_when_the_estimates_stop_so_do_the_setpoints(robot):
 def test_without_sensors_there_is_no_setpoint(robot):
     robot.start()
     robot.unanswered(0.9)
+    assert robot.setpoints[1] == [] and robot.setpoints[2]
 
 
 def test_dome_on_wet_ground_and_flat_again_on_dry(robot):
@@ -229,6 +230,16 @@ def test_the_normal_force_is_read_from_a_message_as_it_travels(frame, load):
     message.wrench.force.x, message.wrench.force.y = 1.0, 2.0
     message.wrench.force.z, message.wrench.torque.x = load, 3.0
     assert normal_force(serialize_message(message)) == load
+
+
+def test_one_infinite_load_among_good_ones_is_passed_over(robot):
+    """A loose cable: the node goes on, and takes the heaviest of the good ones."""
+    robot.start()
+    robot.sense(LOAD)
+    robot.sense(math.inf)
+    robot.sense(math.nan)
+    robot.sense(0.5 * LOAD)
+    assert robot.estimate(0.5).fluid_pressure == AMBIENT
 
 
 def test_a_foot_that_bounces_has_not_stepped(robot):

@@ -431,13 +431,18 @@ def test_a_silent_device_is_an_error_on_diagnostics(robot, devices):
         ),
         timeout=3.0,
     )
+    # One line is silent, and it alone is in error.
+    silent = [s.name for s in robot.diagnostics[-1].status if s.level == DiagnosticStatus.ERROR]
+    assert len(silent) == 1 and 'leg 2' in silent[0]
 
 
 def test_commands_that_stop_are_noticed_when_the_time_of_day_is_set_back(robot, devices):
     node = robot.start(simulated=False, backend='device', command_timeout=0.2)
     robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
     node.channels[1].commanded_ns += 3600 * 10**9  # it was an hour later then
+    assert devices()[0].setpoint == 50e3
     robot.until(lambda: devices()[0].setpoint == 0.0, timeout=2.0, what='the vent')
+    assert devices()[0].setpoint == 0.0
 
 
 def test_a_device_that_is_not_there(robot, devices, context):

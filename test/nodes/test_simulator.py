@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -109,6 +110,8 @@ def test_free_running_keeps_its_rate_and_the_time_of_day(start, observer, until)
 def test_it_does_not_wait_for_its_own_clock(start, observer, until):
     start(rate=100.0, publish_clock=True, use_sim_time=True)
     until(lambda: len(observer.heard['/clock']) > 5 and len(observer.heard['leg_1/wrench']) > 5)
+    stamps = [nanoseconds(each.clock) for each in observer.heard['/clock'][:6]]
+    assert [late - early for early, late in pairwise(stamps)] == [10_000_000] * 5
 
 
 def test_left_alone_it_says_on_which_rung_and_when_the_walk_is_over(start, until, tmp_path, capfd):
