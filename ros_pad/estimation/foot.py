@@ -4,16 +4,21 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.sensing import Sensing
 
 LONGEST_GAP = 0.15
 """Between samples of one stance, s: after a longer silence the foot may have stepped."""
@@ -22,13 +27,23 @@ AIRBORNE = 0.01
 """Height above its last stance from which a foot surely touches nothing, m ..."""
 
 AIRBORNE_LOAD = 0.3
-"""... unless it carries this share of the expected load: what else it reads is its offset."""
+"""... unless it carries this share of the expected load, and did not rise with it: what else it
+reads is its offset."""
+
+OFFSET_SHARE = 0.05
+"""Standard deviation of the offset of a force sensor, of the expected load, until it is known."""
 
 NEW_PLACE = 5e-4
 """Way over which a sliding foot has something new to tell, m."""
 
 TARE_TIME = 0.5
 """Over which the force of a foot in the air is averaged, s."""
+
+LONGEST_STEP = 5.0
+"""Between touch-downs of a foot that walks, s: after a longer time its pace is not known."""
+
+FADING_STEP = 0.02
+"""Way after which belief is faded where a foot feels nothing, m: markers jitter."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +55,13 @@ class Tuning:
     position_noise : float
         Standard deviation of a marker coordinate, m, 0 or more.
     force_noise : float
-        Standard deviation of a force component, N, 0 or more.
+        Standard deviation of a force component, N, 0 or more. Sensors with noise that repeat a
+        number for long are not believed; of those without, 0, nobody can tell.
+    moment_noise : float
+        Standard deviation of the moment about the vertical, N m, 0 or more, where one is given.
+    force_range : float
+        Largest component of force that the sensor shows, N, above 0, or infinite: what is there
+        or beyond is no measurement.
     load_gate : float
         Share of the expected load above which a foot stands, above 0 up to 1. Feet slide most as
         they land and lift off, lightly loaded.
@@ -69,6 +90,8 @@ class Tuning:
 
     position_noise: float = 1.5e-4
     force_noise: float = 0.03
+    moment_noise: float = 5e-4
+    force_range: float = math.inf
     load_gate: float = 0.1
     smoothing: float = 0.02
     filter_period: float = 0.04
@@ -81,6 +104,9 @@ class Tuning:
     def __post_init__(self) -> None:
         number('position_noise', self.position_noise, 'm')
         number('force_noise', self.force_noise, 'N')
+        number('moment_noise', self.moment_noise, 'N m')
+        if self.force_range != math.inf:
+            number('force_range', self.force_range, 'N', above=True)
         number('load_gate', self.load_gate, '(share)', high=1.0, above=True)
         number('smoothing', self.smoothing, 's', above=True)
         number('filter_period', self.filter_period, 's', above=True)
@@ -111,15 +137,22 @@ class Estimate(NamedTuple):
     slip_speed : float
         The same against that force, m/s: positive when the foot gives way.
     slip_speed_sd : float
-        Standard deviation of the slip speed, m/s.
+        Standard deviation of the slip speed, m/s; infinite where nothing is known of it.
     wet_probability : float
         Probability that the ground is wet, 0 to 1.
     friction_mean, friction_sd : float
         Of the coefficient of friction.
     margin : float
-        5 % quantile of μ - T/N: below zero, slip is likely.
+        5 % quantile of μ - T/N: below zero, slip is likely. NaN where the
+        sensors are not believed, until the foot stands again.
     fresh : bool
         Whether wetness and friction were updated by this sample.
+    doubt : str
+        Why the foot cannot know what is below it; empty where it does. What it says of wetness
+        and friction is then what is left of earlier stances, fading.
+    sound : bool
+        Whether its sensors are believed. If not, `doubt` says why, `standing` and `slipping` are
+        False, and nothing is learnt.
     """
 
     time: float
@@ -133,12 +166,16 @@ class Estimate(NamedTuple):
     friction_sd: float
     margin: float
     fresh: bool
+    doubt: str
+    sound: bool
 
 
 class FootEstimator:
     """Estimates slip, wetness and friction of one foot from its force, marker and pressure.
 
     What the force sensor reads while the foot is in the air is its offset, and is taken off.
+    Sensors that stand still, reach the end of their range or come late are not believed: belief
+    returns to what it was before, and fades over the way to the prior.
 
     Parameters
     ----------
@@ -173,20 +210,30 @@ class FootEstimator:
             model_error=tuning.ratio_noise,
         )
         self._time = -math.inf
+        self._sensing = Sensing(tuning.force_noise, tuning.position_noise, tuning.force_range)
+        self._lever = 2.0 / 3.0 * foot.sole_radius
         self._standing = False
-        self._height = math.inf
-        self._offset_x = self._offset_y = self._offset_z = 0.0
+        self._height = self._touched_at = math.inf
+        self._offset_x = self._offset_y = self._offset_z = self._offset_moment = 0.0
+        self._offset_sd = OFFSET_SHARE * expected_load
+        self._air_time = 0.0
         self._smooth_x = self._smooth_y = 0.0
         self._footprint: tuple[float, float] | None = None
+        self._touched = -math.inf
+        self._pace = self._unseen_way = 0.0
+        self._beliefs: deque[tuple[float, tuple[np.ndarray, bool]]] = deque(maxlen=8)
+        self._dome_share = 0.0
+        self._peak_load = self._peak_ratio = self._peak_turning = 0.0
         self._window_start = 0.0
         self._first_window = True
         self._told: tuple[float, ...] | None = None
         self._samples = 0
-        self._sum_load = self._sum_tangential = self._sum_speed = 0.0
+        self._sum_load = self._sum_tangential = self._sum_speed = self._sum_turning = 0.0
         mean, sd = self._ground.friction
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
             self._ground.wet_probability, mean, sd, self._ground.quantile(0.05), True,
+            'has not stood yet', True,
         )  # fmt: skip
 
     def update(
@@ -195,19 +242,27 @@ class FootEstimator:
         force: Sequence[float],
         position: Sequence[float],
         pressure: float,
+        moment: float | None = None,
+        position_time: float | None = None,
     ) -> Estimate:
         """Take one sample.
 
         Parameters
         ----------
         time : float
-            s, later than the last one's.
+            s, later than the last one's. A clock that is set back by more than
+            :data:`LONGEST_GAP` begins a new stance; what was known stays.
         force : sequence of 3 floats
             Of the ground on the foot, N; z is the normal force.
         position : sequence of 3 floats
             Of the foot's marker, m.
         pressure : float
             Gauge pressure in the pads, Pa.
+        moment : float or None
+            Of the ground on the foot about the vertical, N m, where it is measured: how much of
+            its friction a foot that turns has used up is then known, and need not be guessed.
+        position_time : float or None
+            When the position was measured, s; None is `time`.
 
         Returns
         -------
@@ -219,23 +274,35 @@ class FootEstimator:
         InvalidInput
             When a value is not finite, or time does not advance.
         """
+        age = 0.0 if position_time is None else abs(time - position_time)
+        twist = 0.0 if moment is None else moment
         try:
             fx, fy, fz = force
             x, y, z = position
-            finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure)
+            finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure + twist + age)
         except (TypeError, ValueError) as error:
             raise InvalidInput(
                 f'sample at {time!r} s: force = {force!r}, position = {position!r}, pressure ='
-                f' {pressure!r}: three numbers each, and one, are needed'
+                f' {pressure!r}, moment = {moment!r}: three numbers each, and one, are needed'
             ) from error
         if not finite:
-            raise _not_finite(time, force, position, pressure)
+            raise _not_finite(time, force, position, pressure, moment, position_time)
         if time <= self._time:
-            raise InvalidInput(f'time = {time!r} s: must be later than the last, {self._time!r} s')
+            if time > self._time - LONGEST_GAP:
+                raise InvalidInput(
+                    f'time = {time!r} s: must be later than the last, {self._time!r} s'
+                )
+            self._set_back()
         dt, self._time = time - self._time, time
+        trouble = self._sensing.trouble(time, force, position, age, self._standing)
+        if trouble:
+            return self._mistrust(time, dt, x, y, trouble)
         load = fz - self._offset_z
-        if z > self._height + AIRBORNE and load < AIRBORNE_LOAD * self._expected_load:
-            self._tare(dt, fx, fy, fz)
+        if z > self._height + AIRBORNE and (
+            load < AIRBORNE_LOAD * self._expected_load
+            or (self._standing and z > self._touched_at + AIRBORNE)
+        ):
+            self._tare(dt, fx, fy, fz, twist)
             return self._swing(time)
         if load < self._gate:
             return self._swing(time)
@@ -246,7 +313,7 @@ class FootEstimator:
         contact_x = x + fx / self._foot.shear_stiffness
         contact_y = y + fy / self._foot.shear_stiffness
         if not self._standing or dt > LONGEST_GAP:
-            self._touch_down(time, contact_x, contact_y, pressure)
+            self._touch_down(time, contact_x, contact_y, z, pressure)
             dt = self._tuning.smoothing / 10.0 if math.isinf(dt) else dt
         smoothing = self._tuning.smoothing
         share = dt / (smoothing + dt)
@@ -260,70 +327,151 @@ class FootEstimator:
         velocity = (along * fx / tangential, along * fy / tangential) if along else (0.0, 0.0)
         speed = -along
         slipping = self._alarm.update(speed, dt)
+        # On the ellipsoidal limit surface what turning takes up is friction that pull cannot have.
+        turning = 0.0 if moment is None else abs(moment - self._offset_moment) / self._lever
         self._samples += 1
         self._sum_load += fz
         self._sum_tangential += tangential
+        self._sum_turning += turning
         self._sum_speed += speed
+        self._peak_load = max(self._peak_load, fz)
         last = self.estimate
         fresh = time - self._window_start >= self._tuning.filter_period - 1e-9
         if fresh:
-            self._filter(time - self._window_start)
+            self._follow_pressure(pressure)
+            self._filter(time - self._window_start, moment is not None)
             self._window_start = time
             friction_mean, friction_sd = self._ground.friction
             wet = self._ground.wet_probability
-            quantile = self._ground.quantile(0.05)
-            self._quantile = quantile
+            self._quantile = self._ground.quantile(0.05)
+            self._beliefs.append((time, self._ground.belief))
+            said = self._doubt(friction_mean, friction_sd)
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
-            wet, quantile = last.wet_probability, self._quantile
+            wet, said = last.wet_probability, last.doubt
         self.estimate = Estimate(
             time, True, slipping, velocity, speed, self._speed_noise,
-            wet, friction_mean, friction_sd, quantile - tangential / fz, fresh,
+            wet, friction_mean, friction_sd, self._quantile - math.hypot(tangential, turning) / fz,
+            fresh, said, True,
         )  # fmt: skip
         return self.estimate
 
-    def _tare(self, dt: float, fx: float, fy: float, fz: float) -> None:
-        share = dt / (TARE_TIME + dt)
+    def _tare(self, dt: float, fx: float, fy: float, fz: float, moment: float) -> None:
+        # The mean of its first time in the air, and from then on one that forgets.
+        dt = min(dt, TARE_TIME)
+        self._air_time += dt
+        share = dt / min(TARE_TIME + dt, self._air_time)
         self._offset_x += share * (fx - self._offset_x)
         self._offset_y += share * (fy - self._offset_y)
         self._offset_z += share * (fz - self._offset_z)
+        self._offset_moment += share * (moment - self._offset_moment)
+        self._offset_sd *= 1.0 - share
 
     def _swing(self, time: float) -> Estimate:
         last = self.estimate
-        fresh = self._standing
+        fresh = self._standing or not last.sound
         self._standing = False
         self.estimate = Estimate(
             time, False, False, (0.0, 0.0), 0.0, self._speed_noise, last.wet_probability,
-            last.friction_mean, last.friction_sd, last.margin, fresh,
+            last.friction_mean, last.friction_sd, last.margin, fresh, last.doubt, True,
         )  # fmt: skip
         return self.estimate
 
-    def _touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
+    def _mistrust(self, time: float, dt: float, x: float, y: float, trouble: str) -> Estimate:
+        """Learn nothing, take back what the sensors said as they failed, and fade."""
+        last, ground = self.estimate, self._ground
+        since = self._sensing.since
+        self._standing = False
+        faded = False
+        if self._beliefs:
+            before = [belief for at, belief in self._beliefs if at <= since]
+            if len(before) < len(self._beliefs):
+                ground.belief = before[-1] if before else self._beliefs[0][1]
+                faded = True
+            self._beliefs.clear()
+        if self._sensing.marker_sound:
+            way = math.dist(self._footprint, (x, y)) if self._footprint else 0.0
+            if way > FADING_STEP or self._footprint is None:
+                self._footprint = (x, y)
+        else:
+            # Where it is now nobody knows: it walks on as it walked.
+            self._height = math.inf
+            self._unseen_way += 0.0 if math.isinf(dt) else self._pace * dt
+            way, self._footprint = self._unseen_way, None
+            if way > FADING_STEP:
+                self._unseen_way = 0.0
+        if way > FADING_STEP:
+            ground.go(way)
+            faded = True
+        mean, sd = ground.friction if faded else (last.friction_mean, last.friction_sd)
+        self.estimate = Estimate(
+            time, False, False, (0.0, 0.0), 0.0, math.inf, ground.wet_probability, mean, sd,
+            math.nan, faded or last.sound, trouble, False,
+        )  # fmt: skip
+        return self.estimate
+
+    def _set_back(self) -> None:
+        """Begin a new stance at a time before the last one."""
+        self._time = -math.inf
+        self._standing = False
+        self._touched = -math.inf
+        self._beliefs.clear()
+        self._sensing.restart()
+
+    def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._standing = True
         self._alarm.reset()
         self._smooth_x, self._smooth_y = x, y
         before = self._footprint or (x, y)
-        self._footprint = (x, y)
-        domed = self._foot.dome_load(self._expected_load, pressure) > 0.5 * self._expected_load
-        self._ground.touch_down(math.dist(before, (x, y)), domed)
+        way = math.dist(before, (x, y))
+        if self._footprint and time - self._touched < LONGEST_STEP:
+            self._pace += 0.3 * (way / (time - self._touched) - self._pace)
+        self._footprint, self._touched, self._touched_at = (x, y), time, z
+        self._dome_share = self._share_on_domes(pressure)
+        self._ground.touch_down(way, self._dome_share > doubt.DOMED)
         self._quantile = self._ground.quantile(0.05)
         self._window_start = time
         self._first_window = True
         self._told = None
+        self._peak_load = self._peak_ratio = self._peak_turning = 0.0
         self._clear_window()
+
+    def _share_on_domes(self, pressure: float) -> float:
+        return self._foot.dome_load(self._expected_load, pressure) / self._expected_load
+
+    def _follow_pressure(self, pressure: float) -> None:
+        """Begin anew where it stands when the foot changes its shape under load."""
+        before, self._dome_share = self._dome_share, self._share_on_domes(pressure)
+        if (before > doubt.DOMED) != (self._dome_share > doubt.DOMED):
+            self._ground.touch_down(0.0, self._dome_share > doubt.DOMED)
+            self._told = None
+
+    def _doubt(self, friction_mean: float, friction_sd: float) -> str:
+        ground = self._ground
+        stance = doubt.Stance(
+            self._dome_share, ground.told, self._peak_load, self._peak_ratio, self._peak_turning,
+            ground.wet_probability, friction_mean, friction_sd,
+        )  # fmt: skip
+        return doubt.doubt(stance, ground.prior, self._expected_load)
 
     def _clear_window(self) -> None:
         self._samples = 0
-        self._sum_load = self._sum_tangential = self._sum_speed = 0.0
+        self._sum_load = self._sum_tangential = self._sum_speed = self._sum_turning = 0.0
 
-    def _filter(self, duration: float) -> None:
+    def _filter(self, duration: float, turning_known: bool) -> None:
         count = self._samples
         load = self._sum_load / count
-        ratio = self._sum_tangential / self._sum_load
+        pull, turning = self._sum_tangential / self._sum_load, self._sum_turning / self._sum_load
+        ratio = math.hypot(pull, turning)
         tuning = self._tuning
-        noise = math.hypot(
-            tuning.ratio_noise, tuning.force_noise * math.sqrt((1.0 + ratio**2) / count) / load
-        )
+        force_noise = tuning.force_noise
+        if turning > 0.0:
+            share = turning / ratio
+            force_noise = math.hypot(force_noise, share * tuning.moment_noise / self._lever)
+        sensors = math.hypot(force_noise / math.sqrt(count), self._offset_sd) / load
+        noise = math.hypot(tuning.ratio_noise, sensors * math.sqrt(1.0 + ratio**2))
+        self._peak_ratio = max(self._peak_ratio, pull)
+        self._peak_turning = max(self._peak_turning, turning)
         # The mean speed is the way of the smoothed contact over the window. The smoother starts
         # a stance from one sample, and averages later.
         spread = 2.0 * duration / (2.0 * tuning.smoothing * count + duration)
@@ -334,7 +482,9 @@ class FootEstimator:
             tuning.speed_noise, self._contact_noise * math.sqrt(spread) / duration
         )
         weight = self._news(ratio, noise)
-        self._ground.update(ratio, noise, self._sum_speed / count, speed_noise, duration, weight)
+        self._ground.update(
+            ratio, noise, self._sum_speed / count, speed_noise, duration, weight, turning_known
+        )
         self._clear_window()
 
     def _news(self, ratio: float, noise: float) -> float:
@@ -356,7 +506,12 @@ class FootEstimator:
 
 
 def _not_finite(
-    time: float, force: Sequence[float], position: Sequence[float], pressure: float
+    time: float,
+    force: Sequence[float],
+    position: Sequence[float],
+    pressure: float,
+    moment: float | None,
+    position_time: float | None,
 ) -> InvalidInput:
     """Return the error that says which values of a sample are no numbers."""
     values = [('time', time, 's'), ('pressure', pressure, 'Pa')]
@@ -364,6 +519,10 @@ def _not_finite(
     values += [
         (f'position {axis}', value, 'm') for axis, value in zip('xyz', position, strict=True)
     ]
+    if moment is not None:
+        values.append(('moment', moment, 'N m'))
+    if position_time is not None:
+        values.append(('position_time', position_time, 's'))
     wrong = [
         f'{name} = {value!r} {unit}' for name, value, unit in values if not math.isfinite(value)
     ]

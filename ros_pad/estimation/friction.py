@@ -107,6 +107,16 @@ class GroundFilter:
     model_error : float
         Standard deviation of what T/N shows of friction, > 0, besides :data:`MODEL_SHARE` of it.
         It is the same in every sample: no number of them averages it out.
+
+    Attributes
+    ----------
+    prior : FrictionPrior
+        As given.
+    wet_probability : float
+        0 to 1.
+    told : float
+        What this stance has added to the logarithm of the odds of wet ground: about zero where it
+        said nothing.
     """
 
     def __init__(
@@ -119,6 +129,7 @@ class GroundFilter:
         rim_speed: float = 0.0,
         model_error: float = 0.03,
     ) -> None:
+        self.prior = prior
         self._tables = {dome: prior.table(dome) for dome in (False, True)}
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self._patch_length = patch_length
@@ -129,6 +140,7 @@ class GroundFilter:
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2)
         self._blur = blur / blur.sum(axis=0)
         self._dome = False
+        self.told = 0.0
         self._settle(self._grounds * self._tables[False])
 
     def touch_down(self, distance: float, dome: bool) -> None:
@@ -137,8 +149,23 @@ class GroundFilter:
             # Friction of one shape says nothing of the other's; what stays is wet or dry.
             self._dome = dome
             self._belief = self._grounds_known() * self._tables[dome]
+        self.told = 0.0
+        self.go(distance)
+
+    def go(self, distance: float) -> None:
+        """Fade towards the prior over some metres on which nothing is felt."""
         self._move(distance)
         self._settle(self._belief)
+
+    @property
+    def belief(self) -> tuple[np.ndarray, bool]:
+        """All that is believed; set it to take back what has been learnt since."""
+        return self._belief, self._dome
+
+    @belief.setter
+    def belief(self, belief: tuple[np.ndarray, bool]) -> None:
+        grid, self._dome = belief
+        self._settle(grid)
 
     def update(
         self,
@@ -148,6 +175,7 @@ class GroundFilter:
         speed_noise: float,
         dt: float,
         weight: float = 1.0,
+        turning_known: bool = False,
     ) -> None:
         """Take one sample of T/N and of slip speed.
 
@@ -161,6 +189,8 @@ class GroundFilter:
             Time that the sample stands for, s.
         weight : float
             How much of it is new, 0 to 1.
+        turning_known : bool
+            Whether T/N has in it what turning takes up, so that nothing of that is left to guess.
         """
         away = (GRID - ratio) / ratio_noise
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
@@ -170,12 +200,18 @@ class GroundFilter:
         # and T/N shows as much of μ as turning leaves.
         likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         if slip > 0.0:
-            shown = speed / np.hypot(speed, self._rim_speeds)
-            away = (shown * GRID - ratio) / ratio_noise
-            likely = _SHARES @ np.exp(-0.5 * away * away)
+            if turning_known:
+                likely = np.exp(-0.5 * away * away)
+            else:
+                shown = speed / np.hypot(speed, self._rim_speeds)
+                away = (shown * GRID - ratio) / ratio_noise
+                likely = _SHARES @ np.exp(-0.5 * away * away)
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * likely
+        before = self.wet_probability
         self._belief = self._belief * (likelihood + 1e-6) ** (weight * self._temper)
         self._belief /= self._belief.sum()
+        dry, wet = (self._belief @ _ONES).tolist()
+        self.told += math.log(wet / dry) - math.log(before / (1.0 - before))
         if speed > 0.0:
             self._move(speed * dt)
         if self._dome:

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether force sensor and marker of a foot can be believed, from what they say alone.
+
+Analogue sensors scatter: one that repeats a number to the last bit has stopped, or has reached the
+end of its range. Nothing here knows what is being sensed, or by how much a believable sensor is
+off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+PATIENCE = 0.1
+"""Time for which a value may stay the same to the last bit, s: markers are slower than forces, and
+converters have steps."""
+
+FEWEST = 12
+"""Samples that must agree besides: at low rates two may do so by chance."""
+
+OLDEST_POSITION = 0.05
+"""Age of the last position from which slip cannot be told, s: a foot slides 2 mm in it at 40
+mm/s."""
+
+DEAD = 2.0
+"""Time for which a force sensor may read exactly nothing, s: simulated feet do so in the air."""
+
+LEAP = 5.0
+"""Speed at which nothing moves that carries load, m/s ..."""
+
+LEAP_WAY = 0.02
+"""... over a way that no jitter of a clock makes up, m."""
+
+
+class Repeats:
+    """How long each of some values has not changed at all.
+
+    Parameters
+    ----------
+    values : int
+        How many there are.
+    """
+
+    __slots__ = ('_counts', '_last', '_since')
+
+    def __init__(self, values: int) -> None:
+        self._last = [math.nan] * values
+        self._since = [math.inf] * values
+        self._counts = [0] * values
+
+    def since(self, place: int) -> float:
+        """Return the time at which a value was first what it is, s."""
+        return self._since[place]
+
+    def update(self, time: float, values: Sequence[float]) -> list[int]:
+        """Take the values of a time, s; return the places of those that have stopped."""
+        stopped = []
+        last, counts = self._last, self._counts
+        for place, value in enumerate(values):
+            if value != last[place]:
+                last[place] = value
+                self._since[place] = time
+                counts[place] = 1
+                continue
+            counts[place] += 1
+            if counts[place] >= FEWEST and time - self._since[place] > PATIENCE:
+                stopped.append(place)
+        return stopped
+
+
+class Sensing:
+    """Watches the force sensor and the marker of one foot.
+
+    Parameters
+    ----------
+    force_noise, position_noise : float
+        Standard deviations that the sensors are said to have, N and m; one without noise may
+        repeat itself.
+    force_range : float
+        Largest component of force that the sensor shows, N.
+
+    Attributes
+    ----------
+    marker_sound : bool
+        Whether the last position can be believed.
+    since : float
+        When that which is the trouble began, s.
+    """
+
+    def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
+        self._force_noise = force_noise
+        self._position_noise = position_noise
+        self._range = force_range
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what was seen: the clock has been set."""
+        self._forces = Repeats(3)
+        self._positions = Repeats(3)
+        self._last: tuple[float, Sequence[float]] | None = None
+        self.marker_sound = True
+        self.since = math.inf
+
+    def trouble(
+        self,
+        time: float,
+        force: Sequence[float],
+        position: Sequence[float],
+        age: float,
+        standing: bool,
+    ) -> str:
+        """Take a sample; return why nothing can be learnt from it, or '' where something can.
+
+        Parameters
+        ----------
+        time : float
+            s.
+        force, position : sequence of 3 floats
+            N and m.
+        age : float
+            Of the position, s.
+        standing : bool
+            Whether the foot stood at the sample before: then it cannot be elsewhere at once.
+        """
+        forces = self._forces.update(time, force) if self._force_noise > 0.0 else []
+        marker = self._trouble_of_marker(time, position, age, standing)
+        self.marker_sound = not marker
+        return self._trouble_of_force(time, force, forces) or marker
+
+    def _trouble_of_force(self, time: float, force: Sequence[float], stopped: list[int]) -> str:
+        nothing = not any(force)
+        if len(stopped) == 3:
+            self.since = max(map(self._forces.since, stopped))
+            if not nothing:
+                return f'force sensor stands still at {force[2]:.3g} N'
+            if time - self.since > DEAD:
+                return 'force sensor reads exactly nothing'
+            return ''
+        for place, axis in enumerate('xyz'):
+            if abs(force[place]) >= self._range:
+                self.since = time
+                return f'force {axis} = {force[place]:.3g} N is at the end of the range'
+            # An axis that a sensor does not have reads zero for ever.
+            if place in stopped and force[place]:
+                self.since = self._forces.since(place)
+                return f'force {axis} stays at {force[place]:.3g} N: end of the range?'
+        return ''
+
+    def _trouble_of_marker(
+        self, time: float, position: Sequence[float], age: float, standing: bool
+    ) -> str:
+        stopped = self._positions.update(time, position) if self._position_noise > 0.0 else []
+        last, self._last = self._last, (time, tuple(position))
+        if age > OLDEST_POSITION:
+            self.since = time - age
+            return f'marker was last seen {age:.2g} s ago'
+        if len(stopped) == 3:
+            self.since = max(map(self._positions.since, stopped))
+            return 'marker stands still to the last digit'
+        if standing and last and 0.0 < time - last[0] < PATIENCE:
+            way = math.dist(last[1], position)
+            if way > LEAP_WAY and way > LEAP * (time - last[0]):
+                self.since = time
+                return f'marker leapt by {1e3 * way:.0f} mm'
+        return ''
