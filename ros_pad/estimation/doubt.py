@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a stance says nothing about the ground, in words."""
+"""Why a stance says nothing about the ground, in words: what it is, a colon, and details."""
 
 from __future__ import annotations
 
@@ -74,6 +74,6 @@ def doubt(stance: Stance, prior: FrictionPrior, expected_load: float) -> str:
     if not 1.0 - SURE < stance.wet_probability < SURE:
         return ''
     return (
-        f'friction {stance.friction_mean:.2f} ± {stance.friction_sd:.2f} fits wet ground'
-        f' ({prior.flat_wet:.2f}) and dry ({prior.flat_dry:.2f})'
+        f'undecided: friction {stance.friction_mean:.2f} ± {stance.friction_sd:.2f} fits wet'
+        f' ground ({prior.flat_wet:.2f}) and dry ({prior.flat_dry:.2f})'
     )

@@ -42,6 +42,9 @@ TARE_TIME = 0.5
 LONGEST_STEP = 5.0
 """Between touch-downs of a foot that walks, s: after a longer time its pace is not known."""
 
+NOT_YET = 'not yet: has not stood'
+"""Doubt of a foot that has not stood so far."""
+
 FADING_STEP = 0.02
 """Way after which belief is faded where a foot feels nothing, m: markers jitter."""
 
@@ -148,8 +151,9 @@ class Estimate(NamedTuple):
     fresh : bool
         Whether wetness and friction were updated by this sample.
     doubt : str
-        Why the foot cannot know what is below it; empty where it does. What it says of wetness
-        and friction is then what is left of earlier stances, fading.
+        Why the foot cannot know what is below it: what it is, a colon, and details; empty where
+        it does know. What it says of wetness and friction is then what is left of earlier stances,
+        fading.
     sound : bool
         Whether its sensors are believed. If not, `doubt` says why, `standing` and `slipping` are
         False, and nothing is learnt.
@@ -233,7 +237,7 @@ class FootEstimator:
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
             self._ground.wet_probability, mean, sd, self._ground.quantile(0.05), True,
-            'has not stood yet', True,
+            NOT_YET, True,
         )  # fmt: skip
 
     def update(

@@ -132,18 +132,18 @@ class Sensing:
         if len(stopped) == 3:
             self.since = max(map(self._forces.since, stopped))
             if not nothing:
-                return f'force sensor stands still at {force[2]:.3g} N'
+                return f'force stands still: {force[2]:.3g} N to the last digit'
             if time - self.since > DEAD:
-                return 'force sensor reads exactly nothing'
+                return 'force stands still: reads exactly nothing'
             return ''
         for place, axis in enumerate('xyz'):
             if abs(force[place]) >= self._range:
                 self.since = time
-                return f'force {axis} = {force[place]:.3g} N is at the end of the range'
+                return f'force out of range: {axis} = {force[place]:.3g} N'
             # An axis that a sensor does not have reads zero for ever.
             if place in stopped and force[place]:
                 self.since = self._forces.since(place)
-                return f'force {axis} stays at {force[place]:.3g} N: end of the range?'
+                return f'force out of range: {axis} stays at {force[place]:.3g} N'
         return ''
 
     def _trouble_of_marker(
@@ -153,13 +153,13 @@ class Sensing:
         last, self._last = self._last, (time, tuple(position))
         if age > OLDEST_POSITION:
             self.since = time - age
-            return f'marker was last seen {age:.2g} s ago'
+            return f'marker lost: last seen {age:.2g} s ago'
         if len(stopped) == 3:
             self.since = max(map(self._positions.since, stopped))
-            return 'marker stands still to the last digit'
+            return 'marker stands still: to the last digit'
         if standing and last and 0.0 < time - last[0] < PATIENCE:
             way = math.dist(last[1], position)
             if way > LEAP_WAY and way > LEAP * (time - last[0]):
                 self.since = time
-                return f'marker leapt by {1e3 * way:.0f} mm'
+                return f'marker leapt: {1e3 * way:.0f} mm'
         return ''

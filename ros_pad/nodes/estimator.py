@@ -1,11 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator node: what each foot feels, from its wrench, position and pressure."""
+"""The estimator node: what each foot feels, from its wrench, position and pressure.
+
+Why a foot cannot know what is below it is on ``leg_i/doubt``, and on ``/diagnostics`` with the
+health of its sensors.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from geometry_msgs.msg import WrenchStamped
@@ -13,6 +21,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
+from std_msgs.msg import String
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
@@ -28,6 +37,8 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.stamps import on_tick
+from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import Pace
 
 _TUNING = Tuning()
@@ -45,6 +56,15 @@ PARAMETERS = (
         'Standard deviation of a force component.', 'N', 1e-6, 100.0,
     ),
     Parameter(
+        'moment_noise', 0.0,
+        'Standard deviation of the torque z of a wrench; 0: the sensors measure none.',
+        'N m', 0.0, 10.0,
+    ),
+    Parameter(
+        'force_range', 0.0,
+        'Largest force that a sensor shows in any direction; 0: not known.', 'N', 0.0, 1e5,
+    ),
+    Parameter(
         'patch_length', _TUNING.patch_length,
         'Way over which wet and dry ground change.', 'm', 0.01, 100.0,
     ),
@@ -55,26 +75,47 @@ PARAMETERS = (
     Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 1.0, 1000.0),
 )  # fmt: skip
 
+SILENCE = 0.5
+"""Time without a sample after which a foot is said not to be heard, s."""
+
+_HEALTH_PERIOD_NS = 250_000_000  # of the look at which feet are heard
+_LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
+
 
 class _Leg:
     """Estimator of one leg, the messages it waits for, and those it sends."""
 
     def __init__(
-        self, node: Node, leg: int, estimator: FootEstimator, period_ns: int, ambient: float
+        self,
+        node: Node,
+        leg: int,
+        estimator: FootEstimator,
+        period_ns: int,
+        ambient: float,
+        moments: bool,
     ) -> None:
         self._node = node
+        self._leg = leg
         self._estimator = estimator
+        self._moments = moments
         self._pace = Pace(period_ns)
         self._ambient = ambient
         self._pressure = 0.0
         self._wrench: WrenchStamped | None = None
         self._position: PointStamped | None = None
+        self._used: PointStamped | None = None  # position of the last sample ...
+        self._used_ns = 0  # ... and when it was first used
+        self._heard_ns: int | None = None  # when the last sample came
+        self._refusal = ''
         self.samples = 0
+        self.doubt: str | None = None
+        self.sound = True
         self._slip = topics.SLIP.publisher(node, leg)
         self._slipping = topics.SLIPPING.publisher(node, leg)
         self._friction = topics.FRICTION.publisher(node, leg)
         self._margin = topics.FRICTION_MARGIN.publisher(node, leg)
         self._wetness = topics.WETNESS.publisher(node, leg)
+        self._doubts = topics.DOUBT.publisher(node, leg)
         self._slip_message = TwistWithCovarianceStamped()
         self._slip_message.header.frame_id = 'world'
         topics.PRESSURE.subscription(node, self._on_pressure, leg)
@@ -94,9 +135,14 @@ class _Leg:
             self._take(message, self._position)
 
     def _on_position(self, message: PointStamped) -> None:
-        self._position = message
+        point = message.point
+        if math.isfinite(point.x + point.y + point.z):
+            self._position = message
+        # Some motion capture says so when a marker is out of sight: then the last one counts.
+        elif self._position is None:
+            return
         if self._wrench is not None and self._wrench.header.stamp == message.header.stamp:
-            self._take(self._wrench, message)
+            self._take(self._wrench, self._position)
 
     def _take(self, wrench: WrenchStamped, position: PointStamped) -> None:
         self._wrench = None
@@ -104,6 +150,9 @@ class _Leg:
 
     def _update(self, wrench: WrenchStamped, position: PointStamped) -> None:
         stamp_ns = nanoseconds(wrench.header.stamp)
+        if position is not self._used:
+            # Its own stamp may be of another clock.
+            self._used, self._used_ns = position, stamp_ns
         force, point = wrench.wrench.force, position.point
         try:
             estimate = self._estimator.update(
@@ -111,13 +160,56 @@ class _Leg:
                 (force.x, force.y, force.z),
                 (point.x, point.y, point.z),
                 self._pressure,
+                wrench.wrench.torque.z if self._moments else None,
+                self._used_ns * 1e-9,
             )
         except InvalidInput as error:
+            self._refusal = str(error)
             self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
             return
         self.samples += 1
+        self._heard_ns, self._refusal = None, ''
+        self._say(estimate.doubt, estimate.sound)
         if self._pace.due(stamp_ns):
             self._publish(wrench, estimate)
+
+    def _say(self, doubt: str, sound: bool) -> None:
+        # Details, after the colon, may change with every sample.
+        news = self.doubt is None or doubt.partition(':')[0] != self.doubt.partition(':')[0]
+        self.doubt, self.sound = doubt, sound
+        if news:
+            self._doubts.publish(String(data=doubt))
+
+    def listen(self, now_ns: int) -> None:
+        """Say so when no sample has come for long."""
+        if self._heard_ns is None:
+            self._heard_ns = now_ns
+        silence = (now_ns - self._heard_ns) * 1e-9
+        if silence > SILENCE:
+            self._say(self._missing(silence), False)
+
+    def _missing(self, silence: float) -> str:
+        if self._refusal:
+            return f'sample refused: {self._refusal}'
+        if self._position is None and self._wrench is not None:
+            return f'no position: for {silence:.1f} s'
+        return f'no wrench: for {silence:.1f} s'
+
+    def status(self) -> DiagnosticStatus:
+        """Return how the foot is doing, for ``/diagnostics``."""
+        estimate = self._estimator.estimate
+        return DiagnosticStatus(
+            name=f'{self._node.get_name()}: leg {self._leg} sensing',
+            hardware_id=f'foot {self._leg}',
+            level=_LEVELS[self.sound],
+            message=self.doubt or 'knows the ground',
+            values=[
+                KeyValue(key='P(wet)', value=f'{estimate.wet_probability:.3f}'),
+                KeyValue(key='friction', value=f'{estimate.friction_mean:.3f}'),
+                KeyValue(key='friction sd', value=f'{estimate.friction_sd:.3f}'),
+                KeyValue(key='samples', value=str(self.samples)),
+            ],
+        )
 
     def _publish(self, wrench: WrenchStamped, estimate: Estimate) -> None:
         slip = self._slip_message
@@ -145,6 +237,8 @@ class EstimatorNode(Node):
         tuning = Tuning(
             position_noise=values['position_noise'],
             force_noise=values['force_noise'],
+            moment_noise=values['moment_noise'],
+            force_range=values['force_range'] or math.inf,
             patch_length=values['patch_length'],
             wet_prior=values['wet_prior'],
         )
@@ -155,9 +249,27 @@ class EstimatorNode(Node):
                 FootEstimator(foot, values['expected_load'], tuning),
                 round(1e9 / values['publish_rate']),
                 values['ambient_pressure'],
+                moments=values['moment_noise'] > 0.0,
             )
             for leg in values['legs']
         }
+        self._diagnostics = topics.DIAGNOSTICS.publisher(self)
+        self._diagnostics_pace = Pace(1_000_000_000)
+        self._reported = [True] * len(self.legs)
+        self._health_pace = Pace(_HEALTH_PERIOD_NS)
+        on_tick(self, _HEALTH_PERIOD_NS * 1e-9, self._tick)
+
+    def _tick(self, now_ns: int) -> None:
+        if not self._health_pace.due(now_ns):
+            return
+        for leg in self.legs.values():
+            leg.listen(now_ns)
+        sound = [leg.sound for leg in self.legs.values()]
+        if self._diagnostics_pace.due(now_ns) or sound != self._reported:
+            self._reported = sound
+            array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
+            set_stamp(array.header.stamp, now_ns)
+            self._diagnostics.publish(array)
 
     @property
     def samples(self) -> int:

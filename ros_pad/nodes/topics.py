@@ -94,6 +94,7 @@ WETNESS = _measured('leg_{leg}/wetness', Float64)
 FRICTION = _measured('leg_{leg}/friction', Float64)
 FRICTION_MARGIN = _measured('leg_{leg}/friction_margin', Float64)
 SLIPPING = _measured('leg_{leg}/slipping', Bool)
+DOUBT = Topic('leg_{leg}/doubt', String, qos.STATE, qos.STATE)
 MORPHOLOGY = Topic('leg_{leg}/morphology', String, qos.STATE, qos.STATE)
 BODY_POSE = _measured('body/pose', PoseStamped)
 JOINT_STATES = _measured('joint_states', JointState)
@@ -110,6 +111,7 @@ LEG_TOPICS = (
     FRICTION,
     FRICTION_MARGIN,
     SLIPPING,
+    DOUBT,
     MORPHOLOGY,
 )
 """The topics that every leg has."""

@@ -153,7 +153,7 @@ def test_every_message_arrives(tmp_path):
     for index, leg in enumerate(LEGS):
         wrenches, positions = heard[f'/leg_{leg}/wrench'], heard[f'/leg_{leg}/position']
         assert len(wrenches) == len(positions) == len(felt[leg]) == steps
-        for (at, force, place, _), wrench, position in zip(
+        for (at, force, place, *_), wrench, position in zip(
             felt[leg], wrenches, positions, strict=True
         ):
             stamp, f, p = wrench.header.stamp, wrench.wrench.force, position.point
@@ -196,7 +196,7 @@ def test_the_same_seed_gives_the_same_messages(tmp_path):
         composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name)
     one, two, other = (raw_messages(tmp_path / name) for name in ('first', 'second', 'other'))
     assert set(one) == set(two)
-    assert len(one) == 6 * 10 + 4  # ten of each leg; pose, joints, clock, diagnostics
+    assert len(one) == 6 * 11 + 4  # eleven of each leg; pose, joints, clock, diagnostics
     for topic in set(one) - {'/diagnostics'}:
         assert one[topic] == two[topic], topic
     assert one['/leg_1/wrench'][:250] != other['/leg_1/wrench'][:250]

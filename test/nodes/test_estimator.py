@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
+import time
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
@@ -15,6 +17,7 @@ from ros_pad.nodes.stamps import set_stamp
 
 ESTIMATES = (
     topics.SLIP, topics.SLIPPING, topics.FRICTION, topics.FRICTION_MARGIN, topics.WETNESS,
+    topics.DOUBT,
 )  # fmt: skip
 LOAD = 6.83
 AMBIENT = 101325.0
@@ -28,6 +31,7 @@ class Robot:
         executor.add_node(self.node)
         self._context, self._executor, self.until = context, executor, until
         self.heard = {}
+        self.torque = 0.0
         for leg in (1, 2):
             for topic in ESTIMATES:
                 self.heard[topic.name(leg)] = []
@@ -82,6 +86,10 @@ class Robot:
         self.estimator.destroy_subscription(subscription)
         self.until(lambda: publisher.get_subscription_count() == 1)
 
+    def sample_refused(self, seconds):
+        self.wrench(seconds, (math.nan, 0.0, LOAD))
+        self.position(seconds)
+
     def sample(self, seconds, force=(0.0, 0.0, LOAD), point=(0.0, 0.0, 0.0), leg=1):
         """Wrench and position at a time, waited for."""
         message = WrenchStamped()
@@ -89,6 +97,7 @@ class Robot:
         set_stamp(message.header.stamp, round(seconds * 1e9))
         f = message.wrench.force
         f.x, f.y, f.z = map(float, force)
+        message.wrench.torque.z = self.torque
         self._publishers[topics.WRENCH.name(leg)].publish(message)
         place = PointStamped(header=message.header)
         p = place.point
@@ -176,7 +185,6 @@ BAD = {
     'force x': {'force': (math.nan, 0.0, LOAD)},
     'load': {'force': (0.0, 0.0, math.nan)},
     'infinite load': {'force': (0.0, 0.0, math.inf)},
-    'position': {'point': (0.0, math.nan, 0.0)},
 }
 
 
@@ -195,6 +203,23 @@ def test_a_sample_that_is_no_number_is_ignored_with_a_warning(robot, case, capfd
     robot.until(lambda: len(robot.heard['leg_1/wetness']) == 2)
     for topic in (topics.WETNESS, topics.FRICTION, topics.FRICTION_MARGIN):
         assert all(math.isfinite(m.data) for m in robot.heard[topic.name(1)])
+
+
+def test_a_marker_out_of_sight_leaves_the_last_position(robot):
+    """Some motion capture says NaN then; slip is told from it until it is too old."""
+    node = robot.start()
+    robot.position(0.002, (math.nan, 0.0, 0.0))
+    robot.wrench(0.002)
+    assert node.samples == 0
+    robot.sample(0.004)
+    for number in range(2, 30):
+        jitter = 1e-9 * math.sin(number)
+        robot.wrench(0.004 * number, (jitter, 0.0, LOAD + jitter))
+        robot.position(0.004 * number, (math.nan, 0.0, 0.0))
+        assert node.samples == number
+    doubts = [message.data for message in robot.heard['leg_1/doubt']]
+    assert doubts[-1].startswith('marker lost: last seen 0.05')
+    assert not any(doubt.startswith('marker') for doubt in doubts[:-1])
 
 
 def test_a_sample_that_comes_twice_counts_once(robot):
@@ -217,7 +242,9 @@ def stance(robot, ratio, speed, seconds=1.0, start=0.0, foot_at=0.0):
     """A foot that stands under its load, pulled by ratio times it, sliding at a speed."""
     for number in range(1, round(seconds / 0.004) + 1):
         time = start + 0.004 * number
-        robot.sample(time, (-ratio * LOAD, 0.0, LOAD), (foot_at + speed * 0.004 * number, 0, 0))
+        jitter = 1e-9 * math.sin(number)  # sensors that stand still are not believed
+        force = (-ratio * LOAD + jitter, 0.0, LOAD + jitter)
+        robot.sample(time, force, (foot_at + speed * 0.004 * number + jitter, 0, 0))
     robot.until(lambda: robot.heard['leg_1/slip'] and robot.heard['leg_1/wetness'])
 
 
@@ -264,3 +291,77 @@ def test_every_wrench_changes_the_estimator(robot):
         states.append((estimator.estimate.time, estimator.estimate.slip_speed))
     assert len(set(states)) == 10
     assert [time for time, _ in states] == pytest.approx([0.004 * n for n in range(1, 11)])
+
+
+# --- doubts -------------------------------------------------------------------------------------
+
+
+def sensing(statuses, leg):
+    """The last status of a leg on /diagnostics."""
+    return [status for status in statuses if f'leg {leg} sensing' in status.name][-1]
+
+
+@pytest.fixture
+def health(robot):
+    statuses = []
+    topics.DIAGNOSTICS.subscription(robot.node, lambda array: statuses.extend(array.status))
+    return statuses
+
+
+def test_a_doubt_is_said_when_it_changes_and_ends(robot):
+    robot.start()
+    stance(robot, ratio=0.02, speed=0.0, seconds=0.2)
+    assert robot.heard['leg_1/doubt'][-1].data.startswith('not pulled: T/N up to 0.02')
+    assert len(robot.heard['leg_1/doubt']) == 2  # it had not stood before
+    stance(robot, ratio=0.6, speed=0.0, seconds=0.6, start=0.2)
+    robot.until(lambda: robot.heard['leg_1/doubt'][-1].data == '')
+    assert len(robot.heard['leg_1/doubt']) == 3
+
+
+def test_a_force_sensor_that_stands_still_is_an_error_within_a_second(robot, health):
+    robot.start()
+    stance(robot, ratio=0.1, speed=0.0, seconds=0.2)
+    robot.until(lambda: health and sensing(health, 1).level == DiagnosticStatus.OK)
+    frozen = time.monotonic()
+    for number in range(51, 85):
+        robot.sample(0.004 * number, point=(1e-9 * math.sin(number), 0.0, 0.0))
+    robot.until(lambda: sensing(health, 1).level == DiagnosticStatus.ERROR)
+    assert time.monotonic() - frozen < 1.0 + 0.004 * 34
+    assert sensing(health, 1).message.startswith('force stands still: 6.83 N')
+    assert robot.heard['leg_1/doubt'][-1].data.startswith('force stands still')
+    robot.sample(0.4, (0.001, 0.0, LOAD + 0.01))
+    robot.until(lambda: sensing(health, 1).level == DiagnosticStatus.OK)
+    assert math.isfinite(robot.heard['leg_1/friction_margin'][-1].data)
+
+
+def test_a_foot_that_is_not_heard_is_an_error_within_a_second(robot, health):
+    robot.start()
+    robot.sample(0.004)
+    silent = time.monotonic()
+    robot.until(lambda: health and sensing(health, 1).level == DiagnosticStatus.ERROR)
+    assert 0.4 < time.monotonic() - silent < 1.0
+    assert sensing(health, 1).message.startswith('no wrench: for 0.')
+    robot.wrench(0.008, leg=2)
+    robot.until(lambda: 'no position' in sensing(health, 2).message)
+    robot.sample(0.012)
+    robot.until(lambda: sensing(health, 1).level == DiagnosticStatus.OK)
+
+
+def test_samples_that_are_refused_say_why(robot, health):
+    robot.start()
+    robot.sample(0.004)
+    for number in range(2, 6):
+        robot.sample_refused(0.004 * number)
+    robot.until(lambda: health and 'sample refused' in sensing(health, 1).message)
+    assert 'must be finite' in sensing(health, 1).message
+
+
+def test_a_moment_counts_where_there_is_one(robot):
+    """What holds a foot from turning is friction: 0.04 N m on 2/3 of 18.5 mm, 0.47 of its load."""
+    robot.start(moment_noise=5e-4)
+    stance(robot, ratio=0.05, speed=0.0, seconds=0.2)
+    assert robot.heard['leg_1/wetness'][-1].data > 0.4
+    robot.torque = 0.04
+    stance(robot, ratio=0.05, speed=0.0, seconds=0.2, start=0.2)
+    robot.until(lambda: robot.heard['leg_1/wetness'][-1].data < 0.2)
+    assert robot.heard['leg_1/friction'][-1].data > 0.5
