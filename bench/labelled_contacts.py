@@ -2,7 +2,7 @@
 """What force, moment and foot IMU say of slip on labelled contacts of other people's robots.
 
 Run ``python bench/labelled_contacts.py FILE.csv FILE.csv ... [--json]``. The files are those of
-https://github.com/mrsp/lcd, folder ``data`` (MIT licence; doi 10.1109/IROS47612.2022.9981354): 13
+https://github.com/mrsp/lcd, folder ``data`` (MIT licence; ieeexplore.ieee.org/document/9981354): 13
 columns at 100 Hz without a header: force x, y, z (N), moment x, y, z (N m), acceleration x, y, z
 without gravity (m/s²), angular rate x, y, z (rad/s) of one foot, and the label: 0 stable contact,
 1 no contact, 2 slip. What a file's name says before its first underscore is the robot; two robots
@@ -72,6 +72,9 @@ SAME = 0.02
 
 FEWEST = 10
 """Slips, without which no share of them is told."""
+
+POINT = 1e-4
+"""Moment about the vertical, over the load, below which a foot stands on a point, m."""
 
 RESAMPLES = 200
 PRIOR = FrictionPrior.of(Foot.load('large37'), 6.8)
@@ -204,6 +207,12 @@ class Recording:
         )
 
     @functools.cached_property
+    def torsion(self) -> np.ndarray:
+        """Moment about the vertical through the centre of pressure, over the load, m."""
+        x, y = self.centre.T
+        return self.per_load(self.moment[:, 2] - x * self.force[:, 1] + y * self.force[:, 0])
+
+    @functools.cached_property
     def reach(self) -> np.ndarray:
         """Box that holds 98 % of the centres of pressure of each axis, shape (2, 2), m."""
         return np.quantile(self.centre[self.load > 0.5 * self.expected_load], [0.01, 0.99], axis=0)
@@ -285,9 +294,6 @@ def runs(mask: np.ndarray, join: int = 0) -> list[tuple[int, int]]:
 
 def features(recording: Recording) -> dict[str, np.ndarray]:
     """Return each single feature by sample: larger is more like slip; rates as logarithms."""
-    x, y = recording.centre.T
-    twist = recording.moment[:, 2] - (x * recording.force[:, 1] - y * recording.force[:, 0])
-    torsion = 1.5 * twist / recording.sole_radius
     low, high = recording.reach
     off_centre = np.abs(recording.centre - 0.5 * (low + high)) / (0.5 * (high - low))
     rim = 2.0 / 3.0 * recording.sole_radius * recording.speed
@@ -308,7 +314,7 @@ def features(recording: Recording) -> dict[str, np.ndarray]:
         | {
             RATIO: recording.ratio,
             # The ellipsoidal limit surface with the torsional limit 2/3 R μ N of a disc.
-            TWIST: np.hypot(recording.ratio, recording.per_load(torsion)),
+            TWIST: np.hypot(recording.ratio, 1.5 * recording.torsion / recording.sole_radius),
             LIGHT: -recording.load / recording.expected_load,
             EDGE: off_centre.max(axis=1),
             MARGIN: -margin(recording),
@@ -566,6 +572,8 @@ class Study:
             'slip_at_edge': float(np.mean(at_edge[slip])),
             'stick_at_edge': float(np.mean(at_edge[stick])),
             'slip_rolls': float(np.mean((horizontal > np.abs(recording.rate[:, 2]))[slip])),
+            'slip_on_a_point': float(np.mean(np.abs(recording.torsion[slip]) < POINT)),
+            'stick_on_a_point': float(np.mean(np.abs(recording.torsion[stick]) < POINT)),
             'slip_ratio_median': float(np.median(ratio[slip])),
             'stick_ratio_median': float(np.median(ratio[stick])),
             'friction_below_quantile': (

@@ -159,6 +159,7 @@ def test_combined_ratio_is_friction_on_the_limit_surface():
         moment_z=twist + x * slide * friction * 10.0,
     )
     found = bench.features(pulled)
+    np.testing.assert_allclose(pulled.torsion, twist / 10.0, rtol=1e-9)
     np.testing.assert_allclose(found[bench.TWIST], friction, rtol=1e-9)
     np.testing.assert_allclose(found[bench.RATIO], slide * friction, rtol=1e-12)
 
@@ -184,6 +185,12 @@ def test_without_a_position_more_pull_raises_the_least_friction():
     quantile = bench.margin(found) + found.ratio
     assert quantile[38] < 0.15  # nothing asked, nothing known
     assert quantile[-1] > 0.28
+
+
+def test_a_steady_pull_is_no_news():
+    found = foot([0] * 200, force_x=1.0)
+    quantile = bench.margin(found) + found.ratio
+    np.testing.assert_allclose(quantile, quantile[0], atol=1e-12)
 
 
 # --- ranking -------------------------------------------------------------------------------------
