@@ -2,9 +2,9 @@
 """What force, moment and foot IMU say of slip on labelled contacts of other people's robots.
 
 Run ``python bench/labelled_contacts.py FILE.csv FILE.csv ... [--json]``. The files are those of
-https://github.com/mrsp/lcd, folder ``data`` (MIT licence; ieeexplore.ieee.org/document/9981354): 13
-columns at 100 Hz without a header: force x, y, z (N), moment x, y, z (N m), acceleration x, y, z
-without gravity (m/s²), angular rate x, y, z (rad/s) of one foot, and the label: 0 stable contact,
+https://github.com/mrsp/lcd, folder ``data`` (MIT; https://ieeexplore.ieee.org/document/9981354):
+13 columns at 100 Hz without a header: force x, y, z (N), moment x, y, z (N m), acceleration x, y,
+z without gravity (m/s²), angular rate x, y, z (rad/s) of one foot, and a label: 0 stable contact,
 1 no contact, 2 slip. What a file's name says before its first underscore is the robot; two robots
 are needed. Tables go to the screen, a figure and its numbers (labelled_contacts.png and .json) to
 docs/charts. ``bench/turning_feet.py`` asks our own robot about the angular rate.
@@ -794,7 +794,7 @@ def _draw_ranking(panel: Axes, rows: dict[str, Any], colours: dict[str, str]) ->
     panel.set_yticks(range(len(RANKED)), RANKED)
     panel.set(
         ylim=(len(RANKED) - 0.5, -0.5), xlim=(0.1, 1.02), xlabel='AUC of labelled slip, in stance',
-        title='a  what ranks labelled slip above stable contact',
+        title='a  slip ranked above stable contact',
     )  # fmt: skip
     panel.legend(fontsize=7.5, loc='lower left')
 
@@ -814,7 +814,7 @@ def _draw_ratio(panel: Axes, recording: Recording) -> None:
                ms=5.0, ls='', clip_on=False, label='friction of its floors', zorder=5)  # fmt: skip
     panel.set(
         xlim=(0.0, 0.6), ylim=(0.0, top), xlabel='T/N', ylabel='% of samples in stance, each 0.01',
-        title=f'b  {recording.name.replace("_", " ")}: slips pull less than stable contacts',
+        title=f'b  {recording.name.replace("_", " ")}: T/N of both',
     )  # fmt: skip
     panel.legend(fontsize=8)
 
@@ -832,7 +832,7 @@ def _draw_rate(panel: Axes, recordings: Sequence[Recording], colours: dict[str, 
     panel.set(
         xscale='log', xlim=(1e-4, 2.0), ylim=(0.0, 101.0),
         xlabel='angular rate of the foot in stance (rad/s)', ylabel='% of samples below',
-        title='c  most labels turn at 0.08 rad/s: the rate is part of them',
+        title='c  angular rate, and where most labels turn',
     )  # fmt: skip
     panel.legend(fontsize=8, loc='upper left')
 
@@ -849,7 +849,7 @@ def _draw_reliability(panel: Axes, rows: dict[str, Any], colours: dict[str, str]
                label='fitted to the other robot')  # fmt: skip
     panel.set(
         xlim=(0.0, 1.0), ylim=(0.0, 1.0), xlabel='probability of slip from the angular rate',
-        ylabel='share labelled slip', title='d  a probability holds on the robot it was fitted to',
+        ylabel='share labelled slip', title='d  what becomes of a probability',
     )  # fmt: skip
     panel.legend(fontsize=8, loc='upper left', bbox_to_anchor=(0.16, 0.97))
 
@@ -859,7 +859,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument('files', type=pathlib.Path, nargs='+', metavar='FILE.csv')
+    parser.add_argument(
+        'files', type=pathlib.Path, nargs='+', metavar='FILE.csv', help='of two robots'
+    )
     parser.add_argument('--json', action='store_true', help='print the numbers as JSON instead')
     parser.add_argument('--out', type=pathlib.Path, default=CHARTS, help='folder (%(default)s)')
     options = parser.parse_args()
