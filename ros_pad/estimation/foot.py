@@ -302,10 +302,9 @@ class FootEstimator:
         if trouble:
             return self._mistrust(time, dt, x, y, trouble)
         load = fz - self._offset_z
-        if z > self._height + AIRBORNE and (
-            load < AIRBORNE_LOAD * self._expected_load
-            or (self._standing and z > self._touched_at + AIRBORNE)
-        ):
+        if self._standing and z > self._touched_at + AIRBORNE:
+            self._height, load = self._touched_at, 0.0  # no ground rises with a foot
+        if z > self._height + AIRBORNE and load < AIRBORNE_LOAD * self._expected_load:
             self._tare(dt, fx, fy, fz, twist)
             return self._swing(time)
         if load < self._gate:
@@ -390,7 +389,7 @@ class FootEstimator:
         if self._beliefs:
             before = [belief for at, belief in self._beliefs if at <= since]
             if len(before) < len(self._beliefs):
-                ground.belief = before[-1] if before else self._beliefs[0][1]
+                ground.belief = (before or [self._beliefs[0][1]])[-1]
                 faded = True
             self._beliefs.clear()
         if self._sensing.marker_sound:
@@ -433,6 +432,7 @@ class FootEstimator:
         self._footprint, self._touched, self._touched_at = (x, y), time, z
         self._dome_share = self._share_on_domes(pressure)
         self._ground.touch_down(way, self._dome_share > doubt.DOMED)
+        self._beliefs.append((time, self._ground.belief))
         self._quantile = self._ground.quantile(0.05)
         self._window_start = time
         self._first_window = True

@@ -23,7 +23,8 @@ OLDEST_POSITION = 0.05
 mm/s."""
 
 DEAD = 2.0
-"""Time for which a force sensor may read exactly nothing, s: simulated feet do so in the air."""
+"""Time for which a force sensor may read exactly nothing, s: simulated feet do so in the air. And
+for which one may repeat itself whose steps are larger than twice its noise."""
 
 LEAP = 5.0
 """Speed at which nothing moves that carries load, m/s ..."""
@@ -39,11 +40,15 @@ class Repeats:
     ----------
     values : int
         How many there are.
+    noise : float
+        Their standard deviation; values without noise never count as stopped.
     """
 
-    __slots__ = ('_counts', '_last', '_since')
+    __slots__ = ('_counts', '_last', '_noise', '_since', '_steps')
 
-    def __init__(self, values: int) -> None:
+    def __init__(self, values: int, noise: float) -> None:
+        self._noise = noise
+        self._steps = [math.inf] * values  # smallest change so far
         self._last = [math.nan] * values
         self._since = [math.inf] * values
         self._counts = [0] * values
@@ -54,17 +59,24 @@ class Repeats:
 
     def update(self, time: float, values: Sequence[float]) -> list[int]:
         """Take the values of a time, s; return the places of those that have stopped."""
-        stopped = []
+        stopped: list[int] = []
+        if not self._noise:
+            return stopped
         last, counts = self._last, self._counts
         for place, value in enumerate(values):
             if value != last[place]:
+                change = abs(value - last[place])
+                if change < self._steps[place]:
+                    self._steps[place] = change
                 last[place] = value
                 self._since[place] = time
                 counts[place] = 1
                 continue
             counts[place] += 1
             if counts[place] >= FEWEST and time - self._since[place] > PATIENCE:
-                stopped.append(place)
+                coarse = 2.0 * self._noise < self._steps[place] < math.inf
+                if not coarse or time - self._since[place] > DEAD:
+                    stopped.append(place)
         return stopped
 
 
@@ -95,8 +107,8 @@ class Sensing:
 
     def restart(self) -> None:
         """Forget what was seen: the clock has been set."""
-        self._forces = Repeats(3)
-        self._positions = Repeats(3)
+        self._forces = Repeats(3, self._force_noise)
+        self._positions = Repeats(3, self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
         self.marker_sound = True
         self.since = math.inf
@@ -122,7 +134,7 @@ class Sensing:
         standing : bool
             Whether the foot stood at the sample before: then it cannot be elsewhere at once.
         """
-        forces = self._forces.update(time, force) if self._force_noise > 0.0 else []
+        forces = self._forces.update(time, force)
         marker = self._trouble_of_marker(time, position, age, standing)
         self.marker_sound = not marker
         return self._trouble_of_force(time, force, forces) or marker
@@ -149,7 +161,7 @@ class Sensing:
     def _trouble_of_marker(
         self, time: float, position: Sequence[float], age: float, standing: bool
     ) -> str:
-        stopped = self._positions.update(time, position) if self._position_noise > 0.0 else []
+        stopped = self._positions.update(time, position)
         last, self._last = self._last, (time, tuple(position))
         if age > OLDEST_POSITION:
             self.since = time - age

@@ -75,10 +75,10 @@ PARAMETERS = (
     Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 1.0, 1000.0),
 )  # fmt: skip
 
-SILENCE = 0.5
+SILENCE = 0.4
 """Time without a sample after which a foot is said not to be heard, s."""
 
-_HEALTH_PERIOD_NS = 250_000_000  # of the look at which feet are heard
+_HEALTH_PERIOD_NS = 100_000_000  # of the look at which feet are heard
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
 

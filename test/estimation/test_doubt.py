@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a foot cannot know, it says, and does not believe.
+
+Two worlds that look the same to a foot must leave it where it was; worlds that differ must not.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.estimation import FootEstimator
+from ros_pad.estimation import Tuning
+from ros_pad.estimation.friction import FrictionPrior
+
+FOOT = Foot.load('large37')
+LOAD = 6.8  # N
+PERIOD = 0.004  # s
+PRIOR = FrictionPrior.of(FOOT, LOAD)
+LEVER = 2.0 / 3.0 * FOOT.sole_radius
+
+
+class Walk:
+    """A foot that walks ahead; its contact slides, turns or sticks as told."""
+
+    def __init__(self, seed=0, **tuning):
+        self.estimator = FootEstimator(FOOT, LOAD, Tuning(**tuning))
+        self.random = np.random.default_rng(seed)
+        self.time = self.x = 0.0
+
+    @property
+    def estimate(self):
+        return self.estimator.estimate
+
+    def sample(self, ratio, slip=0.0, load=LOAD, height=0.0, pressure=0.0, moment=None):
+        self.time += PERIOD
+        self.x += slip * PERIOD
+        pull = -ratio * load
+        force = np.array([pull, 0.0, load]) + 0.03 * self.random.normal(size=3)
+        marker = np.array([self.x - pull / FOOT.shear_stiffness, 0.0, height])
+        marker += 1.5e-4 * self.random.normal(size=3)
+        if moment is not None:
+            moment += 5e-4 * self.random.normal()
+        return self.estimator.update(self.time, force.tolist(), marker.tolist(), pressure, moment)
+
+    def stand(self, ratio=0.3, slip=0.0, seconds=0.5, load=LOAD, **more):
+        """Stand under a pull that grows to its full in a tenth of a second."""
+        for k in range(round(seconds / PERIOD)):
+            grown = min(1.0, k * PERIOD / 0.1)
+            self.sample(grown * ratio, slip if grown == 1.0 else 0.0, load, **more)
+        return self.estimate
+
+    def swing(self, stride=0.14, seconds=0.4):
+        count = round(seconds / PERIOD)
+        for k in range(count):
+            self.x += stride / count
+            self.sample(0.0, load=0.0, height=0.03 * math.sin(math.pi * k / count))
+        return self.estimate
+
+
+def kind(estimate):
+    return estimate.doubt.partition(':')[0]
+
+
+# --- what is below it ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('ratio', [0.0, 0.02, 0.05, 0.08])
+def test_a_foot_that_is_never_pulled_stays_with_its_prior(ratio):
+    """It would stick on wet ground and on dry: whatever it is, it cannot tell."""
+    for prior in (0.1, 0.5, 0.9):
+        walk = Walk(wet_prior=prior)
+        for _ in range(20):
+            estimate = walk.stand(ratio)
+            assert kind(estimate) == 'not pulled'
+            walk.swing()
+        # Sticking says a little for dry ground, which holds more: at most what one such stance in
+        # a patch length may say.
+        odds = math.log(estimate.wet_probability / (1.0 - estimate.wet_probability))
+        assert abs(odds - math.log(prior / (1.0 - prior))) < 1.0
+        assert estimate.friction_sd > 0.2
+
+
+@pytest.mark.parametrize(('ratio', 'slip', 'wet'), [(0.12, 0.05, True), (0.6, 0.0, False)])
+def test_knowledge_fades_over_the_way_and_comes_back(ratio, slip, wet):
+    walk = Walk()
+    known = walk.stand(ratio, slip)
+    assert (kind(known), known.wet_probability > 0.9) == ('', wet)
+    assert (known.wet_probability < 0.1) != wet
+    walk.swing()
+    excess = []
+    for _ in range(11):
+        excess.append(abs(walk.stand(0.01).wet_probability - 0.5))
+        assert kind(walk.estimate) == 'not pulled'
+        walk.swing()
+    # exp(-d / 1.5 m): 1.4 m on, within what the ten stances between say of themselves.
+    assert excess[-1] / excess[0] == pytest.approx(math.exp(-1.4 / 1.5), abs=0.12)
+    assert kind(walk.stand(ratio, slip)) == ''
+    assert (walk.estimate.wet_probability > 0.9) == wet
+
+
+@pytest.mark.parametrize('wet', [False, True])
+def test_a_dome_feels_both_grounds_alike_and_says_so(wet):
+    walk = Walk()
+    known = walk.stand(*((0.12, 0.05) if wet else (0.6, 0.0)))
+    excess = known.wet_probability - 0.5
+    for step in range(1, 12):
+        walk.swing()
+        for slip in (0.0, 0.03):
+            walk.stand(PRIOR.dome, slip, pressure=80e3)
+        assert kind(walk.estimate) == 'domed'
+        slid = walk.x - 0.14 * step
+    faded = 0.5 + excess * math.exp(-(11 * 0.14 + slid) / 1.5)
+    assert walk.estimate.wet_probability == pytest.approx(faded, abs=0.02)
+    assert walk.estimate.friction_mean == pytest.approx(PRIOR.dome, abs=0.1)
+
+
+def test_a_pad_that_fills_under_load_is_no_longer_taken_for_flat():
+    """At 0.41 a flat foot would slip on neither ground that it expects."""
+    walk = Walk()
+    walk.stand(0.05, pressure=0.0)
+    for k in range(250):
+        estimate = walk.sample(min(0.38, 0.01 * k), pressure=80e3 * min(1.0, k / 20))
+    assert kind(estimate) == 'domed'
+    assert estimate.wet_probability == pytest.approx(0.5, abs=0.1)
+
+
+def test_half_inflated_is_said():
+    walk = Walk()
+    pressure = next(p for p in range(50_000, 90_000, 100) if FOOT.dome_load(LOAD, p) > 0.4 * LOAD)
+    estimate = walk.stand(0.5, pressure=float(pressure))
+    assert estimate.doubt.startswith('half inflated: domes carry 4')
+    assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_light_foot_knows_little():
+    walk = Walk()
+    estimate = walk.stand(0.5, load=0.15 * LOAD)
+    assert kind(estimate) in ('', 'light')
+    lighter = Walk(force_noise=0.3).stand(0.3, load=0.15 * LOAD)
+    assert kind(lighter) == 'light'
+    assert 0.1 < lighter.wet_probability < 0.9
+
+
+def test_friction_between_wet_and_dry_is_undecided():
+    """Slipping at 0.33, where wet ground should hold 0.12 and dry 0.8."""
+    walk = Walk()
+    estimate = walk.stand(0.33, 0.12)
+    assert kind(estimate) in ('undecided', '')
+    assert 0.05 < estimate.wet_probability < 0.95
+    assert estimate.friction_mean == pytest.approx(0.33, abs=2.0 * estimate.friction_sd)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_what_turning_hides_a_moment_shows(seed):
+    """T/N = 0.12 at 10 mm/s: wet, or dry ground on which the foot turns at 5.3 rad/s.
+
+    Without a moment it is taken for wet, as most feet that slide are.
+    """
+    shown = 0.12
+    unknown = Walk(seed).stand(shown, 0.01)
+    assert unknown.wet_probability > 0.5
+    moment = math.sqrt(PRIOR.flat_dry**2 - shown**2) * LOAD * LEVER
+    dry = Walk(seed).stand(shown, 0.01, moment=moment)
+    assert dry.wet_probability < 0.05
+    assert dry.friction_mean == pytest.approx(PRIOR.flat_dry, abs=2.0 * dry.friction_sd)
+    assert dry.margin < 0.05
+    wet = Walk(seed).stand(shown, 0.04, moment=0.0)
+    assert wet.wet_probability > 0.95
+    assert wet.friction_mean == pytest.approx(shown, abs=2.0 * wet.friction_sd)
+    assert wet.friction_sd < unknown.friction_sd
+
+
+def test_a_foot_that_only_turns_a_little_says_so():
+    estimate = Walk().stand(0.02, moment=0.1 * LOAD * LEVER)
+    assert kind(estimate) == 'turning'
+    assert 0.3 < estimate.wet_probability < 0.7
+
+
+def test_doubts_are_where_the_errors_are():
+    """Stances drawn from what is expected: those that know are right, the others near chance."""
+    random = np.random.default_rng(11)
+    knowing, doubting = [], []
+    for seed in range(250):
+        wet = random.random() < 0.5
+        mean = PRIOR.flat_wet if wet else PRIOR.flat_dry
+        friction = max(0.03, random.normal(mean, PRIOR.spread * mean))
+        demand = random.exponential(0.2)
+        slips = demand > friction
+        walk = Walk(seed)
+        estimate = walk.stand(min(demand, friction), random.gamma(2.0, 0.04) if slips else 0.0)
+        likely = estimate.wet_probability if wet else 1.0 - estimate.wet_probability
+        (doubting if estimate.doubt else knowing).append(likely)
+    assert len(knowing) > 60
+    assert len(doubting) > 60
+    assert np.mean(np.array(knowing) > 0.5) > 0.97
+    assert np.mean(doubting) < 0.65
+    # What is said to be likely comes true as often.
+    every = np.array(knowing + doubting)
+    assert np.mean(every > 0.5) == pytest.approx(np.mean(np.maximum(every, 1.0 - every)), abs=0.06)
+
+
+# --- its sensors --------------------------------------------------------------------------------
+
+
+class Broken(Walk):
+    """A walk whose readings a function changes on their way to the estimator."""
+
+    def __init__(self, change, seed=0, **tuning):
+        super().__init__(seed, **tuning)
+        update, self.broken = self.estimator.update, False
+        self.last = None
+
+        def changed(time, force, position, *rest):
+            if not self.broken:
+                self.last = force, position
+                return update(time, force, position, *rest)
+            force, position = change(force, position, *(self.last or (force, position)))
+            return update(time, force, position, *rest)
+
+        self.estimator.update = changed
+
+
+def frozen_force(force, position, last_force, last_position):
+    return last_force, position
+
+
+def frozen_marker(force, position, last_force, last_position):
+    return force, last_position
+
+
+def test_a_force_sensor_that_freezes_takes_back_what_it_said():
+    """It froze at full load on dry ground, and the foot went on: that looked like a slip."""
+    walk = Broken(frozen_force)
+    known = walk.stand(0.6)
+    assert known.wet_probability < 0.1
+    walk.broken = True
+    alarms = 0
+    for _ in range(10):
+        alarms += walk.swing().slipping
+        walk.stand(0.3)
+    estimate = walk.estimate
+    assert estimate.doubt == f'force stands still: {walk.last[0][2]:.3g} N to the last digit'
+    assert not (estimate.sound or estimate.standing or estimate.slipping)
+    assert alarms == 0
+    assert math.isnan(estimate.margin)
+    assert estimate.slip_speed_sd == math.inf
+    faded = 0.5 + (known.wet_probability - 0.5) * math.exp(-1.4 / 1.5)
+    assert estimate.wet_probability == pytest.approx(faded, abs=0.03)
+    assert estimate.friction_sd > known.friction_sd
+    walk.broken = False
+    walk.swing()
+    healed = walk.stand(0.12, 0.05)
+    assert healed.sound
+    assert healed.wet_probability > 0.9
+    assert math.isfinite(healed.margin)
+
+
+def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
+    walk = Broken(frozen_marker)
+    for _ in range(12):  # to get to know the pace: 0.14 m in 0.9 s
+        walk.stand(0.6)
+        walk.swing()
+    known = walk.stand(0.6)
+    walk.broken = True
+    started = walk.time
+    for _ in range(10):
+        walk.swing()
+        walk.stand(0.12, 0.05)
+    assert kind(walk.estimate) == 'marker stands still'
+    way = 0.14 / 0.9 * (walk.time - started)
+    faded = 0.5 + (known.wet_probability - 0.5) * math.exp(-way / 1.5)
+    assert walk.estimate.wet_probability == pytest.approx(faded, abs=0.06)
+
+
+@pytest.mark.parametrize('told', [True, False])
+def test_a_sensor_at_the_end_of_its_range_is_not_believed(told):
+    """At 5 N of 6.8 N a pull of 0.6 looks like 0.82."""
+
+    def saturated(force, position, last_force, last_position):
+        return [force[0], force[1], min(force[2], 5.0)], position
+
+    walk = Broken(saturated, **({'force_range': 5.0} if told else {}))
+    walk.broken = True
+    for _ in range(5):
+        estimate = walk.stand(0.6)
+        assert kind(estimate) == 'force out of range'
+        assert estimate.doubt.endswith('z = 5 N' if told else 'z stays at 5 N')
+        walk.swing()
+    assert estimate.friction_mean == pytest.approx(walk.estimate.friction_mean)
+    assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_sensor_that_dies_is_noticed_in_the_air_too():
+    walk = Broken(lambda *_: ([0.0, 0.0, 0.0], _[1]))
+    walk.stand(0.6)
+    walk.broken = True
+    for _ in range(3):
+        walk.swing()
+        walk.stand()
+    assert walk.estimate.doubt == 'force stands still: reads exactly nothing'
+
+
+def test_simulated_feet_may_read_nothing_in_the_air():
+    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
+    for _ in range(4):
+        walk.broken = False
+        walk.stand(0.6)
+        walk.broken = True
+        assert walk.swing(seconds=1.5).sound
+
+
+def test_sensors_said_to_be_without_noise_may_repeat_themselves():
+    estimator = FootEstimator(FOOT, LOAD, Tuning(force_noise=0.0, position_noise=0.0))
+    for k in range(1000):
+        estimate = estimator.update(PERIOD * k, (-2.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0)
+    assert estimate.sound
+
+
+def test_converters_with_steps_and_slow_markers_are_believed():
+    """Steps of 0.1 N with noise of 0.03 N, and a marker at 30 Hz with forces at 250 Hz."""
+    walk = Broken(None)
+    walk.broken = True
+    update = FootEstimator.update
+    kept = [0.0, 0.0, 0.0]
+
+    def changed(time, force, position, *rest):
+        nonlocal kept
+        if round(time / PERIOD) % 8 == 0:
+            kept = position
+        stepped = [0.1 * round(each / 0.1) for each in force]
+        return update(walk.estimator, time, stepped, kept, *rest)
+
+    walk.estimator.update = changed
+    sound = True
+    for _ in range(10):
+        for k in range(125):
+            sound &= walk.sample(0.3 * math.sin(0.025 * k)).sound
+        for k in range(100):
+            walk.x += 0.0014
+            sound &= walk.sample(0.0, load=0.0, height=0.03 * math.sin(0.0314 * k)).sound
+    assert sound
+
+
+def test_a_position_that_is_old_tells_no_slip():
+    walk = Walk()
+    walk.stand(0.3)
+    for _ in range(20):
+        walk.time += PERIOD
+        force = [-0.3 * LOAD, 0.03 * walk.random.normal(), LOAD]
+        estimate = walk.estimator.update(
+            walk.time, force, (0.0, 0.0, 0.0), 0.0, position_time=walk.time - 0.06
+        )
+    assert estimate.doubt == 'marker lost: last seen 0.06 s ago'
+    assert not estimate.sound
+
+
+def test_a_marker_that_leaps_is_no_slip_and_no_way():
+    """As when motion capture takes another marker for it, and finds its error."""
+    walk = Walk()
+    known = walk.stand(0.6)
+    walk.x += 0.4
+    assert walk.sample(0.3).doubt == 'marker leapt: 400 mm'
+    away = walk.stand(0.3, seconds=0.1)
+    walk.x -= 0.4
+    back = walk.stand(0.3, seconds=0.1)
+    assert not (away.slipping or back.slipping)
+    assert back.wet_probability == pytest.approx(known.wet_probability, abs=0.03)
+
+
+def test_a_clock_that_is_set_back_begins_a_new_stance():
+    walk = Walk()
+    known = walk.stand(0.6)
+    walk.time -= 0.5
+    for _ in range(125):
+        estimate = walk.sample(0.3)
+        assert estimate.time == walk.time
+    assert estimate.standing
+    assert not estimate.slipping
+    assert estimate.wet_probability == pytest.approx(known.wet_probability, abs=0.1)
+
+
+@pytest.mark.parametrize('bias', [0.5, 1.0, 3.0])
+def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
+    """It reads up to nearly half of its load in the air; there it rises, and no ground does."""
+    walk = Broken(lambda force, position, *_: ([force[0], force[1], force[2] + bias], position))
+    walk.broken = True
+    for _ in range(6):
+        estimate = walk.stand(0.12, 0.05)
+        in_the_air = [walk.swing(seconds=0.2).standing, walk.swing(seconds=0.2).standing]
+    assert not any(in_the_air)
+    assert estimate.wet_probability > 0.9
+    assert estimate.friction_mean == pytest.approx(0.12, abs=0.04)
+
+
+def test_an_offset_that_is_not_known_yet_makes_it_less_sure():
+    first = Walk().stand(0.45, 0.1)
+    walk = Walk()
+    for _ in range(5):
+        walk.stand(0.0)
+        walk.swing()
+    assert walk.stand(0.45, 0.1).friction_sd < first.friction_sd
