@@ -144,6 +144,9 @@ class _Ears:
         self.readings = self._sensors.read(robot)
         return self.readings
 
+    def read_moments(self, robot: Any) -> list[float | None]:
+        return self._sensors.read_moments(robot)
+
 
 class _NoLog:
     """Takes what a trial would log."""

@@ -118,6 +118,7 @@ class ComposedTrial:
                 use_sim_time=True,
                 position_noise=tuning.position_noise,
                 force_noise=tuning.force_noise,
+                moment_noise=tuning.moment_noise,
                 publish_rate=rate,
                 **felt,
             )

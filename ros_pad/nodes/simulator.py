@@ -130,12 +130,14 @@ class SimulatorNode(Node):
             self.get_logger().error(f'the walk is not valid from here on: {self.robot.verdict}')
         stamp_ns = self.time_ns if self._simulated else self.get_clock().now().nanoseconds
         readings = self._sensors.read(self.robot)
+        moments = self._sensors.read_moments(self.robot)
         wrench, position = self._wrench_message, self._position_message
         set_stamp(wrench.header.stamp, stamp_ns)
         position.header.stamp = wrench.header.stamp
         force, point = wrench.wrench.force, position.point
         for index, leg in enumerate(self.scene.legs):
             (force.x, force.y, force.z), (point.x, point.y, point.z) = readings[index]
+            wrench.wrench.torque.z = moments[index] or 0.0
             wrench.header.frame_id = f'leg_{leg}_sole'
             self._wrenches[index].publish(wrench)
             self._positions[index].publish(position)

@@ -335,6 +335,7 @@ class FullHexapod:
         self._cleared = [True] * 6  # the ground, in the swing that is on or was last
         self._loads = [0.0] * 6
         self._pushes = [(0.0, 0.0)] * 6
+        self._moments = [0.0] * 6
         self._ratios = [0.0] * 6
         self._mujoco: Any = mujoco
         text = mjcf(scene, self._geometry, floor.heights is not None, settings, self._dt)
@@ -472,18 +473,19 @@ class FullHexapod:
         row[2] = self._lever * ratio
 
     def _read_contacts(self) -> None:
-        """Note the ground's force on each foot in the step that is over."""
+        """Note the ground's force and moment on each foot in the step that is over."""
         model, data, wrench = self.model, self.data, self._wrench
         contact_force = self._mujoco.mj_contactForce
-        loads, pushes = [0.0] * 6, [(0.0, 0.0)] * 6
+        loads, pushes, moments = [0.0] * 6, [(0.0, 0.0)] * 6, [0.0] * 6
         for contact, (_, geom) in enumerate(data.contact.geom.tolist()):
             index = self._index.get(geom)
             if index is not None:
                 contact_force(model, data, contact, wrench)
                 # The axes of a contact with level ground are z, y, -x.
-                normal, left, back, _, _, _ = wrench.tolist()
+                normal, left, back, moment, _, _ = wrench.tolist()
                 loads[index], pushes[index] = normal, (-back, left)
-        self._loads, self._pushes = loads, pushes
+                moments[index] = moment
+        self._loads, self._pushes, self._moments = loads, pushes, moments
 
     def _report(self, pressures: Sequence[float]) -> None:
         dt, foot, floor = self.period, self._foot, self._floor
@@ -495,6 +497,7 @@ class FullHexapod:
             load, (push_x, push_y) = self._loads[index], self._pushes[index]
             state.position = (x - push_x * softness, y - push_y * softness, z - _POINT)
             state.force = (push_x, push_y, load)
+            state.moment = self._moments[index]
             state.standing = load > 0.0
             state.grip = self._ratios[index] * load
             state.slip_speed = 0.0

@@ -174,11 +174,12 @@ class PlanarHexapod:
             return self._feet
         self._fresh = True
         table = self._table if isinstance(self._table, list) else self._table.tolist()
-        for state, (x, y, height, fx, fy, load, cap, wet, speed, path, overload) in zip(
+        for state, (x, y, height, fx, fy, load, moment, cap, wet, speed, path, overload) in zip(
             self._feet, zip(*(table[row] for row in _SHOWN), strict=True), strict=True
         ):
             state.position = (x, y, height)
             state.force = (fx, fy, load)
+            state.moment = moment
             state.standing = load > 0.0
             state.wet = wet > 0.0
             state.grip = cap
@@ -193,6 +194,7 @@ class PlanarHexapod:
 _SHOWN = (
     planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
     planar_step.FORCE_X, planar_step.FORCE_Y, planar_step.LOAD,
+    planar_step.MOMENT,
     planar_step.CAP, planar_step.WET,
     planar_step.SLIP_SPEED, planar_step.SLIP_PATH, planar_step.OVERLOAD,
 )  # fmt: skip

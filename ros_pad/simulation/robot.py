@@ -21,6 +21,8 @@ class FootState:
         Marker on the foot, above its soft pads, m.
     force : tuple of float
         Force of the ground on the foot, N; z up out of the floor.
+    moment : float
+        Of the ground on the foot about the vertical, N m.
     standing : bool
         Whether the foot carries load.
     wet : bool
@@ -36,12 +38,14 @@ class FootState:
     """
 
     __slots__ = (
-        'force', 'grip', 'overload_time', 'position', 'slip_path', 'slip_speed', 'standing', 'wet',
+        'force', 'grip', 'moment', 'overload_time', 'position', 'slip_path', 'slip_speed',
+        'standing', 'wet',
     )  # fmt: skip
 
     def __init__(self) -> None:
         self.position: Vector = (0.0, 0.0, 0.0)
         self.force: Vector = (0.0, 0.0, 0.0)
+        self.moment = 0.0
         self.standing = False
         self.wet = False
         self.grip = 0.0

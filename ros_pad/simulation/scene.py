@@ -138,11 +138,15 @@ class SensorNoise:
         Standard deviation of each force component, N.
     position : float
         Standard deviation of each marker coordinate, m.
+    moment : float
+        Standard deviation of the moment about the vertical, N m; 0 where none is measured, as by
+        sensors of three axes.
     """
 
     rate: float
     force: float
     position: float
+    moment: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -342,6 +346,7 @@ class Scene:
                 rate=part.number('rate', 'Hz', 50.0, 1000.0),
                 force=part.number('force_noise', 'N', 0.0, 10.0),
                 position=part.number('position_noise', 'm', 0.0, 0.01),
+                moment=part.number('moment_noise', 'N m', 0.0, 1.0, default=0.0),
             )
         with table.table('regulator') as part:
             regulator = {

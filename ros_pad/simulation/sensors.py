@@ -27,6 +27,9 @@ class Sensors:
 
     def __init__(self, noise: SensorNoise, legs: int, seed: int) -> None:
         self._generator = np.random.default_rng([seed, 2])
+        self._moment_generator = np.random.default_rng([seed, 3])
+        self._moment_noise = noise.moment
+        self._moments: list[list[float]] = []
         self._scale = np.array([noise.force] * 3 + [noise.position] * 3)
         self._legs = legs
         self._block: list[list[list[float]]] = []
@@ -46,3 +49,16 @@ class Sensors:
             x, y, z = foot.position
             readings.append(((fx + a, fy + b, fz + c), (x + d, y + e, z + f)))
         return readings
+
+    def read_moments(self, robot: Robot) -> list[float | None]:
+        """Return the moment about the vertical of each foot, N m; None where it is not measured.
+
+        Call it once for each :meth:`read`.
+        """
+        if not self._moment_noise:
+            return [None] * self._legs
+        if not self._moments:
+            drawn = self._moment_generator.normal(size=(_BLOCK, self._legs)) * self._moment_noise
+            self._moments = drawn.tolist()
+        row = self._moments.pop()
+        return [foot.moment + error for foot, error in zip(robot.feet, row, strict=True)]

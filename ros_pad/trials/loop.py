@@ -53,7 +53,10 @@ def sample_period_ns(scene: Scene) -> int:
 
 def tuning_for(scene: Scene) -> Tuning:
     """Return what an estimator is told of a scene: its sensors, not its ground."""
-    return Tuning(position_noise=scene.sensors.position, force_noise=scene.sensors.force)
+    sensors = scene.sensors
+    return Tuning(
+        position_noise=sensors.position, force_noise=sensors.force, moment_noise=sensors.moment
+    )
 
 
 def adaptive_with(parameters: Mapping[str, Any]) -> Policy:
@@ -191,6 +194,7 @@ class ClosedLoop:
         self._vent_unheard()
         self.robot.step(self.pads)
         readings = self.sensors.read(self.robot)
+        moments = self.sensors.read_moments(self.robot)
         controller = self.controller
         due = self._pace.due(self._stamp_ns)
         estimates, heaviest = [], self._heaviest
@@ -198,7 +202,9 @@ class ClosedLoop:
             force, position = readings[index]
             heaviest[index] = max(heaviest[index], force[2])
             estimates.append(
-                self.estimators[index].update(now, force, position, self.pressures[index])
+                self.estimators[index].update(
+                    now, force, position, self.pressures[index], moments[index]
+                )
             )
         log.sample(now, self.robot.body, readings)
         if due:

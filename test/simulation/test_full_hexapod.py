@@ -265,6 +265,43 @@ def test_torsional_limit():
         assert (abs(robot.data.qvel[5]) > 0.2) == (share > 1.0)
 
 
+def test_moments_of_the_feet_hold_a_robot_that_is_turned():
+    """Soles that are slippery but for torsion hold what turns them, each with its share."""
+    torque = 0.5 * 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
+    robot = standing(0.5)
+    for leg in robot.legs:
+        robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
+    push(robot, yaw=torque)
+    moments = []
+    for _ in range(200):  # it sways on its servos
+        mujoco.mj_step(robot.model, robot.data, 20)
+        robot._read_contacts()
+        robot._report(FLAT)
+        moments.append([foot.moment for foot in robot.feet])
+    shares = np.mean(moments, axis=0) / -torque
+    assert shares.sum() == pytest.approx(1.0, abs=0.05)
+    assert shares.min() > 0.05
+
+
+def test_sliding_and_turning_feet_are_on_the_ellipsoid():
+    """T and M of a foot that slips fill the limit surface, √(T² + (M/(2/3 R))²) = μ N."""
+    robot = FullHexapod(scene_of(0.5, cycles=3), DRY, 0.004)
+    used = []
+
+    def note():
+        for foot in robot.feet:
+            if foot.force[2] > 2.0:
+                lever = 2.0 / 3.0 * SHIPPED.foot.sole_radius
+                combined = math.hypot(*foot.force[:2], foot.moment / lever)
+                used.append((combined / foot.grip, foot.slip_speed))
+
+    advance(robot, 3.0, note)
+    shares, speeds = np.array(used).T
+    assert shares.max() < 1.03
+    assert np.median(shares[speeds > 0.02]) == pytest.approx(1.0, abs=0.02)
+    assert shares[speeds < 1e-3].min() < 0.5
+
+
 def test_light_feet_do_not_slip():
     """Up to 1 N a contact counts as one that has not landed, however far it is dragged."""
     robot = standing()

@@ -53,3 +53,25 @@ def test_without_noise_the_truth():
 def test_readings_are_plain_floats():
     force, position = Sensors(NOISE, 2, 0).read(Statue())[0]
     assert all(type(value) is float for value in (*force, *position))
+
+
+def test_moments_are_read_where_they_are_measured():
+    statue = Statue()
+    statue.feet[0].moment, statue.feet[1].moment = 0.03, -0.01
+    assert Sensors(NOISE, 2, 0).read_moments(statue) == [None, None]
+    noise = SensorNoise(rate=250.0, force=0.03, position=1.5e-4, moment=5e-4)
+    sensors = Sensors(noise, 2, 0)
+    moments = np.array([sensors.read_moments(statue) for _ in range(5000)])
+    assert moments.mean(axis=0) == pytest.approx([0.03, -0.01], abs=5 * 5e-4 / 5000**0.5)
+    assert moments.std(axis=0) == pytest.approx([5e-4, 5e-4], rel=0.05)
+
+
+def test_a_moment_leaves_the_other_readings_as_they_are():
+    """Results of scenes without it stay what they were."""
+    noise = SensorNoise(rate=250.0, force=0.03, position=1.5e-4, moment=5e-4)
+    sensors, statue = Sensors(noise, 2, 0), Statue()
+    readings = []
+    for _ in range(50):
+        readings.append(sensors.read(statue))
+        sensors.read_moments(statue)
+    assert np.array_equal(np.array(readings), read(count=50))
