@@ -32,6 +32,7 @@ from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.pace import Pace
 from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation.faults import SENSOR_KINDS
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.bag import annotate
@@ -87,8 +88,9 @@ class ComposedTrial:
         felt = feet | {'expected_load': scene.expected_load}
         ground = {'scene': scene.source, 'seed': seed}
         options = dict(scene.regulator)
-        if scene.faults:
-            options['faults'] = [str(fault) for fault in scene.faults]
+        faults = [str(each) for each in scene.faults if each.kind not in SENSOR_KINDS]
+        if faults:
+            options['faults'] = faults
 
         def add(kind: Callable[..., Any], **parameters: Any) -> Any:
             overrides = [Parameter(key, value=value) for key, value in parameters.items()]

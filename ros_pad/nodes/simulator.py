@@ -78,7 +78,7 @@ class SimulatorNode(Node):
         self.robot = fidelity.build(
             self.scene, self.floor, self.period_ns * 1e-9, values['fidelity']
         )
-        self._sensors = Sensors(self.scene.sensors, len(self.scene.legs), values['seed'])
+        self._sensors = Sensors.of(self.scene, values['seed'])
         self._ambient = values['ambient_pressure']
         self.pressures = [0.0] * len(self.scene.legs)
         self.pressure_stamps = [0] * len(self.scene.legs)

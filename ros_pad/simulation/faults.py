@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of a regulator and its line, on a schedule.
+"""Faults of regulators, their lines, and the sensors of feet, on a schedule.
 
 A fault is one line of a scene, or one text of the regulator node's parameter
 ``backend_options.faults``, in the same words::
@@ -26,6 +26,19 @@ device reads is what a sound device would read in its place.
     set-point, and above the ceiling of set-points, but never above full scale.
 ``silence``
     The device does not answer; it holds what it was told last.
+
+Those of sensors are of the foot, not of its regulator:
+
+``force_dead``
+    The force sensor reads exactly zero.
+``force_frozen``
+    It repeats what it read last.
+``force_offset``
+    It reads ``load`` too much of the normal force.
+``force_range``
+    It shows no component beyond ``load``.
+``marker_frozen``
+    The position repeats what it was last.
 """
 
 from __future__ import annotations
@@ -64,9 +77,17 @@ _QUANTITIES: dict[str, dict[str, tuple[str, float, float, float | None]]] = {
         'rise': ('s', 0.0, 1e6, 0.0),
     },
     'silence': {},
+    'force_dead': {},
+    'force_frozen': {},
+    'force_offset': {'load': ('N', -1e4, 1e4, None)},
+    'force_range': {'load': ('N', 1e-3, 1e5, None)},
+    'marker_frozen': {},
 }
 KINDS = tuple(_QUANTITIES)
 """Kinds of fault."""
+
+SENSOR_KINDS = tuple(kind for kind in KINDS if kind.startswith(('force', 'marker')))
+"""Those of a foot's sensors."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +111,9 @@ class Fault:
     offset, rise : float
         Of a sensor drift: Pa, -1e5 to 1e5, positive where the sensor reads too much; and the time
         it takes to get there, s, 0 to 1e6.
+    load : float
+        Of a force sensor, N: what it reads too much of the normal force, -1e4 to 1e4, or the
+        largest component that it shows, 1e-3 to 1e5.
 
     Raises
     ------
@@ -106,6 +130,7 @@ class Fault:
     conductance: float = 0.0
     offset: float = 0.0
     rise: float = 0.0
+    load: float = 0.0
 
     def __post_init__(self) -> None:
         choice('kind', self.kind, KINDS)
@@ -280,7 +305,20 @@ def listed(table: Table) -> tuple[Fault, ...]:
 
 def faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
     """Return the faults that the regulator of a leg has."""
-    return tuple(fault for fault in faults if not fault.legs or leg in fault.legs)
+    return tuple(
+        fault
+        for fault in faults
+        if fault.kind not in SENSOR_KINDS and (not fault.legs or leg in fault.legs)
+    )
+
+
+def sensor_faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
+    """Return the faults that the sensors of a leg's foot have."""
+    return tuple(
+        fault
+        for fault in faults
+        if fault.kind in SENSOR_KINDS and (not fault.legs or leg in fault.legs)
+    )
 
 
 def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
@@ -291,8 +329,14 @@ def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
     ConfigError
         When a text is no fault.
     InvalidInput
-        When this is no list of faults.
+        When this is no list of faults, or one is not a regulator's.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
         raise InvalidInput(f'faults = {faults!r} is not allowed: a list of faults is needed')
-    return tuple(each if isinstance(each, Fault) else Fault.parse(each) for each in faults)
+    found = tuple(each if isinstance(each, Fault) else Fault.parse(each) for each in faults)
+    for fault in found:
+        if fault.kind in SENSOR_KINDS:
+            raise InvalidInput(
+                f'faults: kind = {fault.kind!r} is not allowed: a regulator has no such sensor'
+            )
+    return found

@@ -231,7 +231,7 @@ class Scene:
     accuracy : float
         Relative error of the distance that the scene tolerates.
     faults : tuple of Fault
-        What regulators and hoses suffer, and when; see :mod:`ros_pad.simulation.faults`.
+        What regulators, hoses and sensors suffer, and when; see :mod:`ros_pad.simulation.faults`.
     """
 
     source: str

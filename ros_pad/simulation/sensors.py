@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force sensors and markers of the feet, with white noise."""
+"""Force sensors and markers of the feet, with white noise and faults."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ros_pad.simulation.faults import Fault
+from ros_pad.simulation.faults import sensor_faults_of
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
 
 _BLOCK = 1000  # samples drawn at once: NumPy is slow to ask for a few numbers
+
+
+Reading = tuple[Vector, Vector]
+"""Force, N, and position, m, of a foot."""
 
 
 class Sensors:
@@ -23,9 +32,19 @@ class Sensors:
         Number of feet.
     seed : int
         The same seed gives the same noise.
+    faults : sequence of sequences of Fault
+        Of the sensors of each foot; none by default.
     """
 
-    def __init__(self, noise: SensorNoise, legs: int, seed: int) -> None:
+    def __init__(
+        self,
+        noise: SensorNoise,
+        legs: int,
+        seed: int,
+        faults: Sequence[Sequence[Fault]] = (),
+    ) -> None:
+        self._faults = [(index, of_foot) for index, of_foot in enumerate(faults) if of_foot]
+        self._last: list[Reading] = []
         self._generator = np.random.default_rng([seed, 2])
         self._moment_generator = np.random.default_rng([seed, 3])
         self._moment_noise = noise.moment
@@ -35,7 +54,13 @@ class Sensors:
         self._block: list[list[list[float]]] = []
         self._next = 0
 
-    def read(self, robot: Robot) -> list[tuple[Vector, Vector]]:
+    @classmethod
+    def of(cls, scene: Scene, seed: int) -> Sensors:
+        """Return the sensors of a scene's robot."""
+        faults = [sensor_faults_of(leg, scene.faults) for leg in scene.legs]
+        return cls(scene.sensors, len(scene.legs), seed, faults)
+
+    def read(self, robot: Robot) -> list[Reading]:
         """Return (force, position) of each foot, N and m."""
         if self._next == len(self._block):
             drawn = self._generator.normal(size=(_BLOCK, self._legs, 6)) * self._scale
@@ -43,11 +68,16 @@ class Sensors:
             self._next = 0
         row = self._block[self._next]
         self._next += 1
-        readings = []
+        readings: list[Reading] = []
         for foot, (a, b, c, d, e, f) in zip(robot.feet, row, strict=True):
             fx, fy, fz = foot.force
             x, y, z = foot.position
             readings.append(((fx + a, fy + b, fz + c), (x + d, y + e, z + f)))
+        if self._faults:
+            for index, faults in self._faults:
+                before = self._last[index] if self._last else readings[index]
+                readings[index] = _faulty(readings[index], before, faults, robot.time)
+            self._last = readings
         return readings
 
     def read_moments(self, robot: Robot) -> list[float | None]:
@@ -62,3 +92,23 @@ class Sensors:
             self._moments = drawn.tolist()
         row = self._moments.pop()
         return [foot.moment + error for foot, error in zip(robot.feet, row, strict=True)]
+
+
+def _faulty(reading: Reading, before: Reading, faults: Sequence[Fault], time: float) -> Reading:
+    """Return what sensors with faults say, which said `before` at the last sample."""
+    force, position = reading
+    for fault in faults:
+        if not fault.acts_at(time):
+            continue
+        if fault.kind == 'force_dead':
+            force = (0.0, 0.0, 0.0)
+        elif fault.kind == 'force_frozen':
+            force = before[0]
+        elif fault.kind == 'force_offset':
+            force = (force[0], force[1], force[2] + fault.load)
+        elif fault.kind == 'force_range':
+            x, y, z = (max(-fault.load, min(fault.load, each)) for each in force)
+            force = (x, y, z)
+        else:
+            position = before[1]
+    return force, position

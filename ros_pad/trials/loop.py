@@ -149,7 +149,7 @@ class ClosedLoop:
         self.period_ns = sample_period_ns(scene)
         self.floor = scene.floor.build(seed)
         self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
-        self.sensors = Sensors(scene.sensors, len(scene.legs), seed)
+        self.sensors = Sensors.of(scene, seed)
         tuning = tuning or tuning_for(scene)
         self.estimators = [
             FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs

@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from ros_pad import cli
+from ros_pad import configuration
 from ros_pad import trials
 from ros_pad.errors import BagError
 from ros_pad.errors import PadError
@@ -117,6 +118,40 @@ def test_faults_come_to_both_alike(tmp_path):
     assert np.ptp(on_nodes.pressure[at[0.5] : at[3.0], 3]) < 20.0  # stuck
     assert (on_nodes.pressure[at[3.56]] < 30e3).all()
     assert on_nodes.pressure[at[2.9], 1] < sound.pressure[at[2.9], 1]
+
+
+def test_faulty_sensors_and_moments_come_to_both_alike(tmp_path):
+    """In a scene of one's own: each node loads it for itself."""
+    text = configuration.locate('scenes', 'hexapod_patches').read_text()
+    text = text.replace('cycles: 60', 'cycles: 4')
+    text = text.replace('  position_noise:', '  moment_noise: 5.0e-4\n  position_noise:')
+    text += """
+faults:
+  - {kind: force_frozen, legs: [1], start: 1.2, end: 2.9}
+  - {kind: force_dead, legs: [2], start: 1.5}
+  - {kind: force_offset, legs: [3], start: 0.7, load: 1.5}
+  - {kind: force_range, legs: [4], start: 1.0, load: 5.0}
+  - {kind: marker_frozen, legs: [5], start: 1.3, end: 3.3}
+"""
+    path = tmp_path / 'mine.yaml'
+    path.write_text(text)
+    scene = Scene.load(path)
+    assert (scene.cycles, scene.sensors.moment) == (4, 5e-4)
+    on_nodes = composed.run(scene, 'adaptive', seed=3, bag=tmp_path / 'bag')
+    without = trials.run(scene, 'adaptive', seed=3)
+    for series in SERIES:
+        one, other = getattr(on_nodes, series), getattr(without, series)
+        assert np.array_equal(one, other, equal_nan=True), series
+    doubts = messages_of(tmp_path / 'bag')
+    for leg, doubt in {
+        1: 'force stands still', 2: 'force stands still', 4: 'force out of range',
+        5: 'marker stands still',
+    }.items():  # fmt: skip
+        said = [message.data.partition(':')[0] for message in doubts[f'/leg_{leg}/doubt']]
+        assert doubt in said
+        if leg in (1, 5):  # it is well again
+            assert said[-1] != doubt
+    assert not any('still' in message.data for message in doubts['/leg_6/doubt'])
 
 
 def test_every_message_arrives(tmp_path):

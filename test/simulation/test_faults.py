@@ -22,6 +22,8 @@ from ros_pad.simulation import pneumatics
 from ros_pad.simulation.faults import KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import faults_of
+from ros_pad.simulation.faults import parsed
+from ros_pad.simulation.faults import sensor_faults_of
 
 AMBIENT = 101325.0
 HOSE = Hose(0.002, 1.0)
@@ -281,6 +283,15 @@ def test_faults_of_a_leg():
     assert faults_of(3, (two, all_legs)) == (all_legs,)
 
 
+def test_regulators_and_sensors_get_their_own():
+    leak, dead = LEAK, Fault('force_dead', legs=(2,))
+    assert faults_of(2, (leak, dead)) == (leak,)
+    assert sensor_faults_of(2, (leak, dead)) == (dead,)
+    assert sensor_faults_of(3, (leak, dead)) == ()
+    with pytest.raises(InvalidInput, match="kind = 'force_dead' is not allowed"):
+        parsed([str(leak), str(dead)])
+
+
 # --- text -------------------------------------------------------------------------------------
 
 EXAMPLES = [
@@ -289,6 +300,11 @@ EXAMPLES = [
     Fault('leak', legs=(3,), conductance=1.234567890123e-11),
     Fault('sensor_drift', 3.0, 4.0, offset=-2e3, rise=1.0 / 3.0),
     Fault('silence', 1e-3),
+    Fault('force_dead', 0.5),
+    Fault('force_frozen', 0.5, legs=(4,)),
+    Fault('force_offset', 0.5, load=-2.5),
+    Fault('force_range', load=5.0),
+    Fault('marker_frozen', 2.0, 3.0),
 ]
 
 

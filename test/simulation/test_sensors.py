@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 
+from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.scene import SensorNoise
 from ros_pad.simulation.sensors import Sensors
@@ -75,3 +76,47 @@ def test_a_moment_leaves_the_other_readings_as_they_are():
         readings.append(sensors.read(statue))
         sensors.read_moments(statue)
     assert np.array_equal(np.array(readings), read(count=50))
+
+
+FAULTS = {
+    'force_dead': (Fault('force_dead', 0.1, 0.2), (0.0, 0.0, 0.0)),
+    'force_frozen': (Fault('force_frozen', 0.1, 0.2), None),
+    'force_offset': (Fault('force_offset', 0.1, 0.2, load=1.5), (1.0, -2.0, 8.5)),
+    'force_range': (Fault('force_range', 0.1, 0.2, load=1.2), (1.0, -1.2, 1.2)),
+}
+
+
+@pytest.mark.parametrize('kind', FAULTS)
+def test_faults_are_in_what_is_read_and_end(kind):
+    fault, expected = FAULTS[kind]
+    noise = SensorNoise(250.0, 1e-9, 1e-9)
+    sensors, statue = Sensors(noise, 2, 0, [(fault,), ()]), Statue()
+    before = []
+    for number in range(100):
+        statue.time = number / 250.0
+        if number == 30:
+            statue.feet[0].force = (1.1, -2.0, 7.0)  # moves while it is frozen
+        if fault.start <= statue.time < fault.end:
+            held = before[0][0] if expected is None else expected
+            if number >= 30 and expected and expected[0] == 1.0:
+                held = (1.1, *expected[1:])
+        else:
+            held = statue.feet[0].force
+        before = sensors.read(statue)
+        assert before[0][0] == pytest.approx(held, abs=1e-8)
+        assert before[0][1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
+        assert before[1][0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
+
+
+def test_a_frozen_marker_leaves_the_force():
+    sensors = Sensors(NOISE, 2, 0, [(), (Fault('marker_frozen', 0.5),)])
+    statue = Statue()
+    read = []
+    for number in range(250):
+        statue.time = number / 250.0
+        statue.feet[1].position = (0.01 * number, 0.0, 0.0)
+        read.append(sensors.read(statue))
+    positions = [place for _, (_, place) in read]
+    assert len(set(positions)) == 125
+    assert len({force for _, (force, _) in read}) == 250
+    assert len({place for (_, place), _ in read}) == 250
