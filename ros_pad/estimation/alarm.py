@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Slip alarm: a one-sided CUSUM test on the slip speed (Page 1954)."""
+"""Slip alarm: one-sided CUSUM tests on the slip speed (Page 1954), of slow slips and fast ones."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ros_pad.contact.pad import number
+
+SLOW_SLIP = 0.01
+"""Slip speed worth an alarm, m/s ..."""
+
+FAST_SLIP = 0.03
+"""... and one that noise hides less, m/s: a test for one of them is slow to hear the other."""
 
 
 class SlipAlarm:
@@ -36,7 +44,7 @@ class SlipAlarm:
         self,
         noise: float,
         correlation_time: float,
-        speed: float = 0.01,
+        speed: float = SLOW_SLIP,
         threshold: float = 4.0,
     ) -> None:
         self._noise = number('noise', noise, 'm/s', above=True)
@@ -56,3 +64,42 @@ class SlipAlarm:
         # Bounded above so that the alarm ends soon after the slip does.
         self.statistic = min(max(0.0, self.statistic + gain), 1.25 * self._threshold)
         return self.statistic > self._threshold
+
+
+class SlipAlarms:
+    """Several :class:`SlipAlarm` on one speed; the first to raise is heard.
+
+    Parameters
+    ----------
+    noise, correlation_time : float
+        As of each.
+    speeds : sequence of float
+        Of each, m/s.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the value that is outside its range.
+    """
+
+    __slots__ = ('_alarms',)
+
+    def __init__(
+        self,
+        noise: float,
+        correlation_time: float,
+        speeds: Sequence[float] = (SLOW_SLIP, FAST_SLIP),
+    ) -> None:
+        self._alarms = [SlipAlarm(noise, correlation_time, speed) for speed in speeds]
+
+    def reset(self) -> None:
+        """Forget; call it at touch-down."""
+        for alarm in self._alarms:
+            alarm.reset()
+
+    def update(self, speed: float, dt: float) -> bool:
+        """Take one sample of the slip speed, m/s, dt seconds after the last; True is alarm."""
+        raised = False
+        for alarm in self._alarms:
+            raised |= alarm.update(speed, dt)
+        return raised

@@ -15,7 +15,7 @@ from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
-from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.alarm import SlipAlarms
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.sensing import Sensing
@@ -205,7 +205,7 @@ class FootEstimator:
         noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
         self._contact_noise = noise
         self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
-        self._alarm = SlipAlarm(self._speed_noise, tuning.smoothing)
+        self._alarm = SlipAlarms(self._speed_noise, tuning.smoothing)
         self._ground = GroundFilter(
             FrictionPrior.of(foot, expected_load),
             wet_prior=tuning.wet_prior,

@@ -6,7 +6,10 @@ import pytest
 from scipy import stats
 
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation.alarm import FAST_SLIP
+from ros_pad.estimation.alarm import SLOW_SLIP
 from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.alarm import SlipAlarms
 
 NEVER = 1e6  # nats: a threshold that leaves the statistic alone
 
@@ -107,3 +110,26 @@ def test_bad_values_are_named(name, value):
 def test_noise_may_not_be_zero():
     with pytest.raises(InvalidInput, match='noise = 0 m/s'):
         SlipAlarm(0.0, 0.02)
+
+
+def test_slow_and_fast_slips_are_heard_by_their_own_tests():
+    """After 15 mm/s and 80 mm/s in noise of 7.5 mm/s, each before the other's test alone."""
+
+    def delay(alarm, speed):
+        random = np.random.default_rng(3)
+        delays = []
+        for _ in range(200):
+            alarm.reset()
+            count = 0
+            while not alarm.update(speed + random.normal(0.0, 0.0075), 0.004):
+                count += 1
+                assert count < 2000
+            delays.append(count)
+        return np.mean(delays)
+
+    slow, fast = (SlipAlarm(0.0075, 0.02, speed) for speed in (SLOW_SLIP, FAST_SLIP))
+    both = SlipAlarms(0.0075, 0.02)
+    assert delay(both, 0.012) < 0.5 * delay(fast, 0.012)
+    assert delay(both, 0.08) < 0.5 * delay(slow, 0.08)
+    for speed in (0.012, 0.03, 0.08):
+        assert delay(both, speed) <= min(delay(slow, speed), delay(fast, speed)) + 1e-9
