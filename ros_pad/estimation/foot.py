@@ -16,6 +16,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
+from ros_pad.estimation.friction import THICK_FILM
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.sensing import Sensing
@@ -487,9 +488,22 @@ class FootEstimator:
         )
         weight = self._news(ratio, noise)
         self._ground.update(
-            ratio, noise, self._sum_speed / count, speed_noise, duration, weight, turning_known
-        )
+            ratio, noise, self._sum_speed / count, speed_noise, duration, weight, turning_known,
+            self._scales(load),
+        )  # fmt: skip
         self._clear_window()
+
+    def _scales(self, load: float) -> tuple[float, float]:
+        """Return friction at a load, N, over that at the expected one, dry and wet.
+
+        A flat sole that touches all over holds with its adhesion what the load does not add to.
+        """
+        if self._dome_share > doubt.DOMED:
+            return 1.0, 1.0
+        kernel, prior = self._foot.resistance_of, self._ground.prior
+        dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
+        wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
+        return dry / prior.flat_dry, wet / prior.flat_wet
 
     def _news(self, ratio: float, noise: float) -> float:
         """Return how much of what a foot tells is new, 0 to 1.

@@ -23,7 +23,9 @@ GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
 _UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
 _ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
-_THICK_FILM = 1.0e-3  # m: does not drain within a stance under a flat sole
+THICK_FILM = 1.0e-3
+"""Film of liquid that does not drain within a stance under a flat sole, m."""
+
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
 
 DEMAND = 0.3
@@ -39,8 +41,6 @@ _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARE
 MODEL_SHARE = 0.05
 """Share of friction by which what a slip shows is off, on the average over a walk: windows hold
 some stick, and feet turn more or less than is believed."""
-
-_UNMET = np.exp(-GRID / DEMAND)  # share of demands that a friction coefficient does not meet
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class FrictionPrior:
         pressure = 0.85 * foot.ceiling
         return cls(
             flat_dry=float(tangential_resistance(foot, load, 0.0)) / load,
-            flat_wet=float(tangential_resistance(foot, load, 0.0, sole_film=_THICK_FILM)) / load,
+            flat_wet=float(tangential_resistance(foot, load, 0.0, sole_film=THICK_FILM)) / load,
             dome=float(tangential_resistance(foot, load, pressure)) / load,
             spread=spread,
         )
@@ -114,6 +114,9 @@ class GroundFilter:
         As given.
     wet_probability : float
         0 to 1.
+    scales : tuple of float
+        What friction is at the load of the last sample on dry and on wet ground, over what it is
+        at the load that the prior is for: the belief is about that one.
     told : float
         What this stance has added to the logarithm of the odds of wet ground: about zero where it
         said nothing.
@@ -140,6 +143,7 @@ class GroundFilter:
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2)
         self._blur = blur / blur.sum(axis=0)
         self._dome = False
+        self.scales = (1.0, 1.0)
         self.told = 0.0
         self._settle(self._grounds * self._tables[False])
 
@@ -149,6 +153,7 @@ class GroundFilter:
             # Friction of one shape says nothing of the other's; what stays is wet or dry.
             self._dome = dome
             self._belief = self._grounds_known() * self._tables[dome]
+        self.scales = (1.0, 1.0)
         self.told = 0.0
         self.go(distance)
 
@@ -176,6 +181,7 @@ class GroundFilter:
         dt: float,
         weight: float = 1.0,
         turning_known: bool = False,
+        scales: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Take one sample of T/N and of slip speed.
 
@@ -191,8 +197,12 @@ class GroundFilter:
             How much of it is new, 0 to 1.
         turning_known : bool
             Whether T/N has in it what turning takes up, so that nothing of that is left to guess.
+        scales : tuple of float
+            See the attribute.
         """
-        away = (GRID - ratio) / ratio_noise
+        self.scales = scales
+        friction = np.multiply.outer(scales, GRID)
+        away = (friction - ratio) / ratio_noise
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
@@ -204,9 +214,10 @@ class GroundFilter:
                 likely = np.exp(-0.5 * away * away)
             else:
                 shown = speed / np.hypot(speed, self._rim_speeds)
-                away = (shown * GRID - ratio) / ratio_noise
+                away = (shown * friction[:, None] - ratio) / ratio_noise
                 likely = _SHARES @ np.exp(-0.5 * away * away)
-            likelihood += slip / (_ROOT_2_PI * ratio_noise) * _UNMET * likely
+            unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
+            likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
         self._belief = self._belief * (likelihood + 1e-6) ** (weight * self._temper)
         self._belief /= self._belief.sum()
@@ -243,14 +254,20 @@ class GroundFilter:
         self._belief = belief = belief / belief.sum()
         dry, wet = (belief @ _ONES).tolist()
         self.wet_probability = wet / (dry + wet)
-        self._marginal = self._blur @ ((belief[0] + belief[1]) / (dry + wet))
+        self._known = belief @ self._blur.T / (dry + wet)
 
     @property
     def friction(self) -> tuple[float, float]:
-        """Mean and standard deviation of the friction coefficient."""
-        mean = float(self._marginal @ GRID)
-        return mean, math.sqrt(max(float(self._marginal @ _SQUARES) - mean * mean, 0.0))
+        """Mean and standard deviation of friction at the load of the last sample."""
+        scales = np.array(self.scales)
+        mean = float(scales @ (self._known @ GRID))
+        square = float(scales * scales @ (self._known @ _SQUARES))
+        return mean, math.sqrt(max(square - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
         """Friction coefficient that is larger with probability 1 - share, share in [0, 1]."""
-        return float(np.interp(share, np.cumsum(self._marginal), _UPPER_EDGES))
+        dry, wet = self.scales
+        edges = dry * _UPPER_EDGES
+        on_dry, on_wet = np.cumsum(self._known, axis=1)
+        below = on_dry + np.interp(edges, wet * _UPPER_EDGES, on_wet, left=0.0)
+        return float(np.interp(share, below, edges))

@@ -265,7 +265,7 @@ def test_margin_is_the_5_percent_quantile_of_friction_less_the_ratio_now():
     while not stance.sample(0.3).fresh or stance.time < 0.4:
         pass
     estimate = stance.estimates[-1]
-    marginal = stance.estimator._ground._marginal
+    marginal = stance.estimator._ground._known.sum(axis=0)
     grid = np.linspace(0.01, 1.59, 80)
     generator = np.random.default_rng(1)
     cells = generator.choice(80, size=200_000, p=marginal / marginal.sum())
@@ -299,6 +299,23 @@ def test_ten_times_heavier_without_retuning(seed):
 
 
 GROUND = 0.5  # m: the floor need not be at zero
+
+
+def test_friction_is_told_for_the_load_that_a_foot_stands_under():
+    """Adhesion of a sole that touches all over, 4700 Pa on 908 mm2, is the same at any load."""
+
+    def friction(load):
+        return 0.35 + 4700.0 * math.pi * 0.017**2 / load
+
+    heavy = Stance(load=4.0 * LOAD)
+    for _ in range(125):
+        slid = heavy.sample(friction(4.0 * LOAD), slip=0.1)
+    assert slid.friction_mean == pytest.approx(friction(4.0 * LOAD), abs=0.05)
+    for _ in range(25):
+        light = heavy.sample(0.3, share=0.5)
+    assert light.friction_mean == pytest.approx(friction(2.0 * LOAD), abs=0.07)
+    assert light.friction_mean - slid.friction_mean > 0.1
+    assert light.wet_probability < 0.1
 
 
 class Offset:
