@@ -36,10 +36,10 @@ TOUCH_DOWN = 1.5
 UNFELT = 0.5
 """Without an estimate for so long a leg is flat, s: the regulators vent it then."""
 
-FIRST_WAIT = 10
+FIRST_WAIT = 5
 """Steps for which a foot whose air failed is flat before a dome is tried again."""
 
-LONGEST_WAIT = 80
+LONGEST_WAIT = 40
 """The wait doubles with each try in vain, up to so many steps."""
 
 FURTHEST_LEAD = 3
@@ -69,7 +69,10 @@ class LiftOff:
         Whether another leg is probing now.
     lead : int
         Whole steps that the foot needs to fill beyond its swing; 0 where the swing is enough.
-        ``wet_ahead`` is then the highest probability of that many further steps, too.
+    wet_beyond : float
+        Highest probability of wet ground in that many steps after the next one; 0 without such.
+        A policy that fills a pad early heeds it. The adaptive one does not: measured, it does not
+        pay.
     """
 
     leg: int
@@ -80,6 +83,7 @@ class LiftOff:
     next_position: tuple[float, float]
     others_probing: bool
     lead: int = 0
+    wet_beyond: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -322,6 +326,14 @@ class MorphologyController:
         for leg in legs:
             self._apply(leg, Choice(start))
 
+    def _state(self, leg: int) -> _Leg:
+        state = self._legs.get(leg)
+        if state is None:
+            raise InvalidInput(
+                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
+            )
+        return state
+
     def morphology(self, leg: int) -> str:
         """Shape chosen for a leg's current or next step; of a faulty pad the shape it has."""
         state = self._legs[leg]
@@ -335,12 +347,12 @@ class MorphologyController:
 
     def fault(self, leg: int) -> str:
         """Return what is wrong with a leg now, in words; empty when nothing is."""
-        state = self._legs[leg]
+        state = self._state(leg)
         return '; '.join(filter(None, (state.unfelt, state.unmoved, state.watch.reason)))
 
     def remark(self, leg: int) -> str:
         """Return what is no fault and yet worth saying of a leg, as a slow hose; or nothing."""
-        state = self._legs[leg]
+        state = self._state(leg)
         slow = ''
         if self._lead(state):
             slow = (
@@ -351,11 +363,11 @@ class MorphologyController:
 
     def lead(self, leg: int) -> int:
         """Return how many steps ahead a leg must decide for its pad to be full in time."""
-        return self._lead(self._legs[leg])
+        return self._lead(self._state(leg))
 
     def watch(self, leg: int) -> PadWatch:
         """Return what is known of a leg's air."""
-        return self._legs[leg].watch
+        return self._state(leg).watch
 
     def doubt(self, leg: int, reason: str) -> None:
         """Take note why the estimate of a leg cannot be believed; an empty reason ends it.
@@ -363,7 +375,7 @@ class MorphologyController:
         Such a foot leaves no footprints and does not probe; what other feet felt still counts for
         it.
         """
-        self._legs[leg].doubt = reason
+        self._state(leg).doubt = reason
 
     def observe(self, leg: int, time: float, pressure: float | None) -> None:
         """Take a reading of a pad before the leg's :meth:`update` of the same moment.
@@ -377,20 +389,21 @@ class MorphologyController:
         pressure : float or None
             Gauge Pa; None where there was no reading. Without any nothing is watched.
         """
-        state = self._legs[leg]
+        state = self._state(leg)
         if not 0.0 <= time - state.time <= UNFELT:  # nobody looked
             state.updated = time
             state.lifted = math.nan
         state.time = time
         watch = state.watch
-        faulty = watch.fault
+        before = bool(watch.fault or watch.silence)
         watch.update(time, state.setpoint, pressure)
-        if faulty and not watch.fault:
+        faulty = bool(watch.fault or watch.silence)
+        if before and not faulty:
             # What came back for one may have come back for all.
             state.patience = FIRST_WAIT
             for other in self._legs.values():
                 other.wait = 0
-        elif watch.fault and not faulty:
+        elif faulty and not before:
             state.wait = state.patience
         if time - state.updated <= UNFELT:
             state.unfelt = ''
@@ -451,11 +464,7 @@ class MorphologyController:
             For a leg that is not controlled, a probability outside 0 to 1, or a value that is not
             finite. Nothing has changed then.
         """
-        state = self._legs.get(leg)
-        if state is None:
-            raise InvalidInput(
-                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
-            )
+        state = self._state(leg)
         # A load that is no number is below no gate: it must not pass for a lift-off.
         if not (math.isfinite(load + position[0] + position[1]) and 0.0 <= wet_probability <= 1.0):
             raise InvalidInput(
@@ -499,7 +508,7 @@ class MorphologyController:
             state.trying = False
             blind = choice.probe and state.doubt
             return Choice(state.morphology) if blind else choice
-        if choice.morphology == FLAT:
+        if choice.morphology == FLAT or state.watch.silence:
             state.trying = False
             return Choice(FLAT)
         if state.trying:
@@ -510,7 +519,8 @@ class MorphologyController:
             state.wait = state.patience
         state.wait -= 1
         others = (other for name, other in self._legs.items() if name != leg)
-        if state.wait > 0 or any(other.trying for other in others):
+        # One leg at a time, but for those that another's success, or a try put off, lets through.
+        if state.wait > 0 or (state.wait == 0 and any(other.trying for other in others)):
             return Choice(FLAT)
         state.trying = True
         return choice
@@ -542,15 +552,19 @@ class MorphologyController:
             morphology=self.morphology(leg),
             steps=state.steps,
             probing=state.probing,
-            wet_ahead=max(
-                self._footprints.wet_probability(
-                    (1.0 + far) * x - far * before_x, (1.0 + far) * y - far * before_y
-                )
-                for far in range(1, 2 + lead)
-            ),
+            wet_ahead=self._footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
             lead=lead,
+            wet_beyond=max(
+                (
+                    self._footprints.wet_probability(
+                        (1 + far) * x - far * before_x, (1 + far) * y - far * before_y
+                    )
+                    for far in range(2, 2 + lead)
+                ),
+                default=0.0,
+            ),
         )
         before = state.morphology
         self._apply(leg, self._permitted(leg, state, self._policy(step)))

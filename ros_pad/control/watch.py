@@ -95,9 +95,9 @@ class PadWatch:
     """
 
     __slots__ = (
-        '_ceiling', '_commanded', '_distance', '_fill', '_filling', '_heard', '_highest',
-        '_lowest', '_recent', '_right', '_setpoint', '_side', '_since', '_stopped', '_time',
-        '_vent', 'fault', 'pressure', 'silence', 'stalled', 'tolerance',
+        '_arrived', '_ceiling', '_commanded', '_distance', '_fill', '_filling', '_heard',
+        '_highest', '_lowest', '_recent', '_right', '_setpoint', '_side', '_since', '_stopped',
+        '_time', '_vent', 'fault', 'pressure', 'silence', 'stalled', 'tolerance',
     )  # fmt: skip
 
     def __init__(self, ceiling: float) -> None:
@@ -118,6 +118,7 @@ class PadWatch:
         self._right = math.inf  # since when a faulty pad does what it could not
         self._distance = 0.0  # of the way that is being timed, from its start; 0 for none
         self._filling = False
+        self._arrived = False  # at the present set-point
         self._recent: deque[tuple[float, float]] = deque()  # falling |e| of the last window
         self._fill = RunningMedian(START)
         self._vent = RunningMedian(START)
@@ -159,6 +160,7 @@ class PadWatch:
         if abs(setpoint - self._setpoint) > self.tolerance:
             self._cut_short(before)
             self._commanded = before
+            self._arrived = False
             self._filling = setpoint > self.pressure
             self._distance = abs(setpoint - self.pressure)
             self._wait(before)
@@ -214,6 +216,7 @@ class PadWatch:
         if self._distance > 2.0 * self.tolerance:
             self._learn(time - self._commanded)
         self._distance = 0.0
+        self._arrived = True
         self._since = time
         self._stopped = math.inf
         self.stalled = False
@@ -243,14 +246,13 @@ class PadWatch:
         stuck = bool(self.fault) and side * self._side < 0
         self._side = side
         age = f'{time - self._commanded:.1f} s after'
-        stood = self._since > self._commanded  # it had done as it was told
         if side == 0:
             self.fault = f'reads {_kilo(pressure)}, which no pad has: its sensor is off'
         elif over:
             self.fault = f'{_kilo(pressure)} is above the ceiling of {_kilo(self._ceiling)}'
         elif stuck:
             self.fault = f'stuck: {_kilo(pressure)}, neither fills nor vents'
-        elif stood:
+        elif self._arrived:
             self.fault = (
                 f'{"rises" if side > 0 else "sags"}: {_kilo(pressure)} at a set-point of'
                 f' {_kilo(aim)}'
