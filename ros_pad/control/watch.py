@@ -159,11 +159,7 @@ class PadWatch:
             self._wait(time)
         if abs(setpoint - self._setpoint) > self.tolerance:
             self._cut_short(before)
-            self._commanded = before
-            self._arrived = False
-            self._filling = setpoint > self.pressure
-            self._distance = abs(setpoint - self.pressure)
-            self._wait(before)
+            self._set_out(before, setpoint, self.pressure)
         self._setpoint = setpoint
         if pressure is None or not math.isfinite(pressure):
             if time - self._heard > SILENT and not math.isnan(self.pressure) and not self.silence:
@@ -172,12 +168,23 @@ class PadWatch:
                     f' {_kilo(self.pressure)}'
                 )
             return
-        if self.silence or math.isnan(self.pressure):
+        if math.isnan(self.pressure):
+            self._set_out(time, setpoint, pressure)
+        elif self.silence:
             self.silence = ''
             self._distance = 0.0
             self._wait(time)
         self._heard, self.pressure = time, pressure
         self._judge(time, pressure - setpoint)
+
+    def _set_out(self, time: float, aim: float, pressure: float) -> None:
+        """Begin a new way, and time it if it leads from flat to dome or back."""
+        self._commanded = time
+        self._arrived = False
+        self._filling = aim > pressure
+        way = abs(aim - pressure)
+        self._distance = way if way > 0.5 * max(aim, pressure) else 0.0
+        self._wait(time)
 
     def _wait(self, time: float) -> None:
         """Begin to watch anew."""

@@ -22,7 +22,6 @@ from std_msgs.msg import String
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
 from ros_pad.control import policy_named
-from ros_pad.control.morphology import UNFELT
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
@@ -39,6 +38,8 @@ from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import Pace
 from ros_pad.simulation.scene import Scene
+
+OLD = 0.2  # s after which the last position of a foot serves no more
 
 LOOK_PERIOD_NS = 100_000_000  # how often legs without estimates are looked after, and news told
 
@@ -112,7 +113,7 @@ class _Leg:
         if self._positions != self._positions_taken:
             self._positions_taken = self._positions
             self._position_time = now
-        if not self._position or now - self._position_time > UNFELT:
+        if not self._position or now - self._position_time > OLD:
             # Where the foot is, nobody knows.
             self.tell_shape()
             return
