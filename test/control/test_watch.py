@@ -92,6 +92,14 @@ def test_it_learns_how_long_the_hose_takes():
             pad.hold(0.0, 4.0)
         assert filling < pad.watch.fill_time < 1.7 * filling + PERIOD
         assert filling < pad.watch.vent_time < 2.2 * filling + PERIOD
+        # Loads that come and go move the set-point by less; that is no fill.
+        learnt = pad.watch.fill_time
+        pad.hold(60e3, 5.0)
+        whole = pad.watch.fill_time
+        for _ in range(5):
+            pad.hold(70e3, 2.0)
+            pad.hold(60e3, 2.0)
+        assert pad.watch.fill_time == whole == pytest.approx(learnt, rel=0.1)
 
 
 def test_it_learns_from_fills_that_are_called_off():
@@ -192,6 +200,30 @@ def test_a_pad_that_was_stuck_full_must_vent_to_be_sound():
     assert 'does not vent' in pad.hold(0.0, 2.0)
     assert 'does not vent' in pad.hold(70e3, 1.0)  # it is there, and has not moved
     assert pad.hold(0.0, 3.0) == ''  # mended at 8 s
+
+
+def read(watch, setpoint, *readings):
+    """Let a watch read pressures, each for a time: (Pa, s)."""
+    for pressure, duration in readings:
+        for _ in range(round(duration / PERIOD)):
+            watch.update(watch._time + PERIOD if watch._time > 0.0 else PERIOD, setpoint, pressure)
+    return watch.reason
+
+
+def test_a_moment_at_the_right_pressure_heals_nothing():
+    watch = PadWatch(CEILING)
+    assert 'does not fill' in read(watch, 70e3, (0.0, 1.0))
+    assert 'does not fill' in read(watch, 70e3, (70e3, 0.18))
+    assert 'does not fill' in read(watch, 70e3, (0.0, 0.2), (70e3, 0.18))
+    assert read(watch, 70e3, (70e3, 0.1)) == ''
+
+
+def test_a_pad_at_the_edge_of_the_tolerance_does_not_flicker():
+    watch = PadWatch(CEILING)
+    assert read(watch, 70e3, (0.0, 0.1), (70e3, 1.0)) == ''
+    assert 'sags: 67.2' in read(watch, 70e3, (67.2e3, 1.0))
+    assert 'sags: 67.2' in read(watch, 70e3, (67.5e3, 1.0))  # right, but it has not come back
+    assert read(watch, 70e3, (66.0e3, 1.0), (70e3, 0.3)) == ''
 
 
 def test_readings_that_come_again_end_the_silence():
