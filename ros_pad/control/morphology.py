@@ -395,15 +395,14 @@ class MorphologyController:
             state.lifted = math.nan
         state.time = time
         watch = state.watch
-        before = bool(watch.fault or watch.silence)
+        faulty = watch.fault
         watch.update(time, state.setpoint, pressure)
-        faulty = bool(watch.fault or watch.silence)
-        if before and not faulty:
+        if faulty and not watch.fault:
             # What came back for one may have come back for all.
             state.patience = FIRST_WAIT
             for other in self._legs.values():
                 other.wait = 0
-        elif faulty and not before:
+        elif watch.fault and not faulty:
             state.wait = state.patience
         if time - state.updated <= UNFELT:
             state.unfelt = ''
@@ -504,10 +503,11 @@ class MorphologyController:
 
     def _permitted(self, leg: int, state: _Leg, choice: Choice) -> Choice:
         """Return what the pad of a leg is fit for: flat where its air failed, but for a try."""
-        if not state.watch.reason:
+        if not state.watch.fault:
             state.trying = False
-            blind = choice.probe and state.doubt
-            return Choice(state.morphology) if blind else choice
+            # A device that is silent keeps what it has, and would change it when it hears again.
+            keeps = state.watch.silence or (choice.probe and state.doubt)
+            return Choice(state.morphology) if keeps else choice
         if choice.morphology == FLAT or state.watch.silence:
             state.trying = False
             return Choice(FLAT)

@@ -206,18 +206,31 @@ def test_legs_that_nobody_looked_at_are_not_accused():
     assert walk.shapes[-1] == ['dome', 'dome']
 
 
-def test_a_silent_regulator_is_asked_for_flat_and_keeps_its_last_shape():
+def test_a_silent_regulator_keeps_what_it_has():
+    """What it is asked for now it might take when it hears again, and then the foot may stand."""
     walk = Walk(start='dome')
     walk.stride(3)
     walk.readings = False
     walk.stride(1)
     assert walk.controller.fault(1).startswith('no reading for 0.5 s, the last was')
-    assert walk.asked(1, 12) == [False] * 12  # nobody would hear how a try goes
-    assert walk.controller.morphology(1) == 'dome'
+    walk.controller._policy = flat
+    assert walk.asked(1, 4) == [True] * 4
+    assert walk.shapes[-1][0] == 'dome'
     walk.readings = True
-    walk.stride(2)
+    assert walk.stride(2) == ['flat', 'flat']
     assert walk.controller.fault(1) == ''
-    assert walk.stride(1) == ['dome', 'dome']
+
+
+def test_a_faulty_pad_that_falls_silent_is_not_tried():
+    """Nobody would hear how it goes."""
+    walk = Walk(pads=stuck(1))
+    walk.stride(2)
+    assert walk.controller.setpoint(1) == 0.0
+    walk.readings = False
+    assert walk.asked(1, 12) == [False] * 12
+    assert walk.controller.fault(1).startswith('no reading for 0.5 s, the last was 0.0 kPa; does')
+    walk.readings = True
+    assert any(walk.asked(1, 7))
 
 
 def test_a_leg_that_is_not_felt_is_flat_and_the_others_go_on():
