@@ -212,8 +212,8 @@ class _Leg:
 
     __slots__ = (
         'decided', 'doubt', 'footprint', 'lifted', 'morphology', 'need', 'open', 'patience',
-        'peak', 'probing', 'setpoint', 'short', 'standing', 'steps', 'stride', 'swing', 'time',
-        'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait', 'watch',
+        'peak', 'probing', 'sent', 'setpoint', 'short', 'standing', 'steps', 'stride', 'swing',
+        'time', 'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait', 'watch',
     )  # fmt: skip
 
     def __init__(self, morphology: str, peak: float, ceiling: float) -> None:
@@ -228,6 +228,7 @@ class _Leg:
         self.footprint: tuple[float, float] | None = None
         # Of its air.
         self.watch = PadWatch(ceiling)
+        self.sent: float | None = None  # the set-point in force, if any
         self.need = 0.0  # Pa that carry the load without margin
         self.short = ''  # why the last touch-down lacked pressure
         self.wait = 0  # steps until a dome is tried again
@@ -396,7 +397,7 @@ class MorphologyController:
         state.time = time
         watch = state.watch
         faulty = watch.fault
-        watch.update(time, state.setpoint, pressure)
+        watch.update(time, state.sent, pressure)
         if faulty and not watch.fault:
             # What came back for one may have come back for all.
             state.patience = FIRST_WAIT
@@ -412,6 +413,7 @@ class MorphologyController:
                 self.switches[leg] += 1
             self._apply(leg, Choice(FLAT))
             state.steps = math.inf
+            state.sent = None  # the regulator vents when it has waited long enough
         if self._decisions - state.decided <= 2 * len(self._legs):
             state.unmoved = ''
         elif not state.unmoved:
@@ -479,6 +481,7 @@ class MorphologyController:
         elif state.standing:
             state.standing = False
             self._lift_off(leg, wet_probability, position)
+        state.sent = state.setpoint
         return state.setpoint
 
     def _touch_down(self, leg: int, state: _Leg) -> None:

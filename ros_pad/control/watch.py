@@ -43,7 +43,7 @@ class RunningMedian:
     Parameters
     ----------
     start : float
-        What it is before there is a value.
+        What it is before there are three values.
     """
 
     __slots__ = ('_last', 'value')
@@ -55,7 +55,8 @@ class RunningMedian:
     def add(self, value: float) -> None:
         """Take a value."""
         self._last.append(value)
-        self.value = statistics.median(self._last)
+        if len(self._last) >= 3:
+            self.value = statistics.median(self._last)
 
 
 class PadWatch:
@@ -109,7 +110,7 @@ class PadWatch:
         self.stalled = False
         self._side = 0  # of the fault: -1 too low, 1 too high, 0 the sensor
         self._lowest = self._highest = 0.0  # readings since the fault
-        self._setpoint = 0.0
+        self._setpoint: float | None = None
         self._time = -math.inf
         self._heard = -math.inf
         self._commanded = 0.0  # when the set-point last moved
@@ -138,7 +139,7 @@ class PadWatch:
         """What is wrong, in words; empty when nothing is."""
         return '; '.join(filter(None, (self.silence, self.fault)))
 
-    def update(self, time: float, setpoint: float, pressure: float | None) -> None:
+    def update(self, time: float, setpoint: float | None, pressure: float | None) -> None:
         """Take a reading.
 
         Parameters
@@ -146,8 +147,9 @@ class PadWatch:
         time : float
             s. Where it went back, or nobody looked for longer than ``SILENT``, what was begun is
             dropped, and nobody is accused of it.
-        setpoint : float
-            That was in force up to now, gauge Pa.
+        setpoint : float or None
+            That was in force up to now, gauge Pa; None where none was sent, so that a pad may do
+            as it likes.
         pressure : float or None
             Gauge Pa; None, or what is not finite, where there was no reading.
         """
@@ -157,8 +159,13 @@ class PadWatch:
             self._distance = 0.0
             self._heard = time
             self._wait(time)
-        if abs(setpoint - self._setpoint) > self.tolerance:
-            self._cut_short(before)
+        if setpoint is None:
+            self._distance = 0.0
+            self._wait(time)
+        elif self._setpoint is None:
+            self._set_out(before, setpoint, self.pressure)
+        elif abs(setpoint - self._setpoint) > self.tolerance:
+            self._cut_short(before, abs(self._setpoint - self.pressure))
             self._set_out(before, setpoint, self.pressure)
         self._setpoint = setpoint
         if pressure is None or not math.isfinite(pressure):
@@ -168,14 +175,16 @@ class PadWatch:
                     f' {_kilo(self.pressure)}'
                 )
             return
-        if math.isnan(self.pressure):
-            self._set_out(time, setpoint, pressure)
-        elif self.silence:
+        first, self._heard = math.isnan(self.pressure), time
+        self.pressure = pressure
+        if self.silence:
             self.silence = ''
             self._distance = 0.0
             self._wait(time)
-        self._heard, self.pressure = time, pressure
-        self._judge(time, pressure - setpoint)
+        if setpoint is not None:
+            if first:
+                self._set_out(time, setpoint, pressure)
+            self._judge(time, setpoint)
 
     def _set_out(self, time: float, aim: float, pressure: float) -> None:
         """Begin a new way, and time it if it leads from flat to dome or back."""
@@ -193,8 +202,9 @@ class PadWatch:
         self._stopped = self._right = math.inf
         self.stalled = False
 
-    def _judge(self, time: float, error: float) -> None:
-        size, pressure = abs(error), self.pressure
+    def _judge(self, time: float, aim: float) -> None:
+        pressure = self.pressure
+        size = abs(pressure - aim)
         self._lowest, self._highest = min(self._lowest, pressure), max(self._highest, pressure)
         recent = self._recent
         while recent and recent[-1][1] <= size:
@@ -204,7 +214,7 @@ class PadWatch:
             recent.popleft()
         over = pressure > self._ceiling + self.tolerance
         if size <= self.tolerance and not over:
-            self._arrive(time)
+            self._arrive(time, aim)
             return
         self._right = math.inf
         largest = recent[0][1]
@@ -216,9 +226,9 @@ class PadWatch:
         self._stopped = min(self._stopped, time)
         if time - self._stopped >= CONFIRMED and not self.stalled:
             self.stalled = True
-            self._accuse(time, error, over)
+            self._accuse(time, aim, over)
 
-    def _arrive(self, time: float) -> None:
+    def _arrive(self, time: float, aim: float) -> None:
         """Deal with a pad that is where it should be."""
         if self._distance > 2.0 * self.tolerance:
             self._learn(time - self._commanded)
@@ -230,10 +240,9 @@ class PadWatch:
         if not self.fault:
             return
         able = {
-            -1: self._setpoint > self.tolerance
-            and self.pressure - self._lowest > self.tolerance,
+            -1: aim > self.tolerance and self.pressure - self._lowest > self.tolerance,
             1: self._highest - self.pressure > self.tolerance,
-            0: self._setpoint == 0.0,
+            0: aim == 0.0,
         }  # fmt: skip
         if not able[self._side]:
             self._right = math.inf
@@ -242,9 +251,10 @@ class PadWatch:
         if time - self._right >= HEALED:
             self.fault = ''
 
-    def _accuse(self, time: float, error: float, over: bool) -> None:
+    def _accuse(self, time: float, aim: float, over: bool) -> None:
         self._distance = 0.0
-        side, pressure, aim = (1 if error > 0.0 or over else -1), self.pressure, self._setpoint
+        pressure = self.pressure
+        side = 1 if pressure > aim or over else -1
         if pressure < -self.tolerance:
             side = 0
         self._lowest = self._highest = pressure
@@ -269,13 +279,11 @@ class PadWatch:
         elif pressure < self.tolerance:
             self.fault = f'does not fill: {_kilo(pressure)} {age} {_kilo(aim)} was asked for'
         else:
-            self.fault = (
-                f'leaks or lacks air: {_kilo(pressure)}, {_kilo(-error)} below the set-point'
-            )
+            missing = _kilo(aim - pressure)
+            self.fault = f'leaks or lacks air: {_kilo(pressure)}, {missing} below the set-point'
 
-    def _cut_short(self, time: float) -> None:
+    def _cut_short(self, time: float, left: float) -> None:
         """Learn from a way that was called off: the rest of it would have been exponential."""
-        left = abs(self._setpoint - self.pressure)
         if self.tolerance < left < 0.8 * self._distance:
             self._learn(
                 (time - self._commanded)

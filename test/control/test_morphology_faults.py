@@ -249,6 +249,19 @@ def test_a_leg_that_is_not_felt_is_flat_and_the_others_go_on():
     assert fault.end - fault.start == pytest.approx(0.5, abs=0.1)
 
 
+def test_before_the_first_estimate_no_pad_is_accused():
+    """Pressures come, but nothing was sent yet: nodes take a while to find one another."""
+    walk = Walk(start='dome', pads=lambda leg, p, t: 0.0 if t < 0.8 else p)
+    walk.deaf.update(LEGS)
+    for _ in range(40):
+        walk.look(LOAD)
+    assert walk.controller.fault(1) == 'no load, position or estimate for 0.5 s'
+    walk.deaf.clear()
+    walk.stride(3)
+    assert [fault.reason[:7] for fault in walk.controller.faults] == ['no load'] * 2
+    assert walk.shapes[-1] == ['dome', 'dome']
+
+
 def test_a_load_that_reads_zero_leaves_the_foot_as_it_is_and_is_told_of():
     walk = Walk(start='dome')
     walk.stride(3)
