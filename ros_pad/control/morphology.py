@@ -360,7 +360,7 @@ class MorphologyController:
                 f'slow hose: a fill takes {state.watch.fill_time:.2f} s, a swing'
                 f' {state.swing.value:.2f} s'
             )
-        return '; '.join(filter(None, (state.doubt, self.refusals.get(leg), state.short, slow)))
+        return '; '.join(filter(None, (self.refusals.get(leg), state.short, slow)))
 
     def lead(self, leg: int) -> int:
         """Return how many steps ahead a leg must decide for its pad to be full in time."""
@@ -371,10 +371,9 @@ class MorphologyController:
         return self._state(leg).watch
 
     def doubt(self, leg: int, reason: str) -> None:
-        """Take note why the estimate of a leg cannot be believed; an empty reason ends it.
+        """Take note why a foot cannot know the ground; an empty reason ends it.
 
-        Such a foot leaves no footprints and does not probe; what other feet felt still counts for
-        it.
+        Such a foot leaves no footprints; what other feet felt still counts for it.
         """
         self._state(leg).doubt = reason
 
@@ -509,8 +508,7 @@ class MorphologyController:
         if not state.watch.fault:
             state.trying = False
             # A device that is silent keeps what it has, and would change it when it hears again.
-            keeps = state.watch.silence or (choice.probe and state.doubt)
-            return Choice(state.morphology) if keeps else choice
+            return Choice(state.morphology) if state.watch.silence else choice
         if choice.morphology == FLAT or state.watch.silence:
             state.trying = False
             return Choice(FLAT)

@@ -172,18 +172,6 @@ def test_a_faulty_foot_does_not_probe():
     assert Walk(lambda step: Choice('flat', probe=True), legs=(1,)).stride(4) == ['flat']
 
 
-def test_a_foot_in_doubt_keeps_its_shape_instead_of_probing():
-    script = iter([Choice('dome')] * 3 + [Choice('flat', probe=True)] * 9)
-    walk = Walk(lambda step: next(script), legs=(1,))
-    walk.stride(3)
-    walk.controller.doubt(1, 'the force sensor is saturated')
-    assert walk.stride(3) == ['dome']
-    assert walk.controller.remark(1) == 'the force sensor is saturated'
-    assert walk.controller.faults == []
-    walk.controller.doubt(1, '')
-    assert walk.stride(1) == ['flat']
-
-
 @pytest.mark.parametrize('why', ['sound', 'doubt', 'silence'])
 def test_footprints_that_are_not_sure_are_not_kept(why):
     walk = Walk(flat, legs=(1,), belief=0.9)
