@@ -31,6 +31,7 @@ from ros_pad.trials import label as labels
 from ros_pad.trials import loop
 from ros_pad.trials import report
 from ros_pad.trials.bag import annotate
+from ros_pad.trials.trial import told
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
@@ -260,6 +261,8 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         )
     for refusal in own.refusals:
         print(f'stayed flat: {refusal}')
+    for fault in own.faults:
+        print(f'fault: {told(fault)}')
     for omission in trial.settings['omitted']:
         bound = omission['bound']
         most = 'no bound known' if bound is None else f'at most {100.0 * bound:.1f} %'

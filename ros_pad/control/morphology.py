@@ -2,11 +2,13 @@
 """Flat or dome: the choice for each foot's next step.
 
 A foot never changes shape while it stands. It decides when it lifts off, so that the air has the
-swing to move, and keeps the shape to the next lift-off.
+swing to move, and keeps the shape to the next lift-off. A foot whose air fails goes flat, or keeps
+what it has, and the others go on.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from collections.abc import Sequence
@@ -17,6 +19,8 @@ from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
 from ros_pad.control.pressure import dome_pressure
+from ros_pad.control.watch import PadWatch
+from ros_pad.control.watch import RunningMedian
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 
@@ -28,6 +32,18 @@ LOWEST_DOME = 1000.0
 
 TOUCH_DOWN = 1.5
 """Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
+
+UNFELT = 0.5
+"""Without an estimate for so long a leg is flat, s: the regulators vent it then."""
+
+FIRST_WAIT = 5
+"""Steps for which a foot whose air failed is flat before a dome is tried again."""
+
+LONGEST_WAIT = 40
+"""The wait doubles with each try in vain, up to so many steps."""
+
+FURTHEST_LEAD = 3
+"""Steps that a foot with a slow hose looks further ahead at most."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +67,12 @@ class LiftOff:
         Where that is, m.
     others_probing : bool
         Whether another leg is probing now.
+    lead : int
+        Whole steps that the foot needs to fill beyond its swing; 0 where the swing is enough.
+    wet_beyond : float
+        Highest probability of wet ground in that many steps after the next one; 0 without such.
+        A policy that fills a pad early heeds it. The adaptive one does not: measured, it does not
+        pay.
     """
 
     leg: int
@@ -60,6 +82,8 @@ class LiftOff:
     wet_ahead: float
     next_position: tuple[float, float]
     others_probing: bool
+    lead: int = 0
+    wet_beyond: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -163,15 +187,36 @@ def policy_named(name: str, is_wet: Callable[[float, float], bool] | None = None
     return policies[name]
 
 
+@dataclass(frozen=True)
+class FootFault:
+    """What was wrong with a leg, and for how long.
+
+    Attributes
+    ----------
+    leg : int
+        Number of the leg.
+    start, end : float
+        When it was found and when it was found mended, s; the end is None while it lasts.
+    reason : str
+        In words, with numbers; what was known last.
+    """
+
+    leg: int
+    start: float
+    end: float | None
+    reason: str
+
+
 class _Leg:
     """Memory of the controller about one leg."""
 
     __slots__ = (
-        'decided', 'footprint', 'morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps',
-        'touched',
+        'decided', 'doubt', 'footprint', 'lifted', 'morphology', 'need', 'open', 'patience',
+        'peak', 'probing', 'sent', 'setpoint', 'short', 'standing', 'steps', 'stride', 'swing',
+        'time', 'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait', 'watch',
     )  # fmt: skip
 
-    def __init__(self, morphology: str, peak: float) -> None:
+    def __init__(self, morphology: str, peak: float, ceiling: float) -> None:
         self.morphology = morphology
         self.steps = math.inf
         self.probing = False
@@ -181,6 +226,25 @@ class _Leg:
         self.touched = 0.0
         self.setpoint = 0.0
         self.footprint: tuple[float, float] | None = None
+        # Of its air.
+        self.watch = PadWatch(ceiling)
+        self.sent: float | None = None  # the set-point in force, if any
+        self.need = 0.0  # Pa that carry the load without margin
+        self.short = ''  # why the last touch-down lacked pressure
+        self.wait = 0  # steps until a dome is tried again
+        self.patience = FIRST_WAIT
+        self.trying = False
+        # Of its senses.
+        self.doubt = ''
+        self.unfelt = ''
+        self.unmoved = ''
+        self.open: dict[str, FootFault] = {}
+        # Of its time, s.
+        self.time = math.nan
+        self.updated = math.nan
+        self.lifted = math.nan
+        self.swing = RunningMedian(math.inf)
+        self.stride = RunningMedian(math.inf)
 
 
 class MorphologyController:
@@ -209,10 +273,14 @@ class MorphologyController:
 
     Attributes
     ----------
+    faults : list of FootFault
+        What was wrong with legs so far, by the time it was found.
     refusals : dict
         For each leg that wanted to be a dome and may not, why.
     switches : dict
         For each leg, how often its shape has changed.
+    underpressure : dict
+        For each leg, how often it came down as a dome with less pressure than its load needs.
 
     Raises
     ------
@@ -251,19 +319,128 @@ class MorphologyController:
         self._gate = load_gate * expected_load
         self._footprints = Footprints()
         self._decisions = 0
-        self._legs = {leg: _Leg(start, 1.5 * expected_load) for leg in legs}
+        self._legs = {leg: _Leg(start, 1.5 * expected_load, foot.ceiling) for leg in legs}
+        self.faults: list[FootFault] = []
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
+        self.underpressure = dict.fromkeys(legs, 0)
         for leg in legs:
             self._apply(leg, Choice(start))
 
+    def _state(self, leg: int) -> _Leg:
+        state = self._legs.get(leg)
+        if state is None:
+            raise InvalidInput(
+                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
+            )
+        return state
+
     def morphology(self, leg: int) -> str:
-        """Shape chosen for a leg's current or next step."""
-        return self._legs[leg].morphology
+        """Shape chosen for a leg's current or next step; of a faulty pad the shape it has."""
+        state = self._legs[leg]
+        if not state.watch.reason:
+            return state.morphology
+        return DOME if state.watch.pressure >= LOWEST_DOME else FLAT
 
     def setpoint(self, leg: int) -> float:
         """Gauge pressure wanted for a leg, Pa."""
         return self._legs[leg].setpoint
+
+    def fault(self, leg: int) -> str:
+        """Return what is wrong with a leg now, in words; empty when nothing is."""
+        state = self._state(leg)
+        return '; '.join(filter(None, (state.unfelt, state.unmoved, state.watch.reason)))
+
+    def remark(self, leg: int) -> str:
+        """Return what is no fault and yet worth saying of a leg, as a slow hose; or nothing."""
+        state = self._state(leg)
+        slow = ''
+        if self._lead(state):
+            slow = (
+                f'slow hose: a fill takes {state.watch.fill_time:.2f} s, a swing'
+                f' {state.swing.value:.2f} s'
+            )
+        return '; '.join(filter(None, (self.refusals.get(leg), state.short, slow)))
+
+    def lead(self, leg: int) -> int:
+        """Return how many steps ahead a leg must decide for its pad to be full in time."""
+        return self._lead(self._state(leg))
+
+    def watch(self, leg: int) -> PadWatch:
+        """Return what is known of a leg's air."""
+        return self._state(leg).watch
+
+    def doubt(self, leg: int, reason: str) -> None:
+        """Take note why a foot cannot know the ground; an empty reason ends it.
+
+        Such a foot leaves no footprints; what other feet felt still counts for it.
+        """
+        self._state(leg).doubt = reason
+
+    def observe(self, leg: int, time: float, pressure: float | None) -> None:
+        """Take a reading of a pad before the leg's :meth:`update` of the same moment.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+        time : float
+            s; of all legs on one clock.
+        pressure : float or None
+            Gauge Pa; None where there was no reading. Without any nothing is watched.
+        """
+        state = self._state(leg)
+        if not 0.0 <= time - state.time <= UNFELT:  # nobody looked
+            state.updated = time
+            state.lifted = math.nan
+        state.time = time
+        watch = state.watch
+        faulty = watch.fault
+        watch.update(time, state.sent, pressure)
+        if faulty and not watch.fault:
+            # What came back for one may have come back for all.
+            state.patience = FIRST_WAIT
+            for other in self._legs.values():
+                other.wait = 0
+        elif watch.fault and not faulty:
+            state.wait = state.patience
+        if time - state.updated <= UNFELT:
+            state.unfelt = ''
+        elif not state.unfelt:
+            state.unfelt = f'no load, position or estimate for {time - state.updated:.1f} s'
+            if state.morphology == DOME:
+                self.switches[leg] += 1
+            self._apply(leg, Choice(FLAT))
+            state.steps = math.inf
+            state.sent = None  # the regulator vents when it has waited long enough
+        if self._decisions - state.decided <= 2 * len(self._legs):
+            state.unmoved = ''
+        elif not state.unmoved:
+            state.unmoved = (
+                f'no step felt while the others took {self._decisions - state.decided}:'
+                ' its load is not measured, or it is held up'
+            )
+        self._note(leg, state)
+
+    def _note(self, leg: int, state: _Leg) -> None:
+        """Keep the list of faults: one entry for each time that something was wrong."""
+        watch = state.watch
+        for kind, reason in (
+            ('fault', watch.fault), ('silence', watch.silence),
+            ('unfelt', state.unfelt), ('unmoved', state.unmoved),
+        ):  # fmt: skip
+            known = state.open.get(kind)
+            if known is None:
+                if reason:
+                    state.open[kind] = FootFault(leg, state.time, None, reason)
+                    self.faults.append(state.open[kind])
+            elif known.reason != reason:
+                if reason:  # more is known of it
+                    now = state.open[kind] = dataclasses.replace(known, reason=reason)
+                else:
+                    now = dataclasses.replace(known, end=state.time)
+                    del state.open[kind]
+                self.faults[self.faults.index(known)] = now
 
     def update(
         self, leg: int, load: float, wet_probability: float, position: Sequence[float]
@@ -287,25 +464,67 @@ class MorphologyController:
             For a leg that is not controlled, a probability outside 0 to 1, or a value that is not
             finite. Nothing has changed then.
         """
-        state = self._legs.get(leg)
-        if state is None:
-            raise InvalidInput(
-                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
-            )
+        state = self._state(leg)
         # A load that is no number is below no gate: it must not pass for a lift-off.
         if not (math.isfinite(load + position[0] + position[1]) and 0.0 <= wet_probability <= 1.0):
             raise InvalidInput(
                 f'leg {leg}: load = {load!r} N, position = {tuple(position)!r} m: must be finite;'
                 f' wet_probability = {wet_probability!r}: must be from 0 to 1'
             )
+        state.updated = state.time
         if load >= self._gate:
-            if load >= TOUCH_DOWN * self._gate:
+            if load >= TOUCH_DOWN * self._gate and not state.standing:
                 state.standing = True
+                self._touch_down(leg, state)
             state.touched = max(state.touched, load)
         elif state.standing:
             state.standing = False
             self._lift_off(leg, wet_probability, position)
+        state.sent = state.setpoint
         return state.setpoint
+
+    def _touch_down(self, leg: int, state: _Leg) -> None:
+        """Compare the pressure of a dome with what its load needs."""
+        state.short = ''
+        if state.footprint is None:
+            return  # it has stood from the beginning
+        if state.time > state.lifted:
+            state.swing.add(state.time - state.lifted)
+        pressure = state.watch.pressure
+        if state.morphology == DOME and pressure < state.need:
+            self.underpressure[leg] += 1
+            state.short = (
+                f'{1e-3 * pressure:.1f} kPa at touch-down, {1e-3 * state.need:.1f} needed'
+            )
+
+    def _lead(self, state: _Leg) -> int:
+        late = state.watch.fill_time - state.swing.value
+        if not late > 0.0:
+            return 0
+        return min(math.ceil(late / state.stride.value), FURTHEST_LEAD)
+
+    def _permitted(self, leg: int, state: _Leg, choice: Choice) -> Choice:
+        """Return what the pad of a leg is fit for: flat where its air failed, but for a try."""
+        if not state.watch.fault:
+            state.trying = False
+            # A device that is silent keeps what it has, and would change it when it hears again.
+            return Choice(state.morphology) if state.watch.silence else choice
+        if choice.morphology == FLAT or state.watch.silence:
+            state.trying = False
+            return Choice(FLAT)
+        if state.trying:
+            if not state.watch.stalled:
+                return choice  # its hose may be slow
+            state.trying = False
+            state.patience = min(2 * state.patience, LONGEST_WAIT)
+            state.wait = state.patience
+        state.wait -= 1
+        others = (other for name, other in self._legs.items() if name != leg)
+        # One leg at a time, but for those that another's success, or a try put off, lets through.
+        if state.wait > 0 or (state.wait == 0 and any(other.trying for other in others)):
+            return Choice(FLAT)
+        state.trying = True
+        return choice
 
     def _lift_off(self, leg: int, wet_probability: float, position: Sequence[float]) -> None:
         state = self._legs[leg]
@@ -313,26 +532,44 @@ class MorphologyController:
         # Remember the heaviest step, but forget it over some tens of steps.
         state.peak = max(state.touched, state.peak + 0.1 * (state.touched - state.peak))
         state.touched = 0.0
+        if state.time > state.lifted:
+            state.stride.add(state.time - state.lifted)
+        state.lifted = state.time
         x, y = position[0], position[1]
-        if state.morphology == FLAT:
+        # A pad that holds air is no flat one, whatever was asked of it.
+        if state.morphology == FLAT and not (
+            state.watch.pressure >= LOWEST_DOME or state.watch.silence or state.doubt
+        ):
             self._footprints.add(x, y, wet_probability)
         # The next step is taken to be as long as the last one.
         before_x, before_y = state.footprint or (x, y)
         state.footprint = (x, y)
         ahead = (2.0 * x - before_x, 2.0 * y - before_y)
+        lead = self._lead(state)
         self._decisions += 1
         state.decided = self._decisions
         step = LiftOff(
             leg=leg,
-            morphology=state.morphology,
+            morphology=self.morphology(leg),
             steps=state.steps,
             probing=state.probing,
             wet_ahead=self._footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
+            lead=lead,
+            wet_beyond=max(
+                (
+                    self._footprints.wet_probability(
+                        (1 + far) * x - far * before_x, (1 + far) * y - far * before_y
+                    )
+                    for far in range(2, 2 + lead)
+                ),
+                default=0.0,
+            ),
         )
-        self._apply(leg, self._policy(step))
-        if state.morphology != step.morphology:
+        before = state.morphology
+        self._apply(leg, self._permitted(leg, state, self._policy(step)))
+        if state.morphology != before:
             self.switches[leg] += 1
             state.steps = 0
 
@@ -354,6 +591,12 @@ class MorphologyController:
             try:
                 setpoint = self._fixed_pressure or dome_pressure(
                     self._foot, state.peak, self._margin
+                )
+                # What a fixed pressure is worth is not for the controller to say.
+                state.need = (
+                    setpoint - state.watch.tolerance
+                    if self._fixed_pressure
+                    else dome_pressure(self._foot, state.peak, 1.0)
                 )
             except LimitError as error:
                 # Domes that cannot carry the foot are worse than none.

@@ -8,6 +8,7 @@ it hands messages over in the order they were published, several times faster th
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import threading
@@ -65,6 +66,11 @@ class ComposedTrial:
         Initialised context that the nodes live in.
     fidelity : str
         ``auto`` or a rung of the ladder.
+
+    Attributes
+    ----------
+    walked : MorphologyController
+        The controller as it was at the end of the walk; there only then.
     """
 
     def __init__(
@@ -213,6 +219,8 @@ class ComposedTrial:
                     progress(self.simulator.robot.time)
                 if self.simulator.robot.verdict or self.stopped:
                     break
+            # While the pads are vented it hears of no feet, and takes note of that.
+            self.walked = copy.deepcopy(self.controller.controller)
         except BaseException:
             with suppress(PadError):  # what went wrong first is what is told
                 self._vent()
@@ -329,7 +337,7 @@ def run(
     annotate(bag, label(scene, policy, seed, rung, interrupted=trial.stopped))
     result = recorded.load(bag)
     result.floor = trial.simulator.floor
-    result.metrics = summarise(scene, result, robot, trial.controller.controller)
+    result.metrics = summarise(scene, result, robot, trial.walked)
     result.real_time_factor = robot.time / wall
     annotate(
         bag,

@@ -9,9 +9,11 @@ import struct
 import sys
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64
@@ -32,7 +34,14 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
+from ros_pad.nodes.stamps import on_tick
+from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import Pace
 from ros_pad.simulation.scene import Scene
+
+OLD = 0.2  # s after which the last position of a foot serves no more
+
+LOOK_PERIOD_NS = 100_000_000  # how often legs without estimates are looked after, and news told
 
 PARAMETERS = (
     LEGS,
@@ -53,10 +62,93 @@ PARAMETERS = (
 )  # fmt: skip
 
 
+class _Leg:
+    """What the node has heard of one leg, and what it last said of it."""
+
+    def __init__(self, node: ControllerNode, leg: int) -> None:
+        self.node, self.leg = node, leg
+        # Wrenches and positions come at the rate of the sensors. Of positions only the last one
+        # counts when an estimate comes: it is kept as it travelled, and read then. Of loads the
+        # heaviest since the last estimate counts: feet that bounce have not stepped.
+        self._position = b''
+        self._positions = self._positions_taken = 0
+        self._position_time = 0.0  # when an estimate last found a new position, s
+        self._load, self._heaviest = math.nan, -math.inf
+        self._pressure: float | None = None  # since the last look
+        self._shape = ''
+        self.observed: float | None = None  # time of the last look, s
+        self._setpoints = topics.PRESSURE_SETPOINT.publisher(node, leg)
+        self._shapes = topics.MORPHOLOGY.publisher(node, leg)
+        self._message = FluidPressure()
+        self._message.header.frame_id = f'leg_{leg}_pad'
+        topics.WRENCH.subscription(node, self._on_wrench, leg, raw=True)
+        topics.POSITION.subscription(node, self._on_position, leg, raw=True)
+        topics.PRESSURE.subscription(node, self._on_pressure, leg)
+        topics.WETNESS.subscription(node, self._on_wetness, leg)
+
+    def _on_wrench(self, data: bytes) -> None:
+        self._load = normal_force(data)
+        if self._heaviest < self._load < math.inf:  # an infinite one is no load, refused below
+            self._heaviest = self._load
+        self.node.wrenches += 1
+
+    def _on_position(self, data: bytes) -> None:
+        self._position = data
+        self._positions += 1
+
+    def _on_pressure(self, message: FluidPressure) -> None:
+        self._pressure = message.fluid_pressure - self.node.ambient
+
+    def observe(self, now: float) -> None:
+        """Hand over what is known of the pad at a time, s."""
+        pressure, self._pressure = self._pressure, None
+        self.observed = now
+        self.node.controller.observe(self.leg, now, pressure)
+
+    def _on_wetness(self, message: Float64) -> None:
+        node, controller = self.node, self.node.controller
+        stamp = node.get_clock().now()
+        now = stamp.nanoseconds * 1e-9
+        self.observe(now)
+        if self._positions != self._positions_taken:
+            self._positions_taken = self._positions
+            self._position_time = now
+        if not self._position or now - self._position_time > OLD:
+            # Where the foot is, nobody knows.
+            self.tell_shape()
+            return
+        point = deserialize_message(self._position, PointStamped).point
+        if not math.isfinite(self._load + message.data + point.x + point.y):
+            # A load that is no number is no lift-off. No set-point follows from it either: if it
+            # stays so, the regulators vent.
+            self.tell_shape()
+            return
+        weight = max(self._heaviest, self._load)  # the load where no wrench came since
+        self._heaviest = -math.inf
+        gauge = controller.update(self.leg, weight, message.data, (point.x, point.y))
+        if self.leg in controller.refusals:
+            node.get_logger().warning(
+                f'leg {self.leg} stays flat: {controller.refusals[self.leg]}',
+                throttle_duration_sec=10.0,
+            )
+        self.tell_shape()
+        self._message.header.stamp = stamp.to_msg()
+        self._message.fluid_pressure = gauge + node.ambient
+        self._setpoints.publish(self._message)
+
+    def tell_shape(self) -> None:
+        """Publish the shape if it is another one."""
+        shape = self.node.controller.morphology(self.leg)
+        if shape != self._shape:
+            self._shape = shape
+            self._shapes.publish(String(data=shape))
+
+
 class ControllerNode(Node):
     """Decides at each lift-off, and sends a set-point with every estimate of wetness.
 
-    Where the estimates stop, so do the set-points, and the regulators vent. Parameters are in
+    Where the estimates stop, so do the set-points, and the regulators vent. What is wrong with a
+    leg is said on ``/diagnostics``, once a second and as soon as it is found. Parameters are in
     :data:`PARAMETERS`.
     """
 
@@ -89,62 +181,63 @@ class ControllerNode(Node):
             raise ConfigError(
                 f'node {self.get_name()}: {error} (parameter dome_pressure)'
             ) from error
-        self._ambient = values['ambient_pressure']
+        self.ambient: float = values['ambient_pressure']
         self.wrenches = 0
-        self._message = FluidPressure()
-        for leg in legs:
-            self._serve(leg)
+        self._diagnostics = topics.DIAGNOSTICS.publisher(self)
+        self._said: list[str] = []
+        self._look_pace = Pace(LOOK_PERIOD_NS)
+        self._diagnostics_pace = Pace(1_000_000_000)
+        self._legs = [_Leg(self, leg) for leg in legs]
+        on_tick(self, LOOK_PERIOD_NS * 1e-9, self._tick)
 
-    def _serve(self, leg: int) -> None:
-        # Wrenches and positions come at the rate of the sensors. Of positions only the last one
-        # counts when an estimate comes: it is kept as it travelled, and read then. Of loads the
-        # heaviest since the last estimate counts: feet that bounce have not stepped.
-        position = b''
-        load, heaviest = math.nan, -math.inf
-        shape = ''
-        setpoints: Publisher = topics.PRESSURE_SETPOINT.publisher(self, leg)
-        shapes: Publisher = topics.MORPHOLOGY.publisher(self, leg)
-        frame = f'leg_{leg}_pad'
+    def _tick(self, now_ns: int) -> None:
+        """Look after legs of which no estimates come, and publish what is to be said."""
+        if not self._look_pace.due(now_ns):
+            return
+        now = now_ns * 1e-9
+        for each in self._legs:
+            if each.observed is None:
+                each.observed = now
+            elif abs(now - each.observed) > LOOK_PERIOD_NS * 1e-9:
+                each.observe(now)
+                each.tell_shape()
+        faults = [self.controller.fault(each.leg) for each in self._legs]
+        if self._diagnostics_pace.due(now_ns) or faults != self._said:
+            self._said = faults
+            self._diagnose(now_ns)
 
-        def on_wrench(data: bytes) -> None:
-            nonlocal load, heaviest
-            load = normal_force(data)
-            if heaviest < load < math.inf:  # an infinite one is no load, and refused below
-                heaviest = load
-            self.wrenches += 1
-
-        def on_position(data: bytes) -> None:
-            nonlocal position
-            position = data
-
-        def on_wetness(message: Float64) -> None:
-            nonlocal shape, heaviest
-            if not position:
-                return
-            point = deserialize_message(position, PointStamped).point
-            if not math.isfinite(load + message.data + point.x + point.y):
-                # A load that is no number is no lift-off. No set-point follows from it either:
-                # if it stays so, the regulators vent.
-                return
-            weight = max(heaviest, load)  # the load where no wrench came since
-            heaviest = -math.inf
-            gauge = self.controller.update(leg, weight, message.data, (point.x, point.y))
-            if leg in self.controller.refusals:
-                self.get_logger().warning(
-                    f'leg {leg} stays flat: {self.controller.refusals[leg]}',
-                    throttle_duration_sec=10.0,
-                )
-            if self.controller.morphology(leg) != shape:
-                shape = self.controller.morphology(leg)
-                shapes.publish(String(data=shape))
-            self._message.header.stamp = self.get_clock().now().to_msg()
-            self._message.header.frame_id = frame
-            self._message.fluid_pressure = gauge + self._ambient
-            setpoints.publish(self._message)
-
-        topics.WRENCH.subscription(self, on_wrench, leg, raw=True)
-        topics.POSITION.subscription(self, on_position, leg, raw=True)
-        topics.WETNESS.subscription(self, on_wetness, leg)
+    def _diagnose(self, now_ns: int) -> None:
+        array = DiagnosticArray()
+        set_stamp(array.header.stamp, now_ns)
+        controller = self.controller
+        for leg in (each.leg for each in self._legs):
+            shape, watch = controller.morphology(leg), controller.watch(leg)
+            fault, remark = controller.fault(leg), controller.remark(leg)
+            status = DiagnosticStatus(
+                name=f'{self.get_name()}: leg {leg} pad',
+                hardware_id=f'leg {leg}',
+                level=DiagnosticStatus.OK,
+                message=shape,
+            )
+            if remark:
+                status.level, status.message = DiagnosticStatus.WARN, remark
+            if fault:
+                status.level = DiagnosticStatus.ERROR
+                status.message = '; '.join(filter(None, (fault, remark)))
+            status.values = [
+                KeyValue(key='pressure (Pa gauge)', value=f'{watch.pressure:.0f}'),
+                KeyValue(key='set-point (Pa gauge)', value=f'{controller.setpoint(leg):.0f}'),
+                KeyValue(key='shape', value=shape),
+                KeyValue(key='time to fill (s)', value=f'{watch.fill_time:.2f}'),
+                KeyValue(key='time to vent (s)', value=f'{watch.vent_time:.2f}'),
+                KeyValue(key='steps decided ahead', value=str(controller.lead(leg))),
+                KeyValue(
+                    key='touch-downs with too little pressure',
+                    value=str(controller.underpressure[leg]),
+                ),
+            ]
+            array.status.append(status)
+        self._diagnostics.publish(array)
 
 
 def normal_force(data: bytes) -> float:

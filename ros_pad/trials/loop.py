@@ -172,7 +172,7 @@ class ClosedLoop:
         self.pressures = [0.0] * len(scene.legs)  # as reported last
         self.pads = [0.0] * len(scene.legs)  # as they are
         self._commanded = [0] * len(scene.legs)  # when each last took a command, ns
-        self._unheard: set[int] = set()  # whose last command was not taken
+        self._unheard: set[int] = set()  # that took no command of late
         self._legs = scene.legs
         # Since the last control step: feet that bounce as the other tripod lands have not stepped.
         self._heaviest = [-math.inf] * len(scene.legs)
@@ -208,15 +208,20 @@ class ClosedLoop:
             )
         log.sample(now, self.robot.body, readings)
         if due:
+            heard: list[float | None] = [None] * len(self.regulators)
             for index, regulator in enumerate(self.regulators):
                 with suppress(TransportError):
-                    self.pressures[index] = regulator.read().pressure
+                    heard[index] = self.pressures[index] = regulator.read().pressure
             self.pads = [regulator.pad_pressure for regulator in self.regulators]
             for index, leg in enumerate(self._legs):
-                setpoint = controller.update(
-                    leg, heaviest[index], estimates[index].wet_probability, readings[index][1]
-                )
-                self._command(index, setpoint)
+                controller.observe(leg, now, heard[index])
+                (_, _, load), position = readings[index]
+                wet = estimates[index].wet_probability
+                if not math.isfinite(load + wet + position[0] + position[1]):
+                    # No set-point follows from what is no number; the pad is vented in time.
+                    self._unheard.add(index)
+                    continue
+                self._command(index, controller.update(leg, heaviest[index], wet, position))
             log.control(now, self.pressures, estimates, controller)
             self._heaviest = [-math.inf] * len(heaviest)
 

@@ -34,6 +34,7 @@ from ros_pad.trials.label import promise
 from ros_pad.trials.metrics import LOAD_GATE
 from ros_pad.trials.metrics import stance_ends
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import told
 
 Progress = Callable[[float], None]
 
@@ -964,6 +965,7 @@ def _warnings(trial: Trial) -> list[str]:
     found += [f'Fault on the schedule: {fault}' for fault in trial.settings.get('faults', ())]
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
+        found += [told(fault) for fault in trial.metrics.faults]
     if trial.settings.get('problem'):
         found.append(str(trial.settings['problem']))
     return found

@@ -58,6 +58,7 @@ from ros_pad.simulation import fidelity as ladder
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import told
 
 ESTIMATOR, POLICY = 'estimator.', 'policy.'  # what is no key of a scene begins with one of these
 RESULTS = 'trials.sqlite'
@@ -284,6 +285,8 @@ def columns_of(trial: Trial) -> Row:
     for name, value in trial.metrics.as_dict().items():
         if name == 'refusals':
             found[name] = '; '.join(value)
+        elif name == 'faults':
+            found[name] = '; '.join(map(told, value))
         elif name == 'cycles':  # what a scene calls so are those that it asks for
             found['cycles_walked'] = value
         elif isinstance(value, list):

@@ -18,7 +18,7 @@ BOUNCE = 0.03  # s without load that end no stance
 
 @dataclass(frozen=True)
 class Metrics:
-    """Figures of a trial. Lists have one entry for each leg.
+    """Figures of a trial. Lists of numbers have one entry for each leg.
 
     Attributes
     ----------
@@ -45,6 +45,11 @@ class Metrics:
         Why the walk is not valid.
     refusals : list of str
         Why feet that should have been domes stayed flat at the end; empty when all went well.
+    faults : list of dict
+        What the controller found wrong with legs: ``leg``, ``start`` and ``end``, s (None while it
+        lasts), and ``reason``.
+    underpressure : list of int
+        How often each foot came down as a dome with less pressure than its load needs.
     goal_m : float or None
         Way to the goal, on a rail that has one.
     time_to_goal_s : float or None
@@ -64,12 +69,20 @@ class Metrics:
     wet_accuracy: float | None
     verdict: str | None
     refusals: list[str] = field(default_factory=list)
+    faults: list[dict[str, Any]] = field(default_factory=list)
+    underpressure: list[int] = field(default_factory=list)
     goal_m: float | None = None
     time_to_goal_s: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return asdict(self)
+
+
+def told(fault: dict[str, Any]) -> str:
+    """Return in words what a controller found wrong with a leg, see ``Metrics.faults``."""
+    until = 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
+    return f'Leg {fault["leg"]}, from {fault["start"]:.1f} s to {until}: {fault["reason"]}'
 
 
 @dataclass

@@ -3,6 +3,7 @@ import math
 from itertools import pairwise
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
@@ -42,8 +43,11 @@ class Robot:
             topics.MORPHOLOGY.subscription(
                 self.node, lambda m, leg=leg: self.shapes[leg].append(m.data), leg
             )
+        self.diagnostics = []
+        topics.DIAGNOSTICS.subscription(self.node, self.diagnostics.append)
         self.controller = None
         self.position = 0.0
+        self.time_ns = TIME_NS
 
     def start(self, **parameters):
         parameters = {'legs': list(LEGS), 'use_sim_time': True, **parameters}
@@ -62,18 +66,24 @@ class Robot:
                 )
             )
         )
-        message = topics.CLOCK.message()
-        set_stamp(message.clock, TIME_NS)
-        self._clock.publish(message)
-        self.until(lambda: self.controller.get_clock().now().nanoseconds == TIME_NS)
+        self.tick(0)
         return self.controller
 
-    def sense(self, load, position=None, leg=1):
-        """Wrench and position of a leg, waited for."""
+    def tick(self, milliseconds=20):
+        """Let time pass, and wait until the controller knows."""
+        self.time_ns += milliseconds * 1_000_000
+        message = topics.CLOCK.message()
+        set_stamp(message.clock, self.time_ns)
+        self._clock.publish(message)
+        self.until(lambda: self.controller.get_clock().now().nanoseconds == self.time_ns)
+
+    def sense(self, load, position=None, leg=1, seen=True):
+        """Wrench and, where its marker is seen, position of a leg, waited for."""
         before = self.controller.wrenches
         point = PointStamped()
         point.point.x = self.position if position is None else position
-        self._in[topics.POSITION.name(leg)].publish(point)
+        if seen:
+            self._in[topics.POSITION.name(leg)].publish(point)
         wrench = WrenchStamped()
         wrench.wrench.force.z = load
         self._in[topics.WRENCH.name(leg)].publish(wrench)
@@ -193,6 +203,66 @@ def test_the_shape_reaches_who_comes_late(robot, context, executor):
     topics.MORPHOLOGY.subscription(late, lambda message: heard.append(message.data), 1)
     robot.until(lambda: heard, what='the latched shape')
     assert heard == ['dome']
+
+
+LOST = {
+    'all': {},
+    'estimate': {'load': LOAD},
+    'position': {'load': LOAD, 'wet': 0.98, 'seen': False},
+    'load': {'load': math.nan, 'wet': 0.98},
+    'wetness': {'load': LOAD, 'wet': math.nan},
+}
+
+
+@pytest.mark.parametrize('case', LOST)
+def test_a_leg_that_is_not_felt_is_flat_and_told_of_within_a_second(robot, case):
+    """Its set-points stop, so that its regulator vents; the other leg goes on."""
+    given = LOST[case]
+    robot.start(policy='dome')
+
+    def step():
+        robot.tick()
+        robot.sense(LOAD, leg=2)
+        robot.estimate(0.5, leg=2)
+
+    for _ in range(5):
+        step()
+        robot.sense(LOAD)
+        assert robot.estimate(0.5).fluid_pressure > AMBIENT
+    lost_ns, count = robot.time_ns, len(robot.setpoints[1])
+    while robot.controller.controller.fault(1) == '':
+        assert robot.time_ns < lost_ns + 800_000_000
+        step()
+        if 'load' in given:
+            robot.sense(given['load'], seen=given.get('seen', True))
+        if 'wet' in given:
+            robot._in[topics.WETNESS.name(1)].publish(Float64(data=given['wet']))
+
+    def said():
+        return [
+            (nanoseconds(array.header.stamp), status.message)
+            for array in robot.diagnostics
+            for status in array.status
+            if status.name == 'controller: leg 1 pad' and status.level == DiagnosticStatus.ERROR
+        ]
+
+    while not said():
+        assert robot.time_ns < lost_ns + 1_000_000_000
+        step()
+    assert said()[0][0] <= lost_ns + 900_000_000
+    assert said()[0][1].startswith('no load, position or estimate for 0.')
+    assert robot.shapes[1][-1] == 'flat'
+    assert robot.shapes[2] == ['dome']
+    # Of a marker that is out of sight the last place serves for 0.2 s.
+    assert len(robot.setpoints[1]) - count <= (10 if case == 'position' else 0)
+    assert robot.setpoints[2][-1].fluid_pressure > AMBIENT
+    # Felt again, it steps again.
+    for _ in range(2):
+        robot.tick()
+        robot.sense(LOAD)
+        robot.estimate(0.5)
+    assert robot.controller.controller.fault(1) == ''
+    assert robot.step(0.5) > 0.0
 
 
 BAD = {

@@ -6,6 +6,7 @@ import types
 import numpy as np
 import pytest
 
+from ros_pad.control import FootFault
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import Trial
@@ -111,7 +112,10 @@ def test_a_summary_is_what_the_robot_says():
         body=(3.0, -0.2, 0.1), time=SCENE.settle + 20.0 * SCENE.gait.cycle, feet=feet,
         dissipation=7.0, verdict=None,
     )  # fmt: skip
-    controller = types.SimpleNamespace(switches={1: 4}, refusals={1: 'too heavy'})
+    fault = FootFault(1, 0.5, None, 'leaks')
+    controller = types.SimpleNamespace(
+        switches={1: 4}, refusals={1: 'too heavy'}, faults=[fault], underpressure={1: 2}
+    )
     metrics = summarise(SCENE, trial, robot, controller)
     assert metrics.distance_m == 3.0
     assert metrics.cycles == pytest.approx(20.0)
@@ -122,7 +126,10 @@ def test_a_summary_is_what_the_robot_says():
     assert metrics.switches == [4]
     assert metrics.dissipation_j == 7.0
     assert metrics.verdict is None
-    assert json.loads(json.dumps(metrics.as_dict()))['switches'] == [4]
+    said = json.loads(json.dumps(metrics.as_dict()))
+    assert said['switches'] == [4]
+    assert said['faults'] == [{'leg': 1, 'start': 0.5, 'end': None, 'reason': 'leaks'}]
+    assert said['underpressure'] == [2]
 
 
 def test_a_walk_that_ends_while_it_settles_has_no_cycles():
@@ -130,7 +137,10 @@ def test_a_walk_that_ends_while_it_settles_has_no_cycles():
         body=(0.0, 0.0, 0.0), time=0.5 * SCENE.settle, feet=[], dissipation=0.0, verdict='tip-over'
     )
     metrics = summarise(
-        SCENE, one_leg([0.9] * 5), robot, types.SimpleNamespace(switches={1: 0}, refusals={})
+        SCENE,
+        one_leg([0.9] * 5),
+        robot,
+        types.SimpleNamespace(switches={1: 0}, refusals={}, faults=[], underpressure={1: 0}),
     )
     assert (metrics.cycles, metrics.distance_per_cycle_m) == (0.0, 0.0)
 

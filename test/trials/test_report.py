@@ -235,6 +235,19 @@ def test_faults_are_told_of(tmp_path):
     assert told in page(tmp_path / 'faulty.html').text
 
 
+def test_what_the_controller_found_is_told_of(tmp_path):
+    trial = made_up()
+    found = [
+        {'leg': 2, 'start': 3.48, 'end': None, 'reason': 'leaks'},
+        {'leg': 1, 'start': 4.0, 'end': 9.5, 'reason': 'does not vent'},
+    ]
+    trial.metrics = dataclasses.replace(trial.metrics, faults=found)
+    report.write(trial, tmp_path / 'r.html')
+    text = page(tmp_path / 'r.html').text
+    assert 'Leg 2, from 3.5 s to the end: leaks' in text
+    assert 'Leg 1, from 4.0 s to 9.5 s: does not vent' in text
+
+
 def test_footprints_window_and_omissions(tmp_path):
     report.write(made_up(), tmp_path / 'r.html')
     seen = page(tmp_path / 'r.html')

@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the controller does with legs whose air or senses fail."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.control import Choice
+from ros_pad.control import MorphologyController
+from ros_pad.control import dome
+from ros_pad.control import flat
+from ros_pad.errors import InvalidInput
+
+FOOT = Foot.load('large37')
+LOAD = 6.8  # N
+STRIDE = 0.14  # m
+PERIOD = 0.02  # s
+SWING, STANCE = 20, 30  # looks: 0.4 and 0.6 s
+LEGS = (1, 2)
+
+
+def ideal(leg, setpoint, time):
+    return setpoint
+
+
+class Walk:
+    """Legs that step together, on pads that are given as a function of what is asked of them."""
+
+    def __init__(self, policy=dome, legs=LEGS, pads=ideal, belief=0.5, **options):
+        self.controller = MorphologyController(FOOT, legs, policy, LOAD, **options)
+        self.legs, self.pads, self.belief = legs, pads, belief
+        self.looks = 0
+        self.x = 0.0
+        self.shapes = []  # after each stride, of each leg
+        self.readings = True
+        self.deaf = set()  # legs of which no estimates come
+        self.weightless = set()  # legs whose load reads zero
+
+    @property
+    def time(self):
+        return self.looks * PERIOD
+
+    def look(self, load):
+        for leg in self.legs:
+            setpoint = self.controller.setpoint(leg)
+            reading = self.pads(leg, setpoint, self.time) if self.readings else None
+            self.controller.observe(leg, self.time, reading)
+            if leg not in self.deaf:
+                felt = 0.0 if leg in self.weightless else load
+                self.controller.update(leg, felt, self.belief, (self.x, 0.1 * leg))
+        self.looks += 1
+
+    def stride(self, count=1):
+        for _ in range(count):
+            for _ in range(STANCE):
+                self.look(LOAD)
+            self.x += STRIDE
+            for _ in range(SWING):
+                self.look(0.0)
+            self.shapes.append([self.controller.morphology(leg) for leg in self.legs])
+        return self.shapes[-1]
+
+    def asked(self, leg, strides):
+        """Return for each of some further strides whether pressure is asked for."""
+        return [self.stride() and self.controller.setpoint(leg) > 0.0 for _ in range(strides)]
+
+
+def stuck(leg, start=0.0, end=math.inf):
+    """Pads of which one keeps what it holds from a start to an end, s."""
+    held = dict.fromkeys(LEGS, 0.0)
+
+    def pads(which, setpoint, time):
+        if which != leg or not start <= time < end:
+            held[which] = setpoint
+        return held[which]
+
+    return pads
+
+
+def test_sound_pads_change_nothing():
+    walk = Walk(start='dome')
+    assert walk.stride(12) == ['dome', 'dome']
+    assert walk.controller.faults == []
+    assert walk.controller.underpressure == {1: 0, 2: 0}
+    assert walk.controller.fault(1) == walk.controller.remark(1) == ''
+
+
+def test_a_foot_that_does_not_fill_goes_flat_and_is_tried_now_and_then():
+    walk = Walk(pads=stuck(1))
+    asked = walk.asked(1, 60)
+    # Once; then after 5 steps, 10, 20: each try is one step.
+    tries = [k for k, each in enumerate(asked) if each]
+    assert tries == [0, 5, 15, 35]
+    # Its shape is what it is, whatever was asked; and the other leg waits for nobody.
+    assert [shape[0] for shape in walk.shapes[1:]] == ['flat'] * 59
+    assert [shape[1] for shape in walk.shapes] == ['dome'] * 60
+    (fault,) = walk.controller.faults
+    assert (fault.leg, fault.end) == (1, None)
+    assert fault.start == pytest.approx(1.1, abs=0.1)  # half a second after the first lift-off
+    assert fault.reason.startswith('does not fill: 0.0 kPa 0.5 s after')
+    assert walk.controller.underpressure[1] == 4
+
+
+def test_a_foot_that_is_mended_comes_back_at_the_next_try():
+    """Tried in vain after 5 steps and 10 more; mended soon after that it is tried 20 later."""
+    walk = Walk(pads=stuck(1, end=18.0))
+    walk.stride(45)
+    (fault,) = walk.controller.faults
+    assert 35.0 < fault.end < 38.0
+    assert walk.controller.fault(1) == ''
+    assert [shape[0] for shape in walk.shapes[37:]] == ['dome'] * 8
+    # Forgotten: the next fault waits as short as the first one.
+    walk.pads = stuck(1)
+    walk.stride(1)
+    assert walk.asked(1, 6).index(True) < 5
+
+
+def test_what_comes_back_for_one_is_tried_by_all():
+    """A supply that was lost to all, to one of them earlier: the waits are not the same."""
+    start = {1: 0.0, 2: 0.0, 3: 9.0}
+    walk = Walk(legs=(1, 2, 3), pads=lambda leg, p, t: 0.0 if start[leg] <= t < 40.0 else p)
+    while not all(fault.end for fault in walk.controller.faults) or walk.time < 40.0:
+        walk.stride()
+        assert walk.time < 90.0
+    ends = [fault.end for fault in walk.controller.faults]
+    assert len(ends) == 3 and max(ends) - min(ends) < 2.1
+
+
+def test_a_try_lasts_as_long_as_a_slow_hose_moves():
+    """It takes 2.3 s to fill, more than two steps, and is mended before the first try."""
+    filling = slow(30e3)
+    walk = Walk(legs=(1,), pads=lambda leg, p, t: 0.0 if t < 4.0 else filling(leg, p, t))
+    walk.stride(12)
+    (fault,) = walk.controller.faults
+    assert 6.0 < fault.end < 9.0
+
+
+def test_one_leg_tries_at_a_time():
+    walk = Walk(legs=(1, 2, 3), pads=lambda leg, p, t: 0.0)
+    trying = []
+    for _ in range(60):
+        walk.stride()
+        trying.append(sum(walk.controller.setpoint(leg) > 0.0 for leg in walk.legs))
+    assert max(trying[1:]) == 2  # one waits a step, and then goes
+    assert sum(trying[1:]) < 12
+
+
+def test_a_foot_that_does_not_vent_is_a_dome_that_stays():
+    """It is asked to be flat, told of as a dome, and its footprints are none of flat feet."""
+    script = iter([Choice('dome')] * 4 + [Choice('flat')] * 100)
+    walk = Walk(lambda step: next(script), legs=(1,), pads=stuck(1, start=3.0), belief=0.9)
+    walk.stride(12)
+    assert walk.shapes[-1] == ['dome']
+    assert walk.controller.setpoint(1) == 0.0
+    assert 'does not vent: 7' in walk.controller.fault(1)
+    assert walk.controller._footprints.wet_probability(walk.x, 0.1) == pytest.approx(0.5, abs=0.2)
+    sound = Walk(flat, legs=(1,), belief=0.9)
+    sound.stride(12)
+    assert sound.controller._footprints.wet_probability(sound.x, 0.1) > 0.8
+
+
+def test_a_faulty_foot_does_not_probe():
+    script = iter([Choice('dome')] + [Choice('flat', probe=True)] * 9)
+    walk = Walk(lambda step: next(script), legs=(1,), pads=stuck(1, start=1.5))
+    walk.stride(4)
+    assert walk.controller.fault(1)
+    assert not walk.controller._legs[1].probing
+    assert Walk(lambda step: Choice('flat', probe=True), legs=(1,)).stride(4) == ['flat']
+
+
+@pytest.mark.parametrize('why', ['sound', 'doubt', 'silence'])
+def test_footprints_that_are_not_sure_are_not_kept(why):
+    walk = Walk(flat, legs=(1,), belief=0.9)
+    walk.stride(1)
+    walk.x = 20.0  # where nothing is known
+    walk.readings = why != 'silence'
+    walk.controller.doubt(1, 'saturated' if why == 'doubt' else '')
+    walk.stride(3)
+    known = walk.controller._footprints.wet_probability(walk.x, 0.1)
+    assert known == pytest.approx(0.85 if why == 'sound' else 0.5, abs=0.06)
+
+
+def test_legs_that_nobody_looked_at_are_not_accused():
+    """The node was held up, or simulated time jumped."""
+    walk = Walk(start='dome')
+    walk.stride(3)
+    walk.looks += 5000
+    walk.stride(1)
+    assert walk.controller.faults == []
+    assert walk.shapes[-1] == ['dome', 'dome']
+
+
+def test_a_silent_regulator_keeps_what_it_has():
+    """What it is asked for now it might take when it hears again, and then the foot may stand."""
+    walk = Walk(start='dome')
+    walk.stride(3)
+    walk.readings = False
+    walk.stride(1)
+    assert walk.controller.fault(1).startswith('no reading for 0.5 s, the last was')
+    walk.controller._policy = flat
+    assert walk.asked(1, 4) == [True] * 4
+    assert walk.shapes[-1][0] == 'dome'
+    walk.readings = True
+    assert walk.stride(2) == ['flat', 'flat']
+    assert walk.controller.fault(1) == ''
+
+
+def test_a_faulty_pad_that_falls_silent_is_not_tried():
+    """Nobody would hear how it goes."""
+    walk = Walk(pads=stuck(1))
+    walk.stride(2)
+    assert walk.controller.setpoint(1) == 0.0
+    walk.readings = False
+    assert walk.asked(1, 12) == [False] * 12
+    assert walk.controller.fault(1).startswith('no reading for 0.5 s, the last was 0.0 kPa; does')
+    walk.readings = True
+    assert any(walk.asked(1, 7))
+
+
+def test_a_leg_that_is_not_felt_is_flat_and_the_others_go_on():
+    """The regulator vents where set-points stop for 0.5 s; the controller says the same."""
+    walk = Walk(start='dome')
+    walk.stride(3)
+    walk.deaf.add(1)
+    walk.stride(1)
+    assert walk.controller.fault(1) == 'no load, position or estimate for 0.5 s'
+    assert walk.controller.setpoint(1) == 0.0
+    assert walk.shapes[-1] == ['flat', 'dome']
+    walk.deaf.clear()
+    walk.stride(2)
+    assert walk.shapes[-1] == ['dome', 'dome']
+    (fault,) = walk.controller.faults
+    assert fault.end - fault.start == pytest.approx(0.5, abs=0.1)
+
+
+def test_before_the_first_estimate_no_pad_is_accused():
+    """Pressures come, but nothing was sent yet: nodes take a while to find one another."""
+    walk = Walk(start='dome', pads=lambda leg, p, t: 0.0 if t < 0.8 else p)
+    walk.deaf.update(LEGS)
+    for _ in range(40):
+        walk.look(LOAD)
+    assert walk.controller.fault(1) == 'no load, position or estimate for 0.5 s'
+    walk.deaf.clear()
+    walk.stride(3)
+    assert [fault.reason[:7] for fault in walk.controller.faults] == ['no load'] * 2
+    assert walk.shapes[-1] == ['dome', 'dome']
+
+
+def test_a_load_that_reads_zero_leaves_the_foot_as_it_is_and_is_told_of():
+    walk = Walk(start='dome')
+    walk.stride(3)
+    walk.weightless.add(1)
+    walk.stride(6)
+    assert walk.controller.fault(1).startswith('no step felt while the others took')
+    assert walk.shapes[-1] == ['dome', 'dome']
+    walk.weightless.clear()
+    walk.stride(2)
+    assert walk.controller.fault(1) == ''
+
+
+def test_a_leg_alone_that_stands_is_no_fault():
+    walk = Walk(legs=(1,))
+    for _ in range(500):
+        walk.look(LOAD)
+    assert walk.controller.faults == []
+
+
+def test_too_little_pressure_at_touch_down_is_counted():
+    peak = 1.5 * LOAD - 0.1 * 0.5 * LOAD  # what it began with, faded by one step
+    need = 75e3 + (peak / 37 - 0.2833) / 1.25e-5
+    set_point = 75e3 + (1.2 * peak / 37 - 0.2833) / 1.25e-5
+    for pressure, count in [(need + 50.0, 0), (need - 50.0, 1)]:
+        walk = Walk(legs=(1,))
+        walk.pads = lambda leg, p, t, pressure=pressure: pressure if p else 0.0
+        walk.stride(1)
+        assert walk.controller.setpoint(1) == pytest.approx(set_point, abs=10.0)
+        assert walk.controller.underpressure == {1: 0}
+        walk.look(LOAD)
+        assert walk.controller.underpressure == {1: count}
+        said = f'{1e-3 * pressure:.1f} kPa at touch-down'
+        assert walk.controller.remark(1).startswith(said) is bool(count)
+
+
+def slow(rate):
+    """Pads that move towards the set-point at a rate, Pa/s."""
+    held = {}
+
+    def pads(leg, setpoint, time):
+        before = held.get(leg, 0.0)
+        held[leg] = min(setpoint, before + rate * PERIOD) if setpoint > before else max(
+            setpoint, before - rate * PERIOD
+        )  # fmt: skip
+        return held[leg]
+
+    return pads
+
+
+@pytest.mark.parametrize(('rate', 'lead'), [(400e3, 0), (80e3, 1), (40e3, 2), (20e3, 3)])
+def test_a_slow_hose_is_no_fault_and_decides_earlier(rate, lead):
+    """Full to 2.7 kPa after 70 kPa/rate; a swing of 0.4 s, and steps of 1 s."""
+    seen = []
+
+    def spy(step):
+        seen.append(step)
+        return Choice('dome' if len(seen) % 10 < 5 else 'flat')
+
+    walk = Walk(spy, legs=(1,), pads=slow(rate))
+    walk.stride(30)
+    assert walk.controller.faults == []
+    assert walk.controller.lead(1) == seen[-1].lead == lead
+    filling = walk.controller.watch(1).fill_time
+    assert filling == pytest.approx(70e3 / rate, rel=0.2, abs=0.06)
+    assert ('slow hose' in walk.controller.remark(1)) is bool(lead)
+
+
+def test_unknown_legs_are_refused():
+    controller = MorphologyController(FOOT, (1,), dome, LOAD)
+    for call in (
+        lambda: controller.observe(3, 0.0, 0.0), lambda: controller.doubt(3, ''),
+        lambda: controller.fault(3),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInput, match='leg = 3: one of 1 is needed'):
+            call()
+
+
+def test_what_lies_beyond_the_next_step_is_told_to_those_who_must_decide_early():
+    """A wet footprint of another leg two strides ahead, 1 m long: P0 + 0.47 exp(-d)."""
+    seen = []
+
+    def spy(step):
+        seen.append(step)
+        return Choice('dome' if len(seen) % 10 < 5 else 'flat')
+
+    walk = Walk(spy, legs=(1,), pads=slow(80e3))
+    walk.stride(25)
+    assert seen[-1].lead == 1
+    next_x, y = seen[-1].next_position
+    walk.controller._footprints.add(next_x + 2.0 * STRIDE, y, 0.97)
+    walk.stride(1)
+    (wet_ahead, wet_beyond) = seen[-1].wet_ahead, seen[-1].wet_beyond
+    assert wet_ahead == pytest.approx(0.5 + 0.47 * math.exp(-STRIDE), abs=1e-9)
+    assert wet_beyond == pytest.approx(0.97, abs=1e-9)
+
+
+readings = st.one_of(st.none(), st.just(math.nan), st.floats(-20e3, 120e3))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(readings, st.booleans()), max_size=200), st.sampled_from([dome, flat]))
+def test_whatever_is_read_no_felt_foot_changes_in_stance(stream, policy):
+    controller = MorphologyController(FOOT, (1,), policy, LOAD)
+    stood, time = False, 0.0
+    for pressure, loaded in stream:
+        time += 0.1
+        before = controller.setpoint(1)
+        controller.observe(1, time, pressure)
+        assert controller.setpoint(1) == before
+        controller.update(1, LOAD if loaded else 0.0, 0.5, (0.0, 0.0))
+        if loaded or not stood:
+            assert controller.setpoint(1) == before
+        stood = loaded
+    # The list is in order, and has one open entry of a kind at most.
+    starts = [fault.start for fault in controller.faults]
+    assert starts == sorted(starts)
+    assert all(fault.end is None or fault.end >= fault.start for fault in controller.faults)
+    assert sum(fault.end is None for fault in controller.faults) <= 2

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of regulators on real nodes: what the controller says of them, and how soon."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from ros_pad import configuration
+from ros_pad.nodes import composed
+from ros_pad.simulation.faults import Fault
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials import run
+from ros_pad.trials.bag import BagReader
+from ros_pad.trials.trial import told
+
+# A byte is bytes to rclpy, and a number in a bag.
+OK, ERROR = DiagnosticStatus.OK[0], DiagnosticStatus.ERROR[0]
+
+
+def scene_with(tmp_path, cycles, faults=()):
+    """Return hexapod_patches on ground that is wet for 0.5 m, and dry for 0.5 m."""
+    table = yaml.safe_load(configuration.locate('scenes', 'hexapod_patches').read_text())
+    table['cycles'] = cycles
+    table['floor'] = {'kind': 'drawn', 'drawing': '##########..........', 'cell': 0.05}
+    table['tow']['weight'] = 3.0  # nobody slips much, whatever the shape
+    path = tmp_path / 'stripes.yaml'
+    path.write_text(yaml.safe_dump(table))
+    return dataclasses.replace(Scene.load(path), faults=tuple(map(Fault.parse, faults)))
+
+
+def health(bag):
+    """Return what the controller says of each leg: rows of (time, status)."""
+    found = {}
+    for topic, message, _ in BagReader(bag).messages():
+        if topic != '/diagnostics':
+            continue
+        at = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        for status in message.status:
+            if status.name.startswith('controller: leg'):
+                found.setdefault(int(status.name.split()[2]), []).append((at, status))
+    return found
+
+
+def said(rows):
+    """Return the first time of an error, s, and its words."""
+    for at, status in rows:
+        if status.level == ERROR:
+            return at, status.message
+    return None
+
+
+def test_each_fault_is_said_within_a_second_and_the_others_go_on(tmp_path):
+    faults = (
+        '{kind: stuck_valve, legs: [1]}',
+        '{kind: leak, legs: [2], start: 2.0, conductance: 1.0e-8}',
+        '{kind: silence, legs: [3], start: 2.0}',
+        '{kind: stuck_valve, legs: [4], start: 2.5}',
+        '{kind: sensor_drift, legs: [6], start: 2.0, offset: 8.0e3}',
+    )
+    scene = scene_with(tmp_path, 8, faults)
+    trial = composed.run(scene, 'oracle', bag=tmp_path / 'bag')
+    rows = health(tmp_path / 'bag')
+    time, asked = trial.slow_time, trial.setpoint > 0.0
+
+    def turned(column, to):
+        """Time at which flat or dome was first asked of a leg that was asked for the other."""
+        row = np.flatnonzero((asked[1:, column] == to) & (asked[:-1, column] != to))[0]
+        return time[row + 1]
+
+    visible = {
+        1: turned(0, True),
+        2: turned(1, True),
+        3: 2.0,
+        4: turned(3, False),
+        6: turned(5, False),
+    }
+    words = {
+        1: 'does not fill: 0.0 kPa', 2: 'leaks or lacks air: 4', 3: 'no reading for 0.5 s',
+        4: 'does not vent: 7', 6: 'does not vent: 8.0 kPa',
+    }  # fmt: skip
+    for leg, since in visible.items():
+        at, message = said(rows[leg])
+        assert since < at < since + 1.0, f'leg {leg}'
+        assert message.startswith(words[leg])
+    # While the pads are vented after the walk, no foot is felt.
+    assert said([row for row in rows[5] if row[0] <= scene.duration]) is None
+    # What was said is the trial's list.
+    assert [fault['leg'] for fault in trial.metrics.faults] == sorted(
+        visible, key=lambda leg: (said(rows[leg])[0], leg)
+    )
+    assert told(trial.metrics.faults[0]).startswith('Leg 1, from ')
+    # Fallback: flat, or what it has, and said so.
+    known = {leg: said(rows[leg])[0] for leg in visible}
+    assert not trial.dome[time > known[1], 0].any()
+    assert not trial.dome[time > known[2] + 1.5, 1].any()
+    assert trial.dome[time > known[4], 3].all()
+    assert not trial.setpoint[(time > known[1] + 1.0) & (time < known[1] + 4.0), 0].any()
+    # The foot that is sound does as it does among sound ones.
+    sound = run(dataclasses.replace(scene, faults=()), 'oracle')
+    assert np.argwhere(np.diff(trial.dome[:, 4])).size > 1
+    switches = [time[np.flatnonzero(np.diff(each.dome[:, 4]))] for each in (trial, sound)]
+    assert switches[0] == pytest.approx(switches[1], abs=0.1)
+    assert sound.metrics.faults == []
+
+
+def test_health_is_published_each_second_and_a_lost_supply_said_of_all(tmp_path):
+    fault = '{kind: supply_loss, start: 3.5, time_constant: 0.1}'
+    trial = composed.run(scene_with(tmp_path, 4, [fault]), 'dome', bag=tmp_path / 'bag')
+    rows = health(tmp_path / 'bag')
+    assert set(rows) == set(trial.legs)
+    for leg, each in rows.items():
+        times = [at for at, _ in each if at < 3.5]
+        assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx([1.0] * 3, abs=0.11)
+        status = each[3][1]
+        assert (status.level, status.message) == (OK, 'dome')
+        assert status.hardware_id == f'leg {leg}'
+        figures = {value.key: value.value for value in status.values}
+        pressure = float(figures['pressure (Pa gauge)'])
+        assert 60e3 < pressure == pytest.approx(float(figures['set-point (Pa gauge)']), abs=600.0)
+        assert figures['shape'] == 'dome'
+        # The regulator needs 0.086 s to 90 %.
+        assert 0.08 < float(figures['time to fill (s)']) < 0.25
+        assert figures['steps decided ahead'] == '0'
+        assert figures['touch-downs with too little pressure'] == '0'
+        at, message = said(each)
+        assert 3.5 < at < 4.5
+        # Those that were asked for another pressure since have not filled to it.
+        assert message.startswith(('sags', 'leaks or lacks air', 'does not fill'))
+    assert not trial.dome[trial.slow_time > 4.6].any()
