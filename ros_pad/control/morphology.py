@@ -349,7 +349,8 @@ class MorphologyController:
     def fault(self, leg: int) -> str:
         """Return what is wrong with a leg now, in words; empty when nothing is."""
         state = self._state(leg)
-        return '; '.join(filter(None, (state.unfelt, state.unmoved, state.watch.reason)))
+        reasons = (state.unfelt, state.unmoved, state.doubt, state.watch.reason)
+        return '; '.join(filter(None, reasons))
 
     def remark(self, leg: int) -> str:
         """Return what is no fault and yet worth saying of a leg, as a slow hose; or nothing."""
@@ -371,9 +372,10 @@ class MorphologyController:
         return self._state(leg).watch
 
     def doubt(self, leg: int, reason: str) -> None:
-        """Take note why a foot cannot know the ground; an empty reason ends it.
+        """Take note why a foot's sensors are not believed; an empty reason ends it.
 
-        Such a foot leaves no footprints; what other feet felt still counts for it.
+        Call it before :meth:`observe`. Such a foot leaves no footprints; what other feet felt
+        still counts for it.
         """
         self._state(leg).doubt = reason
 
@@ -427,7 +429,7 @@ class MorphologyController:
         watch = state.watch
         for kind, reason in (
             ('fault', watch.fault), ('silence', watch.silence),
-            ('unfelt', state.unfelt), ('unmoved', state.unmoved),
+            ('unfelt', state.unfelt), ('unmoved', state.unmoved), ('doubt', state.doubt),
         ):  # fmt: skip
             known = state.open.get(kind)
             if known is None:

@@ -4,5 +4,6 @@
 from ros_pad.estimation.foot import Estimate
 from ros_pad.estimation.foot import FootEstimator
 from ros_pad.estimation.foot import Tuning
+from ros_pad.estimation.sensing import trouble_in
 
-__all__ = ['Estimate', 'FootEstimator', 'Tuning']
+__all__ = ['Estimate', 'FootEstimator', 'Tuning', 'trouble_in']

@@ -299,7 +299,8 @@ class FootEstimator:
                 )
             self._set_back()
         dt, self._time = time - self._time, time
-        trouble = self._sensing.trouble(time, force, position, age, self._standing)
+        aloft = not z <= self._height + AIRBORNE < math.inf
+        trouble = self._sensing.trouble(time, force, position, age, self._standing, aloft)
         if trouble:
             return self._mistrust(time, dt, x, y, trouble)
         load = fz - self._offset_z

@@ -26,11 +26,28 @@ DEAD = 2.0
 """Time for which a force sensor may read exactly nothing, s: simulated feet do so in the air. And
 for which one may repeat itself whose steps are larger than twice its noise."""
 
+DEAD_ON_GROUND = 0.4
+"""The same at the height where the foot has stood, s."""
+
+TROUBLES = (
+    'force stands still', 'force out of range',
+    'marker lost', 'marker stands still', 'marker leapt',
+    'no wrench', 'no position', 'sample refused',
+)  # fmt: skip
+"""How doubts begin that are of sensors and not of the ground; the last three are the node's."""
+
+
 LEAP = 5.0
 """Speed at which nothing moves that carries load, m/s ..."""
 
 LEAP_WAY = 0.02
 """... over a way that no jitter of a clock makes up, m."""
+
+
+def trouble_in(doubt: str) -> str:
+    """Return what of a doubt is trouble with sensors: how it begins; empty where it is none."""
+    kind = doubt.partition(':')[0]
+    return kind if kind in TROUBLES else ''
 
 
 class Repeats:
@@ -110,6 +127,7 @@ class Sensing:
         self._forces = Repeats(3, self._force_noise)
         self._positions = Repeats(3, self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
+        self._grounded = math.inf
         self.marker_sound = True
         self.since = math.inf
 
@@ -120,6 +138,7 @@ class Sensing:
         position: Sequence[float],
         age: float,
         standing: bool,
+        aloft: bool,
     ) -> str:
         """Take a sample; return why nothing can be learnt from it, or '' where something can.
 
@@ -133,7 +152,13 @@ class Sensing:
             Of the position, s.
         standing : bool
             Whether the foot stood at the sample before: then it cannot be elsewhere at once.
+        aloft : bool
+            Whether it is above where it stood last, or has not stood yet.
         """
+        if aloft:
+            self._grounded = math.inf
+        elif self._grounded == math.inf:
+            self._grounded = time
         forces = self._forces.update(time, force)
         marker = self._trouble_of_marker(time, position, age, standing)
         self.marker_sound = not marker
@@ -145,7 +170,8 @@ class Sensing:
             self.since = max(map(self._forces.since, stopped))
             if not nothing:
                 return f'force stands still: {force[2]:.3g} N to the last digit'
-            if time - self.since > DEAD:
+            grounded = time - max(self._grounded, self.since)
+            if time - self.since > DEAD or grounded > DEAD_ON_GROUND:
                 return 'force stands still: reads exactly nothing'
             return ''
         for place, axis in enumerate('xyz'):

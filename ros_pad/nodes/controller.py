@@ -25,6 +25,7 @@ from ros_pad.control import policy_named
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
+from ros_pad.estimation import trouble_in
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
@@ -76,6 +77,7 @@ class _Leg:
         self._load, self._heaviest = math.nan, -math.inf
         self._pressure: float | None = None  # since the last look
         self._shape = ''
+        self._trouble = ''
         self.observed: float | None = None  # time of the last look, s
         self._setpoints = topics.PRESSURE_SETPOINT.publisher(node, leg)
         self._shapes = topics.MORPHOLOGY.publisher(node, leg)
@@ -84,6 +86,7 @@ class _Leg:
         topics.WRENCH.subscription(node, self._on_wrench, leg, raw=True)
         topics.POSITION.subscription(node, self._on_position, leg, raw=True)
         topics.PRESSURE.subscription(node, self._on_pressure, leg)
+        topics.DOUBT.subscription(node, self._on_doubt, leg)
         topics.WETNESS.subscription(node, self._on_wetness, leg)
 
     def _on_wrench(self, data: bytes) -> None:
@@ -99,8 +102,12 @@ class _Leg:
     def _on_pressure(self, message: FluidPressure) -> None:
         self._pressure = message.fluid_pressure - self.node.ambient
 
+    def _on_doubt(self, message: String) -> None:
+        self._trouble = trouble_in(message.data)
+
     def observe(self, now: float) -> None:
-        """Hand over what is known of the pad at a time, s."""
+        """Hand over what is known of sensors and pad at a time, s."""
+        self.node.controller.doubt(self.leg, self._trouble)
         pressure, self._pressure = self._pressure, None
         self.observed = now
         self.node.controller.observe(self.leg, now, pressure)

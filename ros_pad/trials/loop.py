@@ -25,6 +25,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import trouble_in
 from ros_pad.pace import Pace
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
@@ -214,6 +215,7 @@ class ClosedLoop:
                     heard[index] = self.pressures[index] = regulator.read().pressure
             self.pads = [regulator.pad_pressure for regulator in self.regulators]
             for index, leg in enumerate(self._legs):
+                controller.doubt(leg, trouble_in(estimates[index].doubt))
                 controller.observe(leg, now, heard[index])
                 (_, _, load), position = readings[index]
                 wet = estimates[index].wet_probability

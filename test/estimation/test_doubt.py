@@ -12,6 +12,7 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import trouble_in
 from ros_pad.estimation.friction import FrictionPrior
 
 FOOT = Foot.load('large37')
@@ -199,6 +200,12 @@ def test_doubts_are_where_the_errors_are():
     # What is said to be likely comes true as often.
     every = np.array(knowing + doubting)
     assert np.mean(every > 0.5) == pytest.approx(np.mean(np.maximum(every, 1.0 - every)), abs=0.06)
+
+
+def test_trouble_with_sensors_is_told_from_ground_that_says_nothing():
+    assert trouble_in('force stands still: 6.8 N to the last digit') == 'force stands still'
+    assert trouble_in('domed: wet and dry ground feel alike') == ''
+    assert trouble_in('') == ''
 
 
 # --- its sensors --------------------------------------------------------------------------------

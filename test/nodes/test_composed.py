@@ -142,6 +142,10 @@ faults:
     for series in SERIES:
         one, other = getattr(on_nodes, series), getattr(without, series)
         assert np.array_equal(one, other, equal_nan=True), series
+    assert on_nodes.metrics == without.metrics
+    faults = {(fault['leg'], fault['reason']): fault for fault in without.metrics.faults}
+    assert faults[1, 'force stands still']['end'] is not None
+    assert faults[2, 'force stands still']['start'] < 1.5 + 1.2  # told of in the next stance
     doubts = messages_of(tmp_path / 'bag')
     for leg, doubt in {
         1: 'force stands still', 2: 'force stands still', 4: 'force out of range',
