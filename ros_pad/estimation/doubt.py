@@ -19,6 +19,11 @@ DOMED = 0.1
 LIGHT = 0.3
 """Share of the expected load below which sensor noise hides what a foot feels."""
 
+OF_THE_GROUND = (
+    'not yet', 'domed', 'half inflated', 'light', 'turning', 'not pulled', 'undecided',
+)  # fmt: skip
+"""How doubts begin that are of the ground; for the others see :data:`sensing.TROUBLES`."""
+
 
 class Stance(NamedTuple):
     """What a stance has felt so far.

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ros_pad.control import MorphologyController
+from ros_pad.estimation import DOUBTS
 from ros_pad.estimation import Estimate
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.robot import Vector
@@ -70,6 +71,7 @@ class TrialLog:
                 math.hypot(*estimate.slip_velocity),
                 estimate.slipping,
                 controller.morphology(leg) == 'dome',
+                DOUBTS.index(estimate.doubt.partition(':')[0]),
             )
             for leg, pressure, estimate in zip(
                 self._scene.legs, pressures, estimates, strict=True
@@ -105,6 +107,7 @@ class TrialLog:
             slip_speed=slow[:, :, 5],
             slipping=slow[:, :, 6].astype(bool),
             dome=slow[:, :, 7].astype(bool),
+            doubt=slow[:, :, 8].astype(int),
             floor=floor,
             settings=settings(self._scene, self._policy, self._fidelity),
             real_time_factor=real_time_factor,

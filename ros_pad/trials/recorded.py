@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.errors import BagError
+from ros_pad.estimation import DOUBTS
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
@@ -75,6 +76,11 @@ def _is_dome(message: Any) -> tuple[float, ...]:
     return (message.data == 'dome',)
 
 
+def _doubt(message: Any) -> tuple[float, ...]:
+    kind = message.data.partition(':')[0]
+    return (DOUBTS.index(kind) if kind in DOUBTS else -1,)
+
+
 # What is read: message type, numbers in a message, and how to get them.
 _KINDS: dict[str, tuple[str, int, Callable[[Any], tuple[float, ...]]]] = {
     'wrench': ('geometry_msgs/msg/WrenchStamped', 3, _force),
@@ -87,6 +93,7 @@ _KINDS: dict[str, tuple[str, int, Callable[[Any], tuple[float, ...]]]] = {
     'wetness': ('std_msgs/msg/Float64', 1, _data),
     'friction': ('std_msgs/msg/Float64', 1, _data),
     'friction_margin': ('std_msgs/msg/Float64', 1, _data),
+    'doubt': ('std_msgs/msg/String', 1, _doubt),
     'morphology': ('std_msgs/msg/String', 1, _is_dome),
 }
 _BODY = 0  # in place of a leg's number, for the body's pose
@@ -189,6 +196,7 @@ def load(
         slip_speed=slow('slip'),
         slipping=slow('slipping') == 1.0,
         dome=slow('morphology') == 1.0,
+        doubt=np.nan_to_num(slow('doubt'), nan=-1.0).astype(int),
     )
 
 

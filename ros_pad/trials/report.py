@@ -30,6 +30,7 @@ from matplotlib.patches import Patch
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.estimation import DOUBTS
 from ros_pad.trials.label import promise
 from ros_pad.trials.metrics import LOAD_GATE
 from ros_pad.trials.metrics import stance_ends
@@ -523,6 +524,28 @@ def _beliefs(view: _View) -> tuple[np.ndarray, np.ndarray]:
     return np.array(believed), np.array(true, dtype=bool)
 
 
+def _doubts(trial: Trial, load_gate: float) -> str:
+    """Return in words at how many stance ends feet knew the ground, and why others did not."""
+    if not len(trial.doubt):
+        return ''
+    ends = [
+        trial.doubt[np.maximum(rows - 1, 0), column]
+        for column, rows in enumerate(stance_ends(trial, load_gate))
+    ]
+    places, counts = np.unique(np.concatenate(ends), return_counts=True)
+    told = dict(zip(places.tolist(), counts.tolist(), strict=True))
+    total = sum(told.values())
+    if not total or set(told) == {-1}:
+        return ''
+    others = sorted(((count, place) for place, count in told.items() if place), reverse=True)
+    why = ', '.join(
+        f'{DOUBTS[place] if place > 0 else "not told"} {100.0 * count / total:.0f} %'
+        for count, place in others
+    )
+    known = f'At the end of {told.get(0, 0)} of {total} stances a foot knew the ground below it.'
+    return known + (f' The others could not know: {why}.' if why else '')
+
+
 def _wilson(hits: int, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a share (Wilson 1927)."""
     z2 = 1.96**2
@@ -944,6 +967,8 @@ def write(
                 'too shy. Bars are 95 % intervals (Wilson).',
                 ' class="half"',
             )
+    if words := _doubts(trial, view.load_gate):
+        parts.append(f'<h2>What the feet knew</h2><p>{html.escape(words)}</p>')
     parts.append('<h2>What the model leaves out</h2>')
     if 'fidelity_note' in view.settings:
         note = html.escape(promise(view.trial))

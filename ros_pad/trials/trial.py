@@ -111,6 +111,9 @@ class Trial:
         As estimated.
     slipping, dome : ndarray of bool (m, legs)
         Alarm, and shape chosen.
+    doubt : ndarray of int (m, legs)
+        Why a foot could not know the ground, as a place in :data:`ros_pad.estimation.DOUBTS`; 0
+        where it knew, -1 where nothing is known. No rows where nobody said.
     floor : Floor or None
         The true floor, where there is one.
     metrics : Metrics or None
@@ -143,6 +146,7 @@ class Trial:
     metrics: Metrics | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None
+    doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=int))
 
     def standing(self, load_gate: float) -> np.ndarray:
         """Whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).

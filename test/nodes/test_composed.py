@@ -31,7 +31,7 @@ AMBIENT = 101325.0
 LEGS = (1, 2, 3, 4, 5, 6)
 SERIES = (
     'time', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability',
-    'friction', 'margin', 'slip_speed', 'slipping', 'dome',
+    'friction', 'margin', 'slip_speed', 'slipping', 'dome', 'doubt',
 )  # fmt: skip
 
 

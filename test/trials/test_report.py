@@ -16,6 +16,7 @@ import pytest
 
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.estimation import DOUBTS
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import report
@@ -404,3 +405,22 @@ def test_what_is_no_regular_file_is_never_replaced(tmp_path):
     (tmp_path / 'page').mkdir()
     with pytest.raises(PadError, match='is no regular file'):
         report.write(trial, tmp_path / 'page', force=True)
+
+
+def test_what_feet_knew_is_told_by_stance():
+    """Leg 1 has ten stances that end at odd seconds, leg 2 at even ones; five of leg 2's are domed."""
+    trial = made_up()
+    trial.doubt = np.where(trial.dome, DOUBTS.index('domed'), 0)
+    trial.doubt[trial.slow_time < 2.0, :] = DOUBTS.index('not pulled')
+    told = report._doubts(trial, 3.0)
+    ends = [*range(1, 20, 2), *range(2, 21, 2)]
+    assert f'of {len(ends)} stances' in told
+    not_pulled = sum(end <= 2 for end in ends)
+    domed = sum(end > 10 and end % 2 == 0 for end in ends)
+    assert f'At the end of {len(ends) - not_pulled - domed} of' in told
+    assert f'domed {100 * domed / len(ends):.0f} %' in told
+    assert f'not pulled {100 * not_pulled / len(ends):.0f} %' in told
+
+
+def test_a_bag_without_doubts_says_nothing_of_them():
+    assert report._doubts(made_up(), 3.0) == ''
