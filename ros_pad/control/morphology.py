@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,10 @@ from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
 from ros_pad.control.pressure import dome_pressure
+from ros_pad.control.probing import Plan
+from ros_pad.control.probing import Planner
+from ros_pad.control.probing import Stakes
+from ros_pad.control.probing import Step
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 
@@ -26,8 +31,12 @@ DOME = 'dome'
 LOWEST_DOME = 1000.0
 """Gauge pressure below which a pad is flat, Pa; who asks for less of a dome meant kilopascals."""
 
-TOUCH_DOWN = 1.5
-"""Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
+TOUCH_DOWN = 0.3
+"""Of the expected load, above the gate, at which a foot stands again: noise makes no steps.
+
+Nor does a foot that lands: it touches with up to 0.55 of its load (0.8 on rough ground), and is
+light once more until the other tripod lifts off.
+"""
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,11 @@ class LiftOff:
         Where that is, m.
     others_probing : bool
         Whether another leg is probing now.
+    wet_expected : float
+        As ``wet_ahead``, but where nothing is known it is the share of wet ground on the way so
+        far, not the prior.
+    plan : Plan
+        What the walk so far advises.
     """
 
     leg: int
@@ -60,6 +74,8 @@ class LiftOff:
     wet_ahead: float
     next_position: tuple[float, float]
     others_probing: bool
+    wet_expected: float
+    plan: Plan
 
 
 @dataclass(frozen=True)
@@ -71,6 +87,9 @@ class Choice:
 
 
 Policy = Callable[[LiftOff], Choice]
+
+PROBING = ('value', 'count', 'threshold')
+"""Ways to plan the probes of :func:`adaptive`."""
 
 
 def flat(step: LiftOff) -> Choice:
@@ -88,39 +107,60 @@ def adaptive(
     dry_below: float = 0.35,
     probe_below: float = 0.75,
     dwell: int = 2,
+    probing: str = 'value',
+    probe_every: int = 20,
 ) -> Policy:
     """Return a policy that follows the belief, with hysteresis, dwell and probes.
+
+    A dome feels wet and dry ground alike, so what is known only fades, and without probes feet
+    that were once on wet ground would stay domed for ever: a probe is one flat step of a domed
+    foot. One leg probes at a time.
 
     Parameters
     ----------
     wet_above, dry_below : float
         Probabilities of wet ground ahead beyond which a foot turns to dome, and back to flat.
     probe_below : float
-        Probability below which a domed foot asks the ground with one flat step. A dome feels wet
-        and dry ground alike, so what is known only fades, and without probes feet that were once
-        on wet ground would stay domed for ever. One leg probes at a time.
+        Probability below which a domed foot probes, if ``probing`` is ``threshold``.
     dwell : int
-        Steps that a shape is kept at least; a probe is exempt.
+        Steps that a shape is kept at least; probes and trials are exempt.
+    probing : str
+        How probes are planned. ``value``: by what they have cost and may bring on this walk, see
+        :class:`ros_pad.control.probing.Planner`; then feet also stay domes where flat ones do not
+        pay. Baselines that do not learn are ``count``, every so many steps, and ``threshold``,
+        when the belief has faded.
+    probe_every : int
+        Steps as a dome after which a foot probes, if ``probing`` is ``count``.
 
     Raises
     ------
     InvalidInput
-        For what is no probability, ``dry_below`` above ``wet_above``, or a dwell below 1.
+        For what is no probability, ``dry_below`` above ``wet_above``, a dwell or a count below 1,
+        or an unknown way of probing.
     """
     number('wet_above', wet_above, '(probability)', high=1.0)
     number('dry_below', dry_below, '(probability)', high=wet_above)
     number('probe_below', probe_below, '(probability)', high=1.0)
     number('dwell', dwell, 'steps', low=1.0)
+    one_of('probing', probing, PROBING)
+    number('probe_every', probe_every, 'steps', low=1.0)
 
     def choose(step: LiftOff) -> Choice:
+        if probing == 'value':
+            wet, plan, due = step.wet_expected, step.plan, step.plan.probe
+        else:
+            wet, plan = step.wet_ahead, Plan()
+            due = step.steps >= probe_every if probing == 'count' else wet < probe_below
+        settled = step.probing or step.steps >= dwell
         if step.morphology == FLAT:
-            settled = step.probing or step.steps >= dwell
-            return Choice(DOME) if settled and step.wet_ahead > wet_above else Choice(FLAT)
-        if step.steps < dwell:
-            return Choice(DOME)
-        if step.wet_ahead < dry_below:
+            if settled and (wet > wet_above or not plan.flat_pays):
+                return Choice(DOME)
+            if settled and plan.trial and wet < dry_below:
+                return Choice(DOME, probe=True)
             return Choice(FLAT)
-        if step.wet_ahead < probe_below and not step.others_probing:
+        if settled and wet < dry_below and plan.flat_pays:
+            return Choice(FLAT)
+        if settled and due and not step.others_probing:
             return Choice(FLAT, probe=True)
         return Choice(DOME)
 
@@ -140,6 +180,25 @@ def oracle(is_wet: Callable[[float, float], bool]) -> Policy:
         return Choice(DOME if is_wet(*step.next_position) else FLAT)
 
     return choose
+
+
+def first_shapes(policy: str, legs: Sequence[int]) -> dict[int, str]:
+    """Return the shape that each leg starts with under a policy.
+
+    Adaptive feet start as domes, but for the first and the last leg, one of each tripod, which
+    feel the ground: with what is known of a floor, nothing, six flat feet lose more on wet ground
+    than six domes on dry, and two flat feet are enough to tell.
+
+    Parameters
+    ----------
+    policy : str
+        Name of a policy, see :data:`POLICIES`.
+    legs : sequence of int
+        Numbers of the legs, in their order about the body.
+    """
+    if policy == 'adaptive':
+        return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
+    return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)
 
 
 POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
@@ -167,8 +226,8 @@ class _Leg:
     """Memory of the controller about one leg."""
 
     __slots__ = (
-        'decided', 'footprint', 'morphology', 'peak', 'probing', 'setpoint', 'standing', 'steps',
-        'touched',
+        'decided', 'footprint', 'landed', 'morphology', 'peak', 'probing', 'setpoint', 'standing',
+        'steps', 'stood', 'touched',
     )  # fmt: skip
 
     def __init__(self, morphology: str, peak: float) -> None:
@@ -181,6 +240,7 @@ class _Leg:
         self.touched = 0.0
         self.setpoint = 0.0
         self.footprint: tuple[float, float] | None = None
+        self.landed = self.stood = (0.0, 0.0)
 
 
 class MorphologyController:
@@ -196,8 +256,8 @@ class MorphologyController:
         Chooses at each lift-off, see :func:`adaptive`.
     expected_load : float
         Normal force in stance, N, above 0.
-    start : str
-        Shape before the first lift-off.
+    start : str or mapping
+        Shape before the first lift-off, of all legs or of each, see :func:`first_shapes`.
     margin : float
         Factor on the load, for the pressure of a dome, above 0.
     fixed_pressure : float or None
@@ -205,7 +265,7 @@ class MorphologyController:
         the load.
     load_gate : float
         Share of the expected load below which a foot has lifted off, above 0 up to 0.6. It stands
-        again at 1.5 times that.
+        again with 0.3 of the expected load more.
 
     Attributes
     ----------
@@ -228,13 +288,15 @@ class MorphologyController:
         legs: Sequence[int],
         policy: Policy,
         expected_load: float,
-        start: str = FLAT,
+        start: str | Mapping[int, str] = FLAT,
         margin: float = 1.2,
         fixed_pressure: float | None = None,
         load_gate: float = 0.3,
     ) -> None:
         number('expected_load', expected_load, 'N', above=True)
-        one_of('start', start, (FLAT, DOME))
+        shapes = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
+        for leg in legs:
+            one_of('start', shapes.get(leg, f'no shape of leg {leg}'), (FLAT, DOME))
         number('margin', margin, '(factor)', above=True)
         number('load_gate', load_gate, '(share)', high=0.6, above=True)
         if fixed_pressure is not None:
@@ -249,13 +311,15 @@ class MorphologyController:
         self._margin = margin
         self._fixed_pressure = fixed_pressure
         self._gate = load_gate * expected_load
+        self._stands = (load_gate + TOUCH_DOWN) * expected_load
         self._footprints = Footprints()
+        self._planner = Planner(Stakes.expected(foot, expected_load), legs)
         self._decisions = 0
-        self._legs = {leg: _Leg(start, 1.5 * expected_load) for leg in legs}
+        self._legs = {leg: _Leg(shapes[leg], 1.5 * expected_load) for leg in legs}
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
         for leg in legs:
-            self._apply(leg, Choice(start))
+            self._apply(leg, Choice(shapes[leg]))
 
     def morphology(self, leg: int) -> str:
         """Shape chosen for a leg's current or next step."""
@@ -299,9 +363,12 @@ class MorphologyController:
                 f' wet_probability = {wet_probability!r}: must be from 0 to 1'
             )
         if load >= self._gate:
-            if load >= TOUCH_DOWN * self._gate:
+            if load >= self._stands:
+                if not state.standing:
+                    state.landed = (position[0], position[1])
                 state.standing = True
             state.touched = max(state.touched, load)
+            state.stood = (position[0], position[1])
         elif state.standing:
             state.standing = False
             self._lift_off(leg, wet_probability, position)
@@ -314,8 +381,10 @@ class MorphologyController:
         state.peak = max(state.touched, state.peak + 0.1 * (state.touched - state.peak))
         state.touched = 0.0
         x, y = position[0], position[1]
-        if state.morphology == FLAT:
-            self._footprints.add(x, y, wet_probability)
+        made = Step(
+            state.landed, state.stood, state.morphology == FLAT, state.probing, wet_probability
+        )
+        self._planner.step(leg, made, self._footprints)
         # The next step is taken to be as long as the last one.
         before_x, before_y = state.footprint or (x, y)
         state.footprint = (x, y)
@@ -330,6 +399,8 @@ class MorphologyController:
             wet_ahead=self._footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
+            wet_expected=self._footprints.wet_expected(*ahead),
+            plan=self._planner.plan(leg),
         )
         self._apply(leg, self._policy(step))
         if state.morphology != step.morphology:
