@@ -51,6 +51,7 @@ def gain_per_metre(stakes, wet_share, length, interval, seed, way=40_000.0):
         (Stakes(0.1, 0.2, 0.05), 0.85, 1.0),
         (Stakes(0.02, 0.1, 0.03), 0.3, 2.0),
         (Stakes(0.1, 0.1, 0.1), 0.7, 0.4),
+        (Stakes(0.3, 0.2, 1.0), 0.1, 0.5),
     ],
 )
 def test_the_planned_interval_is_as_good_as_the_best(stakes, wet_share, length):
@@ -92,7 +93,9 @@ def test_dearer_probes_and_wetter_ground_are_probed_less():
     assert by_share == sorted(by_share) and by_share[-1] > 2.0 * by_share[0]
 
 
-def test_probes_that_cost_nothing_are_made_each_stride():
+def test_probes_that_cost_little_are_made_each_stride():
+    """By hand: the optimum is near sqrt(2 c₁ s ℓ²/((1 - q) 2 g ℓ/q)) = 0.08 m, below a stride."""
+    assert probe_interval(Stakes(0.4, 0.1, 0.02), 0.5, 1.0, STRIDE) == pytest.approx(STRIDE)
     assert probe_interval(Stakes(0.1, 0.1, 0.0), 0.5, 1.0, STRIDE) == STRIDE
 
 
@@ -155,23 +158,39 @@ class Body:
         return {leg: self.planner.plan(leg) for leg in tripod}
 
 
-@pytest.mark.parametrize('heading', [0.0, 2.0])
-@pytest.mark.parametrize('domes', [0.15, 0.04])
-def test_domes_are_tried_once_on_dry_ground(heading, domes):
-    """The trial shows that domes lose 0.15, or no more than flat feet, which lose 0.05."""
-    body, trying, tried = Body(heading), set(), []
-    for _ in range(60):
-        tripod = TRIPODS[body.steps % 2]
-        on_trial = trying & set(tripod)
-        flat = set(tripod) - on_trial
-        plans = body.step(domes if on_trial else 0.05, flat=flat, probing=on_trial)
+def on_dry_ground(body, steps, flat, domes):
+    """Walk as the policy does on dry ground; return which legs were tried, and the last plans."""
+    tried = []
+    trying = set()
+    for _ in range(steps):
+        tripod = set(TRIPODS[body.steps % 2])
+        on_trial = trying & tripod
+        lost = domes if on_trial else flat
+        plans = body.step(lost, flat=tripod - on_trial, probing=on_trial)
         trying -= on_trial
         new = {leg for leg, plan in plans.items() if plan.trial}
         tried += sorted(new)
         trying |= new
+    return tried, plans
+
+
+@pytest.mark.parametrize('heading', [0.0, 2.0])
+@pytest.mark.parametrize('domes', [0.15, 0.04])
+def test_domes_are_tried_once_on_dry_ground(heading, domes):
+    """The trial shows that domes lose 0.15, or no more than flat feet, which lose 0.05."""
+    body = Body(heading)
+    tried, plans = on_dry_ground(body, 60, 0.05, domes)
     assert sorted(tried) == list(LEGS)
     assert body.planner.stakes.gain == pytest.approx(domes - 0.05)
-    assert plans[tripod[0]].flat_pays == (domes > 0.05)
+    assert all(plan.flat_pays == (domes > 0.05) for plan in plans.values())
+
+
+def test_an_old_trial_counts_no_more():
+    body = Body()
+    on_dry_ground(body, 60, 0.05, 0.15)
+    tried, _ = on_dry_ground(body, round(2 * TRIAL_STRIDES) + 20, 0.05, 0.07)
+    assert sorted(tried) == list(LEGS)
+    assert body.planner.stakes.gain == pytest.approx(0.02)
 
 
 def test_that_flat_feet_do_not_pay_is_forgotten_in_the_end():
@@ -197,9 +216,9 @@ def test_what_a_probe_costs_is_what_its_tripod_lost_more_than_before():
     for count in range(120):
         tripod = TRIPODS[count % 2]
         probe = tripod[:1] if count % 8 == 6 else ()
-        towed = 0.002 * (count // 2)
+        towed = 0.002 * (count // 2) + 0.05 * (count % 2)  # and one tripod always loses more
         body.step(towed + (0.04 if probe else 0.01), flat=probe, probing=probe, wet=0.97)
-    # 0.03 more than the step before, which was the other tripod's, and the same tripod's before.
+    # 0.03 more than the last step of the same tripod, and what is towed takes 0.002.
     assert body.planner.stakes.probe_cost == pytest.approx(0.032, abs=1e-6)
 
 
