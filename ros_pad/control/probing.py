@@ -133,8 +133,8 @@ def probe_interval(stakes: Stakes, wet_share: float, fading_length: float, strid
     -------
     float
         The way with the greatest J, from one stride, for the answer takes that to come, up to the
-        one whose probes take :data:`PREMIUM` of the way, which is also the answer where J is
-        nowhere above zero.
+        one whose probes take :data:`PREMIUM` of the way (each taken to cost :data:`LEAST_GAIN` at
+        least), which is also the answer where J is nowhere above zero.
 
     Raises
     ------
@@ -144,10 +144,9 @@ def probe_interval(stakes: Stakes, wet_share: float, fading_length: float, strid
     number('wet_share', wet_share, '(probability)', high=1.0, above=True)
     number('fading_length', fading_length, 'm', above=True)
     number('stride', stride, 'm', above=True)
-    # On dry ground a probe costs where domes hold better.
-    longest = max(stakes.probe_cost, -stakes.gain) * stride / PREMIUM
-    if longest <= stride:
-        return stride
+    # On dry ground a probe costs where domes hold better. And that probes have cost nothing so far
+    # is no reason to make more of them.
+    longest = max(stakes.probe_cost, -stakes.gain, LEAST_GAIN) * stride / PREMIUM
     ways = np.geomspace(stride, longest, 100)
     dry = fading_length / wet_share
     found = (1.0 - wet_share) * -np.expm1(-ways / fading_length)

@@ -75,6 +75,11 @@ def test_where_probes_bring_nothing_they_take_a_fixed_share_of_the_way(gain):
     assert PREMIUM < 0.003
 
 
+def test_that_probes_cost_nothing_is_no_reason_to_make_them():
+    """Four strides: 0.01 of one over 0.0025 of the way."""
+    assert probe_interval(Stakes(0.0, 0.2, 0.0), 0.5, 1.0, STRIDE) == pytest.approx(4.0 * STRIDE)
+
+
 def test_a_probe_on_dry_ground_costs_where_domes_hold_better():
     interval = probe_interval(Stakes(-0.1, 0.2, 0.01), 0.5, 1.0, STRIDE)
     assert 0.1 * STRIDE / interval == pytest.approx(PREMIUM)
