@@ -36,6 +36,7 @@ from tqdm import tqdm
 
 from ros_pad.control import MorphologyController
 from ros_pad.control import adaptive
+from ros_pad.control import first_shapes
 from ros_pad.control import policy_named
 from ros_pad.control.footprints import Footprints
 from ros_pad.estimation import FootEstimator
@@ -288,7 +289,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         told.legs,
         choose,
         load,
-        start='dome' if policy == 'dome' else 'flat',
+        start=first_shapes(policy, told.legs),
         fixed_pressure=told.dome_pressure,
         **setup.controller,
     )

@@ -8,6 +8,7 @@ from ros_pad.control.morphology import LiftOff
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.morphology import adaptive
 from ros_pad.control.morphology import dome
+from ros_pad.control.morphology import first_shapes
 from ros_pad.control.morphology import flat
 from ros_pad.control.morphology import oracle
 from ros_pad.control.morphology import policy_named
@@ -24,6 +25,7 @@ __all__ = [
     'adaptive',
     'dome',
     'dome_pressure',
+    'first_shapes',
     'flat',
     'oracle',
     'policy_named',

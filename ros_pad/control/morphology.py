@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,10 @@ from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
 from ros_pad.control.pressure import dome_pressure
+from ros_pad.control.probing import Plan
+from ros_pad.control.probing import Planner
+from ros_pad.control.probing import Stakes
+from ros_pad.control.probing import Step
 from ros_pad.control.watch import PadWatch
 from ros_pad.control.watch import RunningMedian
 from ros_pad.errors import InvalidInput
@@ -30,8 +35,12 @@ DOME = 'dome'
 LOWEST_DOME = 1000.0
 """Gauge pressure below which a pad is flat, Pa; who asks for less of a dome meant kilopascals."""
 
-TOUCH_DOWN = 1.5
-"""Load at which a foot stands again, over that at which it lifts off: noise makes no steps."""
+TOUCH_DOWN = 0.3
+"""Of the expected load, above the gate, at which a foot stands again: noise makes no steps.
+
+Nor does a foot that lands: it touches with up to 0.55 of its load (0.8 on rough ground), and is
+light once more until the other tripod lifts off.
+"""
 
 UNFELT = 0.5
 """Without an estimate for so long a leg is flat, s: the regulators vent it then."""
@@ -67,6 +76,11 @@ class LiftOff:
         Where that is, m.
     others_probing : bool
         Whether another leg is probing now.
+    wet_expected : float
+        As ``wet_ahead``, but where nothing is known it is the share of wet ground on the way so
+        far, not the prior.
+    plan : Plan
+        What the walk so far advises.
     lead : int
         Whole steps that the foot needs to fill beyond its swing; 0 where the swing is enough.
     wet_beyond : float
@@ -82,6 +96,8 @@ class LiftOff:
     wet_ahead: float
     next_position: tuple[float, float]
     others_probing: bool
+    wet_expected: float
+    plan: Plan
     lead: int = 0
     wet_beyond: float = 0.0
 
@@ -95,6 +111,9 @@ class Choice:
 
 
 Policy = Callable[[LiftOff], Choice]
+
+PROBING = ('value', 'count', 'threshold')
+"""Ways to plan the probes of :func:`adaptive`."""
 
 
 def flat(step: LiftOff) -> Choice:
@@ -112,39 +131,60 @@ def adaptive(
     dry_below: float = 0.35,
     probe_below: float = 0.75,
     dwell: int = 2,
+    probing: str = 'value',
+    probe_every: int = 20,
 ) -> Policy:
     """Return a policy that follows the belief, with hysteresis, dwell and probes.
+
+    A dome feels wet and dry ground alike, so what is known only fades, and without probes feet
+    that were once on wet ground would stay domed for ever: a probe is one flat step of a domed
+    foot. One leg probes at a time.
 
     Parameters
     ----------
     wet_above, dry_below : float
         Probabilities of wet ground ahead beyond which a foot turns to dome, and back to flat.
     probe_below : float
-        Probability below which a domed foot asks the ground with one flat step. A dome feels wet
-        and dry ground alike, so what is known only fades, and without probes feet that were once
-        on wet ground would stay domed for ever. One leg probes at a time.
+        Probability below which a domed foot probes, if ``probing`` is ``threshold``.
     dwell : int
-        Steps that a shape is kept at least; a probe is exempt.
+        Steps that a shape is kept at least; probes and trials are exempt.
+    probing : str
+        How probes are planned. ``value``: by what they have cost and may bring on this walk, see
+        :class:`ros_pad.control.probing.Planner`; then feet also stay domes where flat ones do not
+        pay. Baselines that do not learn are ``count``, every so many steps, and ``threshold``,
+        when the belief has faded.
+    probe_every : int
+        Steps as a dome after which a foot probes, if ``probing`` is ``count``.
 
     Raises
     ------
     InvalidInput
-        For what is no probability, ``dry_below`` above ``wet_above``, or a dwell below 1.
+        For what is no probability, ``dry_below`` above ``wet_above``, a dwell or a count below 1,
+        or an unknown way of probing.
     """
     number('wet_above', wet_above, '(probability)', high=1.0)
     number('dry_below', dry_below, '(probability)', high=wet_above)
     number('probe_below', probe_below, '(probability)', high=1.0)
     number('dwell', dwell, 'steps', low=1.0)
+    one_of('probing', probing, PROBING)
+    number('probe_every', probe_every, 'steps', low=1.0)
 
     def choose(step: LiftOff) -> Choice:
+        if probing == 'value':
+            wet, plan, due = step.wet_expected, step.plan, step.plan.probe
+        else:
+            wet, plan = step.wet_ahead, Plan()
+            due = step.steps >= probe_every if probing == 'count' else wet < probe_below
+        settled = step.probing or step.steps >= dwell
         if step.morphology == FLAT:
-            settled = step.probing or step.steps >= dwell
-            return Choice(DOME) if settled and step.wet_ahead > wet_above else Choice(FLAT)
-        if step.steps < dwell:
-            return Choice(DOME)
-        if step.wet_ahead < dry_below:
+            if settled and (wet > wet_above or not plan.flat_pays):
+                return Choice(DOME)
+            if settled and plan.trial and wet < dry_below:
+                return Choice(DOME, probe=True)
             return Choice(FLAT)
-        if step.wet_ahead < probe_below and not step.others_probing:
+        if settled and wet < dry_below and plan.flat_pays:
+            return Choice(FLAT)
+        if settled and due and not step.others_probing:
             return Choice(FLAT, probe=True)
         return Choice(DOME)
 
@@ -164,6 +204,25 @@ def oracle(is_wet: Callable[[float, float], bool]) -> Policy:
         return Choice(DOME if is_wet(*step.next_position) else FLAT)
 
     return choose
+
+
+def first_shapes(policy: str, legs: Sequence[int]) -> dict[int, str]:
+    """Return the shape that each leg starts with under a policy.
+
+    Adaptive feet start as domes, but for the first and the last leg, one of each tripod, which
+    feel the ground: with what is known of a floor, nothing, six flat feet lose more on wet ground
+    than six domes on dry, and two flat feet are enough to tell.
+
+    Parameters
+    ----------
+    policy : str
+        Name of a policy, see :data:`POLICIES`.
+    legs : sequence of int
+        Numbers of the legs, in their order about the body.
+    """
+    if policy == 'adaptive':
+        return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
+    return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)
 
 
 POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
@@ -211,9 +270,10 @@ class _Leg:
     """Memory of the controller about one leg."""
 
     __slots__ = (
-        'decided', 'doubt', 'footprint', 'lifted', 'morphology', 'need', 'open', 'patience',
-        'peak', 'probing', 'sent', 'setpoint', 'short', 'standing', 'steps', 'stride', 'swing',
-        'time', 'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait', 'watch',
+        'decided', 'doubt', 'footprint', 'landed', 'lifted', 'morphology', 'need', 'open',
+        'patience', 'peak', 'probing', 'sent', 'setpoint', 'short', 'standing', 'steps', 'stood',
+        'stride', 'swing', 'time', 'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait',
+        'watch',
     )  # fmt: skip
 
     def __init__(self, morphology: str, peak: float, ceiling: float) -> None:
@@ -226,6 +286,7 @@ class _Leg:
         self.touched = 0.0
         self.setpoint = 0.0
         self.footprint: tuple[float, float] | None = None
+        self.landed = self.stood = (0.0, 0.0)
         # Of its air.
         self.watch = PadWatch(ceiling)
         self.sent: float | None = None  # the set-point in force, if any
@@ -260,8 +321,8 @@ class MorphologyController:
         Chooses at each lift-off, see :func:`adaptive`.
     expected_load : float
         Normal force in stance, N, above 0.
-    start : str
-        Shape before the first lift-off.
+    start : str or mapping
+        Shape before the first lift-off, of all legs or of each, see :func:`first_shapes`.
     margin : float
         Factor on the load, for the pressure of a dome, above 0.
     fixed_pressure : float or None
@@ -269,7 +330,7 @@ class MorphologyController:
         the load.
     load_gate : float
         Share of the expected load below which a foot has lifted off, above 0 up to 0.6. It stands
-        again at 1.5 times that.
+        again with 0.3 of the expected load more.
 
     Attributes
     ----------
@@ -296,13 +357,15 @@ class MorphologyController:
         legs: Sequence[int],
         policy: Policy,
         expected_load: float,
-        start: str = FLAT,
+        start: str | Mapping[int, str] = FLAT,
         margin: float = 1.2,
         fixed_pressure: float | None = None,
         load_gate: float = 0.3,
     ) -> None:
         number('expected_load', expected_load, 'N', above=True)
-        one_of('start', start, (FLAT, DOME))
+        shapes = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
+        for leg in legs:
+            one_of('start', shapes.get(leg, f'no shape of leg {leg}'), (FLAT, DOME))
         number('margin', margin, '(factor)', above=True)
         number('load_gate', load_gate, '(share)', high=0.6, above=True)
         if fixed_pressure is not None:
@@ -317,15 +380,17 @@ class MorphologyController:
         self._margin = margin
         self._fixed_pressure = fixed_pressure
         self._gate = load_gate * expected_load
+        self._stands = (load_gate + TOUCH_DOWN) * expected_load
         self._footprints = Footprints()
+        self._planner = Planner(Stakes.expected(foot, expected_load), legs)
         self._decisions = 0
-        self._legs = {leg: _Leg(start, 1.5 * expected_load, foot.ceiling) for leg in legs}
+        self._legs = {leg: _Leg(shapes[leg], 1.5 * expected_load, foot.ceiling) for leg in legs}
         self.faults: list[FootFault] = []
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
         self.underpressure = dict.fromkeys(legs, 0)
         for leg in legs:
-            self._apply(leg, Choice(start))
+            self._apply(leg, Choice(shapes[leg]))
 
     def _state(self, leg: int) -> _Leg:
         state = self._legs.get(leg)
@@ -475,10 +540,12 @@ class MorphologyController:
             )
         state.updated = state.time
         if load >= self._gate:
-            if load >= TOUCH_DOWN * self._gate and not state.standing:
+            if load >= self._stands and not state.standing:
+                state.landed = (position[0], position[1])
                 state.standing = True
                 self._touch_down(leg, state)
             state.touched = max(state.touched, load)
+            state.stood = (position[0], position[1])
         elif state.standing:
             state.standing = False
             self._lift_off(leg, wet_probability, position)
@@ -538,11 +605,11 @@ class MorphologyController:
             state.stride.add(state.time - state.lifted)
         state.lifted = state.time
         x, y = position[0], position[1]
-        # A pad that holds air is no flat one, whatever was asked of it.
-        if state.morphology == FLAT and not (
-            state.watch.pressure >= LOWEST_DOME or state.watch.silence or state.doubt
-        ):
-            self._footprints.add(x, y, wet_probability)
+        if not (state.watch.silence or state.doubt):
+            # A pad that holds air is no flat one, whatever was asked of it.
+            flat = state.morphology == FLAT and not state.watch.pressure >= LOWEST_DOME
+            made = Step(state.landed, state.stood, flat, state.probing, wet_probability)
+            self._planner.step(leg, made, self._footprints)
         # The next step is taken to be as long as the last one.
         before_x, before_y = state.footprint or (x, y)
         state.footprint = (x, y)
@@ -558,6 +625,8 @@ class MorphologyController:
             wet_ahead=self._footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
+            wet_expected=self._footprints.wet_expected(*ahead),
+            plan=self._planner.plan(leg),
             lead=lead,
             wet_beyond=max(
                 (

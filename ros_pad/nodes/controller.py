@@ -21,6 +21,7 @@ from std_msgs.msg import String
 
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
+from ros_pad.control import first_shapes
 from ros_pad.control import policy_named
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -179,7 +180,7 @@ class ControllerNode(Node):
                 legs,
                 policy_named(values['policy'], is_wet),
                 values['expected_load'],
-                start='dome' if values['policy'] == 'dome' else 'flat',
+                start=first_shapes(values['policy'], legs),
                 margin=values['margin'],
                 fixed_pressure=values['dome_pressure'] or None,
             )

@@ -19,6 +19,7 @@ from typing import Any
 
 from ros_pad.control import MorphologyController
 from ros_pad.control import adaptive
+from ros_pad.control import first_shapes
 from ros_pad.control import policy_named
 from ros_pad.control.morphology import Policy
 from ros_pad.errors import InvalidInput
@@ -160,7 +161,7 @@ class ClosedLoop:
             scene.legs,
             policy_for(policy, self.floor, policy_parameters),
             scene.expected_load,
-            start='dome' if policy == 'dome' else 'flat',
+            start=first_shapes(policy, scene.legs),
             fixed_pressure=scene.dome_pressure,
         )
         self._now = 0.0

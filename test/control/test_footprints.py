@@ -72,3 +72,40 @@ def test_probabilities_stay_probabilities(felt, prior, x):
 def test_bad_values_are_named(name, value):
     with pytest.raises(InvalidInput, match=name):
         Footprints(**{name: value})
+
+
+def test_the_wet_share_counts_ways_not_feet():
+    """Beta(1, 1) and, by hand, 3 m in steps of 1 m, each worth 1 - 1/e, and 0.9 sure of 0.95."""
+    prints = Footprints()
+    for step in range(4):
+        for foot in range(6):
+            # Six feet on one place are worth one.
+            prints.add(float(step), 0.1 * foot, 0.95, walked=0.0 if foot or not step else 1.0)
+    told = 3 * 0.9 * 0.632121
+    assert prints.wet_share == pytest.approx((1.0 + 0.95 * told) / (2.0 + told), abs=1e-6)
+
+
+def test_feet_that_could_not_tell_teach_no_share():
+    prints = Footprints(wet_prior=0.3)
+    for step in range(50):
+        prints.add(float(step), 0.0, 0.5, walked=1.0)
+    assert prints.wet_share == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(('felt', 'least', 'most'), [(0.97, 0.85, 0.97), (0.03, 0.03, 0.15)])
+def test_on_ground_that_is_all_alike_the_share_is_learnt(felt, least, most):
+    prints = Footprints()
+    for step in range(60):
+        prints.add(0.5 * step, 0.0, felt, walked=0.5)
+    assert least < prints.wet_share < most
+    # Far from every footprint that is what is expected; the prior stays what it was.
+    assert prints.wet_expected(999.0, 0.0) == pytest.approx(prints.wet_share)
+    assert prints.wet_probability(999.0, 0.0) == pytest.approx(0.5)
+    assert prints.wet_expected(29.5, 0.0) == pytest.approx(felt)
+
+
+def test_a_floor_that_has_changed_is_learnt_anew():
+    prints = Footprints()
+    for step in range(400):
+        prints.add(0.5 * step, 0.0, 0.97 if step < 300 else 0.03, walked=0.5)
+    assert prints.wet_share < 0.2

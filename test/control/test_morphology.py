@@ -3,6 +3,7 @@ import dataclasses
 import itertools
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import settings
@@ -15,9 +16,11 @@ from ros_pad.control import LiftOff
 from ros_pad.control import MorphologyController
 from ros_pad.control import adaptive
 from ros_pad.control import dome
+from ros_pad.control import first_shapes
 from ros_pad.control import flat
 from ros_pad.control import oracle
 from ros_pad.control import policy_named
+from ros_pad.control.probing import Plan
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.errors import PadError
@@ -30,9 +33,14 @@ STRIDE = 0.16  # m
 def lift_off(**changes):
     step = LiftOff(
         leg=1, morphology='flat', steps=5, probing=False, wet_ahead=0.5,
-        next_position=(1.0, 0.0), others_probing=False,
+        next_position=(1.0, 0.0), others_probing=False, wet_expected=0.5, plan=Plan(),
     )  # fmt: skip
+    changes = {'wet_expected': changes.get('wet_ahead', 0.5)} | changes
     return dataclasses.replace(step, **changes)
+
+
+def by_threshold(**options):
+    return adaptive(probing='threshold', **options)
 
 
 # --- policies ------------------------------------------------------------------------------------
@@ -73,12 +81,60 @@ def test_fixed_policies_are_fixed(wet_ahead, morphology):
     ],
 )
 def test_adaptive_step_by_step(step, expected):
+    assert by_threshold()(lift_off(**step)) == expected
+
+
+@pytest.mark.parametrize(
+    ('step', 'expected'),
+    [
+        # What is unknown is as wet as the way so far, not as the prior.
+        ({'wet_ahead': 0.5, 'wet_expected': 0.66}, Choice('dome')),
+        ({'morphology': 'dome', 'wet_ahead': 0.5, 'wet_expected': 0.34}, Choice('flat')),
+        # Probes come when they are planned, one leg at a time, and not before a shape is settled.
+        ({'morphology': 'dome', 'plan': Plan(probe=True)}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'wet_ahead': 0.9, 'plan': Plan()}, Choice('dome')),
+        ({'morphology': 'dome', 'others_probing': True, 'plan': Plan(probe=True)}, Choice('dome')),
+        ({'morphology': 'dome', 'steps': 1, 'plan': Plan(probe=True)}, Choice('dome')),
+        # Where flat feet do not pay, dry ground is no reason to be flat.
+        ({'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
+        ({'wet_ahead': 0.0, 'steps': 1, 'plan': Plan(flat_pays=False)}, Choice('flat')),
+        ({'morphology': 'dome', 'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
+        # A trial is made on dry ground alone, and over after one step.
+        ({'wet_ahead': 0.1, 'plan': Plan(trial=True)}, Choice('dome', probe=True)),
+        ({'wet_ahead': 0.5, 'plan': Plan(trial=True)}, Choice('flat')),
+        ({'morphology': 'dome', 'steps': 1, 'probing': True, 'wet_ahead': 0.1}, Choice('flat')),
+    ],
+)
+def test_adaptive_follows_the_plan(step, expected):
     assert adaptive()(lift_off(**step)) == expected
+
+
+def test_a_fixed_count_of_steps_between_probes():
+    policy = adaptive(probing='count', probe_every=7)
+    for steps in range(2, 12):
+        step = lift_off(morphology='dome', wet_ahead=0.6, steps=steps, plan=Plan(probe=True))
+        assert policy(step).probe == (steps >= 7)
+
+
+def test_first_shapes():
+    legs = (1, 2, 3, 4, 5, 6)
+    assert set(first_shapes('flat', legs).values()) == {'flat'}
+    assert set(first_shapes('oracle', legs).values()) == {'flat'}
+    assert set(first_shapes('dome', legs).values()) == {'dome'}
+    # One foot of each tripod feels the ground.
+    adaptive_shapes = first_shapes('adaptive', legs)
+    assert [leg for leg in legs if adaptive_shapes[leg] == 'flat'] == [1, 6]
+    assert first_shapes('adaptive', (1,)) == {1: 'flat'}
+    controller = MorphologyController(FOOT, legs, adaptive(), LOAD, start=adaptive_shapes)
+    assert {leg: controller.morphology(leg) for leg in legs} == adaptive_shapes
+    assert sum(controller.switches.values()) == 0
+    with pytest.raises(InvalidInput, match=r'start = .* leg 2'):
+        MorphologyController(FOOT, (1, 2), adaptive(), LOAD, start={1: 'flat'})
 
 
 def test_between_the_thresholds_each_shape_stays():
     """Hysteresis: without probes a belief between 0.35 and 0.65 changes nothing."""
-    policy = adaptive(probe_below=0.0)
+    policy = by_threshold(probe_below=0.0)
     for wet_ahead in (0.36, 0.5, 0.64):
         for shape in ('flat', 'dome'):
             assert policy(lift_off(morphology=shape, wet_ahead=wet_ahead)) == Choice(shape)
@@ -92,6 +148,8 @@ def test_between_the_thresholds_each_shape_stays():
         {'dry_below': 0.7},
         {'probe_below': math.nan},
         {'dwell': 0},
+        {'probing': 'luck'},
+        {'probe_every': 0},
     ],
 )
 def test_bad_thresholds_are_named(bad):
@@ -141,7 +199,7 @@ class Walk:
 
 
 def test_a_flat_foot_turns_to_dome_on_wet_ground():
-    walk = Walk(adaptive(), is_wet=lambda x: x > 0.5)
+    walk = Walk(by_threshold(), is_wet=lambda x: x > 0.5)
     shapes = [walk.step(1) for _ in range(7)]
     # The fifth footprint, at 0.64 m, is the first one that is wet.
     assert shapes == ['flat'] * 4 + ['dome'] * 3
@@ -150,7 +208,7 @@ def test_a_flat_foot_turns_to_dome_on_wet_ground():
 
 
 def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
-    walk = Walk(adaptive(), is_wet=lambda x: True)
+    walk = Walk(by_threshold(), is_wet=lambda x: True)
     shapes = [walk.step(1) for _ in range(40)]
     probes = [k for k in range(1, 40) if shapes[k] == 'flat' and shapes[k - 1] == 'dome']
     assert len(probes) >= 4
@@ -160,7 +218,7 @@ def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
 
 
 def test_a_probe_that_finds_dry_ground_stays_flat():
-    walk = Walk(adaptive(), is_wet=lambda x: x < 1.0)
+    walk = Walk(by_threshold(), is_wet=lambda x: x < 1.0)
     shapes = [walk.step(1) for _ in range(30)]
     assert 'dome' in shapes[:5]
     # It knows after the next probe, at most five strides past the edge at 1 m.
@@ -169,7 +227,7 @@ def test_a_probe_that_finds_dry_ground_stays_flat():
 
 def test_the_information_trap():
     """Without probes a foot that was once on wet ground never returns: a dome feels no dry."""
-    trapped = Walk(adaptive(probe_below=0.0), is_wet=lambda x: x < 1.0)
+    trapped = Walk(by_threshold(probe_below=0.0), is_wet=lambda x: x < 1.0)
     shapes = [trapped.step(1) for _ in range(300)]
     assert shapes[1:] == ['dome'] * 299
     assert trapped.x[1] > 45.0
@@ -177,7 +235,7 @@ def test_the_information_trap():
 
 def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
     legs = (1, 2, 3, 4, 5, 6)
-    walk = Walk(adaptive(), legs=legs, is_wet=lambda x: True)
+    walk = Walk(by_threshold(), legs=legs, is_wet=lambda x: True)
     flats = []
     for _ in range(40):
         for leg in legs:
@@ -191,7 +249,7 @@ def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
 
 
 def test_a_leg_that_is_held_up_keeps_no_other_from_probing():
-    walk = Walk(adaptive(), legs=(1, 2), is_wet=lambda x: True)
+    walk = Walk(by_threshold(), legs=(1, 2), is_wet=lambda x: True)
     for _ in range(3):
         walk.step(1)
         walk.step(2)
@@ -319,7 +377,7 @@ def test_never_a_change_in_stance(stream, name):
             if n != leg or not lifted:
                 assert after[n] == before[n]
         switches[leg] += after[leg][1] != before[leg][1]
-        if load >= 0.45 * LOAD:
+        if load >= 0.6 * LOAD:
             stood[leg] = True
         elif load < 0.3 * LOAD:
             stood[leg] = False
@@ -344,6 +402,42 @@ def test_noise_at_the_gate_is_no_step():
     for load in (gate + 0.1, gate - 0.1, gate + 0.1, gate - 0.1, 0.0):
         controller.update(1, load, 0.9, (0.0, 0.0))
     assert len(decisions) == 1
+
+
+def test_a_foot_that_lands_lightly_has_not_stepped():
+    """Feet touch with half their load and are light again until the other tripod lifts off."""
+    decisions = []
+
+    def spy(step):
+        decisions.append(step)
+        return Choice('flat')
+
+    controller = MorphologyController(FOOT, (1,), spy, LOAD)
+    for load in (0.0, 0.55, 0.5, 0.2, 0.0, 0.2, 0.65, 1.5, 1.5, 0.65, 0.2, 0.0):
+        controller.update(1, load * LOAD, 0.5, (0.0, 0.0))
+    assert len(decisions) == 1
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_never_more_switches_than_the_dwell_allows(seed):
+    """Whatever feet feel: between changes of shape lie two steps, but for probes and trials."""
+    random = np.random.default_rng(seed)
+    policy, dwell = adaptive(), 2
+    morphology, probing, steps, kept = 'flat', False, math.inf, []
+    for _ in range(500):
+        step = lift_off(
+            morphology=morphology, probing=probing, steps=steps,
+            wet_ahead=float(random.random()),
+            plan=Plan(*(bool(each) for each in random.random(3) < 0.5)),
+        )  # fmt: skip
+        choice = policy(step)
+        if choice.morphology != morphology:
+            kept.append((steps, probing))
+            steps = 0
+        morphology, probing = choice.morphology, choice.probe
+        steps += 1
+    assert len(kept) > 50
+    assert all(steps >= dwell or probing for steps, probing in kept)
 
 
 @pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf])

@@ -228,24 +228,31 @@ def test_adaptive_beats_both_fixed_shapes_on_patches():
         assert min(flat, dome) > 0.02  # nobody is stuck: the comparison is not with a wreck
 
 
-def test_on_dry_ground_adapting_costs_nothing():
-    scene = short(20, 'dry')
+def test_on_dry_ground_adapting_costs_the_start_and_one_trial():
+    """Feet start as domes, and are domes for one more step: what do they lose on dry ground?"""
+    scene = short(60, 'dry')
     flat, dome, adapted = (per_cycle(scene, each) for each in ('flat', 'dome', 'adaptive'))
     assert flat > 1.2 * dome
     assert adapted > 0.99 * flat
 
 
-def test_on_wet_ground_adapting_costs_the_first_steps_and_the_probes():
-    """Over 60 cycles less than 2 %; most of it is the first two steps, before anything is felt."""
+def test_on_wet_ground_adapting_costs_the_probes():
     trials = {each: run(short(60, 'wet'), each) for each in ('dome', 'adaptive')}
-    way = {each: trial.body[:, 0] for each, trial in trials.items()}
-    assert way['adaptive'][-1] > 0.98 * way['dome'][-1]
-    time = trials['dome'].time
-    late = np.searchsorted(time, 10.0)
-    walked = {each: x[-1] - x[late] for each, x in way.items()}
-    assert walked['adaptive'] > 0.99 * walked['dome']
+    way = {each: trial.metrics.distance_m for each, trial in trials.items()}
+    assert way['adaptive'] > 0.99 * way['dome']
     # Probes there were.
     assert sum(trials['adaptive'].metrics.switches) >= 12
+
+
+@pytest.mark.parametrize('foot', ['as shipped', 'no better flat than domed'])
+def test_where_domes_cannot_be_beaten_adapting_costs_little(foot):
+    """Nothing towed, so that domes hold everywhere; or dry friction without adhesion."""
+    if foot == 'as shipped':
+        scene = dataclasses.replace(short(60), tow=dataclasses.replace(PATCHES.tow, weight=0.0))
+    else:
+        plain = dataclasses.replace(PATCHES.foot, friction=0.41, shear_strength=0.0)
+        scene = dataclasses.replace(short(60, 'wet'), foot=plain)
+    assert per_cycle(scene, 'adaptive', seed=41) > 0.99 * per_cycle(scene, 'dome', seed=41)
 
 
 def test_the_information_trap_on_patches():
@@ -256,7 +263,7 @@ def test_the_information_trap_on_patches():
     scene = dataclasses.replace(short(40), tow=tow)
     trapped = ClosedLoop(scene, 'adaptive', seed, 'L1')
     trapped.controller = MorphologyController(
-        scene.foot, scene.legs, adaptive(probe_below=0.0), scene.expected_load
+        scene.foot, scene.legs, adaptive(probe_below=0.0, probing='threshold'), scene.expected_load
     )
     log = TrialLog(scene, 'adaptive', seed, 'L1')
     for _ in range(round(scene.duration / 0.004)):
@@ -275,7 +282,7 @@ def test_the_information_trap_on_patches():
 # --- what the estimators are worth --------------------------------------------------------------
 
 
-def watched(policy, seed, cycles=10):
+def watched(policy, seed, cycles=20):
     """Walk; return rows of (true friction, mean, sd, quantile, domed) and of flat stance ends."""
     scene = short(cycles)
     loop = ClosedLoop(scene, policy, seed, 'L1')

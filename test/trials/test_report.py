@@ -408,7 +408,7 @@ def test_what_is_no_regular_file_is_never_replaced(tmp_path):
 
 
 def test_what_feet_knew_is_told_by_stance():
-    """Leg 1 has ten stances that end at odd seconds, leg 2 at even ones; five of leg 2's are domed."""
+    """Leg 1 has ten stances that end at odd seconds, leg 2 at even ones, five of them domed."""
     trial = made_up()
     trial.doubt = np.where(trial.dome, DOUBTS.index('domed'), 0)
     trial.doubt[trial.slow_time < 2.0, :] = DOUBTS.index('not pulled')
