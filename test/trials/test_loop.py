@@ -308,18 +308,20 @@ def watched(policy, seed, cycles=20):
     return np.array(rows, dtype=float), np.array(ends)
 
 
-@pytest.mark.parametrize('seed', [0, 1, 2])
 @pytest.mark.parametrize('policy', ['flat', 'adaptive'])
-def test_estimates_are_as_sure_as_they_may_be(policy, seed):
-    """Measured over 30 cycles: coverage 0.96 to 1.00, accuracy 1.00, below the quantile 0 to 6 %.
+def test_estimates_are_as_sure_as_they_may_be(policy):
+    """Measured on six floors: coverage 0.96 to 1.00, accuracy of all stances 0.98 and 0.99.
 
     The estimator knows the foot's contact model here, and L1 has neither scuffing nor feet that
     fight: that is the best case.
     """
-    rows, ends = watched(policy, seed)
-    truth, mean, sd, quantile, _ = rows.T
-    assert len(rows) > 4000 and len(ends) > 5
-    assert np.mean(abs(truth - mean) < 2.0 * sd) > 0.9
-    assert np.mean(truth < quantile) < 0.1
-    assert np.mean(ends[:, 0] == ends[:, 1]) > 0.9
-    assert np.mean(sd) < 0.2  # sure of something
+    walks = [watched(policy, seed) for seed in (0, 1, 2)]
+    for rows, _ in walks:
+        truth, mean, sd, quantile, _ = rows.T
+        assert len(rows) > 4000
+        assert np.mean(abs(truth - mean) < 2.0 * sd) > 0.9
+        assert np.mean(truth < quantile) < 0.1
+        assert np.mean(sd) < 0.2  # sure of something
+    ends = np.concatenate([ends for _, ends in walks])
+    assert len(ends) > 100  # domes that seldom probe have few
+    assert np.mean(ends[:, 0] == ends[:, 1]) > 0.95
