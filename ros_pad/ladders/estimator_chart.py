@@ -296,7 +296,8 @@ def _cell(
                 edge, mark = (high, '^') if value > high else (low, 'v')
                 panel.plot(at, edge, mark, color=look['color'], ms=5.0, clip_on=False, zorder=4)
                 panel.annotate(
-                    f'{value:.2g}', (at, edge), xytext=(-5, -3 if mark == '^' else 2),
+                    f'{value:.0f}' if value > 100.0 else f'{value:.2g}',
+                    (at, edge), xytext=(-5, -3 if mark == '^' else 2),
                     textcoords='offset points', ha='right', va='center', fontsize=7,
                     color=look['color'],
                 )  # fmt: skip
