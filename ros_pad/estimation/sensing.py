@@ -188,16 +188,18 @@ class Sensing:
         self, time: float, position: Sequence[float], age: float, standing: bool
     ) -> str:
         stopped = self._positions.update(time, position)
-        last, self._last = self._last, (time, tuple(position))
+        # Markers may be slower than forces: what counts is when each was where it was.
+        seen = time - age
+        last, self._last = self._last, (seen, tuple(position))
         if age > OLDEST_POSITION:
             self.since = time - age
             return f'marker lost: last seen {age:.2g} s ago'
         if len(stopped) == 3:
             self.since = max(map(self._positions.since, stopped))
             return 'marker stands still: to the last digit'
-        if standing and last and 0.0 < time - last[0] < PATIENCE:
+        if standing and last and 0.0 < seen - last[0] < PATIENCE:
             way = math.dist(last[1], position)
-            if way > LEAP_WAY and way > LEAP * (time - last[0]):
+            if way > LEAP_WAY and way > LEAP * (seen - last[0]):
                 self.since = time
                 return f'marker leapt: {1e3 * way:.0f} mm'
         return ''

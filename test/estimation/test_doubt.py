@@ -376,6 +376,22 @@ def test_a_marker_that_leaps_is_no_slip_and_no_way():
     assert back.wet_probability == pytest.approx(known.wet_probability, abs=0.03)
 
 
+@pytest.mark.parametrize('every', [8, 4])
+def test_a_slow_marker_does_not_leap(every):
+    """At 31 and 62 Hz a foot that slides at 0.8 m/s has moved by 26 and 13 mm in between."""
+    walk = Walk()
+    estimator, seen = walk.estimator, None
+    for k in range(150):
+        time, x = k * PERIOD, 0.8 * max(0.0, k - 50) * PERIOD
+        if k % every == 0:
+            marker = np.array([x, 0.0, 0.0]) + 1.5e-4 * walk.random.normal(size=3)
+            seen = (time, marker.tolist())
+        force = np.array([-0.4 * LOAD, 0.0, LOAD]) + 0.03 * walk.random.normal(size=3)
+        estimate = estimator.update(time, force.tolist(), seen[1], 0.0, position_time=seen[0])
+        assert estimate.sound
+    assert estimate.slipping
+
+
 def test_a_clock_that_is_set_back_begins_a_new_stance():
     walk = Walk()
     known = walk.stand(0.6)
