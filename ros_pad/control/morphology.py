@@ -405,7 +405,7 @@ class MorphologyController:
         state = self._legs[leg]
         if not state.watch.reason:
             return state.morphology
-        return DOME if state.watch.pressure >= LOWEST_DOME else FLAT
+        return DOME if self._holds_air(state) else FLAT
 
     def setpoint(self, leg: int) -> float:
         """Gauge pressure wanted for a leg, Pa."""
@@ -552,6 +552,12 @@ class MorphologyController:
         state.sent = state.setpoint
         return state.setpoint
 
+    @staticmethod
+    def _holds_air(state: _Leg) -> bool:
+        # What the watch lets pass as vented is flat here, too: a sensor that reads a little too
+        # much must not cost a foot all its footprints.
+        return state.watch.pressure > max(LOWEST_DOME, state.watch.tolerance)
+
     def _touch_down(self, leg: int, state: _Leg) -> None:
         """Compare the pressure of a dome with what its load needs."""
         state.short = ''
@@ -607,7 +613,7 @@ class MorphologyController:
         x, y = position[0], position[1]
         if not (state.watch.silence or state.doubt):
             # A pad that holds air is no flat one, whatever was asked of it.
-            flat = state.morphology == FLAT and not state.watch.pressure >= LOWEST_DOME
+            flat = state.morphology == FLAT and not self._holds_air(state)
             made = Step(state.landed, state.stood, flat, state.probing, wet_probability)
             self._planner.step(leg, made, self._footprints)
         # The next step is taken to be as long as the last one.
