@@ -264,6 +264,30 @@ def test_a_force_sensor_that_freezes_takes_back_what_it_said():
     assert math.isfinite(healed.margin)
 
 
+def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
+    """Steps of 0.2 N: it repeats itself as it is, so that two seconds pass, in which it lies."""
+
+    kept = []
+
+    def coarse(force, position, *_):
+        if not stopped:
+            kept[:] = [0.2 * round(component / 0.2) for component in force]
+        return list(kept), position
+
+    walk = Broken(coarse)
+    walk.broken, stopped = True, False
+    walk.swing()
+    for k in range(125):  # neither load nor pull stays as it is for long
+        known = walk.sample(0.12 + 0.5 * math.sin(math.pi * k / 124), load=LOAD + 0.01 * k)
+    assert known.wet_probability < 0.1
+    stopped = True
+    for _ in range(4):
+        walk.stand(slip=0.05, seconds=0.6)
+    estimate = walk.estimate
+    assert kind(estimate) == 'force stands still'
+    assert estimate.wet_probability < 0.3
+
+
 def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
     walk = Broken(frozen_marker)
     for _ in range(12):  # to get to know the pace: 0.14 m in 0.9 s
