@@ -50,6 +50,9 @@ NOT_YET = 'not yet: has not stood'
 HINDSIGHT = DEAD + LONGEST_GAP
 """Time for which earlier beliefs are kept, s: sensors that fail may be believed for so long."""
 
+NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
+"""Doubt of a foot whose sensors are believed again."""
+
 FADING_STEP = 0.02
 """Way after which belief is faded where a foot feels nothing, m: markers jitter."""
 
@@ -357,7 +360,7 @@ class FootEstimator:
             said = self._doubt(friction_mean, friction_sd)
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
-            wet, said = last.wet_probability, last.doubt
+            wet, said = last.wet_probability, last.doubt if last.sound else NOT_AGAIN
         self.estimate = Estimate(
             time, True, slipping, velocity, speed, self._speed_noise,
             wet, friction_mean, friction_sd, self._quantile - math.hypot(tangential, turning) / fz,
@@ -382,7 +385,8 @@ class FootEstimator:
         self._standing = False
         self.estimate = Estimate(
             time, False, False, (0.0, 0.0), 0.0, self._speed_noise, last.wet_probability,
-            last.friction_mean, last.friction_sd, last.margin, fresh, last.doubt, True,
+            last.friction_mean, last.friction_sd, last.margin, fresh,
+            last.doubt if last.sound else NOT_AGAIN, True,
         )  # fmt: skip
         return self.estimate
 
