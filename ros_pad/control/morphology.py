@@ -439,8 +439,8 @@ class MorphologyController:
     def doubt(self, leg: int, reason: str) -> None:
         """Take note why a foot's sensors are not believed; an empty reason ends it.
 
-        Call it before :meth:`observe`. Such a foot leaves no footprints; what other feet felt
-        still counts for it.
+        Call it before :meth:`observe`. Such a foot leaves no footprints and does not probe; what
+        other feet felt still counts for it.
         """
         self._state(leg).doubt = reason
 
@@ -579,7 +579,9 @@ class MorphologyController:
         return min(math.ceil(late / state.stride.value), FURTHEST_LEAD)
 
     def _permitted(self, leg: int, state: _Leg, choice: Choice) -> Choice:
-        """Return what the pad of a leg is fit for: flat where its air failed, but for a try."""
+        """Return what a leg is fit for: flat where its air failed, but for a try."""
+        if state.doubt and choice.probe and choice.morphology == FLAT:
+            choice = Choice(state.morphology)  # it would not learn anything
         if not state.watch.fault:
             state.trying = False
             # A device that is silent keeps what it has, and would change it when it hears again.
