@@ -128,6 +128,7 @@ class Sensing:
         self._positions = Repeats(3, self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
         self._grounded = math.inf
+        self._dead = False
         self.marker_sound = True
         self.since = math.inf
 
@@ -171,9 +172,12 @@ class Sensing:
             if not nothing:
                 return f'force stands still: {force[2]:.3g} N to the last digit'
             grounded = time - max(self._grounded, self.since)
-            if time - self.since > DEAD or grounded > DEAD_ON_GROUND:
+            # Once found dead it is so in the air as well, until it reads anything.
+            self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
+            if self._dead:
                 return 'force stands still: reads exactly nothing'
             return ''
+        self._dead = False
         for place, axis in enumerate('xyz'):
             if abs(force[place]) >= self._range:
                 self.since = time

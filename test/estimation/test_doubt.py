@@ -334,6 +334,17 @@ def test_a_sensor_that_dies_is_noticed_in_the_air_too():
     assert walk.estimate.doubt == 'force stands still: reads exactly nothing'
 
 
+def test_a_sensor_found_dead_on_the_ground_does_not_come_to_life_in_the_air():
+    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
+    walk.stand(0.6)
+    walk.swing()
+    walk.broken = True
+    assert kind(walk.stand(0.6)) == 'force stands still'
+    assert not any(walk.swing(seconds=seconds).sound for seconds in (0.1, 0.2, 0.4))
+    walk.broken = False
+    assert walk.swing().sound
+
+
 def test_simulated_feet_may_read_nothing_in_the_air():
     walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
     for _ in range(4):
