@@ -261,8 +261,8 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         )
     for refusal in own.refusals:
         print(f'stayed flat: {refusal}')
-    for fault in own.faults:
-        print(f'fault: {told(fault)}')
+    for fault in told(own.faults):
+        print(f'fault: {fault}')
     for omission in trial.settings['omitted']:
         bound = omission['bound']
         most = 'no bound known' if bound is None else f'at most {100.0 * bound:.1f} %'

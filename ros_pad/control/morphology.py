@@ -405,7 +405,7 @@ class MorphologyController:
         state = self._legs[leg]
         if not state.watch.reason:
             return state.morphology
-        return DOME if state.watch.pressure >= LOWEST_DOME else FLAT
+        return DOME if self._holds_air(state) else FLAT
 
     def setpoint(self, leg: int) -> float:
         """Gauge pressure wanted for a leg, Pa."""
@@ -439,8 +439,8 @@ class MorphologyController:
     def doubt(self, leg: int, reason: str) -> None:
         """Take note why a foot's sensors are not believed; an empty reason ends it.
 
-        Call it before :meth:`observe`. Such a foot leaves no footprints; what other feet felt
-        still counts for it.
+        Call it before :meth:`observe`. Such a foot leaves no footprints and does not probe; what
+        other feet felt still counts for it.
         """
         self._state(leg).doubt = reason
 
@@ -552,6 +552,12 @@ class MorphologyController:
         state.sent = state.setpoint
         return state.setpoint
 
+    @staticmethod
+    def _holds_air(state: _Leg) -> bool:
+        # What the watch lets pass as vented is flat here, too: a sensor that reads a little too
+        # much must not cost a foot all its footprints.
+        return state.watch.pressure > max(LOWEST_DOME, state.watch.tolerance)
+
     def _touch_down(self, leg: int, state: _Leg) -> None:
         """Compare the pressure of a dome with what its load needs."""
         state.short = ''
@@ -573,7 +579,9 @@ class MorphologyController:
         return min(math.ceil(late / state.stride.value), FURTHEST_LEAD)
 
     def _permitted(self, leg: int, state: _Leg, choice: Choice) -> Choice:
-        """Return what the pad of a leg is fit for: flat where its air failed, but for a try."""
+        """Return what a leg is fit for: flat where its air failed, but for a try."""
+        if state.doubt and choice.probe and choice.morphology == FLAT:
+            choice = Choice(state.morphology)  # it would not learn anything
         if not state.watch.fault:
             state.trying = False
             # A device that is silent keeps what it has, and would change it when it hears again.
@@ -607,7 +615,7 @@ class MorphologyController:
         x, y = position[0], position[1]
         if not (state.watch.silence or state.doubt):
             # A pad that holds air is no flat one, whatever was asked of it.
-            flat = state.morphology == FLAT and not state.watch.pressure >= LOWEST_DOME
+            flat = state.morphology == FLAT and not self._holds_air(state)
             made = Step(state.landed, state.stood, flat, state.probing, wet_probability)
             self._planner.step(leg, made, self._footprints)
         # The next step is taken to be as long as the last one.

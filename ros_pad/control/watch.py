@@ -175,7 +175,7 @@ class PadWatch:
                     f' {_kilo(self.pressure)}'
                 )
             return
-        first, self._heard = math.isnan(self.pressure), time
+        first, heard, self._heard = math.isnan(self.pressure), self._heard, time
         self.pressure = pressure
         if self.silence:
             self.silence = ''
@@ -184,7 +184,7 @@ class PadWatch:
         if setpoint is not None:
             if first:
                 self._set_out(time, setpoint, pressure)
-            self._judge(time, setpoint)
+            self._judge(time, setpoint, heard)
 
     def _set_out(self, time: float, aim: float, pressure: float) -> None:
         """Begin a new way, and time it if it leads from flat to dome or back."""
@@ -202,7 +202,7 @@ class PadWatch:
         self._stopped = self._right = math.inf
         self.stalled = False
 
-    def _judge(self, time: float, aim: float) -> None:
+    def _judge(self, time: float, aim: float, heard: float) -> None:
         pressure = self.pressure
         size = abs(pressure - aim)
         self._lowest, self._highest = min(self._lowest, pressure), max(self._highest, pressure)
@@ -210,7 +210,8 @@ class PadWatch:
         while recent and recent[-1][1] <= size:
             recent.pop()
         recent.append((time, size))
-        while recent[0][0] < time - WINDOW:
+        # Where readings are further apart than that, the one before is all there is to compare.
+        while recent[0][0] < min(time - WINDOW, heard):
             recent.popleft()
         over = pressure > self._ceiling + self.tolerance
         if size <= self.tolerance and not over:

@@ -19,6 +19,7 @@ from ros_pad.estimation.alarm import SlipAlarms
 from ros_pad.estimation.friction import THICK_FILM
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.sensing import Sensing
 
 LONGEST_GAP = 0.15
@@ -45,6 +46,12 @@ LONGEST_STEP = 5.0
 
 NOT_YET = 'not yet: has not stood'
 """Doubt of a foot that has not stood so far."""
+
+HINDSIGHT = DEAD + LONGEST_GAP
+"""Time for which earlier beliefs are kept, s: sensors that fail may be believed for so long."""
+
+NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
+"""Doubt of a foot whose sensors are believed again."""
 
 FADING_STEP = 0.02
 """Way after which belief is faded where a foot feels nothing, m: markers jitter."""
@@ -226,7 +233,7 @@ class FootEstimator:
         self._footprint: tuple[float, float] | None = None
         self._touched = -math.inf
         self._pace = self._unseen_way = 0.0
-        self._beliefs: deque[tuple[float, tuple[np.ndarray, bool]]] = deque(maxlen=8)
+        self._beliefs: deque[tuple[float, tuple[np.ndarray, bool]]] = deque()
         self._dome_share = 0.0
         self._peak_load = self._peak_ratio = self._peak_turning = 0.0
         self._window_start = 0.0
@@ -349,11 +356,11 @@ class FootEstimator:
             friction_mean, friction_sd = self._ground.friction
             wet = self._ground.wet_probability
             self._quantile = self._ground.quantile(0.05)
-            self._beliefs.append((time, self._ground.belief))
+            self._remember(time)
             said = self._doubt(friction_mean, friction_sd)
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
-            wet, said = last.wet_probability, last.doubt
+            wet, said = last.wet_probability, last.doubt if last.sound else NOT_AGAIN
         self.estimate = Estimate(
             time, True, slipping, velocity, speed, self._speed_noise,
             wet, friction_mean, friction_sd, self._quantile - math.hypot(tangential, turning) / fz,
@@ -378,7 +385,8 @@ class FootEstimator:
         self._standing = False
         self.estimate = Estimate(
             time, False, False, (0.0, 0.0), 0.0, self._speed_noise, last.wet_probability,
-            last.friction_mean, last.friction_sd, last.margin, fresh, last.doubt, True,
+            last.friction_mean, last.friction_sd, last.margin, fresh,
+            last.doubt if last.sound else NOT_AGAIN, True,
         )  # fmt: skip
         return self.estimate
 
@@ -434,13 +442,20 @@ class FootEstimator:
         self._footprint, self._touched, self._touched_at = (x, y), time, z
         self._dome_share = self._share_on_domes(pressure)
         self._ground.touch_down(way, self._dome_share > doubt.DOMED)
-        self._beliefs.append((time, self._ground.belief))
+        self._remember(time)
         self._quantile = self._ground.quantile(0.05)
         self._window_start = time
         self._first_window = True
         self._told = None
         self._peak_load = self._peak_ratio = self._peak_turning = 0.0
         self._clear_window()
+
+    def _remember(self, time: float) -> None:
+        """Keep what is believed now, and what was when a sensor may have failed unnoticed."""
+        beliefs = self._beliefs
+        beliefs.append((time, self._ground.belief))
+        while len(beliefs) > 1 and beliefs[1][0] <= time - HINDSIGHT:
+            beliefs.popleft()
 
     def _share_on_domes(self, pressure: float) -> float:
         return self._foot.dome_load(self._expected_load, pressure) / self._expected_load

@@ -128,6 +128,7 @@ class Sensing:
         self._positions = Repeats(3, self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
         self._grounded = math.inf
+        self._dead = False
         self.marker_sound = True
         self.since = math.inf
 
@@ -171,9 +172,12 @@ class Sensing:
             if not nothing:
                 return f'force stands still: {force[2]:.3g} N to the last digit'
             grounded = time - max(self._grounded, self.since)
-            if time - self.since > DEAD or grounded > DEAD_ON_GROUND:
+            # Once found dead it is so in the air as well, until it reads anything.
+            self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
+            if self._dead:
                 return 'force stands still: reads exactly nothing'
             return ''
+        self._dead = False
         for place, axis in enumerate('xyz'):
             if abs(force[place]) >= self._range:
                 self.since = time
@@ -188,16 +192,18 @@ class Sensing:
         self, time: float, position: Sequence[float], age: float, standing: bool
     ) -> str:
         stopped = self._positions.update(time, position)
-        last, self._last = self._last, (time, tuple(position))
+        # Markers may be slower than forces: what counts is when each was where it was.
+        seen = time - age
+        last, self._last = self._last, (seen, tuple(position))
         if age > OLDEST_POSITION:
             self.since = time - age
             return f'marker lost: last seen {age:.2g} s ago'
         if len(stopped) == 3:
             self.since = max(map(self._positions.since, stopped))
             return 'marker stands still: to the last digit'
-        if standing and last and 0.0 < time - last[0] < PATIENCE:
+        if standing and last and 0.0 < seen - last[0] < PATIENCE:
             way = math.dist(last[1], position)
-            if way > LEAP_WAY and way > LEAP * (time - last[0]):
+            if way > LEAP_WAY and way > LEAP * (seen - last[0]):
                 self.since = time
                 return f'marker leapt: {1e3 * way:.0f} mm'
         return ''

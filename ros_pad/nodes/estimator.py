@@ -49,11 +49,11 @@ PARAMETERS = (
     AMBIENT_PRESSURE,
     Parameter(
         'position_noise', _TUNING.position_noise,
-        'Standard deviation of a marker coordinate.', 'm', 1e-7, 0.1,
+        'Standard deviation of a marker coordinate; 0: it may repeat itself.', 'm', 0.0, 0.1,
     ),
     Parameter(
         'force_noise', _TUNING.force_noise,
-        'Standard deviation of a force component.', 'N', 1e-6, 100.0,
+        'Standard deviation of a force component; 0: it may repeat itself.', 'N', 0.0, 100.0,
     ),
     Parameter(
         'moment_noise', 0.0,
@@ -123,7 +123,9 @@ class _Leg:
         topics.POSITION.subscription(node, self._on_position, leg)
 
     def _on_pressure(self, message: FluidPressure) -> None:
-        self._pressure = message.fluid_pressure - self._ambient
+        # A device that does not answer may be told of so: what it said last counts.
+        if math.isfinite(message.fluid_pressure):
+            self._pressure = message.fluid_pressure - self._ambient
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         if self._wrench is not None and self._position is not None:

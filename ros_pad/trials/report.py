@@ -533,16 +533,18 @@ def _doubts(trial: Trial, load_gate: float) -> str:
         for column, rows in enumerate(stance_ends(trial, load_gate))
     ]
     places, counts = np.unique(np.concatenate(ends), return_counts=True)
-    told = dict(zip(places.tolist(), counts.tolist(), strict=True))
-    total = sum(told.values())
-    if not total or set(told) == {-1}:
+    stances = dict(zip(places.tolist(), counts.tolist(), strict=True))
+    total = sum(stances.values())
+    if not total or set(stances) == {-1}:
         return ''
-    others = sorted(((count, place) for place, count in told.items() if place), reverse=True)
+    others = sorted(((count, place) for place, count in stances.items() if place), reverse=True)
     why = ', '.join(
         f'{DOUBTS[place] if place > 0 else "not told"} {100.0 * count / total:.0f} %'
         for count, place in others
     )
-    known = f'At the end of {told.get(0, 0)} of {total} stances a foot knew the ground below it.'
+    known = (
+        f'At the end of {stances.get(0, 0)} of {total} stances a foot knew the ground below it.'
+    )
     return known + (f' The others could not know: {why}.' if why else '')
 
 
@@ -990,7 +992,7 @@ def _warnings(trial: Trial) -> list[str]:
     found += [f'Fault on the schedule: {fault}' for fault in trial.settings.get('faults', ())]
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
-        found += [told(fault) for fault in trial.metrics.faults]
+        found += told(trial.metrics.faults)
     if trial.settings.get('problem'):
         found.append(str(trial.settings['problem']))
     return found

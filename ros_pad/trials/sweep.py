@@ -286,7 +286,7 @@ def columns_of(trial: Trial) -> Row:
         if name == 'refusals':
             found[name] = '; '.join(value)
         elif name == 'faults':
-            found[name] = '; '.join(map(told, value))
+            found[name] = '; '.join(told(value))
         elif name == 'cycles':  # what a scene calls so are those that it asks for
             found['cycles_walked'] = value
         elif isinstance(value, list):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict
 from dataclasses import dataclass
 from dataclasses import field
@@ -14,6 +15,8 @@ import numpy as np
 from ros_pad.simulation.terrain import Floor
 
 BOUNCE = 0.03  # s without load that end no stance
+
+OFTEN = 3  # faults of one kind on one leg that are each told of
 
 
 @dataclass(frozen=True)
@@ -79,10 +82,31 @@ class Metrics:
         return asdict(self)
 
 
-def told(fault: dict[str, Any]) -> str:
-    """Return in words what a controller found wrong with a leg, see ``Metrics.faults``."""
-    until = 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
-    return f'Leg {fault["leg"]}, from {fault["start"]:.1f} s to {until}: {fault["reason"]}'
+def told(faults: Iterable[dict[str, Any]]) -> list[str]:
+    """Return in words what a controller found wrong with legs, see ``Metrics.faults``.
+
+    What came and went more than :data:`OFTEN` times on a leg is told once.
+    """
+    alike: dict[tuple[int, str], list[dict[str, Any]]] = {}
+    for fault in faults:
+        alike.setdefault((fault['leg'], fault['reason'].partition(':')[0]), []).append(fault)
+    lines = []
+    for (leg, kind), found in alike.items():
+        if len(found) > OFTEN:
+            lines.append(
+                f'Leg {leg}, {len(found)} times from {found[0]["start"]:.1f} s to'
+                f' {_end(found[-1])}: {kind}'
+            )
+        else:
+            lines += [
+                f'Leg {leg}, from {each["start"]:.1f} s to {_end(each)}: {each["reason"]}'
+                for each in found
+            ]
+    return lines
+
+
+def _end(fault: dict[str, Any]) -> str:
+    return 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
 
 
 @dataclass

@@ -172,6 +172,25 @@ def test_a_faulty_foot_does_not_probe():
     assert Walk(lambda step: Choice('flat', probe=True), legs=(1,)).stride(4) == ['flat']
 
 
+def test_a_foot_that_feels_nothing_leaves_probes_to_others():
+    due = Choice('flat', probe=True)
+    walk = Walk(lambda step: due if not step.others_probing else Choice('dome'), start='dome')
+    walk.controller.doubt(1, 'force out of range')
+    assert walk.stride(3) == ['dome', 'flat']
+    walk.controller.doubt(1, '')
+    assert walk.stride() == ['dome', 'flat']
+    assert walk.controller._legs[2].probing
+
+
+@pytest.mark.parametrize('offset', [-2000.0, 1500.0, 2500.0])
+def test_a_pressure_sensor_that_is_a_little_off_costs_no_footprints(offset):
+    """By less than the watch can tell, as when the weather changes under an absolute sensor."""
+    walk = Walk(flat, legs=(1,), belief=0.9, pads=lambda leg, setpoint, time: setpoint + offset)
+    walk.stride(12)
+    assert walk.controller.fault(1) == ''
+    assert walk.controller._footprints.wet_probability(walk.x, 0.1) > 0.8
+
+
 @pytest.mark.parametrize('why', ['sound', 'doubt', 'silence'])
 def test_footprints_that_are_not_sure_are_not_kept(why):
     walk = Walk(flat, legs=(1,), belief=0.9)

@@ -79,6 +79,18 @@ def test_a_sound_pad_is_never_accused(line, noise):
     assert pad.said == []
 
 
+@pytest.mark.parametrize('period', [0.1, 0.3, 0.42, 0.48])
+def test_a_pad_that_moves_is_not_accused_however_rarely_it_is_read(period):
+    watch = PadWatch(CEILING)
+    now = pressure = 0.0
+    for aim in (75e3, 0.0, 75e3, 0.0):
+        for _ in range(round(4.0 / period)):
+            now += period
+            pressure = aim + (pressure - aim) * math.exp(-period / 0.8)
+            watch.update(now, aim, pressure)
+            assert watch.reason == ''
+
+
 def test_it_learns_how_long_the_hose_takes():
     """Against the times of the bench of hoses: to 90 % of 75 kPa in 0.086, 0.57 and 1.25 s.
 

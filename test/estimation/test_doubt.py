@@ -257,11 +257,36 @@ def test_a_force_sensor_that_freezes_takes_back_what_it_said():
     assert estimate.wet_probability == pytest.approx(faded, abs=0.03)
     assert estimate.friction_sd > known.friction_sd
     walk.broken = False
-    walk.swing()
+    for healed in (walk.swing(), walk.sample(0.12)):
+        assert (kind(healed), healed.sound) == ('not yet', True)
     healed = walk.stand(0.12, 0.05)
     assert healed.sound
     assert healed.wet_probability > 0.9
     assert math.isfinite(healed.margin)
+
+
+def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
+    """Steps of 0.2 N: it repeats itself as it is, so that two seconds pass, in which it lies."""
+
+    kept = []
+
+    def coarse(force, position, *_):
+        if not stopped:
+            kept[:] = [0.2 * round(component / 0.2) for component in force]
+        return list(kept), position
+
+    walk = Broken(coarse)
+    walk.broken, stopped = True, False
+    walk.swing()
+    for k in range(125):  # neither load nor pull stays as it is for long
+        known = walk.sample(0.12 + 0.5 * math.sin(math.pi * k / 124), load=LOAD + 0.01 * k)
+    assert known.wet_probability < 0.1
+    stopped = True
+    for _ in range(4):
+        walk.stand(slip=0.05, seconds=0.6)
+    estimate = walk.estimate
+    assert kind(estimate) == 'force stands still'
+    assert estimate.wet_probability < 0.3
 
 
 def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
@@ -307,6 +332,17 @@ def test_a_sensor_that_dies_is_noticed_in_the_air_too():
         walk.swing()
         walk.stand()
     assert walk.estimate.doubt == 'force stands still: reads exactly nothing'
+
+
+def test_a_sensor_found_dead_on_the_ground_does_not_come_to_life_in_the_air():
+    walk = Broken(lambda force, position, *_: ([0.0, 0.0, 0.0], position))
+    walk.stand(0.6)
+    walk.swing()
+    walk.broken = True
+    assert kind(walk.stand(0.6)) == 'force stands still'
+    assert not any(walk.swing(seconds=seconds).sound for seconds in (0.1, 0.2, 0.4))
+    walk.broken = False
+    assert walk.swing().sound
 
 
 def test_simulated_feet_may_read_nothing_in_the_air():
@@ -374,6 +410,22 @@ def test_a_marker_that_leaps_is_no_slip_and_no_way():
     back = walk.stand(0.3, seconds=0.1)
     assert not (away.slipping or back.slipping)
     assert back.wet_probability == pytest.approx(known.wet_probability, abs=0.03)
+
+
+@pytest.mark.parametrize('every', [8, 4])
+def test_a_slow_marker_does_not_leap(every):
+    """At 31 and 62 Hz a foot that slides at 0.8 m/s has moved by 26 and 13 mm in between."""
+    walk = Walk()
+    estimator, seen = walk.estimator, None
+    for k in range(150):
+        time, x = k * PERIOD, 0.8 * max(0.0, k - 50) * PERIOD
+        if k % every == 0:
+            marker = np.array([x, 0.0, 0.0]) + 1.5e-4 * walk.random.normal(size=3)
+            seen = (time, marker.tolist())
+        force = np.array([-0.4 * LOAD, 0.0, LOAD]) + 0.03 * walk.random.normal(size=3)
+        estimate = estimator.update(time, force.tolist(), seen[1], 0.0, position_time=seen[0])
+        assert estimate.sound
+    assert estimate.slipping
 
 
 def test_a_clock_that_is_set_back_begins_a_new_stance():

@@ -172,6 +172,25 @@ def test_without_any_position_nothing_is_said(robot):
     assert not any(robot.heard.values())
 
 
+@pytest.mark.parametrize('noise', [0.0, 1e-4])
+def test_sensors_without_noise_may_repeat_themselves(robot, noise):
+    node = robot.start(force_noise=noise, position_noise=noise)
+    for number in range(1, 31):
+        robot.sample(0.004 * number)
+    assert node.legs[1].sound == (noise == 0.0)
+
+
+def test_a_pressure_that_is_no_number_leaves_the_last_one_in_force(robot):
+    node = robot.start()
+    robot.pressure(80e3)
+    robot.sample(0.004)
+    robot.pressure(math.nan)
+    for number in range(2, 14):
+        robot.sample(0.004 * number)
+    assert node.samples == 13
+    assert node.legs[1].doubt.startswith('domed')
+
+
 def test_legs_do_not_mix(robot):
     node = robot.start()
     robot.wrench(0.004, leg=1)

@@ -75,7 +75,7 @@ def test_a_walk_goes_on_with_a_fault(case, sound):
         assert abs(change).max() <= 4
         assert trial.dome[-1, others].sum() >= 4
     assert json.loads(trial.to_json())['metrics']['faults'] == metrics.faults
-    assert columns_of(trial)['faults'] == '; '.join(map(told, metrics.faults))
+    assert columns_of(trial)['faults'] == '; '.join(told(metrics.faults))
 
 
 def test_a_foot_whose_position_is_no_number_is_vented_like_on_nodes(monkeypatch):

@@ -249,6 +249,23 @@ def test_what_the_controller_found_is_told_of(tmp_path):
     assert 'Leg 1, from 4.0 s to 9.5 s: does not vent' in text
 
 
+def test_what_comes_and_goes_is_told_of_once(tmp_path):
+    trial = made_up()
+    found = [
+        {'leg': leg, 'start': k, 'end': k + 0.1, 'reason': f'force out of range: z = {k} N'}
+        for k in range(30)
+        for leg in (1, 2)
+    ]
+    found.append({'leg': 2, 'start': 12.0, 'end': None, 'reason': 'leaks'})
+    trial.metrics = dataclasses.replace(trial.metrics, faults=found)
+    report.write(trial, tmp_path / 'r.html')
+    text = page(tmp_path / 'r.html').text
+    for leg in (1, 2):
+        assert f'Leg {leg}, 30 times from 0.0 s to 29.1 s: force out of range' in text
+    assert text.count('out of range') == 2
+    assert 'Leg 2, from 12.0 s to the end: leaks' in text
+
+
 def test_footprints_window_and_omissions(tmp_path):
     report.write(made_up(), tmp_path / 'r.html')
     seen = page(tmp_path / 'r.html')
