@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
 from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,12 @@ from ros_pad.contact.pad import quantity
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
+
+THICK_FILM = 1.0e-3
+"""Film of liquid that does not drain within a stance under a flat sole, m."""
+
+DOMED = 0.85
+"""Share of the ceiling at which domes are taken to be walked on."""
 
 FORCE_LIMITS = ('measured', 'max_depth', 'flattening')
 
@@ -319,3 +326,23 @@ def tangential_resistance(
     except ValueError as error:
         raise InvalidInput('load, pressure and films do not broadcast') from error
     return float(result) if result.ndim == 0 else result
+
+
+class ExpectedFriction(NamedTuple):
+    """Coefficients of friction of a foot, flat on dry and on wet ground, and as a dome."""
+
+    flat_dry: float
+    flat_wet: float
+    dome: float
+
+
+def expected_friction(foot: Foot, load: float) -> ExpectedFriction:
+    """Return what the contact model lets expect of a foot under a load, N, > 0.
+
+    A dome holds about the same on wet and dry ground.
+    """
+    return ExpectedFriction(
+        float(tangential_resistance(foot, load, 0.0)) / load,
+        float(tangential_resistance(foot, load, 0.0, sole_film=THICK_FILM)) / load,
+        float(tangential_resistance(foot, load, DOMED * foot.ceiling)) / load,
+    )

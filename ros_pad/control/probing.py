@@ -19,7 +19,7 @@ import numpy as np
 
 from ros_pad.contact.pad import number
 from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import tangential_resistance
+from ros_pad.contact.resistance import expected_friction
 from ros_pad.control.footprints import Footprints
 
 STAKE_PER_FRICTION = 0.25
@@ -28,9 +28,6 @@ STAKE_PER_FRICTION = 0.25
 Between nothing, where the gait demands less than either shape holds, and half, where one shape
 stands still.
 """
-
-THICK_FILM = 1e-3
-"""Depth of liquid on which a flat sole floats, m."""
 
 LEAST_GAIN = 0.01
 """Gain of flat feet on dry ground, share of a stride, below which it is worth no air."""
@@ -80,9 +77,7 @@ class Stakes:
     @classmethod
     def expected(cls, foot: Foot, load: float) -> Stakes:
         """Return what the contact model of a foot lets expect at a load, N."""
-        flat_dry = float(tangential_resistance(foot, load, 0.0)) / load
-        flat_wet = float(tangential_resistance(foot, load, 0.0, sole_film=THICK_FILM)) / load
-        dome = float(tangential_resistance(foot, load, 0.85 * foot.ceiling)) / load
+        flat_dry, flat_wet, dome = expected_friction(foot, load)
         cost = STAKE_PER_FRICTION * max(0.0, dome - flat_wet)
         return cls(STAKE_PER_FRICTION * (flat_dry - dome), cost, cost / 3.0)
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.contact.pad import number
+from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
-from ros_pad.estimation.friction import THICK_FILM
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.sensing import DEAD

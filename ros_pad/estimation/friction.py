@@ -17,15 +17,12 @@ import numpy as np
 from scipy import special
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import tangential_resistance
+from ros_pad.contact.resistance import expected_friction
 
 GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
 _UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
 _ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
-THICK_FILM = 1.0e-3
-"""Film of liquid that does not drain within a stance under a flat sole, m."""
-
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
 
 DEMAND = 0.3
@@ -63,13 +60,7 @@ class FrictionPrior:
     @classmethod
     def of(cls, foot: Foot, load: float, spread: float = 0.2) -> FrictionPrior:
         """Return the contact model's friction of a foot at a load, N."""
-        pressure = 0.85 * foot.ceiling
-        return cls(
-            flat_dry=float(tangential_resistance(foot, load, 0.0)) / load,
-            flat_wet=float(tangential_resistance(foot, load, 0.0, sole_film=THICK_FILM)) / load,
-            dome=float(tangential_resistance(foot, load, pressure)) / load,
-            spread=spread,
-        )
+        return cls(*expected_friction(foot, load), spread=spread)
 
     def table(self, dome: bool) -> np.ndarray:
         """Probabilities on :data:`GRID` for dry and wet ground, shape (2, grid)."""

@@ -72,7 +72,7 @@ PARAMETERS = (
         'wet_prior', _TUNING.wet_prior,
         'Probability of wet ground where nothing is known.', '', 0.01, 0.99,
     ),
-    Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 1.0, 1000.0),
+    Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 5.0, 1000.0),
 )  # fmt: skip
 
 SILENCE = 0.4

@@ -49,6 +49,7 @@ class Sensors:
         self._moment_generator = np.random.default_rng([seed, 3])
         self._moment_noise = noise.moment
         self._moments: list[list[float]] = []
+        self._last_moments: list[float | None] = [0.0] * legs
         self._scale = np.array([noise.force] * 3 + [noise.position] * 3)
         self._legs = legs
         self._block: list[list[list[float]]] = []
@@ -91,7 +92,16 @@ class Sensors:
             drawn = self._moment_generator.normal(size=(_BLOCK, self._legs)) * self._moment_noise
             self._moments = drawn.tolist()
         row = self._moments.pop()
-        return [foot.moment + error for foot, error in zip(robot.feet, row, strict=True)]
+        moments: list[float | None] = [
+            foot.moment + error for foot, error in zip(robot.feet, row, strict=True)
+        ]
+        for index, faults in self._faults:
+            for fault in faults:
+                if fault.kind in ('force_dead', 'force_frozen') and fault.acts_at(robot.time):
+                    dead = fault.kind == 'force_dead'
+                    moments[index] = 0.0 if dead else self._last_moments[index]
+        self._last_moments = moments
+        return moments
 
 
 def _faulty(reading: Reading, before: Reading, faults: Sequence[Fault], time: float) -> Reading:

@@ -302,7 +302,7 @@ def test_what_a_pull_says_depends_on_the_shape(robot):
 
 def test_every_wrench_changes_the_estimator(robot):
     """Each sample is a state of its own, also between two messages."""
-    node = robot.start(publish_rate=1.0)
+    node = robot.start(publish_rate=5.0)
     estimator = node.legs[1]._estimator
     states = []
     for number in range(1, 11):
