@@ -132,10 +132,9 @@ class SerialRegulator(ABC):
         self._frame: Frame | None = None
         self._error: PadError | None = None  # of the last turn, None when it went well
         self._refusal = ''
-        # For the thread alone.
         self._unsure = False  # a set-point was sent and nobody knows what became of it
         self._retry_at = -math.inf
-        self._pause = FIRST_PAUSE
+        self._pause = FIRST_PAUSE  # for the thread alone
 
     # --- what a backend says on the line -------------------------------------------------------
 
@@ -289,16 +288,18 @@ class SerialRegulator(ABC):
             return False
         self._wanted = setpoint
         self._obeyed = False
+        self._refusal = ''
         self._retry_at = -math.inf
         return True
 
     def _check(self) -> Frame:
-        """Return the last frame if the device is not lost. The lock is held."""
+        """Return the last frame; lose the device if it is too old. The lock is held."""
         if self._bus is None:
             raise self._closed()
         age = math.inf if self._frame is None else time.monotonic() - self._frame.time
         if self._met and self._frame and age <= self._silence:
             return self._frame
+        self._lose()
         if self._error:
             raise _again(self._error)
         raise TransportError(
@@ -330,35 +331,38 @@ class SerialRegulator(ABC):
             self._changed.notify_all()
 
     def _talk(self, ask: Ask) -> None:
-        frame = None if self._met else self._meet(ask)
-        last = frame or self._frame
+        with self._changed:
+            last = self._frame if self._met else None
+        frame = None if last else self._meet(ask)
+        last = last or frame
         assert last is not None
+        refusal = ''
         with self._changed:
             wanted = self._wanted
-        refusal = ''
-        if wanted is not None and time.monotonic() >= self._retry_at:
-            setpoint = self._rounded(wanted, last.resolution)
-            if self._unsure or not self._obeys(last, setpoint):
+            due = wanted is not None and time.monotonic() >= self._retry_at
+            setpoint = self._rounded(wanted or 0.0, last.resolution)
+            due = due and (self._unsure or not self._obeys(last, setpoint))
+            if due:
                 self._unsure = True
-                try:
-                    frame = self._set(ask, setpoint) or self._poll(ask)
-                except DeviceFault as error:
-                    refusal = str(error)
-                self._unsure = False
+                self._retry_at = time.monotonic() + RETRY
+        if due:
+            try:
+                frame = self._set(ask, setpoint) or self._poll(ask)
+            except DeviceFault as error:
+                refusal = str(error)
         frame = frame or self._poll(ask)
         obeyed = wanted is None or self._obeys(frame, self._rounded(wanted, frame.resolution))
         if not obeyed and not refusal:
-            refusal = (
+            refusal = self._refusal or (
                 f'set-point of {wanted:g} Pa is not obeyed: {frame.setpoint:g} Pa is in force:'
                 f' port {self._line.port}, regulator {self._address!r}'
             )
         with self._changed:
             self._frame, self._met, self._error = frame, True, None
+            self._unsure = False
             if wanted == self._wanted:
                 self._obeyed = obeyed
                 self._refusal = '' if obeyed else refusal
-                if not obeyed and self._retry_at < time.monotonic():
-                    self._retry_at = time.monotonic() + RETRY
             self._changed.notify_all()
 
     def _obeys(self, frame: Frame, setpoint: float) -> bool:
@@ -374,12 +378,14 @@ class SerialRegulator(ABC):
     def _fail(self, error: PadError) -> None:
         with self._changed:
             self._error = error
+            self._retry_at = -math.inf
             age = math.inf if self._frame is None else time.monotonic() - self._frame.time
             if age > self._silence:
                 self._lose()
             self._changed.notify_all()
 
     def _lose(self) -> None:
+        """Forget the device and what it was to do, but for a vent. The lock is held."""
         self._met = False
         self._frame = None
         self._obeyed = False

@@ -61,14 +61,18 @@ class Dialogue:
             if self.said == len(self._script):
                 self.problems.append(f'heard {heard!r} after the end of the script')
                 return
-            expected, reply = self._script[self.said]
-            if heard == expected:
-                heard = ''
-                os.write(self._near, reply.encode('latin-1'))
-                self.said += 1
-            elif not expected.startswith(heard):
-                self.problems.append(f'heard {heard!r}, the script has {expected!r}')
-                return
+            while heard and self.said < len(self._script):
+                expected, reply = self._script[self.said]
+                # Only what needs no answer may be followed by more.
+                if heard == expected or (heard.startswith(expected) and not reply):
+                    heard = heard.removeprefix(expected)
+                    os.write(self._near, reply.encode('latin-1'))
+                    self.said += 1
+                elif expected.startswith(heard):
+                    break
+                else:
+                    self.problems.append(f'heard {heard!r}, the script has {expected!r}')
+                    return
 
     @property
     def over(self) -> bool:

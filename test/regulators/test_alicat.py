@@ -164,7 +164,7 @@ def test_bytes_that_nobody_asked_for_are_an_error_and_thrown_away(dialogue):
             GREETING[0],
             ('AVE', 'A   10v20.0-R24\rA +011.11 +022.22\r'),
             *GREETING,  # met anew
-            ('AS0.00', 'A +000.00 +000.00\r'),
+            ('A', 'A +000.00 +000.00\r'),
         ]
     )
     regulator = create('alicat', port=device.path, **SLOW)
