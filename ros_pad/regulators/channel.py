@@ -206,7 +206,13 @@ class SerialRegulator(ABC):
             error = self._error
         if not met:
             self._leave()
-            raise _again(error or TransportError(f'port {self._line.port}: no turn in time'))
+            raise _again(
+                error
+                or TransportError(
+                    f'port {self._line.port}: regulator {self._address!r} did not answer in'
+                    f' {OPEN_PATIENCE:g} s'
+                )
+            )
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Want a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``.

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import select
 import threading
 import time
 import tty
-from collections.abc import Callable
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -260,6 +260,8 @@ class AlicatEmulator:
     ) -> None:
         if not unit_ids or not unit_ids.isalpha() or not unit_ids.isupper():
             raise InvalidInput(f'unit_ids = {unit_ids!r} is not allowed: letters A to Z')
+        if not re.fullmatch(r'\d+v\d+', firmware):
+            raise InvalidInput(f'firmware = {firmware!r} is not allowed: such as 10v20 is needed')
         self._units = units
         self._unit = unit(units)
         self._decimals = decimals
@@ -405,18 +407,21 @@ class SerialTextEmulator:
         time_constant: float = 0.1,
         schedule: Sequence[str] = (),
     ) -> None:
+        if not 1 <= channels <= 99:
+            raise InvalidInput(f'channels = {channels!r} is not allowed: 1 to 99 is needed')
         self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
         self.valves = {str(each + 1): Pneumatics(time_constant) for each in range(channels)}
         self.faults = Faults(self.FAULTS, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
         """Answer one command."""
-        order, channel, *words = [*command.split(), '', ''][: max(2, len(command.split()))]
+        words = command.split()
+        order, channel = [*words, '', ''][:2]
         valve = self.valves.get(channel)
         if valve and order == 'READ':
             return channel, f'{channel} {1.0 + 4.0 * valve.pressure / self._full_scale:.3f}'
         try:
-            volts = float(words[0])
+            volts = float(words[2])
         except (IndexError, ValueError):
             return channel, 'ERROR'
         if not valve or order != 'SET' or self.faults.act('rejection', channel):
@@ -428,7 +433,7 @@ class SerialTextEmulator:
         return channel, f'OK {channel} {volts:.3f}'
 
 
-EMULATORS: dict[str, Callable[..., Device]] = {
+EMULATORS: dict[str, type[AlicatEmulator | SmcItvEmulator | SerialTextEmulator]] = {
     'alicat': AlicatEmulator,
     'smc_itv': SmcItvEmulator,
     'serial_text': SerialTextEmulator,
