@@ -68,7 +68,7 @@ class AlicatRegulator(SerialRegulator):
     ``LSS`` tells of it from 10v05 on, and for all others the echo does.
 
     A vent is the set-point zero; a device that holds its valves (HLD) is told to let go first.
-    The exhaust command is not used: it would have to be cancelled before the next set-point.
+    The exhaust command is not used: no manual at hand says how it is left again.
 
     Source: Alicat's manuals (frame, status, ``S``, ``C``) and reports of firmware (``LS``,
     ``LSS``, ``VE``); see docs/regulators.md.

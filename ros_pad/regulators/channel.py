@@ -128,8 +128,7 @@ class SerialRegulator(ABC):
         self._changed = threading.Condition()
         self._wanted: float | None = None  # None leaves the device as it was found
         self._obeyed = False
-        self._met = False
-        self._frame: Frame | None = None
+        self._frame: Frame | None = None  # None when the device is lost, or not yet met
         self._error: PadError | None = None  # of the last turn, None when it went well
         self._refusal = ''
         self._unsure = False  # a set-point was sent and nobody knows what became of it
@@ -192,7 +191,7 @@ class SerialRegulator(ABC):
             return
         with self._changed:
             self._wanted, self._frame, self._error = None, None, None
-            self._obeyed = self._met = self._unsure = False
+            self._obeyed = self._unsure = False
             self._refusal = ''
             self._retry_at = -math.inf
             self._pause = FIRST_PAUSE
@@ -303,7 +302,7 @@ class SerialRegulator(ABC):
         if self._bus is None:
             raise self._closed()
         age = math.inf if self._frame is None else time.monotonic() - self._frame.time
-        if self._met and self._frame and age <= self._silence:
+        if self._frame and age <= self._silence:
             return self._frame
         self._lose()
         if self._error:
@@ -323,7 +322,8 @@ class SerialRegulator(ABC):
         except Exception as error:  # a thread that dies would take every vent with it
             if not isinstance(error, PadError):
                 error = TransportError(f'port {self._line.port}: {error!r}')
-            self._fail(error)
+            if not self._fail(error):
+                return time.monotonic() + self._poll_period
             pause, self._pause = self._pause, min(2.0 * self._pause, LONGEST_PAUSE)
             return time.monotonic() + pause
         self._pause = FIRST_PAUSE
@@ -338,7 +338,7 @@ class SerialRegulator(ABC):
 
     def _talk(self, ask: Ask) -> None:
         with self._changed:
-            last = self._frame if self._met else None
+            last = self._frame
         frame = None if last else self._meet(ask)
         last = last or frame
         assert last is not None
@@ -364,7 +364,7 @@ class SerialRegulator(ABC):
                 f' port {self._line.port}, regulator {self._address!r}'
             )
         with self._changed:
-            self._frame, self._met, self._error = frame, True, None
+            self._frame, self._error = frame, None
             self._unsure = False
             if wanted == self._wanted:
                 self._obeyed = obeyed
@@ -381,7 +381,8 @@ class SerialRegulator(ABC):
             steps -= 1
         return steps * resolution
 
-    def _fail(self, error: PadError) -> None:
+    def _fail(self, error: PadError) -> bool:
+        """Note what went wrong; return whether the device is lost."""
         with self._changed:
             self._error = error
             self._retry_at = -math.inf
@@ -389,10 +390,10 @@ class SerialRegulator(ABC):
             if age > self._silence:
                 self._lose()
             self._changed.notify_all()
+            return self._frame is None
 
     def _lose(self) -> None:
         """Forget the device and what it was to do, but for a vent. The lock is held."""
-        self._met = False
         self._frame = None
         self._obeyed = False
         self._unsure = True

@@ -286,6 +286,13 @@ def test_status_tokens_are_faults(emulated, opened, until):
         until(lambda: regulator.read().faults == ())
 
 
+def test_a_firmware_that_does_not_say_what_it_is_counts_as_old(dialogue):
+    device = dialogue([GREETING[0], ('AVE', '?\r'), ('A', 'A +000.00 +000.00\r')])
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    regulator.close()
+
+
 @pytest.mark.parametrize('kind', ['analog_source', 'echo', 'rejection'])
 def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(emulated, opened, until, kind):
     device, line = emulated('alicat')
