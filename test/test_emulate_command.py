@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import pytest
 
 from ros_pad import cli
-from ros_pad.errors import PadError
 from ros_pad.regulators import create
 
 LIMIT = 20.0  # s, for slow machines
@@ -44,9 +43,13 @@ def emulate() -> Iterator:
         ('serial_text', ['--channels', '2', '--time-constant', '0.02'], {'channel': 2}),
     ],
 )
-def test_a_backend_talks_to_its_emulator(emulate, name, arguments, options):
-    child, path = emulate(name, *arguments)
-    regulator = create(name, port=path, **options)
+def test_a_backend_talks_to_its_emulator(
+    emulate, tmp_path: pathlib.Path, name, arguments, options
+):
+    link = tmp_path / 'regulator'
+    child, path = emulate(name, '--link', str(link), *arguments)
+    assert path == str(link)
+    regulator = create(name, port=path, silence=5.0, **options)
     regulator.open()
     regulator.set_pressure(50e3)
     end = time.monotonic() + LIMIT
@@ -57,27 +60,7 @@ def test_a_backend_talks_to_its_emulator(emulate, name, arguments, options):
     regulator.close()
     child.send_signal(signal.SIGINT)
     assert child.wait(LIMIT) == 130
-
-
-def test_faults_come_and_go_on_their_schedule(emulate, tmp_path: pathlib.Path):
-    link = tmp_path / 'regulator'
-    _, path = emulate('alicat', '--link', str(link), '--fault', 'unplugged:1.5:2.5')
-    assert path == str(link)
-    regulator = create('alicat', port=path, silence=0.3)
-    regulator.open()
-    seen = []
-    end = time.monotonic() + LIMIT
-    while seen != ['well', 'gone', 'well']:
-        assert time.monotonic() < end, seen
-        try:
-            regulator.read()
-            state = 'well'
-        except PadError:
-            state = 'gone'
-        if seen[-1:] != [state]:
-            seen.append(state)
-        time.sleep(0.005)
-    regulator.close()
+    assert not link.is_symlink()
 
 
 @pytest.mark.parametrize(

@@ -272,7 +272,7 @@ class SerialRegulator(ABC):
             vented, error, refusal = self._obeyed, self._error, self._refusal
         self._leave()
         if not vented:
-            kind = type(error) if error else DeviceFault
+            kind = type(_again(error)) if error else DeviceFault
             why = error or refusal or 'it had no turn in time'
             raise kind(f'closed, and not known to be vented: port {self._line.port}: {why}')
 
@@ -338,9 +338,9 @@ class SerialRegulator(ABC):
 
     def _talk(self, ask: Ask) -> None:
         with self._changed:
-            last = self._frame
-        frame = None if last else self._meet(ask)
-        last = last or frame
+            known = self._frame
+        frame = None if known else self._meet(ask)
+        last = known or frame
         assert last is not None
         refusal = ''
         with self._changed:
@@ -364,6 +364,8 @@ class SerialRegulator(ABC):
                 f' port {self._line.port}, regulator {self._address!r}'
             )
         with self._changed:
+            if self._frame is not known:
+                return  # lost meanwhile: it must be met anew
             self._frame, self._error = frame, None
             self._unsure = False
             if wanted == self._wanted:

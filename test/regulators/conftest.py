@@ -23,6 +23,7 @@ from ros_pad.regulators.emulate import EMULATORS
 from ros_pad.regulators.emulate import Emulator
 
 LIMIT = 20.0  # s, for slow machines: no test that passes takes so long
+PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # so that a slow machine is no lost device
 
 
 def wait_until(condition: Callable[[], Any], limit: float = LIMIT) -> Any:
@@ -132,7 +133,7 @@ def opened() -> Iterator[Callable[..., Regulator]]:
     made: list[Regulator] = []
 
     def make(backend: str, **options: Any) -> Regulator:
-        regulator = create(backend, **options)
+        regulator = create(backend, **(PATIENT | options))
         made.append(regulator)
         regulator.open()
         return regulator

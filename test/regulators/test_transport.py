@@ -14,7 +14,7 @@ from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
 from ros_pad.regulators import create
 
-QUICK = {'reply_timeout': 0.05, 'silence': 0.3}
+QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
 
 
 def raised(call):
@@ -231,7 +231,7 @@ def test_closing_vents_and_says_when_it_could_not(emulated, until):
     assert not threads()
     device.faults.clear()
     device.faults.add('silence')
-    with pytest.raises(TransportError, match=r'no reply in 0\.05 s'):
+    with pytest.raises(TransportError, match=r'no reply in 0\.1 s'):
         regulator.open()
     assert not threads()
 
