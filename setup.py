@@ -44,6 +44,7 @@ setup(
         'tqdm>=4.66',
         'mcap>=1.5',
         'mcap-ros2-support>=0.6',
+        'pyserial>=3.5',
     ],
     extras_require={
         # ROS 2 Jazzy as wheels; leave this extra out where Jazzy is installed from apt.

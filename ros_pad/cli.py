@@ -16,6 +16,7 @@ from ros_pad.commands import calibrate
 from ros_pad.commands import chart
 from ros_pad.commands import contact
 from ros_pad.commands import design
+from ros_pad.commands import emulate
 from ros_pad.commands import report
 from ros_pad.commands import run
 from ros_pad.commands import scenes
@@ -37,6 +38,7 @@ COMMANDS = (
     calibrate,
     design,
     chart,
+    emulate,
 )
 
 

@@ -42,6 +42,7 @@ EXTRAS = {'mujoco': 'mujoco', 'numba': 'fast', 'distributed': 'sweep', 'pyarrow'
 FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'errors': set(),
     'simulation': NUMERICS | {'mujoco', 'numba'},
+    'regulators': NUMERICS | {'serial'},
     'trials': NUMERICS | FILES | {'distributed', 'pyarrow'},
     'ladders': NUMERICS | FILES | {'mpmath', 'mujoco'},
     'figures': NUMERICS | FILES,
@@ -151,7 +152,7 @@ ROSDEP_KEY = {
     'mcap_ros2': 'mcap-ros2-support',
     'mpmath': 'python3-sympy',
 }
-PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
+PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support', 'serial': 'pyserial'}
 
 
 def test_what_is_imported_is_declared():

@@ -11,13 +11,21 @@ from typing import Any
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.regulators.alicat import AlicatRegulator
 from ros_pad.regulators.protocol import Reading
 from ros_pad.regulators.protocol import Regulator
+from ros_pad.regulators.serial_text import SerialTextRegulator
 from ros_pad.regulators.simulated import SimulatedRegulator
+from ros_pad.regulators.smc_itv import SmcItvRegulator
 
 __all__ = ['BACKENDS', 'Reading', 'Regulator', 'SimulatedRegulator', 'create']
 
-BACKENDS: dict[str, Callable[..., Regulator]] = {'simulated': SimulatedRegulator}
+BACKENDS: dict[str, Callable[..., Regulator]] = {
+    'simulated': SimulatedRegulator,
+    'alicat': AlicatRegulator,
+    'smc_itv': SmcItvRegulator,
+    'serial_text': SerialTextRegulator,
+}
 """What ``create`` can make: a class or function for each name, its arguments the options."""
 
 

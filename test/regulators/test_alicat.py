@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: Apache-2.0
+import re
+
+import pytest
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import DeviceFault
+from ros_pad.errors import LimitError
+from ros_pad.errors import ProtocolError
+from ros_pad.errors import TransportError
+from ros_pad.regulators import Regulator
+from ros_pad.regulators import create
+from ros_pad.regulators.alicat import STATUS
+
+# One poll after each command and no more, so that a script can foresee every word.
+SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
+GREETING = [
+    ('A', 'A +000.00 +000.00\r'),
+    ('AVE', 'A   10v20.0-R24 Jan  2 2024,10:20:30\r'),
+    ('ALS', 'A +000.00 +000.00 10 kPaG\r'),
+    ('ALSS', 'A S\r'),
+]
+
+
+def fault_of(regulator):
+    return next(iter(regulator.read().faults), None)
+
+
+# --- scripted dialogues ------------------------------------------------------------------------
+
+
+def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
+    device = dialogue(
+        [
+            *GREETING,
+            ('AS75.00', 'A +000.00 +075.00\r'),
+            ('AS12.35', 'A +074.31 +012.35\r'),
+            ('AS0.00', 'A +012.34 +000.00\r'),
+        ]
+    )
+    regulator = create('alicat', port=device.path, **SLOW)
+    assert isinstance(regulator, Regulator)
+    regulator.open()
+    reading = regulator.read()
+    assert (reading.pressure, reading.setpoint, reading.faults) == (0.0, 0.0, ())
+    regulator.set_pressure(75e3)
+    until(lambda: regulator.read().setpoint == 75e3)
+    regulator.set_pressure(75e3)  # nothing new: not a word of it
+    regulator.set_pressure(12_345.6)
+    reading = until(lambda: (found := regulator.read()).setpoint < 75e3 and found)
+    assert reading.pressure == pytest.approx(74_310.0)
+    assert reading.setpoint == pytest.approx(12_350.0)
+    assert reading.faults == ()
+    regulator.close()
+    assert device.said == 7
+
+
+@pytest.mark.parametrize(
+    ('units', 'frame', 'setpoint', 'command', 'in_force'),
+    [
+        ('psi', 'A +00.000 +00.000', 75e3, 'AS10.878', 10.878 * 6894.757293168361),
+        ('kPa', 'A +000 +000', 74_600.0, 'AS75', 75e3),
+        ('kPa', 'A +000 +000', 89_700.0, 'AS89', 89e3),  # 90 would be above the ceiling
+        ('bar', 'A +0.0000 +0.0000', 75e3, 'AS0.7500', 75e3),
+        ('Pa', 'A +000000 +000000', 75e3, 'AS75000', 75e3),
+    ],
+)
+def test_setpoints_have_the_decimals_of_the_frame(
+    dialogue, until, units, frame, setpoint, command, in_force
+):
+    def told(value):
+        return f'{frame.rsplit(" ", 1)[0]} {value}\r'
+
+    device = dialogue(
+        [
+            ('A', frame + '\r'),
+            ('AVE', 'A 8v17.0-R23 Oct 20 2017,16:35:38\r'),  # knows neither LS nor LSS
+            (command, told(command[2:])),
+            ('AS' + format(0.0, f'.{len(command.partition(".")[2])}f'), frame + '\r'),
+        ]
+    )
+    ceiling = 89_800.0
+    regulator = create('alicat', port=device.path, units=units, ceiling=ceiling, **SLOW)
+    regulator.open()
+    regulator.set_pressure(setpoint)
+    until(lambda: regulator.read().setpoint > 0.0)
+    assert regulator.read().setpoint == pytest.approx(in_force)
+    assert regulator.read().setpoint <= ceiling
+    regulator.close()
+
+
+def test_valves_that_are_held_are_let_go_to_vent(dialogue, until):
+    device = dialogue(
+        [
+            ('A', 'A +050.00 +000.00 HLD\r'),
+            *GREETING[1:],
+            ('AC', 'A +050.00 +000.00\r'),
+            ('AS0.00', 'A +049.00 +000.00\r'),
+        ]
+    )
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    assert regulator.read().faults == (STATUS['HLD'],)
+    regulator.vent()
+    until(lambda: regulator.read().faults == ())
+    regulator.close()
+
+
+def test_a_rejection_is_a_fault_and_the_old_setpoint_stays(dialogue, until):
+    device = dialogue(
+        [*GREETING, ('AS75.00', '?\r'), ('A', 'A +000.00 +000.00\r'), ('A', 'A +000.00 +000.00\r')]
+    )
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    regulator.set_pressure(75e3)
+    fault = until(lambda: fault_of(regulator))
+    for part in ('rejected', device.path, "'AS75.00'", "'?'"):
+        assert part in fault
+    assert regulator.read().setpoint == 0.0
+    regulator.close()
+
+
+@pytest.mark.parametrize(
+    ('reply', 'words'),
+    [
+        ('B +000.00 +000.00', 'not a reply of unit A'),
+        ('', 'not a reply of unit A'),
+        ('?', 'not a reply of unit A'),
+        ('A +000.00', '1 numbers'),
+        ('A +000.00 +000.00 +023.40', '3 numbers'),
+        ('A +000.00 +000.00 WHAT', 'not a frame'),
+        ('A +000.00 HLD +000.00', 'not a frame'),
+        ('A +0e3.00 +nan', 'not a frame'),
+    ],
+)
+def test_what_is_no_frame_is_refused_with_port_command_and_reply(reply, words):
+    regulator = create('alicat', port='/dev/somewhere')
+    with pytest.raises(ProtocolError, match=re.escape(words)) as caught:
+        regulator._poll(lambda command: reply)
+    assert f"port /dev/somewhere, command 'A', reply {reply!r}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('reply', 'kind', 'words'),
+    [
+        ('', TransportError, 'no reply in 0.05 s'),
+        ('A +000.0', TransportError, 'half a line in 0.05 s'),
+        ('\xfe\x91\x00+0.00\r', ProtocolError, 'garbage'),
+        ('x' * 300, ProtocolError, 'a reply without an end'),
+    ],
+)
+def test_a_line_that_is_none_is_an_error_with_port_command_and_reply(mute, reply, kind, words):
+    device = mute([('A', reply)] * 100)
+    with pytest.raises(kind, match=words) as caught:
+        create('alicat', port=device.path, reply_timeout=0.05).open()
+    assert type(caught.value) is kind
+    assert f"port {device.path}, command 'A', reply b'{reply[:1]}"[:-1] in str(caught.value)
+    device.close()
+
+
+def test_bytes_that_nobody_asked_for_are_an_error_and_thrown_away(dialogue):
+    device = dialogue(
+        [
+            GREETING[0],
+            ('AVE', 'A   10v20.0-R24\rA +011.11 +022.22\r'),
+            *GREETING,  # met anew
+            ('A', 'A +000.00 +000.00\r'),
+        ]
+    )
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    assert regulator.read().pressure == 0.0
+    regulator.close()
+
+
+# --- the scripts themselves: they must notice what they are for --------------------------------
+
+
+def test_a_script_notices_replies_that_are_left_unread(mute):
+    device = mute([*GREETING, ('A', 'A +000.00 +000.00\rmore')])
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    regulator.close()
+    device.close()
+    assert device.problems == ['4 bytes of replies were left unread']
+
+
+def test_a_script_notices_another_word_and_a_missing_one(mute):
+    device = mute([*GREETING, ('A', 'A +000.00 +000.00\r'), ('AS1.00', '?\r')])
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    regulator.close()
+    device.close()
+    assert device.problems == ["never heard 'AS1.00\\r'"]
+    device = mute([('A', 'A +000.00 +000.00\r'), ('AWRONG', '?\r')])
+    with pytest.raises(TransportError):
+        create('alicat', port=device.path, **SLOW).open()
+    device.close()
+    assert "heard 'AVE\\r', the script has 'AWRONG\\r'" in device.problems
+
+
+# --- settings of the device --------------------------------------------------------------------
+
+
+def test_an_analog_source_is_found_when_the_device_is_met(emulated, opened):
+    device, line = emulated('alicat')
+    device.faults.add('analog_source')
+    with pytest.raises(DeviceFault, match=r"source is analogue.*'ALSS', reply 'A A'"):
+        opened('alicat', port=line.path)
+
+
+def test_units_of_the_device_must_be_those_of_the_option(emulated, opened):
+    device, line = emulated('alicat')
+    device.faults.add('wrong_unit')
+    with pytest.raises(ConfigError, match=r"units = 'kPa' is not allowed: .* set to PSIG.*'ALS'"):
+        opened('alicat', port=line.path)
+
+
+def test_an_old_firmware_is_not_asked_what_it_takes_for_a_lock(emulated, opened, until):
+    device, line = emulated('alicat', firmware='7v09')
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(50e3)
+    until(lambda: regulator.read().setpoint == 50e3)
+    assert not device._locked
+    assert not [each for each in line.commands if each.startswith('AL')]
+
+
+def test_nothing_is_ever_saved(emulated, opened, until):
+    _, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    for pressure in (10e3, 20e3, 0.0, 30e3):
+        regulator.set_pressure(pressure)
+        until(lambda pressure=pressure: regulator.read().setpoint == pressure)
+    regulator.vent()
+    until(lambda: regulator.read().setpoint == 0.0)
+    words = {each.rstrip('0123456789.') for each in line.commands}
+    assert words == {'A', 'AVE', 'ALS', 'ALSS', 'AS'}
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'allowed'),
+    [
+        ('unit_id', 'a', 'A to Z'),
+        ('unit_id', 'AB', 'A to Z'),
+        ('unit_id', 1, 'A to Z'),
+        ('units', 'torr', 'one of Pa, hPa, kPa'),
+        ('baudrate', 19.2, '300 to 4000000'),
+        ('baudrate', 0, '300 to 4000000'),
+        ('ceiling', 0.5, '1 to 1e+07 Pa'),
+        ('reply_timeout', 0.0, '0.005 to 5 s'),
+        ('poll_period', -1.5, '0 to 1 s'),
+        ('silence', float('nan'), '0.05 to 10 s'),
+        ('port', '', 'the name of a serial port'),
+    ],
+)
+def test_bad_options_name_value_and_range(name, value, allowed):
+    with pytest.raises(ConfigError) as caught:
+        create('alicat', **{'port': 'somewhere', name: value})
+    for part in ('alicat', name, str(value), allowed):
+        assert part in str(caught.value)
+
+
+# --- against the emulator ----------------------------------------------------------------------
+
+
+def test_pressure_follows_and_vents(emulated, opened, until):
+    _, line = emulated('alicat', time_constant=0.02)
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(75e3)
+    until(lambda: abs(regulator.read().pressure - 75e3) < 100.0)
+    with pytest.raises(LimitError):
+        regulator.set_pressure(90_001.0)
+    assert regulator.read().setpoint == 75e3
+    regulator.vent()
+    until(lambda: regulator.read().pressure < 100.0)
+
+
+def test_status_tokens_are_faults(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    for token, words in STATUS.items():
+        device.faults.add(f'status={token}')
+        expected = () if token == 'LCK' else (words,)
+        until(lambda expected=expected: regulator.read().faults == expected)
+        device.faults.clear()
+        until(lambda: regulator.read().faults == ())
+
+
+def test_a_firmware_that_does_not_say_what_it_is_counts_as_old(dialogue):
+    device = dialogue([GREETING[0], ('AVE', '?\r'), ('A', 'A +000.00 +000.00\r')])
+    regulator = create('alicat', port=device.path, **SLOW)
+    regulator.open()
+    regulator.close()
+
+
+@pytest.mark.parametrize('kind', ['analog_source', 'echo', 'rejection'])
+def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(emulated, opened, until, kind):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    device.faults.add(kind)
+    regulator.set_pressure(60e3)
+    fault = until(lambda: fault_of(regulator))
+    assert line.path in fault
+    assert ('rejected' if kind == 'rejection' else 'set-point of 60000 Pa is not obeyed') in fault
+    assert regulator.read().setpoint == (30e3 if kind == 'echo' else 0.0)
+    device.faults.clear()
+    until(lambda: regulator.read().setpoint == 60e3)
+    assert regulator.read().faults == ()
+
+
+def test_a_vent_is_repeated_until_it_is_obeyed(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    device.faults.add('rejection')
+    regulator.vent()
+    until(lambda: line.commands.count('AS0.00') > 2)
+    assert 'rejected' in fault_of(regulator)
+    device.faults.clear()
+    until(lambda: regulator.read().setpoint == 0.0)
+
+
+def test_a_device_that_forgets_its_setpoint_is_told_again(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    device.valves['A'].setpoint = 20e3  # somebody turned the knob
+    until(lambda: line.commands.count('AS60.00') == 2)
+    until(lambda: regulator.read().setpoint == 60e3)
+
+
+def test_valves_held_by_hand_are_let_go(emulated, opened, until):
+    device, line = emulated('alicat', time_constant=0.02)
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().pressure > 59e3)
+    device.valves['A'].held = True
+    until(lambda: regulator.read().faults == (STATUS['HLD'],))
+    regulator.vent()
+    until(lambda: regulator.read().pressure < 1e3)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+import os
+import time
+
+import pytest
+
+from ros_pad.errors import InvalidInput
+from ros_pad.regulators import BACKENDS
+from ros_pad.regulators.emulate import EMULATORS
+from ros_pad.regulators.emulate import AlicatEmulator
+from ros_pad.regulators.emulate import Faults
+from ros_pad.regulators.emulate import Pneumatics
+from ros_pad.regulators.emulate import SerialTextEmulator
+from ros_pad.regulators.emulate import SmcItvEmulator
+
+
+def test_every_serial_backend_has_an_emulator():
+    assert set(EMULATORS) == set(BACKENDS) - {'simulated'}
+
+
+def test_pressure_follows_with_one_time_constant(monkeypatch):
+    now = 100.0
+    monkeypatch.setattr(time, 'monotonic', lambda: now)
+    valve = Pneumatics(time_constant=0.1)
+    valve.setpoint = 50e3
+    now += 0.1
+    assert valve.pressure == pytest.approx(50e3 * 0.6321206)
+    valve.setpoint = 0.0
+    now += 0.1
+    assert valve.pressure == pytest.approx(50e3 * 0.6321206 * 0.3678794)
+    valve.held = True
+    before = valve.pressure
+    now += 1.0
+    assert valve.pressure == before
+
+
+def test_faults_act_when_and_where_they_are_told(monkeypatch):
+    clock = iter([100.0, *[100.5] * 3, *[101.5] * 3, *[102.5] * 3, *[103.5] * 3, 104.0])
+    monkeypatch.setattr(time, 'monotonic', lambda: next(clock))
+    faults = Faults(('silence', 'echo'), ['silence@B:1:2', 'echo:3'])
+    seen = []
+    for _ in range(4):
+        seen.append((faults.act('silence', 'A'), faults.act('silence', 'B'), faults.act('echo')))
+    assert seen == [(0, 0, 0), (0, 1, 0), (0, 0, 0), (0, 0, 1)]
+    faults.clear()
+    assert not faults.act('echo')
+
+
+@pytest.mark.parametrize(
+    'text', ['fire', 'echo:2:1', 'echo:-1', 'echo:x', 'echo:1:2:3', 'echo:nan']
+)
+def test_faults_that_are_none_are_refused(text):
+    with pytest.raises(InvalidInput, match='is not allowed'):
+        Faults(('silence', 'echo'), [text])
+
+
+def test_a_port_comes_and_goes_on_its_schedule(emulated, until, tmp_path):
+    link = tmp_path / 'regulator'
+    emulated('alicat', link=str(link), schedule=['unplugged:0.3:0.6'])
+    assert os.path.exists(link)
+    until(lambda: not os.path.lexists(link))
+    until(lambda: os.path.exists(link))
+
+
+def test_words_of_an_alicat():
+    device = AlicatEmulator('AB', time_constant=1e-6)
+
+    def said(command):
+        return device.answer(command)
+
+    assert said('C') is None  # no such unit
+    assert said('a') == ('A', 'A +000.00 +000.00')
+    assert said('AS75.00')[1].endswith(' +075.00')
+    assert said('ASx')[1] == said('AS-1')[1] == said('AS1000')[1] == said('AWHAT')[1] == '?'
+    assert said('AHP')[1].endswith(' HLD')
+    assert not said('AC')[1].endswith(' HLD')
+    assert said('BLSS')[1] == 'B S'
+    assert AlicatEmulator(firmware='7v09').answer('ALSS')[1].endswith(' LCK')
+
+
+def test_words_of_an_itv():
+    device = SmcItvEmulator(time_constant=1e-6)
+    words = ['SET 1000', 'INC', 'DEC', 'REQ', 'SET 2000', 'set 1', 'SET', 'SET -1', '']
+    assert [device.answer(each)[1] for each in words] == [
+        *('1000', '1001', '1000', '1000', '1023'),
+        *['UNKNOWN COMMAND'] * 4,
+    ]
+
+
+def test_words_of_a_board():
+    device = SerialTextEmulator(channels=1)
+    words = ['SET 1 2.5', 'READ 1', 'SET 1', 'SET 2 1.0', 'SET 1 x', '', 'WHAT 1 1']
+    said = [device.answer(each)[1] for each in words]
+    assert said[0] == 'OK 1 2.500'
+    assert said[1].startswith('1 1.')
+    assert said[2:] == ['ERROR'] * 5

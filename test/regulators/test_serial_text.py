@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import pytest
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import ProtocolError
+from ros_pad.regulators import Regulator
+from ros_pad.regulators import create
+
+SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
+
+
+def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
+    device = dialogue(
+        [
+            ('READ 3', '3 1.040\n'),
+            *[('SET 3 3.750', 'OK 3 3.750\n'), ('READ 3', '3 3.96\n')],
+            *[('SET 3 0.000', 'OK 3 0\n'), ('READ 3', '3 3.9\n')],
+        ],
+        '\n',
+    )
+    regulator = create('serial_text', port=device.path, channel=3, **SLOW)
+    assert isinstance(regulator, Regulator)
+    regulator.open()
+    assert regulator.read().pressure == pytest.approx(1e3)
+    assert math.isnan(regulator.read().setpoint)  # nobody can ask the board
+    regulator.set_pressure(75e3)
+    until(lambda: regulator.read().setpoint == 75e3)
+    assert regulator.read().pressure == pytest.approx(74e3)
+    assert regulator.read().faults == ()
+    regulator.close()
+
+
+def test_a_board_with_other_words_counts_and_no_answer(dialogue, until):
+    # 12 bit; the command falls with the pressure; nothing is said to a command.
+    device = dialogue(
+        [
+            ('p2?', 'p2=+204.8\r\n'),
+            *[('p2!1024', ''), ('p2?', 'p2=819.2\r\n')],
+            *[('p2!4095', ''), ('p2?', 'p2=8e2\r\n')],
+        ],
+        '\r\n',
+    )
+    regulator = create(
+        'serial_text',
+        port=device.path,
+        channel=2,
+        set_template='p{channel}!{value:d}',
+        set_reply='',
+        read_template='p{channel}?',
+        read_reply='p{channel}={value}',
+        terminator='\r\n',
+        command_zero=4095.0,
+        command_full=0.0,
+        monitor_zero=204.8,
+        monitor_full=1024.0,
+        full_scale=200e3,
+        ceiling=180e3,
+        **SLOW,
+    )
+    regulator.open()
+    assert regulator.read().pressure == pytest.approx(0.0)
+    regulator.set_pressure(150e3)
+    until(lambda: regulator.read().setpoint > 0.0)
+    assert regulator.read().setpoint == pytest.approx(3071 / 4095 * 200e3)
+    assert regulator.read().pressure == pytest.approx(150e3)
+    regulator.close()
+
+
+@pytest.mark.parametrize('reply', ['', '2 1.0', '1 x', '1 1.0 V', '1 nan', 'ERROR'])
+def test_what_is_no_reading_is_refused_with_port_command_and_reply(reply):
+    regulator = create('serial_text', port='/dev/somewhere')
+    with pytest.raises(ProtocolError, match='not a reply as read_reply has it') as caught:
+        regulator._poll(lambda command: reply)
+    assert f"port /dev/somewhere, command 'READ 1', reply {reply!r}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'words'),
+    [('rejection', "reply 'ERROR'"), ('echo', '3.000 was sent, 1.5 is in force')],
+)
+def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
+    emulated, opened, until, kind, words
+):
+    device, line = emulated('serial_text')
+    regulator = opened('serial_text', port=line.path)
+    device.faults.add(kind)
+    regulator.set_pressure(60e3)
+    fault = until(lambda: next(iter(regulator.read().faults), None))
+    assert words in fault
+    assert line.path in fault
+    assert math.isnan(regulator.read().setpoint)
+    device.faults.clear()
+    until(lambda: regulator.read().setpoint == 60e3)
+    assert regulator.read().faults == ()
+
+
+def test_six_channels_share_a_port(emulated, opened, until):
+    _, line = emulated('serial_text', time_constant=0.02)
+    feet = [opened('serial_text', port=line.path, channel=each + 1) for each in range(6)]
+    for number, foot in enumerate(feet):
+        foot.set_pressure(10e3 * (number + 1))
+    for number, foot in enumerate(feet):
+        wanted = 10e3 * (number + 1)
+        until(lambda foot=foot, wanted=wanted: abs(foot.read().pressure - wanted) < 100.0)
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        ({'set_template': 'SET {channel}'}, '1 {value} is needed'),
+        ({'set_template': 'SET {value:.3f} {value:.3f}'}, '1 {value} is needed'),
+        ({'set_template': 'SET {value:x}'}, '1 {value} is needed'),
+        ({'set_template': 'SET {value'}, '1 {value} is needed'),
+        ({'set_template': 'SET {value}'}, 'how many decimals'),
+        ({'set_template': 7}, 'ASCII text'),
+        ({'set_reply': '{value} {value}'}, '0 or 1 {value} is needed'),
+        ({'read_template': 'READ {value}'}, '0 {value} is needed'),
+        ({'read_reply': 'nothing'}, '1 {value} is needed'),
+        ({'set_template': 'SET {value:d}'}, 'its step is 20000 Pa, too coarse'),
+        ({'command_zero': 0.0001}, 'has 3 decimals, and a vent must be exact'),
+        ({'command_zero': 5.0}, 'another value than command_zero'),
+        ({'monitor_full': 1.0}, 'another value than monitor_zero'),
+        ({'monitor_full': math.nan}, 'monitor_full = nan'),
+        ({'terminator': ''}, '1 to 4 ASCII'),
+        ({'channel': 100}, '0 to 99'),
+        ({'full_scale': 50e3}, 'from 1 to 50000 Pa'),
+    ],
+)
+def test_bad_options_say_what_is_needed(options, words):
+    with pytest.raises(ConfigError) as caught:
+        create('serial_text', port='somewhere', **options)
+    assert words in str(caught.value)

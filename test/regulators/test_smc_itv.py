@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+import pytest
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import DeviceFault
+from ros_pad.errors import ProtocolError
+from ros_pad.regulators import Regulator
+from ros_pad.regulators import create
+
+SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
+COUNT = 100e3 / 1023
+
+
+def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
+    device = dialogue(
+        [
+            *[('REQ', '0\r\n'), ('MON', '3\r\n')],
+            *[('SET 767', '767\r\n'), ('REQ', '767\r\n'), ('MON', '700\r\n')],
+            *[('SET 0', '0\r\n'), ('REQ', '0\r\n'), ('MON', '650\r\n')],
+        ],
+        '\r\n',
+    )
+    regulator = create('smc_itv', port=device.path, full_scale=100e3, **SLOW)
+    assert isinstance(regulator, Regulator)
+    regulator.open()
+    assert regulator.read().pressure == pytest.approx(3 * COUNT)
+    regulator.set_pressure(75e3)
+    until(lambda: regulator.read().setpoint > 0.0)
+    assert regulator.read().setpoint == pytest.approx(767 * COUNT)
+    assert regulator.read().pressure == pytest.approx(700 * COUNT)
+    assert regulator.read().faults == ()
+    regulator.close()
+
+
+def test_a_setpoint_at_the_ceiling_is_rounded_down(dialogue, until):
+    device = dialogue(
+        [
+            *[('REQ', '0\r\n'), ('MON', '0\r\n')],
+            *[('SET 613', '613\r\n'), ('REQ', '613\r\n'), ('MON', '0\r\n')],  # of 613.8
+            *[('SET 0', '0\r\n'), ('REQ', '0\r\n'), ('MON', '0\r\n')],
+        ],
+        '\r\n',
+    )
+    regulator = create('smc_itv', port=device.path, full_scale=100e3, ceiling=60e3, **SLOW)
+    regulator.open()
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint > 0.0)
+    assert regulator.read().faults == ()
+    regulator.close()
+
+
+@pytest.mark.parametrize('reply', ['', '-1', '1024', '5.0', 'OK', '²'])
+def test_what_is_no_count_is_refused_with_port_command_and_reply(reply):
+    regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
+    with pytest.raises(ProtocolError, match='not a number from 0 to 1023') as caught:
+        regulator._poll(lambda command: reply)
+    assert f"port /dev/somewhere, command 'REQ', reply {reply!r}" in str(caught.value)
+
+
+def test_a_rejection_is_a_fault_of_the_device():
+    regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
+    with pytest.raises(DeviceFault, match=r"rejected: .* 'SET 512', reply 'UNKNOWN COMMAND'"):
+        regulator._set(lambda command: 'UNKNOWN COMMAND', 50e3)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'words'),
+    [
+        ('rejection', 'rejected'),
+        ('echo', '614 was sent, 307 is in force'),
+        ('analog_source', 'is not obeyed: 0 Pa is in force'),
+    ],
+)
+def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
+    emulated, opened, until, kind, words
+):
+    device, line = emulated('smc_itv')
+    regulator = opened('smc_itv', port=line.path, full_scale=100e3)
+    device.faults.add(kind)
+    regulator.set_pressure(60e3)
+    fault = until(lambda: next(iter(regulator.read().faults), None))
+    assert words in fault
+    assert line.path in fault
+    device.faults.clear()
+    until(lambda: abs(regulator.read().setpoint - 60e3) < COUNT)
+    assert regulator.read().faults == ()
+
+
+def test_bad_options_name_value_and_range():
+    with pytest.raises(ConfigError, match="needs the option 'full_scale'"):
+        create('smc_itv', port='somewhere')
+    with pytest.raises(ConfigError, match=r'ceiling = 90000 Pa .* from 1 to 50000 Pa'):
+        create('smc_itv', port='somewhere', full_scale=50e3)
+    with pytest.raises(ConfigError, match=r'full_scale = 100 Pa .* from 1000 to 1e\+07 Pa'):
+        create('smc_itv', port='somewhere', full_scale=100.0)

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One port, its thread, and the regulators on it: who waits for whom, and what is lost when."""
+
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import PadError
+from ros_pad.errors import ProtocolError
+from ros_pad.errors import TransportError
+from ros_pad.regulators import create
+
+QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
+
+
+def raised(call):
+    """Return the error that a call raises, or None."""
+    try:
+        call()
+    except PadError as error:
+        return error
+    return None
+
+
+def threads():
+    return [each for each in threading.enumerate() if each.name.startswith('serial port')]
+
+
+def test_regulators_on_one_bus_share_port_and_thread(emulated, opened, until):
+    _, line = emulated('alicat', unit_ids='ABCDEF', time_constant=0.02)
+    feet = [opened('alicat', port=line.path, unit_id=each) for each in 'ABCDEF']
+    assert len(threads()) == 1
+    for number, foot in enumerate(feet):
+        foot.set_pressure(10e3 * (number + 1))
+    for number, foot in enumerate(feet):
+        wanted = 10e3 * (number + 1)
+        until(lambda foot=foot, wanted=wanted: abs(foot.read().pressure - wanted) < 100.0)
+    feet[0].close()
+    feet[1].vent()
+    until(lambda: feet[1].read().setpoint == 0.0)
+    for foot in feet:
+        foot.close()
+        foot.close()  # may be repeated
+    assert not threads()
+
+
+def test_one_command_is_in_flight_at_a_time(mute, until):
+    device = mute([('A', '')])
+    calls = [
+        threading.Thread(
+            target=raised,
+            args=[create('alicat', port=device.path, unit_id=each, reply_timeout=2.0).open],
+        )
+        for each in 'AB'
+    ]
+    calls[0].start()
+    until(lambda: device.said)
+    calls[1].start()
+    time.sleep(0.3)  # B has joined, and A has 1.7 s left to answer
+    for each in calls:
+        each.join()
+    device.close()
+    assert not device.problems  # the device never heard of B
+
+
+def test_a_port_has_one_line_setting_and_each_address_once(emulated, opened):
+    _, line = emulated('alicat', unit_ids='AB')
+    opened('alicat', port=line.path)
+    with pytest.raises(ConfigError, match=r'open with .*19200.*38400.* not allowed beside it'):
+        opened('alicat', port=line.path, unit_id='B', baudrate=38400)
+    with pytest.raises(ConfigError, match="has a device 'A' already"):
+        opened('alicat', port=line.path)
+    opened('alicat', port=line.path, unit_id='B').read()
+
+
+def test_nothing_waits_for_the_line(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, reply_timeout=1.0, silence=10.0)
+    regulator.set_pressure(10e3)
+    until(lambda: regulator.read().setpoint == 10e3)
+    device.faults.add('silence')
+    heard = len(line.commands)
+    until(lambda: len(line.commands) > heard)  # the thread waits 1 s for an answer now
+    started = time.monotonic()
+    for _ in range(100):
+        regulator.read()
+        regulator.set_pressure(20e3)
+    regulator.vent()
+    assert time.monotonic() - started < 0.5
+    device.faults.clear()
+
+
+def test_the_latest_setpoint_wins_and_none_is_queued(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, reply_timeout=0.3, silence=10.0)
+    device.faults.add('silence')
+    heard = len(line.commands)
+    until(lambda: len(line.commands) > heard)
+    for pressure in range(1000, 80_000, 1000):
+        regulator.set_pressure(float(pressure))
+    device.faults.clear()
+    until(lambda: regulator.read().setpoint == 79e3)
+    assert {each for each in line.commands if each.startswith('AS')} == {'AS79.00'}
+
+
+def test_a_vent_goes_before_all_else(emulated, opened, until):
+    device, line = emulated('alicat', unit_ids='ABCDEF')
+    feet = {
+        each: opened('alicat', port=line.path, unit_id=each, reply_timeout=0.2, silence=10.0)
+        for each in 'ABCDEF'
+    }
+    for foot in feet.values():
+        foot.set_pressure(50e3)
+    for foot in feet.values():
+        until(lambda foot=foot: foot.read().setpoint == 50e3)
+    device.faults.add('silence@A')
+    heard = len(line.commands)
+    until(lambda: 'A' in line.commands[heard:])
+    # While the thread waits for A, five commands come in; the vent is the last of them.
+    for each in 'BCDE':
+        feet[each].set_pressure(60e3)
+    feet['F'].vent()
+    until(lambda: 'FS0.00' in line.commands)
+    told = [each for each in line.commands if each in ('BS60.00', 'ES60.00', 'FS0.00')]
+    assert told[0] == 'FS0.00'
+    device.faults.clear()
+
+
+@pytest.mark.parametrize('kind', ['silence', 'half_line', 'garbage', 'wrong_id'])
+def test_a_device_that_is_lost_is_vented_when_it_is_back(emulated, opened, until, kind):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, **QUICK)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    device.faults.add(kind)
+    error = until(lambda: raised(regulator.read))
+    assert isinstance(error, (TransportError, ProtocolError))
+    for part in (line.path, 'command', 'reply'):
+        assert part in str(error)
+    # Nobody knows what the device would make of it: it is refused, not kept for later.
+    assert raised(lambda: regulator.set_pressure(70e3))
+    assert raised(regulator.vent)
+    device.faults.clear()
+    until(lambda: raised(regulator.read) is None)
+    until(lambda: regulator.read().setpoint == 0.0)
+    assert line.commands.count('ALSS') > 1  # met anew: it may be another one
+    regulator.set_pressure(30e3)
+    until(lambda: regulator.read().setpoint == 30e3)
+
+
+def test_one_bad_reply_is_no_fault(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, reply_timeout=0.05, silence=10.0)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    for kind in ('silence', 'half_line', 'garbage'):
+        device.faults.add(kind)
+        heard = len(line.commands)
+        until(lambda heard=heard: len(line.commands) > heard)
+        device.faults.clear()
+        now = time.monotonic()
+        until(lambda now=now: regulator.read().time > now)
+        assert regulator.read().setpoint == 60e3
+    assert line.commands.count('AS0.00') == 0
+
+
+def test_unplugged_in_mid_run_and_back(emulated, opened, until, tmp_path):
+    device, line = emulated('alicat', link=str(tmp_path / 'regulator'))
+    regulator = opened('alicat', port=line.path, **QUICK)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    for _ in range(2):
+        device.faults.add('unplugged')
+        error = until(lambda: raised(regulator.read))
+        assert isinstance(error, TransportError)
+        assert line.path in str(error)
+        until(lambda: 'cannot be opened' in str(raised(regulator.read)))
+        device.faults.clear()
+        until(lambda: raised(regulator.read) is None)
+        until(lambda: regulator.read().setpoint == 0.0)
+        regulator.set_pressure(60e3)
+        until(lambda: regulator.read().setpoint == 60e3)
+    assert len(threads()) == 1
+
+
+def test_a_silent_neighbour_does_not_silence_the_others(emulated, opened, until):
+    device, line = emulated('alicat', unit_ids='AB')
+    first = opened('alicat', port=line.path, **QUICK)
+    second = opened('alicat', port=line.path, unit_id='B', **QUICK)
+    device.faults.add('silence@A')
+    until(lambda: raised(first.read))
+    second.set_pressure(20e3)
+    until(lambda: second.read().setpoint == 20e3)
+    before = len(line.commands)
+    until(lambda: len(line.commands) > before + 100)
+    heard = line.commands[before:]
+    assert heard.count('A') < 0.2 * heard.count('B')  # it is asked less and less often
+
+
+def test_errors_that_are_raised_again_do_not_pile_up(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path, **QUICK)
+    device.faults.add('silence')
+    until(lambda: raised(regulator.read))
+    for _ in range(3):
+        error, depth = raised(regulator.read), 0
+        trace = error.__traceback__
+        while trace:
+            depth, trace = depth + 1, trace.tb_next
+        assert depth == 3  # raised(), read() and the check
+
+
+def test_closing_vents_and_says_when_it_could_not(emulated, until):
+    device, line = emulated('alicat')
+    regulator = create('alicat', port=line.path, **QUICK)
+    regulator.open()
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    regulator.close()
+    assert device.valves['A'].setpoint == 0.0
+    regulator.open()
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    device.faults.add('rejection')
+    with pytest.raises(PadError, match=r'closed, and not known to be vented: .*rejected'):
+        regulator.close()
+    assert not threads()
+    device.faults.clear()
+    device.faults.add('silence')
+    with pytest.raises(TransportError, match=r'no reply in 0\.1 s'):
+        regulator.open()
+    assert not threads()
+
+
+def test_a_setpoint_under_way_does_not_survive_the_closing(emulated, until):
+    device, line = emulated('alicat')
+    for _ in range(20):
+        regulator = create('alicat', port=line.path)
+        regulator.open()
+        regulator.set_pressure(60e3)
+        regulator.close()
+        assert device.valves['A'].setpoint == 0.0
+
+
+def test_what_is_closed_takes_nothing(emulated):
+    _, line = emulated('alicat')
+    regulator = create('alicat', port=line.path)
+    for call in (regulator.read, regulator.vent, lambda: regulator.set_pressure(1e3)):
+        assert 'is not open' in str(raised(call))
+    regulator.close()
+
+
+def test_a_port_that_is_not_there_or_taken_is_an_error(emulated, opened):
+    with pytest.raises(
+        TransportError, match=r'port /dev/nowhere cannot be opened: .*No such file'
+    ):
+        create('alicat', port='/dev/nowhere').open()
+    _, line = emulated('alicat')
+    opened('alicat', port=line.path)
+    code = f'from ros_pad.regulators import create; create("alicat", port="{line.path}").open()'
+    other = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
+    assert 'TransportError' in other.stderr
+    assert 'lock' in other.stderr
+
+
+def test_pyserial_is_only_needed_to_open_a_port(monkeypatch):
+    code = 'import sys, ros_pad.regulators; print("serial" in sys.modules)'
+    child = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
+    assert child.stdout == 'False\n'
+    monkeypatch.setitem(sys.modules, 'serial', None)
+    regulator = create('alicat', port='/dev/nowhere')
+    with pytest.raises(TransportError, match=r'pip install pyserial.* python3-serial'):
+        regulator.open()
