@@ -450,10 +450,12 @@ class RegulatorNode(LifecycleNode):
         said = [self._health(channel) for channel in channels]
         if channels:
             said.append(self._supply())
+        # That a sound pad is filled or vented is no news: it happens with every step.
+        news = [words if level != DiagnosticStatus.OK else '' for level, words in said]
         refused = any(each.refusal and not each.refusal_told for each in channels)
-        if not (self._diagnostics_pace.due(now_ns) or said != self._said or refused):
+        if not (self._diagnostics_pace.due(now_ns) or news != self._said or refused):
             return
-        self._said = said
+        self._said = news
         array = DiagnosticArray()
         set_stamp(array.header.stamp, now_ns)
         for channel, (level, words) in zip(channels, said, strict=False):
