@@ -301,6 +301,7 @@ class RegulatorNode(LifecycleNode):
         """Vent a pad and refuse its set-points until somebody activates the node again."""
         if not channel.held:
             channel.held = f'{reason}; vented until the node is activated again'
+            self.get_logger().error(f'leg {channel.leg}: {channel.held}')
             self._vent(channel, reason)
 
     def destroy_node(self) -> None:
@@ -345,8 +346,9 @@ class RegulatorNode(LifecycleNode):
         """Return the gauge pressure that a message commands; raise what is wrong with it."""
         age = (now_ns - nanoseconds(message.header.stamp)) * 1e-9
         if abs(age) > self._values['command_timeout']:
+            stamped = f'{age:.3f} s old' if age > 0.0 else f'{-age:.3f} s ahead of the clock here'
             raise LimitError(
-                f'set-point is {age:.3f} s old: at most'
+                f'set-point is {stamped}: at most'
                 f' {self._values["command_timeout"]:g} s either way is accepted'
             )
         # Added and subtracted, an ambient pressure leaves rounding errors: below 1 uPa.
@@ -371,6 +373,7 @@ class RegulatorNode(LifecycleNode):
         step = slew_limit * elapsed if slew_limit else math.inf
         start = channel.setpoint if channel.sent is None else channel.sent
         setpoint = min(max(command, start - step), start + step)
+        channel.moved_ns = now_ns  # answered or not: time without an answer is not saved up
         try:
             channel.regulator.set_pressure(setpoint)
         except (InvalidInput, LimitError):
@@ -379,7 +382,7 @@ class RegulatorNode(LifecycleNode):
             # The device may have taken it all the same.
             channel.vented, channel.sent = False, None
             raise
-        channel.command, channel.sent, channel.moved_ns = command, setpoint, now_ns
+        channel.command, channel.sent = command, setpoint
         channel.vented = setpoint == command == 0.0
 
     def _proceed(self, channel: _Channel, now_ns: int) -> None:
@@ -441,7 +444,7 @@ class RegulatorNode(LifecycleNode):
                 )
         if watch.reason and watch.reason != known:
             self.get_logger().error(f'leg {channel.leg}: {watch.reason}')
-        if lasting and self._active and self._values['on_fault'] == 'vent':
+        if lasting and self._values['on_fault'] == 'vent':
             self._hold(channel, lasting)
 
     def _look(self, now_ns: int) -> None:
@@ -474,7 +477,9 @@ class RegulatorNode(LifecycleNode):
 
     def _health(self, channel: _Channel) -> tuple[bytes, str]:
         """Return level and message of a channel, as REP 107 has them; refusals come on top."""
-        trouble = [channel.held, channel.trouble]
+        trouble = [channel.held]
+        if channel.trouble not in channel.held:
+            trouble.append(channel.trouble)
         if channel.commanded_ns is None and not channel.vented:
             trouble.append('cannot be vented')
         if any(trouble):
