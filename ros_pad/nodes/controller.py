@@ -45,13 +45,22 @@ OLD = 0.2  # s after which the last position of a foot serves no more
 
 LOOK_PERIOD_NS = 100_000_000  # how often legs without estimates are looked after, and news told
 
+
+def _set_margin(node: ControllerNode, margin: float) -> None:
+    """Let the domes of steps to come have another margin."""
+    node.controller._margin = margin
+
+
 PARAMETERS = (
     LEGS,
     FOOT,
     EXPECTED_LOAD,
     AMBIENT_PRESSURE,
     Parameter('policy', 'adaptive', 'How shapes are chosen.', choices=POLICIES),
-    Parameter('margin', 1.2, 'Factor on the load, for the pressure of a dome.', '', 1.0, 5.0),
+    Parameter(
+        'margin', 1.2, 'Factor on the load, for the pressure of a dome.', '', 1.0, 5.0,
+        live=True, change=_set_margin,
+    ),
     Parameter(
         'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
         'Pa', 0.0, 1e6,

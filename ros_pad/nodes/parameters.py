@@ -14,7 +14,9 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
@@ -47,6 +49,10 @@ class Parameter:
         Allowed words; empty for any.
     read : callable or None
         Makes of the value what the node works with; raises `PadError` where it cannot.
+    live : bool
+        Whether it may be changed while the node runs; all others are read-only.
+    change : callable or None
+        What besides is to be done then, with the node and the new value.
     """
 
     name: str
@@ -57,6 +63,8 @@ class Parameter:
     high: float = math.inf
     choices: tuple[str, ...] = ()
     read: Callable[[Any], Any] | None = None
+    live: bool = False
+    change: Callable[[Any, Any], None] | None = None
 
     @property
     def kind(self) -> str:
@@ -111,7 +119,7 @@ class Parameter:
         descriptor = ParameterDescriptor(
             description=f'{self.description} [{self.unit}]' if self.unit else self.description,
             additional_constraints=self.allowed,
-            read_only=True,
+            read_only=not self.live,
         )
         bounded = math.isfinite(self.low) and math.isfinite(self.high)
         if bounded and isinstance(self.default, float):
@@ -149,6 +157,9 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
     A node that is made with ``automatically_declare_parameters_from_overrides`` also refuses what
     looks like a misspelt parameter, and warns of others that it does not have.
 
+    Later changes are judged here too: those of live parameters are in what was returned as soon
+    as they are accepted, and all others are refused with the reason, ``use_sim_time`` among them.
+
     Raises
     ------
     ConfigError
@@ -165,19 +176,8 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
             )
         given = node.get_parameter(name).value
         node.undeclare_parameter(name)
-        where = f'node {node.get_name()}: parameter {name} = '
-        try:
-            value = parameter.accept(given)
-        except ValueError:
-            shown = given.tolist() if isinstance(given, array) else given
-            raise ConfigError(
-                f'{where}{shown!r} is not allowed: {parameter.allowed} is needed'
-            ) from None
+        value, values[name] = _judged(node, parameter, given)
         node.declare_parameter(name, value, parameter.descriptor(), ignore_override=True)
-        try:
-            values[name] = parameter.read(value) if parameter.read else value
-        except PadError as error:
-            raise ConfigError(f'{where}{value!r} is not allowed: {error}') from error
     known = [parameter.name for parameter in table]
     for name in node.get_parameters_by_prefix(''):
         head = name.split('.')[0]
@@ -192,4 +192,60 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
             )
         if '.' not in name:
             node.get_logger().warning(f'parameter {name!r} is not known here')
+    _follow(node, {parameter.name: parameter for parameter in table if parameter.live}, values)
     return values
+
+
+def _judged(node: Node, parameter: Parameter, given: Any) -> tuple[Any, Any]:
+    """Return a value as the parameter's type, and what the node works with."""
+    where = f'node {node.get_name()}: parameter {parameter.name} = '
+    try:
+        value = parameter.accept(given)
+    except ValueError:
+        shown = given.tolist() if isinstance(given, array) else given
+        raise ConfigError(
+            f'{where}{shown!r} is not allowed: {parameter.allowed} is needed'
+        ) from None
+    try:
+        return value, parameter.read(value) if parameter.read else value
+    except PadError as error:
+        raise ConfigError(f'{where}{value!r} is not allowed: {error}') from error
+
+
+def _follow(node: Node, live: dict[str, Parameter], values: dict[str, Any]) -> None:
+    """Let live parameters be changed; ROS itself refuses to change those that are read-only."""
+
+    def prepare(changes: list[RosParameter]) -> list[RosParameter]:
+        # As at the start, a whole number will do for a double.
+        return [
+            RosParameter(each.name, value=float(each.value))
+            if each.name in live and type(each.value) is int and live[each.name].kind == 'double'
+            else each
+            for each in changes
+        ]
+
+    def judge(changes: list[RosParameter]) -> SetParametersResult:
+        for each in changes:
+            if each.name == 'use_sim_time' and each.value != node.get_parameter(each.name).value:
+                # A node that waits for a /clock that nobody publishes would not vent.
+                return SetParametersResult(
+                    reason=f'node {node.get_name()}: parameter use_sim_time is read at the start'
+                )
+            if each.name in live:
+                try:
+                    _judged(node, live[each.name], each.value)
+                except ConfigError as error:
+                    return SetParametersResult(reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def take(changes: list[RosParameter]) -> None:
+        for each in changes:
+            if each.name in live:
+                parameter = live[each.name]
+                _, values[each.name] = _judged(node, parameter, each.value)
+                if parameter.change:
+                    parameter.change(node, values[each.name])
+
+    node.add_pre_set_parameters_callback(prepare)
+    node.add_on_set_parameters_callback(judge)
+    node.add_post_set_parameters_callback(take)

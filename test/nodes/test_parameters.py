@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import importlib
 import inspect
+import math
 import pathlib
 import re
 import signal
@@ -29,6 +31,8 @@ RATE = Parameter('rate', 50.0, 'Samples a second.', 'Hz', 1.0, 1000.0)
 COUNT = Parameter('count', 3, 'How many.', '', 0, 9)
 SHAPE = Parameter('shape', 'flat', 'Which.', choices=('flat', 'dome'))
 SWITCH = Parameter('switch', False, 'Whether.')
+GAIN = Parameter('gain', 2.0, 'Factor.', '', 1.0, 5.0, live=True)
+MODE = Parameter('mode', 'slow', 'How.', choices=('slow', 'fast'), live=True)
 
 
 def table_of(name):
@@ -55,7 +59,8 @@ def test_the_shipped_file_says_over_each_key_what_it_is(name):
     for parameter in table_of(name):
         over = re.search(rf'^    # (.*)\n    {parameter.name}: ', text, re.MULTILINE)
         assert over, parameter.name
-        assert over[1] == f'{parameter.description} ({parameter.allowed})'
+        live = '; live' if parameter.live else ''
+        assert over[1] == f'{parameter.description} ({parameter.allowed}{live})'
         assert parameter.description.endswith('.')
         assert parameter.unit in over[1]
 
@@ -76,6 +81,7 @@ def test_the_page_has_every_parameter(name):
             in_yaml(parameter.default).replace("''", '""'),
             parameter.unit or '-',
             parameter.allowed,
+            'yes' if parameter.live else '-',
             parameter.description,
         ]
         for parameter in table_of(name)
@@ -136,10 +142,93 @@ def test_ros_tools_see_type_range_and_unit(declared):
 
 
 def test_parameters_do_not_change_later(declared):
-    node, _ = declared(RATE)
+    node, values = declared(RATE)
     (result,) = node.set_parameters([Override('rate', value=20.0)])
     assert not result.successful
-    assert node.get_parameter('rate').value == 50.0
+    assert result.reason == 'Trying to set a read-only parameter: rate.'
+    assert (node.get_parameter('rate').value, values['rate']) == (50.0, 50.0)
+    assert node.describe_parameter('rate').read_only
+
+
+def test_live_parameters_do(declared):
+    told = []
+    noted = dataclasses.replace(MODE, change=lambda node, value: told.append((node, value)))
+    node, values = declared(GAIN, noted)
+    assert not node.describe_parameter('gain').read_only
+    results = node.set_parameters([Override('gain', value=3), Override('mode', value='fast')])
+    assert [each.successful for each in results] == [True, True]
+    assert values == {'gain': 3.0, 'mode': 'fast'}
+    assert type(values['gain']) is float
+    assert node.get_parameter('gain').value == 3.0
+    assert told == [(node, 'fast')]
+
+
+@pytest.mark.parametrize(
+    ('name', 'given', 'reason'),
+    [
+        ('gain', 5.5, 'Parameter gain out of range'),  # ROS has the first word on ranges
+        ('gain', math.nan, 'Parameter gain out of range'),
+        ('gain', 'high', 'Wrong parameter type'),
+        ('gain', True, 'Wrong parameter type'),
+        (
+            'gain',
+            1.0 - 1e-9,  # a range that ROS takes for kept
+            'node probe: parameter gain = 0.999999999 is not allowed: a number from 1 to 5 is',
+        ),
+        (
+            'mode',
+            'faster',
+            "node probe: parameter mode = 'faster' is not allowed: one of slow, fast is needed",
+        ),
+        ('use_sim_time', True, 'node probe: parameter use_sim_time is read at the start'),
+    ],
+)
+def test_a_change_that_is_not_allowed_is_refused_with_the_reason(declared, name, given, reason):
+    told = []
+    mode = dataclasses.replace(MODE, change=lambda *each: told.append(each))
+    node, values = declared(GAIN, mode)
+    good = Override('mode', value='fast')
+    result = node.set_parameters_atomically([good, Override(name, value=given)])
+    assert not result.successful
+    assert result.reason.startswith(reason)
+    assert values == {'gain': 2.0, 'mode': 'slow'}
+    assert told == []
+    assert not node.get_parameter('use_sim_time').value
+
+
+LIVE = {
+    'regulator': {'command_timeout': 0.3, 'slew_limit': 5e4, 'on_fault': 'vent'},
+    'controller': {'margin': 1.5},
+}
+CLASSES = {name: f'{name.capitalize()}Node' for name in NODES}
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_path):
+    node = getattr(importlib.import_module(f'ros_pad.nodes.{name}'), CLASSES[name])(
+        context=context,
+        parameter_overrides=(
+            [Override('folder', value=str(tmp_path / 'bag'))] if name == 'recorder' else []
+        ),
+    )
+    try:
+        live = LIVE.get(name, {})
+        assert {each.name for each in table_of(name) if each.live} == set(live)
+        for parameter in table_of(name):
+            before = node.get_parameter(parameter.name).value
+            given = live.get(parameter.name, parameter.default)
+            (result,) = node.set_parameters([Override(parameter.name, value=given)])
+            assert result.successful is (parameter.name in live), parameter.name
+            if not result.successful:
+                assert parameter.name in result.reason
+                given = before
+            assert node.get_parameter(parameter.name).value == given
+        (result,) = node.set_parameters([Override('use_sim_time', value=True)])
+        assert not result.successful
+        if name == 'controller':
+            assert node.controller._margin == 1.5
+    finally:
+        node.destroy_node()
 
 
 @pytest.mark.parametrize(

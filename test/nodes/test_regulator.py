@@ -8,6 +8,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from lifecycle_msgs.srv import GetState
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
@@ -109,6 +110,29 @@ class Robot:
         (status,) = [s for s in self.diagnostics[-1].status if f'leg {leg} ' in s.name]
         return status
 
+    def told(self, name, level=DiagnosticStatus.ERROR):
+        """When a level was first told of, s, and its words; None if it never was."""
+        for array in self.diagnostics:
+            for status in array.status:
+                if name in status.name and status.level == level:
+                    return nanoseconds(array.header.stamp) * 1e-9, status.message
+        return None
+
+    def walk(self, steps):
+        """Command pressures of both pads at once, each for some time: (gauge, gauge, seconds)."""
+        for one, two, seconds in steps:
+            for _ in range(round(seconds / 0.02)):
+                self.send(one, 1)
+                self.send(two, 2)
+                self.tick(0.02)
+
+    def set(self, name, value):
+        """Change a parameter as ``ros2 param set`` does."""
+        request = SetParameters.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()]
+        )
+        return self.call(SetParameters, 'regulator/set_parameters', request).results[0]
+
     def call(self, service, name, request):
         client = self.node.create_client(service, name)
         self.until(client.service_is_ready, what=name)
@@ -141,6 +165,8 @@ class Device:
         self.setpoint = 40e3  # left over from whoever used it last
         self.is_open = False
         self.broken = None
+        self.reads = None  # in place of the set-point
+        self.faults = ()
         Device.made = (*Device.made, self)
 
     def open(self):
@@ -154,7 +180,8 @@ class Device:
 
     def read(self):
         self._talk()
-        return Reading(self.setpoint, self.setpoint, (), 0.0)
+        pressure = self.setpoint if self.reads is None else self.reads
+        return Reading(pressure, self.setpoint, self.faults, 0.0)
 
     def vent(self):
         self._talk()
@@ -217,7 +244,10 @@ def test_the_ceiling_itself_is_allowed_whatever_the_weather(robot):
 
 REFUSED = {
     'stale': ({'gauge': 50e3, 'age': 0.51}, 'set-point is 0.510 s old: at most 0.5 s'),
-    'future': ({'gauge': 50e3, 'age': -0.51}, 'set-point is -0.510 s old: at most 0.5 s'),
+    'future': (
+        {'gauge': 50e3, 'age': -0.51},
+        'set-point is 0.510 s ahead of the clock here: at most 0.5 s',
+    ),
     'no stamp': ({'gauge': 50e3, 'stamp_ns': 0}, 'set-point is 2.000 s old'),
     'nan': ({'gauge': math.nan}, 'set-point nan Pa is not allowed: 0 to 80000 Pa gauge'),
     'inf': ({'gauge': math.inf}, 'set-point inf Pa is not allowed: 0 to 80000 Pa gauge'),
@@ -468,7 +498,379 @@ def test_real_devices_do_not_live_in_simulated_time(context, devices):
         RegulatorNode(context=context, parameter_overrides=overrides)
 
 
+def test_legs_have_options_of_their_own(robot):
+    """A list has one for each leg; the longer hose fills more slowly."""
+    node = robot.start(
+        legs=[1, 2],
+        **{'backend_options.hose_length': [0.5, 20.0], 'backend_options.hose_diameter': 0.001},
+    )
+    fast, slow = (node.channels[leg].regulator._channel._hose.length for leg in (1, 2))
+    assert (fast, slow) == (0.5, 20.0)
+
+
+def test_a_list_that_does_not_fit_the_legs_is_refused(robot):
+    with pytest.raises(ConfigError, match=r'hose_length = \[1.0, 2.0, 3.0\] .* one for each leg'):
+        robot.start(legs=[1, 2], **{'backend_options.hose_length': [1.0, 2.0, 3.0]})
+
+
 def test_volumes_and_hoses_are_options_of_the_simulated_backend(robot):
     robot.start(**{'backend_options.hose_length': 20.0, 'backend_options.hose_diameter': 0.001})
     robot.hold(60e3, 0.1)
     assert robot.gauge() < 30e3  # a thin long hose is slow
+
+
+# What each fault does to leg 1, when it can be seen, and the first words of what is said of it.
+FAULTS = {
+    'stuck flat': ('{kind: stuck_valve, legs: [1]}', 1.0, 'does not fill: 0.0 kPa'),
+    'stuck filled': ('{kind: stuck_valve, legs: [1], start: 1.5}', 2.2, 'does not vent: 60.'),
+    'leak': (
+        '{kind: leak, legs: [1], start: 1.5, conductance: 1.0e-8}', 1.5, 'sags: ',
+    ),
+    'drift': (
+        '{kind: sensor_drift, legs: [1], start: 1.5, offset: 8.0e3}', 2.2,
+        'does not vent: 8.0 kPa',
+    ),
+    'drift down': (
+        '{kind: sensor_drift, legs: [1], start: 1.5, offset: -8.0e3}', 2.2,
+        'reads -8.0 kPa, which no pad has',
+    ),
+    'silence': (
+        '{kind: silence, legs: [1], start: 1.5, end: 2.4}', 1.5,
+        'the simulated regulator does not answer',
+    ),
+    'supply': (
+        '{kind: supply_loss, legs: [1], start: 1.5, time_constant: 0.1}', 1.6, 'sags: ',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', FAULTS)
+def test_each_fault_is_told_of_within_a_second(robot, case):
+    fault, visible, words = FAULTS[case]
+    robot.start(**{'backend_options.faults': [fault]})
+    filled = 60e3
+    answered = robot.regulator.channels[1]
+    for k in range(165):
+        gauge = filled if 1.0 <= 0.02 * k < 2.2 else 0.0
+        robot.send(gauge, 1)
+        robot.send(gauge, 2)
+        robot.tick(0.02)
+    robot.until(lambda: nanoseconds(robot.diagnostics[-1].header.stamp) >= 3e9)
+    at, message = robot.told('leg 1')
+    assert visible <= at <= visible + 1.0
+    assert message.startswith(words)
+    assert robot.told('leg 2') is None
+    assert robot.told('supply') is None  # one pad alone is no supply
+    if case != 'silence':
+        assert answered.refusals == 0  # it is told, and no more
+
+
+def test_a_supply_that_goes_is_told_apart_from_a_leak(robot):
+    robot.start(**{'backend_options.faults': ['{kind: supply_loss, start: 1.0}']})
+    robot.walk([(60e3, 50e3, 2.4)])
+    at, message = robot.told('supply')
+    # It falls from 100 kPa with a time constant of 1 s: to 60 kPa in 0.51 s, to 50 in 0.69 s.
+    assert 1.69 < at <= 2.69
+    assert message == 'supply sags: legs 1, 2 lack air'
+    assert robot.status(2).level == DiagnosticStatus.ERROR
+    assert [s.name for s in robot.diagnostics[0].status] == [
+        'regulator: leg 1 regulator', 'regulator: leg 2 regulator', 'regulator: supply',
+    ]  # fmt: skip
+
+
+def test_sound_pads_are_not_accused(robot):
+    robot.start()
+    robot.walk([(60e3, 0.0, 0.5), (0.0, 88e3, 0.5), (90e3, 20e3, 1.0), (0.0, 90e3, 1.0)])
+    robot.tick(2.0)
+    robot.until(lambda: nanoseconds(robot.diagnostics[-1].header.stamp) >= 5e9)
+    assert robot.told('') is None
+    levels = {
+        (nanoseconds(array.header.stamp) // MS, status.level)
+        for array in robot.diagnostics
+        for status in array.status
+        if 'leg 1 ' in status.name
+    }
+    # Each second that all is well; and, at once, that no set-points have come for 0.5 s.
+    assert sorted(levels) == [
+        *((at, DiagnosticStatus.OK) for at in (10, 1000, 2000, 3000)),
+        *((at, DiagnosticStatus.STALE) for at in (3500, 4000, 5000)),
+    ]
+
+
+def test_a_faulty_pad_is_vented_and_held_if_one_wants_that(robot, capfd):
+    leak = '{kind: leak, legs: [1], start: 1.0, end: 2.5, conductance: 1.0e-8}'
+    robot.start(on_fault='vent', **{'backend_options.faults': [leak]})
+    robot.walk([(60e3, 40e3, 2.0)])
+    channel = robot.regulator.channels[1]
+    assert channel.regulator.read().setpoint == 0.0
+    assert robot.gauge(2) == pytest.approx(40e3, abs=500.0)
+    assert 0 < channel.refusals == 100 - channel.commands
+    status = robot.status()
+    assert status.level == DiagnosticStatus.ERROR
+    assert status.message.startswith('sags: ')
+    assert '; vented until the node is activated again' in status.message
+    assert 'leg 1: vented: sags: ' in capfd.readouterr().err
+    robot.walk([(60e3, 40e3, 0.5)])  # the hole is closed, and still
+    assert robot.gauge() < 1e3
+    assert robot.call(Trigger, 'regulator/vent', Trigger.Request()).success
+    assert robot.transit(Transition.TRANSITION_ACTIVATE)
+    robot.diagnostics.clear()
+    robot.walk([(60e3, 40e3, 1.0)])
+    assert robot.gauge() == pytest.approx(60e3, abs=500.0)
+    assert robot.told('leg 1', DiagnosticStatus.OK)
+    assert robot.told('leg 1') is None
+
+
+def test_a_reaction_can_be_chosen_while_the_pad_is_faulty(robot):
+    robot.start(**{'backend_options.faults': ['{kind: stuck_valve, legs: [1]}']})
+    robot.walk([(60e3, 60e3, 1.0)])
+    assert robot.regulator.channels[1].refusals == 0
+    assert robot.set('on_fault', 'vent').successful
+    robot.tick(0.02)
+    robot.send(60e3)
+    assert robot.regulator.channels[1].refusals == 1
+
+
+def test_faults_that_a_device_reports_count_as_well(robot, devices):
+    node = robot.start(simulated=False, backend='device', on_fault='vent')
+    robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
+    devices()[0].faults = ('EXH: the exhaust is open',)
+    robot.until(lambda: devices()[0].setpoint == 0.0, what='the vent')
+    robot.until(
+        lambda: robot.told('leg 1') and robot.told('leg 1')[1].startswith('EXH: the exhaust'),
+        what='/diagnostics',
+    )
+
+
+def test_a_device_that_is_silent_for_long_is_held_but_one_lost_answer_is_not(robot):
+    lost = '{kind: silence, legs: [1], start: 1.0, end: 1.1}'
+    silent = '{kind: silence, legs: [2], start: 1.0, end: 1.7}'
+    robot.start(on_fault='vent', **{'backend_options.faults': [lost, silent]})
+    robot.walk([(60e3, 60e3, 2.5)])
+    assert robot.gauge(1) == pytest.approx(60e3, abs=500.0)
+    assert robot.gauge(2) < 1e3
+    assert robot.regulator.channels[2].held.startswith('no reading for 0.5 s')
+
+
+def test_a_device_that_is_silent_from_the_start_is_missed(robot):
+    silent = '{kind: silence, legs: [1], start: 0.005}'  # it heard the first vent
+    robot.start(on_fault='vent', **{'backend_options.faults': [silent]})
+    robot.walk([(60e3, 60e3, 0.7)])
+    assert robot.regulator.channels[1].held.startswith('no reading for 0.5 s')
+    assert not robot.regulator.channels[2].held
+
+
+def test_a_pad_above_the_ceiling_is_vented_at_once_and_held(robot, devices, capfd):
+    node = robot.start(simulated=False, backend='device', ceiling=80e3)
+    first, second = devices()
+
+    def command():
+        for leg in (1, 2):
+            robot.send(70e3, leg, stamp_ns=node.get_clock().now().nanoseconds)
+
+    first.reads = 81.5e3  # 80 kPa and 2 %: 81.6 kPa
+    read = len(robot.pressures[1])
+    robot.until(lambda: len(robot.pressures[1]) > read + 3)
+    command()
+    assert (first.setpoint, second.setpoint) == (70e3, 70e3)
+    first.reads = 81.7e3
+    robot.until(lambda: first.setpoint == 0.0, what='the vent')
+    command()
+    assert (first.setpoint, second.setpoint) == (0.0, 70e3)
+    assert node.channels[1].refusal.startswith('set-point 70000 Pa is not allowed: 81700 Pa is')
+    robot.until(lambda: robot.told('leg 1'), what='/diagnostics')
+    assert robot.told('leg 1')[1].startswith(
+        '81700 Pa is above the ceiling of 80000 Pa; vented until the node is activated again'
+    )
+    assert 'leg 1: vented: 81700 Pa is above the ceiling of 80000 Pa' in capfd.readouterr().err
+
+
+def test_a_reading_that_is_no_number_is_none(robot, devices):
+    robot.start(simulated=False, backend='device')
+    count = len(robot.pressures[1])
+    devices()[0].reads = math.nan
+    robot.until(lambda: robot.told('leg 1'), what='/diagnostics')
+    assert robot.told('leg 1')[1] == 'device reads nan Pa: a number is needed'
+    assert all(math.isfinite(each.fluid_pressure) for each in robot.pressures[1][count:])
+
+
+def test_set_points_approach_the_command_no_faster_than_they_may(robot):
+    robot.start(slew_limit=50e3)
+    channel = robot.regulator.channels[1]
+    robot.tick(1.0)  # a rest is not saved up
+    sent = []
+    for gauge, seconds in ((60e3, 1.5), (15e3, 1.2)):
+        for _ in range(round(seconds / 0.02)):
+            robot.send(gauge)
+            robot.tick(0.02)
+            sent.append(channel.regulator.read().setpoint)
+    steps = [b - a for a, b in zip([0.0, *sent], sent, strict=False)]
+    # 1 kPa each 20 ms: 60 steps up, 15 s at rest, 45 down.
+    assert steps[:60] == pytest.approx([1e3] * 60)
+    assert steps[60:75] == pytest.approx([0.0] * 15)
+    assert steps[75:120] == pytest.approx([-1e3] * 45)
+    assert (max(sent), sent[-1]) == (60e3, 15e3)
+    assert robot.told('') is None
+    assert robot.call(Trigger, 'regulator/vent', Trigger.Request()).success
+    assert channel.regulator.read().setpoint == 0.0  # a vent is not slowed
+
+
+def test_a_slow_set_point_goes_on_between_commands_and_stops_with_them(robot):
+    robot.start(slew_limit=50e3, command_timeout=0.3)
+    channel = robot.regulator.channels[1]
+    robot.tick(0.1)
+    robot.send(60e3)
+    robot.tick(0.3)
+    # Nothing at once, and 1 kPa with each pressure since.
+    assert channel.regulator.read().setpoint == pytest.approx(15e3, abs=1001.0)
+    robot.tick(0.02)
+    assert channel.regulator.read().setpoint == 0.0
+    assert robot.set('slew_limit', 0.0).successful
+    robot.send(60e3)
+    assert channel.regulator.read().setpoint == 60e3
+
+
+def test_a_slow_set_point_does_not_leap_after_a_silence(robot):
+    fault = '{kind: silence, legs: [1], start: 0.4, end: 0.7}'
+    robot.start(slew_limit=50e3, **{'backend_options.faults': [fault]})
+    robot.tick(0.1)
+    robot.hold(60e3, 0.28)
+    device = robot.regulator.channels[1].regulator
+    before = device.read().setpoint
+    assert before > 10e3
+    robot.hold(60e3, 0.34)
+    assert before < device.read().setpoint < before + 3e3
+    robot.hold(60e3, 1.2)
+    assert device.read().setpoint == 60e3
+
+
+def test_a_pad_that_does_not_follow_a_slow_set_point_is_told_of_when_it_has_arrived(robot):
+    robot.start(slew_limit=100e3, **{'backend_options.faults': ['{kind: stuck_valve, legs: [1]}']})
+    robot.walk([(60e3, 60e3, 1.6)])
+    at, message = robot.told('leg 1')
+    assert 0.6 < at < 1.6
+    assert message.startswith('does not fill')
+
+
+def test_a_shorter_patience_acts_at_once(robot):
+    robot.start(command_timeout=5.0)
+    robot.hold(60e3, 0.5)
+    assert robot.set('command_timeout', 0.1).successful
+    robot.tick(0.12)
+    assert robot.regulator.channels[1].regulator.read().setpoint == 0.0
+    refused = robot.set('command_timeout', 100.0)
+    assert not refused.successful
+    assert 'command_timeout out of range' in refused.reason
+
+
+def fail_once(monkeypatch, where, name):
+    """Let the next call of a method fail in a way that nobody foresaw."""
+    real = getattr(where, name)
+
+    def fail(*_):
+        monkeypatch.setattr(where, name, real)
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(where, name, fail)
+
+
+REASONS = {
+    'timeout': 'vented: no set-point for 0.2 s',
+    'deactivate': 'vented: deactivated',
+    'vent': 'vented: deactivated',
+    'shutdown': 'vented: closing: shut down',
+    'error': 'vented: closing: a transition failed',
+    'destroy': 'vented: closing: the node ends',
+}
+
+
+@pytest.mark.parametrize('end', REASONS)
+def test_the_log_says_why_a_pad_is_vented(robot, devices, executor, monkeypatch, capfd, end):
+    node = robot.start(simulated=False, backend='device', command_timeout=0.2)
+    if end != 'timeout':
+        assert robot.set('command_timeout', 60.0).successful
+    robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
+    if end == 'timeout':
+        robot.until(lambda: devices()[0].setpoint == 0.0, what='the vent')
+    elif end == 'vent':
+        assert robot.call(Trigger, 'regulator/vent', Trigger.Request()).success
+    elif end == 'destroy':
+        executor.remove_node(node)
+        node.destroy_node()
+    elif end == 'error':
+        fail_once(monkeypatch, node, 'vent')
+        robot.transit(Transition.TRANSITION_DEACTIVATE)
+        assert robot.state() == State.PRIMARY_STATE_UNCONFIGURED
+    else:
+        robot.transit(
+            Transition.TRANSITION_DEACTIVATE
+            if end == 'deactivate'
+            else Transition.TRANSITION_ACTIVE_SHUTDOWN
+        )
+    assert devices()[0].setpoint == 0.0
+    assert f'leg 1: {REASONS[end]}' in capfd.readouterr().err
+
+
+TRANSITIONS = {
+    'unconfigured': ((), Transition.TRANSITION_UNCONFIGURED_SHUTDOWN),
+    'inactive': ((Transition.TRANSITION_CONFIGURE,), Transition.TRANSITION_INACTIVE_SHUTDOWN),
+    'active': (
+        (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE),
+        Transition.TRANSITION_ACTIVE_SHUTDOWN,
+    ),
+}
+
+
+@pytest.mark.parametrize('state', TRANSITIONS)
+def test_the_node_can_be_shut_down_in_every_state(robot, devices, state):
+    node = robot.start(simulated=False, backend='device', autostart=False)
+    way, shutdown = TRANSITIONS[state]
+    for transition in way:
+        assert robot.transit(transition)
+    if state == 'active':
+        robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
+    assert robot.transit(shutdown)
+    assert robot.state() == State.PRIMARY_STATE_FINALIZED
+    assert not node.channels
+    assert all(each.setpoint == 0.0 and not each.is_open for each in devices())
+    count = len(robot.diagnostics)  # it lives on, and says that it serves nobody
+    robot.until(lambda: len(robot.diagnostics) > count, what='/diagnostics')
+
+
+@pytest.mark.parametrize('failing', ['configure', 'activate', 'deactivate', 'cleanup'])
+def test_after_a_transition_that_fails_it_can_be_configured_again(
+    robot, devices, monkeypatch, failing
+):
+    node = robot.start(simulated=False, backend='device', autostart=False)
+    names = ['configure', 'activate', 'deactivate', 'cleanup']
+    numbers = {each: getattr(Transition, f'TRANSITION_{each.upper()}') for each in names}
+    for name in names[: names.index(failing)]:
+        assert robot.transit(numbers[name])
+    culprit = {'configure': (Device, 'vent'), 'activate': (module, 'PadWatch')}
+    fail_once(monkeypatch, *culprit.get(failing, (node, 'vent')))
+    assert not robot.transit(numbers[failing])
+    assert robot.state() == State.PRIMARY_STATE_UNCONFIGURED
+    assert not node.channels
+    assert devices()
+    assert not any(each.is_open for each in devices())
+    assert robot.transit(numbers['configure'])
+    assert robot.transit(numbers['activate'])
+    robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
+    assert devices()[-2].setpoint == 50e3
+
+
+def test_a_port_can_be_corrected_and_tried_again(robot, devices, capfd):
+    node = robot.start(
+        simulated=False, backend='device', autostart=False, **{'backend_options.port': 'none'}
+    )
+    assert not robot.transit(Transition.TRANSITION_CONFIGURE)
+    assert "node regulator: no such port: 'none'" in capfd.readouterr().err
+    assert robot.set('backend_options.port', 'usb').successful
+    assert robot.transit(Transition.TRANSITION_CONFIGURE)
+    assert [channel.regulator.port for channel in node.channels.values()] == ['usb', 'usb']
+    refused = robot.set('backend_options.port', 'other')
+    assert not refused.successful
+    assert refused.reason == (
+        'node regulator: parameter backend_options.port is read when the devices are opened:'
+        ' clean up first'
+    )
