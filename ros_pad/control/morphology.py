@@ -336,6 +336,8 @@ class MorphologyController:
     ----------
     faults : list of FootFault
         What was wrong with legs so far, by the time it was found.
+    margin : float
+        As given; another one counts from the next lift-off on.
     refusals : dict
         For each leg that wanted to be a dome and may not, why.
     switches : dict
@@ -377,7 +379,7 @@ class MorphologyController:
                 )
         self._foot = foot
         self._policy = policy
-        self._margin = margin
+        self.margin = margin
         self._fixed_pressure = fixed_pressure
         self._gate = load_gate * expected_load
         self._stands = (load_gate + TOUCH_DOWN) * expected_load
@@ -669,7 +671,7 @@ class MorphologyController:
         if morphology == DOME:
             try:
                 setpoint = self._fixed_pressure or dome_pressure(
-                    self._foot, state.peak, self._margin
+                    self._foot, state.peak, self.margin
                 )
                 # What a fixed pressure is worth is not for the controller to say.
                 state.need = (

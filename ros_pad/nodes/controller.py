@@ -48,7 +48,7 @@ LOOK_PERIOD_NS = 100_000_000  # how often legs without estimates are looked afte
 
 def _set_margin(node: ControllerNode, margin: float) -> None:
     """Let the domes of steps to come have another margin."""
-    node.controller._margin = margin
+    node.controller.margin = margin
 
 
 PARAMETERS = (

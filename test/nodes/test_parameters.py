@@ -226,7 +226,7 @@ def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_pa
         (result,) = node.set_parameters([Override('use_sim_time', value=True)])
         assert not result.successful
         if name == 'controller':
-            assert node.controller._margin == 1.5
+            assert node.controller.margin == 1.5
     finally:
         node.destroy_node()
 

@@ -504,7 +504,7 @@ def test_legs_have_options_of_their_own(robot):
         legs=[1, 2],
         **{'backend_options.hose_length': [0.5, 20.0], 'backend_options.hose_diameter': 0.001},
     )
-    fast, slow = (node.channels[leg].regulator._channel._hose.length for leg in (1, 2))
+    fast, slow = (node.channels[leg].regulator._channel.hose.length for leg in (1, 2))
     assert (fast, slow) == (0.5, 20.0)
 
 
