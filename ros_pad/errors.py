@@ -41,15 +41,35 @@ class MeshError(PadError):
     """A mesh cannot be wetted: open, flipped, non-manifold, or off the floor."""
 
 
-class TransportError(PadError):
+class DeviceError(PadError):
+    """Something went wrong between here and a device.
+
+    Attributes
+    ----------
+    port : str
+        The line, such as ``/dev/ttyUSB0``; empty where there is none.
+    command : str
+        What was sent.
+    reply : str or bytes
+        What came back.
+    """
+
+    def __init__(
+        self, message: str, port: str = '', command: str = '', reply: str | bytes = ''
+    ) -> None:
+        super().__init__(message)
+        self.port, self.command, self.reply = port, command, reply
+
+
+class TransportError(DeviceError):
     """The line to a device is closed, silent or broken."""
 
 
-class ProtocolError(PadError):
+class ProtocolError(DeviceError):
     """A device answered something that its protocol does not allow."""
 
 
-class DeviceFault(PadError):
+class DeviceFault(DeviceError):
     """A device reports a fault of its own."""
 
 

@@ -13,6 +13,7 @@ from dataclasses import field
 
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import number
+from ros_pad.errors import DeviceError
 from ros_pad.errors import DeviceFault
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
@@ -411,6 +412,8 @@ def _passing(error: PadError) -> bool:
 def _again(error: PadError) -> PadError:
     """Return an error like this one: raised again, one object would pile up tracebacks."""
     kind = TransportError if isinstance(error, Unplugged) else type(error)
+    if isinstance(error, DeviceError):
+        return kind(str(error), error.port, error.command, error.reply)
     return kind(*error.args)
 
 

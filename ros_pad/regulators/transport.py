@@ -12,6 +12,7 @@ from typing import Any
 from typing import Protocol
 
 from ros_pad.errors import ConfigError
+from ros_pad.errors import DeviceError
 from ros_pad.errors import PadError
 from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
@@ -78,10 +79,11 @@ class Device(Protocol):
 
 
 def failure(
-    kind: type[PadError], what: str, line: Line, command: str, reply: str | bytes
-) -> PadError:
+    kind: type[DeviceError], what: str, line: Line, command: str, reply: str | bytes
+) -> DeviceError:
     """Return an error that says what went wrong on which port after which command."""
-    return kind(f'{what}: port {line.port}, command {command!r}, reply {reply!r}')
+    words = f'{what}: port {line.port}, command {command!r}, reply {reply!r}'
+    return kind(words, line.port, command, reply)
 
 
 class Bus:

@@ -92,7 +92,7 @@ def test_each_fault_is_said_within_a_second_and_the_others_go_on(tmp_path):
     assert [fault['leg'] for fault in trial.metrics.faults] == sorted(
         visible, key=lambda leg: (said(rows[leg])[0], leg)
     )
-    assert told(trial.metrics.faults[0]).startswith('Leg 1, from ')
+    assert told(trial.metrics.faults)[0].startswith('Leg 1, from ')
     # Fallback: flat, or what it has, and said so.
     known = {leg: said(rows[leg])[0] for leg in visible}
     assert not trial.dome[time > known[1], 0].any()

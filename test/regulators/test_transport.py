@@ -12,7 +12,9 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
 from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
+from ros_pad.regulators import channel
 from ros_pad.regulators import create
+from ros_pad.regulators import transport
 
 QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
 
@@ -275,3 +277,15 @@ def test_pyserial_is_only_needed_to_open_a_port(monkeypatch):
     regulator = create('alicat', port='/dev/nowhere')
     with pytest.raises(TransportError, match=r'pip install pyserial.* python3-serial'):
         regulator.open()
+
+
+def test_errors_carry_port_command_and_reply():
+    class Port:
+        port = '/dev/ttyUSB9'
+
+    error = transport.failure(ProtocolError, 'a strange reply', Port, 'AS20.00', b'?')
+    assert (error.port, error.command, error.reply) == ('/dev/ttyUSB9', 'AS20.00', b'?')
+    assert str(error) == "a strange reply: port /dev/ttyUSB9, command 'AS20.00', reply b'?'"
+    again = channel._again(error)
+    assert again is not error
+    assert (type(again), str(again), again.reply) == (ProtocolError, str(error), b'?')
