@@ -139,6 +139,7 @@ def walk(tmp_path_factory):
             observer.measure(SECONDS, result)
             if min(result.rates.values()) >= 0.95 * RATE:
                 break
+        result.measured_ns = time.time_ns()
         # The controller goes, and with it the set-points; the regulator vents by itself.
         end('controller', signal.SIGTERM)
         gone = time.monotonic()
@@ -206,7 +207,12 @@ def test_the_bag_has_the_walk(walk):
         assert reader.counts[f'/{topic.name(leg)}'] >= 0.95 * RATE * SECONDS, topic.name(leg)
     assert reader.counts['/body/pose'] >= 0.95 * RATE * SECONDS
     assert reader.counts['/diagnostics'] >= 4
-    shapes = [message.data for _, message, _ in reader.messages({'/leg_3/morphology'})]
+    # When regulator or estimator go before the controller, a foot is flat, and is said to be.
+    shapes = [
+        message.data
+        for _, message, log_ns in reader.messages({'/leg_3/morphology'})
+        if log_ns < walk.measured_ns
+    ]
     assert set(shapes) == {'dome'}
     highest = max(m.fluid_pressure for _, m, _ in reader.messages({'/leg_3/pressure'})) - AMBIENT
     assert 55e3 < highest < 61e3
