@@ -20,7 +20,6 @@ import inspect
 import json
 import math
 import multiprocessing
-import os
 import pathlib
 import platform
 import sys
@@ -43,6 +42,7 @@ from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.ladders.ladder import processor
 from ros_pad.pace import Pace
 from ros_pad.regulators.simulated import SimulatedRegulator
 from ros_pad.simulation import Scene
@@ -398,24 +398,13 @@ def measure(processes: int) -> dict[str, Any]:
         'scene': SCENE,
         'cycles': CYCLES,
         'seeds': list(SEEDS),
-        'machine': machine(),
+        'machine': f'{processor()}, Python {platform.python_version()}',
         'date': datetime.date.today().isoformat(),
         'wall_s': round(time.perf_counter() - started, 1),
         'shipped': base,
         'cases': {name: figures(f'case: {name}') for name in cases(setup)},
         'assumptions': rows,
     }
-
-
-def machine() -> str:
-    """Return processor and number of cores."""
-    processor = platform.processor() or platform.machine()
-    info = pathlib.Path('/proc/cpuinfo')
-    if info.exists():
-        lines = info.read_text(encoding='utf-8').splitlines()
-        models = [line.split(':', 1)[1].strip() for line in lines if line.startswith('model name')]
-        processor = models[0] if models else processor
-    return f'{processor}, {os.cpu_count()} cores, Python {platform.python_version()}'
 
 
 def table(document: dict[str, Any]) -> str:

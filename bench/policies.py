@@ -13,7 +13,6 @@ import argparse
 import datetime
 import json
 import multiprocessing
-import os
 import pathlib
 import platform
 import statistics
@@ -33,6 +32,7 @@ from tqdm import tqdm
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_shapes
+from ros_pad.ladders.ladder import processor
 from ros_pad.simulation import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
@@ -237,7 +237,7 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
     document: dict[str, Any] = {
         'scene': SCENE,
         'cycles': cycles,
-        'machine': machine(),
+        'machine': f'{processor()}, Python {platform.python_version()}',
         'date': datetime.date.today().isoformat(),
         'grounds': {
             ground: {
@@ -265,17 +265,6 @@ def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
         }
     document['wall_s'] = round(time.perf_counter() - started, 1)
     return document
-
-
-def machine() -> str:
-    """Return processor and number of cores."""
-    processor = platform.processor() or platform.machine()
-    info = pathlib.Path('/proc/cpuinfo')
-    if info.exists():
-        lines = info.read_text(encoding='utf-8').splitlines()
-        models = [line.split(':', 1)[1].strip() for line in lines if line.startswith('model name')]
-        processor = models[0] if models else processor
-    return f'{processor}, {os.cpu_count()} cores, Python {platform.python_version()}'
 
 
 def interval(part: dict[str, float]) -> str:

@@ -16,6 +16,13 @@ SURE = 0.9
 DOMED = 0.1
 """Part of the load on domes from which a foot no longer tells wet from dry."""
 
+ALL_DOMED = 0.9
+"""Part of the load on domes from which a foot is a dome, and not half inflated."""
+
+PULLED = 1.5
+"""T/N that tells wet ground from dry, over what wet ground is expected to hold: it may hold half
+as much again."""
+
 LIGHT = 0.3
 """Share of the expected load below which sensor noise hides what a foot feels."""
 
@@ -57,7 +64,7 @@ class Stance(NamedTuple):
 
 def doubt(stance: Stance, prior: FrictionPrior, expected_load: float) -> str:
     """Return why a stance has told nothing of the ground, or '' where it has."""
-    if stance.dome_share > 0.9:
+    if stance.dome_share > ALL_DOMED:
         return 'domed: wet and dry ground feel alike'
     if stance.dome_share > DOMED:
         return f'half inflated: domes carry {100 * stance.dome_share:.0f} % of the load'
@@ -70,8 +77,7 @@ def doubt(stance: Stance, prior: FrictionPrior, expected_load: float) -> str:
             f'turning: it takes up {stance.turning_ratio:.2f} of friction, pull'
             f' {stance.peak_ratio:.2f}'
         )
-    # Wet ground may well hold half as much again as expected.
-    if stance.peak_ratio < 1.5 * prior.flat_wet:
+    if stance.peak_ratio < PULLED * prior.flat_wet:
         return (
             f'not pulled: T/N up to {stance.peak_ratio:.2f}, and wet ground holds'
             f' {prior.flat_wet:.2f}'

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import datetime
 import math
+import os
+import pathlib
 import platform
 import statistics
 import time
@@ -231,10 +233,21 @@ def _attempt(method: Method, values: tuple[float, ...]) -> None:
 # --- what is shown -------------------------------------------------------------------------------
 
 
+def processor() -> str:
+    """Return the model of the processor, and number of its cores."""
+    name = platform.processor() or platform.machine()
+    info = pathlib.Path('/proc/cpuinfo')
+    if info.exists():
+        lines = info.read_text(encoding='utf-8').splitlines()
+        models = [line.split(':', 1)[1].strip() for line in lines if line.startswith('model name')]
+        name = models[0] if models else name
+    return f'{name}, {os.cpu_count()} cores'
+
+
 def machine() -> dict[str, str]:
     """Return what the times depend on: processor, Python, NumPy, date."""
     return {
-        'processor': platform.machine(),
+        'processor': processor(),
         'system': platform.system(),
         'python': platform.python_version(),
         'numpy': np.__version__,

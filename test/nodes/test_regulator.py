@@ -636,10 +636,10 @@ def test_faults_that_a_device_reports_count_as_well(robot, devices):
     robot.send(50e3, stamp_ns=node.get_clock().now().nanoseconds)
     devices()[0].faults = ('EXH: the exhaust is open',)
     robot.until(lambda: devices()[0].setpoint == 0.0, what='the vent')
-    robot.until(
-        lambda: robot.told('leg 1') and robot.told('leg 1')[1].startswith('EXH: the exhaust'),
-        what='/diagnostics',
-    )
+    robot.until(lambda: robot.told('leg 1'), what='/diagnostics')
+    assert robot.told('leg 1')[1].startswith('EXH: the exhaust is open')
+    assert devices()[0].setpoint == 0.0
+    assert node.channels[1].held.startswith('EXH: the exhaust is open')
 
 
 def test_a_device_that_is_silent_for_long_is_held_but_one_lost_answer_is_not(robot):

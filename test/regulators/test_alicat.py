@@ -278,12 +278,16 @@ def test_pressure_follows_and_vents(emulated, opened, until):
 def test_status_tokens_are_faults(emulated, opened, until):
     device, line = emulated('alicat')
     regulator = opened('alicat', port=line.path)
+    told = {}
     for token, words in STATUS.items():
         device.faults.add(f'status={token}')
         expected = () if token == 'LCK' else (words,)
         until(lambda expected=expected: regulator.read().faults == expected)
+        told[token] = regulator.read().faults
         device.faults.clear()
         until(lambda: regulator.read().faults == ())
+    # Only a locked panel is none.
+    assert {token for token, faults in told.items() if not faults} == {'LCK'}
 
 
 def test_a_firmware_that_does_not_say_what_it_is_counts_as_old(dialogue):
@@ -291,6 +295,9 @@ def test_a_firmware_that_does_not_say_what_it_is_counts_as_old(dialogue):
     regulator = create('alicat', port=device.path, **SLOW)
     regulator.open()
     regulator.close()
+    # Neither LS nor LSS: they would lock the front panel of an old one.
+    assert device.said == 3
+    assert device.problems == []
 
 
 @pytest.mark.parametrize('kind', ['analog_source', 'echo', 'rejection'])
@@ -329,6 +336,7 @@ def test_a_device_that_forgets_its_setpoint_is_told_again(emulated, opened, unti
     device.valves['A'].setpoint = 20e3  # somebody turned the knob
     until(lambda: line.commands.count('AS60.00') == 2)
     until(lambda: regulator.read().setpoint == 60e3)
+    assert device.valves['A'].setpoint == pytest.approx(60e3)
 
 
 def test_valves_held_by_hand_are_let_go(emulated, opened, until):
@@ -340,3 +348,5 @@ def test_valves_held_by_hand_are_let_go(emulated, opened, until):
     until(lambda: regulator.read().faults == (STATUS['HLD'],))
     regulator.vent()
     until(lambda: regulator.read().pressure < 1e3)
+    assert not device.valves['A'].held
+    assert 'AC' in line.commands

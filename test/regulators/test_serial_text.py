@@ -101,9 +101,12 @@ def test_six_channels_share_a_port(emulated, opened, until):
     feet = [opened('serial_text', port=line.path, channel=each + 1) for each in range(6)]
     for number, foot in enumerate(feet):
         foot.set_pressure(10e3 * (number + 1))
-    for number, foot in enumerate(feet):
-        wanted = 10e3 * (number + 1)
-        until(lambda foot=foot, wanted=wanted: abs(foot.read().pressure - wanted) < 100.0)
+    wanted = [10e3 * (number + 1) for number in range(6)]
+    until(lambda: abs(feet[-1].read().pressure - wanted[-1]) < 100.0)
+    until(lambda: all(foot.read().setpoint == at for foot, at in zip(feet, wanted, strict=True)))
+    # Nobody has another channel's: steps of the board are 20 Pa.
+    until(lambda: abs(feet[0].read().pressure - wanted[0]) < 100.0)
+    assert [foot.read().pressure for foot in feet] == pytest.approx(wanted, abs=500.0)
 
 
 @pytest.mark.parametrize(
