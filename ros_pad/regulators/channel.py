@@ -13,6 +13,7 @@ from dataclasses import field
 
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import number
+from ros_pad.errors import ConfigError
 from ros_pad.errors import DeviceError
 from ros_pad.errors import DeviceFault
 from ros_pad.errors import InvalidInput
@@ -390,8 +391,8 @@ class SerialRegulator(ABC):
             self._error = error
             self._retry_at = -math.inf
             age = math.inf if self._frame is None else time.monotonic() - self._frame.time
-            if age > self._silence:
-                self._lose()
+            if age > self._silence or isinstance(error, ConfigError):
+                self._lose()  # a device that is not what the options say is not asked further
             self._changed.notify_all()
             return self._frame is None
 

@@ -21,6 +21,10 @@ LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
 """Faults of any line; each device has more of its own."""
 
 
+UNIT_CODE = '10'
+"""What the emulated Alicat calls its units; every device has codes of its own."""
+
+
 class Faults:
     """What is wrong now. Kinds as text; ``kind@address`` for one device of several on a bus.
 
@@ -294,10 +298,13 @@ class AlicatEmulator:
             return self._frame(address)
         if order == 'LSS' and self._version >= (10, 5):
             return f'{address} {"A" if has("analog_source", address) else "S"}'
-        if order == 'LS':
+        if order.split()[0] == 'LS':
+            _, *words = order.split()
+            if words and (words[1:] != [UNIT_CODE] or self._set(address, words[0]) == '?'):
+                return '?'
             label = 'PSIG' if has('wrong_unit', address) else f'{self._units}G'
             shown = self._shown(valve.setpoint)
-            return f'{address} {shown} {shown} 10 {label}'
+            return f'{address} {shown} {shown} {UNIT_CODE} {label}'
         if order in ('HP', 'C'):
             valve.pressure  # noqa: B018 up to now as before
             valve.held = order == 'HP'

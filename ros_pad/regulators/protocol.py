@@ -74,7 +74,11 @@ class Regulator(Protocol):
         """Command zero gauge pressure at once, whatever the set-point was."""
 
     def close(self) -> None:
-        """End the conversation. It does not vent: call ``vent`` first."""
+        """End the conversation.
+
+        Call ``vent`` first: a backend may vent here too, as those on a serial line do, which
+        raise where they cannot; the simulated one does not.
+        """
 
 
 def permitted(gauge_pa: float, ceiling: float) -> float:

@@ -33,9 +33,12 @@ def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
     device = dialogue(
         [
             *GREETING,
-            ('AS75.00', 'A +000.00 +075.00\r'),
-            ('AS12.35', 'A +074.31 +012.35\r'),
-            ('AS0.00', 'A +012.34 +000.00\r'),
+            ('ALS 75.00 10', 'A +000.00 +075.00 10 kPaG\r'),
+            ('A', 'A +000.00 +075.00\r'),
+            ('ALS 12.35 10', 'A +075.00 +012.35 10 kPaG\r'),
+            ('A', 'A +074.31 +012.35\r'),
+            ('ALS 0.00 10', 'A +012.35 +000.00 10 kPaG\r'),
+            ('A', 'A +012.34 +000.00\r'),
         ]
     )
     regulator = create('alicat', port=device.path, **SLOW)
@@ -52,7 +55,7 @@ def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
     assert reading.setpoint == pytest.approx(12_350.0)
     assert reading.faults == ()
     regulator.close()
-    assert device.said == 7
+    assert device.said == 10
 
 
 @pytest.mark.parametrize(
@@ -95,7 +98,8 @@ def test_valves_that_are_held_are_let_go_to_vent(dialogue, until):
             ('A', 'A +050.00 +000.00 HLD\r'),
             *GREETING[1:],
             ('AC', 'A +050.00 +000.00\r'),
-            ('AS0.00', 'A +049.00 +000.00\r'),
+            ('ALS 0.00 10', 'A +000.00 +000.00 10 kPaG\r'),
+            ('A', 'A +049.00 +000.00\r'),
         ]
     )
     regulator = create('alicat', port=device.path, **SLOW)
@@ -108,13 +112,18 @@ def test_valves_that_are_held_are_let_go_to_vent(dialogue, until):
 
 def test_a_rejection_is_a_fault_and_the_old_setpoint_stays(dialogue, until):
     device = dialogue(
-        [*GREETING, ('AS75.00', '?\r'), ('A', 'A +000.00 +000.00\r'), ('A', 'A +000.00 +000.00\r')]
+        [
+            *GREETING,
+            ('ALS 75.00 10', '?\r'),
+            ('A', 'A +000.00 +000.00\r'),
+            ('A', 'A +000.00 +000.00\r'),
+        ]
     )
     regulator = create('alicat', port=device.path, **SLOW)
     regulator.open()
     regulator.set_pressure(75e3)
     fault = until(lambda: fault_of(regulator))
-    for part in ('rejected', device.path, "'AS75.00'", "'?'"):
+    for part in ('rejected', device.path, "'ALS 75.00 10'", "'?'"):
         assert part in fault
     assert regulator.read().setpoint == 0.0
     regulator.close()
@@ -233,8 +242,8 @@ def test_nothing_is_ever_saved(emulated, opened, until):
         until(lambda pressure=pressure: regulator.read().setpoint == pressure)
     regulator.vent()
     until(lambda: regulator.read().setpoint == 0.0)
-    words = {each.rstrip('0123456789.') for each in line.commands}
-    assert words == {'A', 'AVE', 'ALS', 'ALSS', 'AS'}
+    words = {each.split()[0] for each in line.commands}
+    assert words == {'A', 'AVE', 'ALS', 'ALSS'}
 
 
 @pytest.mark.parametrize(
@@ -300,19 +309,102 @@ def test_a_firmware_that_does_not_say_what_it_is_counts_as_old(dialogue):
     assert device.problems == []
 
 
-@pytest.mark.parametrize('kind', ['analog_source', 'echo', 'rejection'])
-def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(emulated, opened, until, kind):
+@pytest.mark.parametrize(
+    ('set_command', 'kind', 'words'),
+    [
+        ('LS', 'analog_source', '60.00 was sent, 0 is in force'),
+        ('LS', 'echo', '60.00 was sent, 30 is in force'),
+        ('LS', 'rejection', 'rejected'),
+        ('S', 'analog_source', 'set-point of 60000 Pa is not obeyed'),
+        ('S', 'echo', 'set-point of 60000 Pa is not obeyed'),
+        ('S', 'rejection', 'rejected'),
+    ],
+)
+def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
+    emulated, opened, until, set_command, kind, words
+):
     device, line = emulated('alicat')
-    regulator = opened('alicat', port=line.path)
+    regulator = opened('alicat', port=line.path, set_command=set_command)
     device.faults.add(kind)
     regulator.set_pressure(60e3)
     fault = until(lambda: fault_of(regulator))
     assert line.path in fault
-    assert ('rejected' if kind == 'rejection' else 'set-point of 60000 Pa is not obeyed') in fault
+    assert words in fault
     assert regulator.read().setpoint == (30e3 if kind == 'echo' else 0.0)
     device.faults.clear()
     until(lambda: regulator.read().setpoint == 60e3)
     assert regulator.read().faults == ()
+
+
+@pytest.mark.parametrize(
+    ('reply', 'error', 'words'),
+    [
+        ('A +060.00 +060.00', ProtocolError, 'not two numbers, a code and a unit'),
+        ('A +060.00 +nan 10 kPaG', ProtocolError, 'not two numbers, a code and a unit'),
+        ('A +060.00 +060.00 x kPaG', ProtocolError, 'not two numbers, a code and a unit'),
+        ('B +060.00 +060.00 10 kPaG', ProtocolError, 'not a reply of unit A'),
+        ('A +060.00 +059.99 10 kPaG', DeviceFault, '60.00 was sent, 59.99 is in force'),
+        ('A +008.70 +008.70 10 PSIG', ConfigError, 'the device is set to PSIG'),
+        ('A +060.00 +060.00 10 kPaA', ConfigError, 'the device is set to kPaA'),
+    ],
+)
+def test_the_answer_to_a_setpoint_names_value_and_unit(reply, error, words):
+    regulator = create('alicat', port='/dev/somewhere')
+    said = dict(GREETING) | {'ALS 60.00 10': reply, 'AS0': 'A +000.00 +000.00'}
+    asked = []
+
+    def ask(command):
+        asked.append(command)
+        return said[command].strip()
+
+    regulator._meet(ask)
+    with pytest.raises(error, match=re.escape(words)):
+        regulator._set(ask, 60e3)
+    # Whatever the units are, zero is no pressure.
+    assert (asked[-1] == 'AS0') is (error is ConfigError)
+
+
+def test_units_that_change_meanwhile_end_in_a_vent(emulated, opened, until):
+    device, line = emulated('alicat')
+    regulator = opened('alicat', port=line.path)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    device.faults.add('wrong_unit')
+    regulator.set_pressure(70e3)
+    until(lambda: 'AS0' in line.commands)
+    with pytest.raises(ConfigError, match='the device is set to PSIG'):
+        until(lambda: regulator.read() is None)
+    assert device.valves['A'].setpoint == 0.0
+    assert line.commands.count('ALS 70.00 10') == 1
+    device.faults.clear()
+    until(lambda: _answers(regulator))
+    assert regulator.read().setpoint == 0.0
+
+
+def _answers(regulator):
+    try:
+        return regulator.read()
+    except ConfigError:
+        return None
+
+
+@pytest.mark.parametrize(
+    ('firmware', 'set_command', 'told'),
+    [
+        ('10v20', 'auto', 'ALS 60.00 10'),
+        ('9v00', 'auto', 'ALS 60.00 10'),
+        ('8v17', 'auto', 'AS60.00'),
+        ('10v20', 'S', 'AS60.00'),
+        ('8v17', 'S', 'AS60.00'),
+    ],
+)
+def test_which_command_sets(emulated, opened, until, firmware, set_command, told):
+    device, line = emulated('alicat', firmware=firmware)
+    regulator = opened('alicat', port=line.path, set_command=set_command)
+    regulator.set_pressure(60e3)
+    until(lambda: regulator.read().setpoint == 60e3)
+    assert told in line.commands
+    assert not device._locked
 
 
 def test_a_vent_is_repeated_until_it_is_obeyed(emulated, opened, until):
@@ -322,7 +414,7 @@ def test_a_vent_is_repeated_until_it_is_obeyed(emulated, opened, until):
     until(lambda: regulator.read().setpoint == 60e3)
     device.faults.add('rejection')
     regulator.vent()
-    until(lambda: line.commands.count('AS0.00') > 2)
+    until(lambda: line.commands.count('ALS 0.00 10') > 2)
     assert 'rejected' in fault_of(regulator)
     device.faults.clear()
     until(lambda: regulator.read().setpoint == 0.0)
@@ -334,7 +426,7 @@ def test_a_device_that_forgets_its_setpoint_is_told_again(emulated, opened, unti
     regulator.set_pressure(60e3)
     until(lambda: regulator.read().setpoint == 60e3)
     device.valves['A'].setpoint = 20e3  # somebody turned the knob
-    until(lambda: line.commands.count('AS60.00') == 2)
+    until(lambda: line.commands.count('ALS 60.00 10') == 2)
     until(lambda: regulator.read().setpoint == 60e3)
     assert device.valves['A'].setpoint == pytest.approx(60e3)
 

@@ -72,6 +72,9 @@ def test_words_of_an_alicat():
     assert said('a') == ('A', 'A +000.00 +000.00')
     assert said('AS75.00')[1].endswith(' +075.00')
     assert said('ASx')[1] == said('AS-1')[1] == said('AS1000')[1] == said('AWHAT')[1] == '?'
+    assert said('ALS 60.00 10')[1] == 'A +060.00 +060.00 10 kPaG'
+    assert said('ALS')[1] == 'A +060.00 +060.00 10 kPaG'
+    assert said('ALS 60.00 7')[1] == said('ALS 60.00')[1] == said('ALS 1000 10')[1] == '?'
     assert said('AHP')[1].endswith(' HLD')
     assert not said('AC')[1].endswith(' HLD')
     assert said('BLSS')[1] == 'B S'

@@ -106,7 +106,7 @@ def test_the_latest_setpoint_wins_and_none_is_queued(emulated, opened, until):
         regulator.set_pressure(float(pressure))
     device.faults.clear()
     until(lambda: regulator.read().setpoint == 79e3)
-    assert {each for each in line.commands if each.startswith('AS')} == {'AS79.00'}
+    assert {each for each in line.commands if each.startswith('ALS ')} == {'ALS 79.00 10'}
 
 
 def test_a_vent_goes_before_all_else(emulated, opened, until):
@@ -126,9 +126,9 @@ def test_a_vent_goes_before_all_else(emulated, opened, until):
     for each in 'BCDE':
         feet[each].set_pressure(60e3)
     feet['F'].vent()
-    until(lambda: 'FS0.00' in line.commands)
-    told = [each for each in line.commands if each in ('BS60.00', 'ES60.00', 'FS0.00')]
-    assert told[0] == 'FS0.00'
+    until(lambda: 'FLS 0.00 10' in line.commands)
+    orders = ('BLS 60.00 10', 'ELS 60.00 10', 'FLS 0.00 10')
+    assert next(each for each in line.commands if each in orders) == orders[-1]
     device.faults.clear()
 
 
@@ -167,7 +167,7 @@ def test_one_bad_reply_is_no_fault(emulated, opened, until):
         now = time.monotonic()
         until(lambda now=now: regulator.read().time > now)
         assert regulator.read().setpoint == 60e3
-    assert line.commands.count('AS0.00') == 0
+    assert line.commands.count('ALS 0.00 10') == 0
 
 
 def test_unplugged_in_mid_run_and_back(emulated, opened, until, tmp_path):
