@@ -46,7 +46,7 @@ def run(
     def stop(number: int, frame: Any) -> None:
         nonlocal stopped
         stopped = True
-        signal.signal(number, before[number])  # a second signal is not waited for
+        signal.signal(number, before[signal.Signals(number)])  # a second signal is not waited for
 
     # Signals end the spin, not the context: what a node does in destroy_node, such as venting or
     # closing a bag, is done whole and can be heard of. rclpy's own handlers would take the

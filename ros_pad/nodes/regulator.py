@@ -203,8 +203,8 @@ class RegulatorNode(LifecycleNode):
             started = time.monotonic()
             clock = self._last_tick if self._simulated_time else lambda: time.monotonic() - started
             options = {'clock': clock, 'pad_volume': self._foot.air_volume}
-        for name, parameter in self.get_parameters_by_prefix(BACKEND_OPTIONS).items():
-            options[name] = parameter.value
+        for name in self.get_parameters_by_prefix(BACKEND_OPTIONS):
+            options[name] = self.get_parameter(f'{BACKEND_OPTIONS}.{name}').value
         self._problem = None
         try:
             if 'ceiling' in options:
