@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad bag``: what is in a bag."""
+"""``pad bag``: what is in a bag, and a whole one of what a kill or a full disk left."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import pathlib
+import warnings
+from dataclasses import asdict
+from typing import Any
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.progress import bar
+from ros_pad.errors import InvalidInput
 from ros_pad.trials import label as labels
+from ros_pad.trials import repair as repairs
 from ros_pad.trials.bag import BagReader
 
 
@@ -20,18 +26,70 @@ def add(commands: Commands) -> None:
         commands,
         'bag',
         run,
-        'Say what is in a bag.',
-        'pad bag info runs/hexapod_patches_adaptive_seed0/bag',
+        'Say what is in a bag, or repair one.',
+        'pad bag info runs/hexapod_patches_adaptive_seed0/bag\n'
+        '  pad bag repair my_trial --out my_trial_repaired',
     )
-    part.add_argument('action', choices=('info',), help='topics, types, numbers of messages')
-    part.add_argument('bag', metavar='BAG', type=pathlib.Path, help='folder of a bag')
+    part.add_argument(
+        'action',
+        choices=('info', 'repair'),
+        help='info: topics, types, numbers of messages, what was lost; repair: write what can be'
+        ' read of a bag whose recorder was killed, or whose disk was full, into a new bag',
+    )
+    part.add_argument(
+        'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'
+    )
+    part.add_argument(
+        '--out',
+        type=pathlib.Path,
+        metavar='FOLDER',
+        help='of the repaired bag; default: BAG_repaired beside the broken one, which stays',
+    )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Tell of the bag; return the exit status."""
-    reader = BagReader(options.bag)
-    about = json.loads(reader.custom_data.get(labels.KEY, '{}'))
+    """Do what was asked; return the exit status."""
+    if options.action == 'repair':
+        return _repair(options)
+    if options.out:
+        raise InvalidInput('--out is for pad bag repair: pad bag info writes nothing')
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # the problem is told below
+        reader = BagReader(options.bag)
+    return _tell(options, reader)
+
+
+def _repair(options: argparse.Namespace) -> int:
+    source: pathlib.Path = options.bag
+    folder = options.out or source.with_name(f'{source.resolve().stem}_repaired')
+    with bar('reading', 1.0, 'bag') as progress:
+        found = repairs.inspect(source, progress)
+    whole = found.sound and (source / 'metadata.yaml').is_file()
+    if not whole:
+        with bar('writing', 1.0, 'bag') as progress:
+            found = repairs.repair(source, folder, progress)
+    if options.json:
+        written = None if whole else str(folder)
+        print(json.dumps({'bag': str(source), 'repaired': written} | asdict(found)))
+        return 0
+    if whole:
+        print(f'{source}: is whole, {found.messages} messages; nothing was written')
+        return 0
+    print(f'{folder}: {found.messages} messages recovered')
+    for count, words in (
+        (found.unread_bytes, 'bytes at the end make no sense'),
+        (found.damaged_chunks, 'damaged chunks were left out'),
+        (found.lost_messages, 'messages lost their topic with a damaged chunk'),
+    ):
+        if count:
+            print(f'{count:8d}  {words}')
+    return 0
+
+
+def _tell(options: argparse.Namespace, reader: BagReader) -> int:
+    about: dict[str, Any] = json.loads(reader.custom_data.get(labels.KEY, '{}'))
+    lost: dict[str, int] = json.loads(reader.custom_data.get(labels.LOST, '{}'))
     if options.json:
         print(
             json.dumps(
@@ -44,18 +102,25 @@ def run(options: argparse.Namespace) -> int:
                         name: {'type': kind, 'messages': reader.counts[name]}
                         for name, kind in reader.topics.items()
                     },
+                    'lost': lost,
                     'problem': reader.problem,
                     'trial': about,
+                    'made_with': json.loads(reader.custom_data.get(labels.MADE_WITH, '{}')),
+                    'parameters': json.loads(reader.custom_data.get(labels.PARAMETERS, '{}')),
                 }
             )
         )
-        return 0
+        return 1 if reader.problem else 0
     print(f'{options.bag}: {reader.message_count} messages in', end=' ')
     print(f'{(reader.end - reader.start) * 1e-9:.2f} s')
     if about:
         print(f'scene {about["scene"]}, policy {about["policy"]}, seed {about["seed"]}')
+    made_with = json.loads(reader.custom_data.get(labels.MADE_WITH, '{}'))
+    if made_with:
+        print('made with', ', '.join(f'{name} {version}' for name, version in made_with.items()))
     for name in sorted(reader.topics):
-        print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}')
+        missed = f'  {lost[name]} lost' if name in lost else ''
+        print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')
     if reader.problem:
-        return complain(reader.problem, 1)
+        return complain(f'{reader.problem}: pad bag repair makes a whole bag of it', 1)
     return 0

@@ -9,6 +9,7 @@ it hands messages over in the order they were published, several times faster th
 from __future__ import annotations
 
 import copy
+import json
 import os
 import signal
 import threading
@@ -17,6 +18,7 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import rclpy
@@ -28,6 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 from ros_pad.errors import PadError
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.parameters import values_of
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
@@ -37,6 +40,7 @@ from ros_pad.simulation.faults import SENSOR_KINDS
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.bag import annotate
+from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.label import label
 from ros_pad.trials.loop import CONTROL_PERIOD_NS
 from ros_pad.trials.loop import Progress
@@ -112,7 +116,12 @@ class ComposedTrial:
             return node
 
         try:
-            self.recorder = add(RecorderNode, use_sim_time=True, legs=legs, folder=os.fspath(bag))
+            self.recorder = add(
+                partial(RecorderNode, label(scene, policy, seed, fidelity)),
+                use_sim_time=True,
+                legs=legs,
+                folder=os.fspath(bag),
+            )
             self.regulator = add(
                 RegulatorNode,
                 use_sim_time=True,
@@ -146,6 +155,8 @@ class ComposedTrial:
                 free_running=False,
                 **ground,
             )
+            said = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
+            self.recorder.describe({PARAMETERS: json.dumps(said)})
             # The executor takes in new nodes as it spins: messages that come before would be
             # handed over in another order.
             self._executor.spin_once(timeout_sec=0.01)

@@ -249,3 +249,13 @@ def _follow(node: Node, live: dict[str, Parameter], values: dict[str, Any]) -> N
     node.add_pre_set_parameters_callback(prepare)
     node.add_on_set_parameters_callback(judge)
     node.add_post_set_parameters_callback(take)
+
+
+def values_of(node: Node) -> dict[str, Any]:
+    """Return every parameter of a node as JSON has it, by name."""
+    names = sorted(node.get_parameters_by_prefix(''))
+    values = [each.value for each in node.get_parameters(names)]
+    return {
+        name: value.tolist() if isinstance(value, array) else value
+        for name, value in zip(names, values, strict=True)
+    }

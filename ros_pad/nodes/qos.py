@@ -38,8 +38,12 @@ CLOCK_PUBLISH = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """``/diagnostics``, as diagnostic_updater publishes it."""
 
-RECORD = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-"""Record a topic whose publishers are reliable."""
+RECORD = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+"""Record a topic whose publishers are reliable.
+
+A queue of fixed depth overflows without a word; with this one every message waits until it is
+written, and what is lost on the way all the same is told by the middleware.
+"""
 
 
 def recording(offered: Sequence[QoSProfile]) -> QoSProfile:
@@ -54,7 +58,7 @@ def recording(offered: Sequence[QoSProfile]) -> QoSProfile:
     reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
     latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
     return QoSProfile(
-        depth=RECORD.depth,
+        history=RECORD.history,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=(
             DurabilityPolicy.TRANSIENT_LOCAL if offered and latched else DurabilityPolicy.VOLATILE

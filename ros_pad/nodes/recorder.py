@@ -4,17 +4,25 @@
 from __future__ import annotations
 
 import datetime
+import json
 import struct
 import sys
 import time
+from array import array
+from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
 from typing import Any
 
+from rclpy.clock import Clock
+from rclpy.clock import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.task import Future
 
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
@@ -22,6 +30,8 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
+from ros_pad.trials import label
+from ros_pad.trials.bag import FLUSH_PERIOD
 from ros_pad.trials.bag import BagWriter
 
 PARAMETERS = (
@@ -42,12 +52,18 @@ class RecorderNode(Node):
     second pass. Their log time is the node's clock: with ``use_sim_time`` that of the last
     ``/clock`` message, and 0 for what comes before the first one.
 
+    What is recorded reaches the disk within about a second. Messages that were lost on the way
+    here are counted by the middleware; the log tells of them as it happens, and the bag at its
+    end, under `ros_pad.trials.label.LOST`.
+
     Its ROS parameters are in :data:`PARAMETERS`; ``use_sim_time`` is read at the start only.
 
     Parameters
     ----------
     custom_data : mapping of str to str, optional
-        What the bag is to say about the trial.
+        What the bag is to say about the trial. Without it, it says the versions of ros_pad and
+        its libraries, and the parameters of all nodes in the namespace of this one, which are
+        asked as they appear.
     **kwargs
         Passed on to `rclpy.node.Node`.
 
@@ -70,23 +86,40 @@ class RecorderNode(Node):
             # Called for every message; replaced when the first /clock message is there.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
             self._clock_ns = 0
-            self._bag = BagWriter(folder, custom_data)
+            self._bag = BagWriter(
+                folder, custom_data or {label.MADE_WITH: json.dumps(label.made_with())}
+            )
         except BaseException:
             super().destroy_node()
             raise
         self._recordings: dict[str, Subscription] = {}
+        self._lost: Counter[str] = Counter()
         # The clock comes first: an executor that finds several messages waiting takes them in
         # the order of their subscriptions.
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             self._record(full_name, topic, qos.recording([topic.publish]))
+        self._parameters: dict[str, dict[str, Any]] = {}
+        self._asked: dict[str, AsyncParameterClient] = {}
+        # Of wall time, whatever the clock of the trial does.
+        self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._asks = custom_data is None
         self.get_logger().info(f'recording {len(recorded)} topics into {self._bag.folder}')
 
     @property
     def message_count(self) -> int:
         """Number of messages recorded so far."""
         return self._bag.message_count
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Number of messages that did not come, by topic; only topics that miss some."""
+        return dict(self._lost)
+
+    def describe(self, custom_data: Mapping[str, str]) -> None:
+        """Add to what the bag says about the trial."""
+        self._bag.describe(custom_data)
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
         """Stop recording and close the bag.
@@ -104,7 +137,7 @@ class RecorderNode(Node):
         for subscription in self._recordings.values():
             self.destroy_subscription(subscription)
         self._recordings.clear()
-        self._bag.close(custom_data)
+        self._bag.close({label.LOST: json.dumps(self.lost)} | dict(custom_data or {}))
 
     def destroy_node(self) -> None:
         """Close the bag, if nobody has, and the node; raises as :meth:`close` does."""
@@ -127,9 +160,60 @@ class RecorderNode(Node):
             name,
             self._clock_writer(name) if topic is topics.CLOCK else self._writer(name),
             profile,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=adapt),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=adapt, message_lost=self._loss_counter(name)
+            ),
             raw=True,
         )
+
+    def _loss_counter(self, name: str) -> Callable[[Any], None]:
+        known = 0
+
+        def callback(event: Any) -> None:
+            nonlocal known
+            # The change that an event names may have been told by the one before.
+            more, known = event.total_count - known, event.total_count
+            self._lost[name] += more
+            if more:
+                self.get_logger().warning(
+                    f'{self._lost.total()} messages lost so far, {self._lost[name]} of them on'
+                    f' {name}: this machine or network does not keep up',
+                    throttle_duration_sec=1.0,
+                )
+
+        return callback
+
+    def _look(self) -> None:
+        """Write down what has come, also when nothing comes any more, and who has appeared."""
+        if self._asks:
+            self._ask_nodes()
+        self._bag.flush()
+
+    def _ask_nodes(self) -> None:
+        for name, namespace in self.get_node_names_and_namespaces():
+            full_name = f'{namespace.rstrip("/")}/{name}'
+            hidden = name.startswith('_')
+            if hidden or namespace != self.get_namespace() or full_name in self._asked:
+                continue
+            client = AsyncParameterClient(self, full_name)
+            if client.services_are_ready():
+                self._asked[full_name] = client
+                self._ask(full_name, client)
+
+    def _ask(self, node: str, client: AsyncParameterClient) -> None:
+        def named(future: Future) -> None:
+            names = list(future.result().result.names)
+            client.get_parameters(names, lambda values: told(names, values))
+
+        def told(names: list[str], future: Future) -> None:
+            values = map(parameter_value_to_python, future.result().values)
+            self._parameters[node] = {
+                name: value.tolist() if isinstance(value, array) else value
+                for name, value in zip(names, values, strict=True)
+            }
+            self._bag.describe({label.PARAMETERS: json.dumps(self._parameters)})
+
+        client.list_parameters(callback=named)
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

@@ -23,6 +23,8 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
+from concurrent.futures import Future
+from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import IO
 from typing import Any
@@ -50,7 +52,7 @@ CHUNK_SIZE = 64 * 1024
 """Bytes of messages that are compressed together, and that a killed writer may lose."""
 
 FLUSH_PERIOD = 1.0
-"""Seconds of wall time after which a write also hands everything so far to the disk."""
+"""Seconds of wall time after which a write also sends everything so far on to the disk."""
 
 # Measured on wrenches with noise in chunks of 64 KiB: a message takes 5.4 us of time and 44 bytes
 # of file with zstd, 5.0 us and 55 bytes with LZ4, 4.8 us and 123 bytes without compression.
@@ -133,7 +135,8 @@ def type_hash(type_name: str) -> str:
 class BagWriter:
     """Writes a new bag; use it as a context manager.
 
-    Should the process die, all but the last second or so can still be read.
+    Should the process die, or the power fail, all but the last second or so can still be read,
+    and `ros_pad.trials.repair` makes a whole bag of it.
 
     Parameters
     ----------
@@ -175,6 +178,9 @@ class BagWriter:
         self._schemas: dict[str, int] = {}
         self._next_flush = 0.0
         self._stream: IO[bytes] | None = None
+        # A disk may take its time to write, and a recorder has none: another thread waits.
+        self._disk = ThreadPoolExecutor(1, 'bag to disk')
+        self._synced: Future[None] | None = None
         try:
             self._stream = self._path.open('xb')
             self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION)
@@ -211,27 +217,50 @@ class BagWriter:
         BagError
             When the type is unknown, the topic is there already, or the bag is closed.
         """
+        digest = type_hash(type_name)
+        definition = message_definition(type_name).encode()
+        metadata = {'offered_qos_profiles': qos, 'topic_type_hash': digest}
+        self.copy_topic(
+            Channel(id=0, topic=name, message_encoding='cdr', metadata=metadata, schema_id=0),
+            Schema(id=0, name=type_name, encoding='ros2msg', data=definition),
+        )
+
+    def copy_topic(self, channel: Channel, schema: Schema) -> None:
+        """Declare a topic as another bag has it; its types need not be installed.
+
+        Parameters
+        ----------
+        channel : mcap.records.Channel
+            Its name, encoding and metadata; its numbers are given anew.
+        schema : mcap.records.Schema
+            Its message type, with all that this refers to.
+
+        Raises
+        ------
+        BagError
+            When the topic is there already, or the bag is closed.
+        """
+        name = channel.topic
         if self._stream is None:
             raise BagError(f'{self.folder}: is closed, no topic {name} can be added')
         if name in self._topics:
             raise BagError(f'{self.folder}: has topic {name} already')
-        digest = type_hash(type_name)
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._writer.register_schema(
-                type_name, 'ros2msg', message_definition(type_name).encode()
+        if schema.name not in self._schemas:
+            self._schemas[schema.name] = self._writer.register_schema(
+                schema.name, schema.encoding, schema.data
             )
         self._channels[name] = self._writer.register_channel(
-            name,
-            'cdr',
-            self._schemas[type_name],
-            {'offered_qos_profiles': qos, 'topic_type_hash': digest},
+            name, channel.message_encoding, self._schemas[schema.name], channel.metadata
         )
         self._topics[name] = {
             'name': name,
-            'type': type_name,
-            'serialization_format': 'cdr',
-            'offered_qos_profiles': yaml.safe_load(qos),
-            'type_description_hash': digest,
+            'type': schema.name,
+            'serialization_format': channel.message_encoding,
+            'offered_qos_profiles': yaml.safe_load(
+                channel.metadata.get('offered_qos_profiles', '[]')
+            )
+            or [],
+            'type_description_hash': channel.metadata.get('topic_type_hash', ''),
         }
         self._next_flush = 0.0  # the next message brings file and metadata.yaml up to date
 
@@ -279,8 +308,21 @@ class BagWriter:
         except OSError as error:
             self._fail(error)
 
+    def describe(self, custom_data: Mapping[str, str]) -> None:
+        """Add to what ``metadata.yaml`` carries about the trial; it is there after the next flush.
+
+        Raises
+        ------
+        InvalidInput
+            When `custom_data` holds anything but text.
+        """
+        self._custom_data |= _texts(custom_data)
+        self._next_flush = 0.0
+
     def flush(self) -> None:
-        """Hand everything written so far to the operating system.
+        """Hand everything written so far to the operating system, and that to the disk.
+
+        The disk is not waited for: what it could not take is raised by the next flush.
 
         Raises
         ------
@@ -291,8 +333,12 @@ class BagWriter:
             raise BagError(f'{self.folder}: is closed')
         try:
             self._writer.flush()
-            if self._next_flush == 0.0:  # topics were added
+            if self._next_flush == 0.0:  # there is more to say
                 self._write_metadata(_Contents())
+            if self._synced is None or self._synced.done():
+                if self._synced:
+                    self._synced.result()
+                self._synced = self._disk.submit(os.fsync, self._stream.fileno())
         except OSError as error:
             self._fail(error)
         self._next_flush = time.monotonic() + FLUSH_PERIOD
@@ -312,9 +358,11 @@ class BagWriter:
         """
         if self._stream is None:
             return
-        self._custom_data |= _texts(custom_data)
+        self.describe(custom_data or {})
         try:
             self._writer.finish()
+            self._disk.shutdown()
+            os.fsync(self._stream.fileno())
             self._stream.close()
             self._stream = None
             self._channels = {}
@@ -324,6 +372,7 @@ class BagWriter:
 
     def _fail(self, error: OSError) -> None:
         """Leave what can be left on a disk that takes no more, and raise."""
+        self._disk.shutdown()
         if self._stream is not None:
             with contextlib.suppress(OSError):
                 self._stream.close()
@@ -395,15 +444,16 @@ def annotate(folder: str | os.PathLike[str], custom_data: Mapping[str, str]) -> 
 def _replace_metadata(folder: pathlib.Path, information: dict[str, Any]) -> None:
     """Write metadata.yaml as a whole, so that a full disk or a kill leaves the earlier one."""
     new = folder / 'metadata.yaml.new'
-    new.write_text(
-        yaml.dump(
-            {'rosbag2_bagfile_information': information},
-            Dumper=_NoAliasDumper,
-            sort_keys=False,
-            allow_unicode=True,
-        ),
-        encoding='utf-8',
+    text = yaml.dump(
+        {'rosbag2_bagfile_information': information},
+        Dumper=_NoAliasDumper,
+        sort_keys=False,
+        allow_unicode=True,
     )
+    with new.open('w', encoding='utf-8') as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())  # or the name may reach the disk before the contents
     new.replace(folder / 'metadata.yaml')
 
 

@@ -3,10 +3,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import json
 import math
+import os
+import pathlib
+import platform
+import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict
+from dataclasses import fields
+from dataclasses import is_dataclass
+from importlib import metadata
 from typing import Any
 
 import ros_pad
@@ -16,6 +25,17 @@ from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
 KEY = 'ros_pad'
+"""Of what a simulated trial was, and what came out."""
+
+MADE_WITH = 'ros_pad_made_with'
+"""Of the versions of what made the bag."""
+
+PARAMETERS = 'ros_pad_parameters'
+"""Of the parameters of the nodes on the graph, by full name of the node."""
+
+LOST = 'ros_pad_lost'
+"""Of the numbers of messages that were lost on the way to the recorder, by topic."""
+
 AMBIENT_PRESSURE = 101325.0  # Pa, that simulated trials add to gauge pressures
 
 
@@ -51,6 +71,7 @@ def label(
                 'seed': seed,
                 'fidelity': fidelity,
                 'floor': asdict(scene.floor),
+                'conditions': _plain(scene),
                 'ambient_pressure': AMBIENT_PRESSURE,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,
@@ -60,8 +81,55 @@ def label(
                     'comparison': list(comparison),
                 },
             }
-        )
+        ),
+        MADE_WITH: json.dumps(made_with()),
     }
+
+
+@functools.cache
+def made_with() -> dict[str, str]:
+    """Return the versions of ros_pad and of what its numbers hang on, with the git description.
+
+    The latter, ``git``, is there only where ros_pad runs from a checkout of its repository.
+    """
+    versions = {'ros_pad': ros_pad.__version__}
+    folder = pathlib.Path(ros_pad.__file__).parent
+    # Elsewhere, as in a venv inside somebody's repository, git would describe that one.
+    ours = _git(folder, 'ls-files', '--error-unmatch', '__init__.py')
+    if ours and (description := _git(folder, 'describe', '--always', '--dirty', '--tags')):
+        versions['git'] = description
+    versions['python'] = platform.python_version()
+    for package in ('numpy', 'scipy', 'mujoco', 'mcap'):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            versions[package] = metadata.version(package)
+    if distro := os.environ.get('ROS_DISTRO'):
+        versions['ros'] = distro
+    return versions | {'system': f'{platform.system()} {platform.machine()}'}
+
+
+def _git(folder: pathlib.Path, *words: str) -> str:
+    """Return what git says there; empty where it does not know, or is not there."""
+    try:
+        said = subprocess.run(
+            ['git', '-C', str(folder), *words], capture_output=True, text=True, timeout=5.0
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ''
+    return said.stdout.strip() if said.returncode == 0 else ''
+
+
+def _plain(thing: Any) -> Any:
+    """Return a scene as JSON has it: by the names of its attributes, without what is derived."""
+    if is_dataclass(thing) and not isinstance(thing, type):
+        public = [each.name for each in fields(thing) if not each.name.startswith('_')]
+        return {name: _plain(getattr(thing, name)) for name in public}
+    if isinstance(thing, dict):
+        return {str(key): _plain(value) for key, value in thing.items()}
+    if isinstance(thing, (list, tuple)):
+        return [_plain(each) for each in thing]
+    if isinstance(thing, float) and not math.isfinite(thing):
+        return str(thing)
+    return thing if isinstance(thing, (str, int, float, bool, type(None))) else str(thing)
 
 
 def promise(trial: Trial) -> str:

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import json
+import os
 import re
 import signal
 import subprocess
@@ -12,17 +14,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_msgs.msg import String
 
+import ros_pad
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
 from ros_pad.nodes.recorder import RecorderNode
+from ros_pad.trials import label
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.bag import BagWriter
 
@@ -81,7 +86,9 @@ def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path
     recorder.close({'outcome': 'done'})
     reader = BagReader(tmp_path / 'trial')
     assert reader.counts == {f'/{name}': 20 for name in publishers}
-    assert reader.custom_data == {'outcome': 'done'}
+    assert reader.custom_data['outcome'] == 'done'
+    assert json.loads(reader.custom_data[label.LOST]) == {}
+    assert json.loads(reader.custom_data[label.MADE_WITH])['ros_pad'] == ros_pad.__version__
     # The table of DESIGN: what each topic of a leg carries.
     assert {t.removeprefix('/leg_4/'): n for t, n in reader.topics.items() if 'leg_4' in t} == {
         'pressure': 'sensor_msgs/msg/FluidPressure',
@@ -130,6 +137,100 @@ def test_a_best_effort_driver_is_recorded_too(robot, record, until, tmp_path):
     until(lambda: recorder.message_count == 3)
     recorder.close()
     assert BagReader(tmp_path / 'trial').counts['/leg_1/wrench'] == 2
+
+
+def on_disk(folder, topic):
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        try:
+            return BagReader(folder).counts[topic]
+        except BagError:  # nothing yet
+            return 0
+
+
+def test_a_last_message_reaches_the_disk_although_none_follows(robot, record, until, tmp_path):
+    recorder = record()
+    publisher = topics.WETNESS.publisher(robot, 1)
+    until(lambda: publisher.get_subscription_count())
+    for number in (1, 2):
+        publisher.publish(Float64())
+        until(lambda n=number: recorder.message_count == n)
+    until(lambda: on_disk(tmp_path / 'trial', '/leg_1/wetness') == 2)
+    recorder.close()
+
+
+def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
+    context, executor, record, until, tmp_path
+):
+    nodes = [
+        Node('gait', context=context, enable_rosout=False),
+        Node('other', namespace='elsewhere', context=context, enable_rosout=False),
+        Node('_hidden', context=context, enable_rosout=False),
+    ]
+    for node in nodes:
+        node.declare_parameter('stride', 0.14)
+        node.declare_parameter('homes', [0.1, 0.2])
+        executor.add_node(node)
+    recorder = record()
+
+    def told():
+        text = BagReader(tmp_path / 'trial').custom_data.get(label.PARAMETERS, '{}')
+        return json.loads(text).get('/gait')
+
+    def while_open():
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')
+            try:
+                return told()
+            except BagError:
+                return None
+
+    publisher = topics.WETNESS.publisher(nodes[0], 1)
+    until(lambda: publisher.get_subscription_count())
+    publisher.publish(Float64())
+    until(while_open)
+    recorder.close()
+    assert told() == {'homes': [0.1, 0.2], 'stride': 0.14, 'use_sim_time': False} | {
+        'start_type_description_service': True
+    }
+    said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
+    assert set(said) <= {'/gait', '/robot', '/recorder'}
+
+
+@pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
+def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
+    driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = robot.create_publisher(WrenchStamped, 'leg_2/wrench', driver)
+    process = start(f'folder:={tmp_path / "trial"}')
+    sent = 0
+
+    def send(count):
+        nonlocal sent
+        for _ in range(count):
+            publisher.publish(WrenchStamped())
+        sent += count
+
+    try:
+        until(lambda: publisher.get_subscription_count(), timeout=30.0)
+        until(lambda: send(1) or on_disk(tmp_path / 'trial', '/leg_2/wrench'), timeout=30.0)
+        os.kill(process.pid, signal.SIGSTOP)
+        send(20_000)  # more than any queue on the way holds
+        os.kill(process.pid, signal.SIGCONT)
+        before = on_disk(tmp_path / 'trial', '/leg_2/wrench')
+        # One that comes is how the middleware finds out about those that did not.
+        until(lambda: send(1) or on_disk(tmp_path / 'trial', '/leg_2/wrench') > before)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 0, errors
+    reader = BagReader(tmp_path / 'trial')
+    (lost,) = json.loads(reader.custom_data[label.LOST]).items()
+    assert lost[0] == '/leg_2/wrench'
+    assert lost[1] > 1000
+    # What was sent before the recorder was found, or while it ended, is nobody's loss.
+    assert sent - 50 <= lost[1] + reader.counts['/leg_2/wrench'] <= sent
+    assert 'messages lost so far' in errors
 
 
 def test_time_is_that_of_the_machine(robot, record, until, tmp_path):
@@ -294,4 +395,4 @@ def test_recording_hears_the_weakest_publisher():
     )
     assert qos.recording([qos.STATE]).durability == qos.STATE.durability
     assert qos.recording([qos.STATE, qos.COMMAND]).durability == qos.COMMAND.durability
-    assert qos.recording([qos.SENSOR_PUBLISH]).depth == 1000
+    assert qos.recording([qos.SENSOR_PUBLISH]).history == HistoryPolicy.KEEP_ALL
