@@ -60,6 +60,7 @@ setup(
             'ros-jazzy-sensor-msgs',
             'ros-jazzy-std-msgs',
             'ros-jazzy-std-srvs',
+            'ros-jazzy-visualization-msgs',
         ],
         # The hexapod with joints (L2), and compiled loops of the planar one.
         'mujoco': ['mujoco>=3.2'],

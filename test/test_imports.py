@@ -35,6 +35,7 @@ FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'tqdm'}
 ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
+    'visualization_msgs',
 }
 # What an extra brings: imported inside the functions that need it, missing where it is not asked
 # for.

@@ -100,7 +100,7 @@ class RecorderNode(Node):
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             self._record(full_name, topic, qos.recording([topic.publish]))
-        self._parameters: dict[str, dict[str, Any]] = {}
+        self._said: dict[str, dict[str, Any]] = {}
         self._asked: dict[str, AsyncParameterClient] = {}
         # Of wall time, whatever the clock of the trial does.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -207,11 +207,11 @@ class RecorderNode(Node):
 
         def told(names: list[str], future: Future) -> None:
             values = map(parameter_value_to_python, future.result().values)
-            self._parameters[node] = {
+            self._said[node] = {
                 name: value.tolist() if isinstance(value, array) else value
                 for name, value in zip(names, values, strict=True)
             }
-            self._bag.describe({label.PARAMETERS: json.dumps(self._parameters)})
+            self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
 
         client.list_parameters(callback=named)
 

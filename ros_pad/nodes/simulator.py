@@ -21,6 +21,7 @@ from sensor_msgs.msg import JointState
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
+from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import SCENE
 from ros_pad.nodes.parameters import SEED
@@ -29,6 +30,7 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import Pace
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import Sensors
@@ -48,6 +50,9 @@ PARAMETERS = (
     ),
     Parameter('publish_clock', False, 'Stamp with simulated time, and publish it on /clock.'),
     Parameter('free_running', True, 'Step by a timer; otherwise step() is called.'),
+    Parameter(
+        'markers_rate', 10.0, 'Drawings for RViz and Foxglove a second; 0: none.', 'Hz', 0.0, 60.0
+    ),
     AMBIENT_PRESSURE,
 )
 
@@ -82,6 +87,10 @@ class SimulatorNode(Node):
         self._ambient = values['ambient_pressure']
         self.pressures = [0.0] * len(self.scene.legs)
         self.pressure_stamps = [0] * len(self.scene.legs)
+        rate = values['markers_rate']
+        self._markers = WalkMarkers(self.scene, self.floor) if rate else None
+        self._markers_pace = Pace(round(1e9 / rate)) if rate else None
+        self._marker_publisher = topics.MARKERS.publisher(self) if rate else None
         self._simulated = values['publish_clock']
         self.time_ns = 0
         self._clock_publisher = topics.CLOCK.publisher(self) if self._simulated else None
@@ -151,6 +160,13 @@ class SimulatorNode(Node):
             self._joint_message.header.stamp = wrench.header.stamp
             self._joint_message.position = self.robot.joint_positions
             self._joints.publish(self._joint_message)
+        self._draw(stamp_ns)
+
+    def _draw(self, stamp_ns: int) -> None:
+        if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
+            assert self._marker_publisher
+            message = self._markers.message(self.robot, self.pressures, stamp_ns)
+            self._marker_publisher.publish(message)
 
     def tick(self) -> None:
         """Let simulated time go on by one sample; :meth:`step` does it too."""

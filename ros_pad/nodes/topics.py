@@ -27,6 +27,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
 from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
@@ -98,6 +99,7 @@ DOUBT = Topic('leg_{leg}/doubt', String, qos.STATE, qos.STATE)
 MORPHOLOGY = Topic('leg_{leg}/morphology', String, qos.STATE, qos.STATE)
 BODY_POSE = _measured('body/pose', PoseStamped)
 JOINT_STATES = _measured('joint_states', JointState)
+MARKERS = Topic('markers', MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
 CLOCK = Topic('/clock', Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
 
@@ -116,7 +118,7 @@ LEG_TOPICS = (
 )
 """The topics that every leg has."""
 
-COMMON_TOPICS = (CLOCK, BODY_POSE, JOINT_STATES, DIAGNOSTICS)
+COMMON_TOPICS = (CLOCK, BODY_POSE, JOINT_STATES, MARKERS, DIAGNOSTICS)
 """The topics that there is one of."""
 
 

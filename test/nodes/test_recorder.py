@@ -76,7 +76,7 @@ def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path
             for topic in topics.LEG_TOPICS
         ]
     } | {topic.name().lstrip('/'): topic.publisher(robot) for topic in topics.COMMON_TOPICS}
-    assert len(publishers) == 2 * 11 + 4
+    assert len(publishers) == 2 * 11 + 5
     recorder = record(legs=[1, 4])
     until(lambda: all(p.get_subscription_count() for p in publishers.values()))
     for round_number in range(1, 21):
@@ -300,7 +300,7 @@ def test_a_namespace_moves_the_robot_but_not_the_clock(context, tmp_path):
     node.close()
     node.destroy_node()
     recorded = BagReader(tmp_path / 'trial').topics
-    assert len(recorded) == 6 * 11 + 4
+    assert len(recorded) == 6 * 11 + 5
     assert {'/lab/robot_7/leg_6/wrench', '/lab/robot_7/body/pose', '/clock'} <= set(recorded)
     assert recorded['/diagnostics'] == 'diagnostic_msgs/msg/DiagnosticArray'
 

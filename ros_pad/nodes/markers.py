@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The walk as markers, for RViz and Foxglove: soles, forces, body, path, wet ground."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+from visualization_msgs.msg import MarkerArray
+
+from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terrain import Floor
+
+FORCE_SCALE = 0.01
+"""m of arrow in a newton."""
+
+DOME = 5000.0
+"""Gauge pressure, Pa, above which a pad is drawn as a dome."""
+
+TILE = 1.0
+"""Edge of the square of floor in one marker, m."""
+
+_CELLS = 20  # a side of a tile
+_SIGHT = 1.5  # m before and behind the body in which floor is shown
+_BREADTH = 0.6  # m to either side
+_SLOW_NS = 1_000_000_000  # floor and path come once a second: they are long
+_PATH_STEP = 0.02  # m between points of the path
+
+# Okabe and Ito's colours, as in the report.
+_WET = (0.337, 0.706, 0.914)
+_DRY = (0.902, 0.624, 0.0)
+_SWING = (0.6, 0.6, 0.6)
+_SLIPPING = (0.835, 0.369, 0.0)
+_BLACK = (0.0, 0.0, 0.0)
+
+
+class WalkMarkers:
+    """Makes the markers of one walk.
+
+    Soles are discs, thin when flat and thick when domed, blue on wet ground, yellow on dry, grey
+    in the air; arrows are the forces of the ground, red where the foot slips. All are in the
+    frame ``world``, and each keeps its name and number, so that a new one takes the old one's
+    place.
+
+    Parameters
+    ----------
+    scene : Scene
+    floor : Floor
+    """
+
+    def __init__(self, scene: Scene, floor: Floor) -> None:
+        self._scene = scene
+        self._floor = floor
+        self._tiles: dict[tuple[int, int], Marker] = {}
+        self._path: list[Point] = []
+        self._slow_ns: int | None = None
+        outline: Sequence[tuple[float, float]] = ()
+        if isinstance(scene.body, HexapodBody):
+            outline = (*scene.body.homes, scene.body.homes[0])
+        # Half way in to the feet: the body that carries the legs.
+        self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
+        list(self._ground(0.0, 0.0))  # making them takes its time, and a walk has none
+
+    def message(self, robot: Robot, pressures: Sequence[float], time_ns: int) -> MarkerArray:
+        """Return what is to be drawn now.
+
+        Parameters
+        ----------
+        robot : Robot
+            As it is now.
+        pressures : sequence of float
+            Of the pads, gauge Pa, in the order of the robot's legs.
+        time_ns : int
+            Stamp, ns.
+        """
+        seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
+        stamp = Time(sec=seconds, nanosec=nanoseconds)
+        array = MarkerArray()
+        for leg, foot, pressure in zip(robot.legs, robot.feet, pressures, strict=True):
+            array.markers.append(self._sole(leg, foot, pressure))
+            array.markers.append(self._force(leg, foot))
+        x, y, heading = robot.body
+        array.markers.append(self._body(x, y, heading))
+        if not self._path or math.dist((self._path[-1].x, self._path[-1].y), (x, y)) > _PATH_STEP:
+            self._path.append(Point(x=x, y=y, z=0.002))
+        if self._slow_ns is None or not 0 <= time_ns - self._slow_ns < _SLOW_NS:
+            self._slow_ns = time_ns
+            array.markers.append(self._line('path', self._path, _BLACK, 0.006))
+            array.markers.extend(self._ground(x, y))
+        for marker in array.markers:
+            marker.header.stamp = stamp
+        return array
+
+    def _sole(self, leg: int, foot: FootState, pressure: float) -> Marker:
+        x, y, z = foot.position
+        marker = _marker('soles', leg, Marker.CYLINDER)
+        height = 0.006 if pressure > DOME else 0.002
+        ground = self._floor.height(x, y) if foot.standing else z
+        marker.pose.position = Point(x=x, y=y, z=ground + 0.5 * height)
+        diameter = 2.0 * self._scene.foot.sole_radius
+        marker.scale = Vector3(x=diameter, y=diameter, z=height)
+        marker.color = _colour((_WET if foot.wet else _DRY) if foot.standing else _SWING)
+        return marker
+
+    def _force(self, leg: int, foot: FootState) -> Marker:
+        marker = _marker('forces', leg, Marker.ARROW)
+        x, y, _ = foot.position
+        fx, fy, fz = (FORCE_SCALE * each for each in foot.force)
+        if not foot.standing or not math.hypot(fx, fy, fz) > 0.0:
+            marker.action = Marker.DELETE
+            return marker
+        z = self._floor.height(x, y)
+        marker.points = [Point(x=x, y=y, z=z), Point(x=x + fx, y=y + fy, z=z + fz)]
+        marker.scale = Vector3(x=0.006, y=0.012, z=0.015)  # shaft, head, head's length
+        marker.color = _colour(_SLIPPING if foot.slip_speed > 0.005 else _BLACK)
+        return marker
+
+    def _body(self, x: float, y: float, heading: float) -> Marker:
+        cosine, sine = math.cos(heading), math.sin(heading)
+        corners = [
+            Point(
+                x=x + cosine * fore - sine * left,
+                y=y + sine * fore + cosine * left,
+                z=self._scene.body.height if isinstance(self._scene.body, HexapodBody) else 0.05,
+            )
+            for fore, left in self._outline or ((-0.05, 0.0), (0.05, 0.0))
+        ]
+        return self._line('body', corners, _BLACK, 0.008)
+
+    def _line(
+        self, name: str, points: list[Point], colour: tuple[float, float, float], width: float
+    ) -> Marker:
+        marker = _marker(name, 0, Marker.LINE_STRIP)
+        # One point is no line, and RViz says so again and again.
+        marker.points = points if len(points) > 1 else points * 2
+        marker.scale = Vector3(x=width)
+        marker.color = _colour(colour)
+        return marker
+
+    def _ground(self, x: float, y: float) -> Iterator[Marker]:
+        """Yield the wet floor around the body, square by square."""
+        for column in range(math.floor((x - _SIGHT) / TILE), math.floor((x + _SIGHT) / TILE) + 1):
+            for row in range(
+                math.floor((y - _BREADTH) / TILE), math.floor((y + _BREADTH) / TILE) + 1
+            ):
+                if (column, row) not in self._tiles:
+                    self._tiles[column, row] = self._tile(column, row)
+                if self._tiles[column, row].points:
+                    yield self._tiles[column, row]
+
+    def _tile(self, column: int, row: int) -> Marker:
+        number = column * 1000 + row  # of its own over a kilometre of floor
+        marker = _marker('wet ground', number, Marker.TRIANGLE_LIST)
+        cell = TILE / _CELLS
+        centres = (np.arange(_CELLS) + 0.5) * cell
+        wet = self._floor.wet_along(*np.meshgrid(column * TILE + centres, row * TILE + centres))
+        for left, right, bottom, top in _rectangles(wet):
+            x0, x1 = column * TILE + left * cell, column * TILE + right * cell
+            y0, y1 = row * TILE + bottom * cell, row * TILE + top * cell
+            a, b, c, d = (Point(x=x, y=y) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+            marker.points += [a, b, c, a, c, d]
+        marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
+        marker.color = _colour(_WET, 0.5)
+        return marker
+
+
+def _rectangles(wet: np.ndarray) -> Iterator[tuple[int, int, int, int]]:
+    """Yield rectangles (left, right, bottom, top) that together are the wet cells.
+
+    Runs of cells in a row, and runs that are alike in the rows above taken together: a tenth of
+    the corners of single cells.
+    """
+    growing: dict[tuple[int, int], int] = {}  # from which row on there is such a run
+    for row in range(len(wet) + 1):
+        cells = wet[row].astype(int) if row < len(wet) else []
+        edges = np.flatnonzero(np.diff(cells, prepend=0, append=0)).tolist()
+        runs = set(zip(edges[::2], edges[1::2], strict=True))
+        for left, right in sorted(growing.keys() - runs):
+            yield left, right, growing.pop((left, right)), row
+        for run in runs:
+            growing.setdefault(run, row)
+
+
+def _marker(name: str, number: int, kind: int) -> Marker:
+    marker = Marker(ns=name, id=number, type=kind, action=Marker.ADD)
+    marker.header.frame_id = 'world'
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def _colour(rgb: tuple[float, float, float], opacity: float = 1.0) -> ColorRGBA:
+    red, green, blue = rgb
+    return ColorRGBA(r=red, g=green, b=blue, a=opacity)

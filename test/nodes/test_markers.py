@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+import itertools
+import math
+
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message
+from rclpy.serialization import serialize_message
+from visualization_msgs.msg import Marker
+from visualization_msgs.msg import MarkerArray
+
+from ros_pad.nodes.markers import FORCE_SCALE
+from ros_pad.nodes.markers import WalkMarkers
+from ros_pad.simulation import fidelity
+from ros_pad.simulation.scene import Scene
+
+DT = 0.004
+
+
+def walked(scene_name, seconds, pressure=0.0):
+    """Yield a robot every 0.1 s, with its markers after a journey over the wire."""
+    scene = Scene.load(scene_name)
+    floor = scene.floor.build(0)
+    robot = fidelity.build(scene, floor, DT, 'L0' if scene.robot == 'rail_leg' else 'L1')
+    markers = WalkMarkers(scene, floor)
+    pressures = [pressure] * len(scene.legs)
+    for step in range(round(seconds / DT)):
+        robot.step(pressures)
+        if step % 25 == 0:
+            message = markers.message(robot, pressures, round(robot.time * 1e9))
+            wire = deserialize_message(serialize_message(message), MarkerArray)
+            yield scene, floor, robot, {(each.ns, each.id): each for each in wire.markers}
+
+
+def test_soles_and_forces_are_where_the_feet_are():
+    standing = swinging = wet = 0
+    for scene, _, robot, drawn in walked('hexapod_patches', 24.0, 75e3):
+        for leg, foot in zip(robot.legs, robot.feet, strict=True):
+            sole, force = drawn['soles', leg], drawn['forces', leg]
+            assert sole.header.frame_id == force.header.frame_id == 'world'
+            x, y = sole.pose.position.x, sole.pose.position.y
+            assert (x, y) == pytest.approx(foot.position[:2])
+            assert sole.scale.x == pytest.approx(2 * scene.foot.sole_radius)
+            assert (sole.type, force.type) == (Marker.CYLINDER, Marker.ARROW)
+            if not foot.standing:
+                swinging += 1
+                assert force.action == Marker.DELETE
+                continue
+            standing += 1
+            tail, head = force.points
+            arrow = (head.x - tail.x, head.y - tail.y, head.z - tail.z)
+            assert arrow == pytest.approx([FORCE_SCALE * each for each in foot.force])
+            assert head.z > tail.z  # the ground pushes up
+            blue = sole.color.b > sole.color.r
+            assert blue == foot.wet
+            wet += blue
+    assert min(standing, swinging, wet, standing - wet) > 20
+
+
+def test_domes_are_thicker():
+    (*_, flat), (*_, dome) = (next(walked('hexapod_smooth_dry_flat', 0.1, p)) for p in (0.0, 75e3))
+    assert dome['soles', 1].scale.z > 2 * flat['soles', 1].scale.z
+
+
+def test_wet_ground_is_drawn_where_it_is_wet_and_nowhere_else():
+    _, floor, _, drawn = next(walked('hexapod_patches', 0.1))
+    tiles = [each for (name, _), each in drawn.items() if name == 'wet ground']
+    corners = [(p.x, p.y) for tile in tiles for p in tile.points]
+    triangles = np.array(corners).reshape(-1, 3, 2)
+    for x in np.arange(-0.975, 1.0, 0.05):
+        for y in np.arange(-0.475, 0.5, 0.05):
+            (ax, ay), (bx, by), (cx, cy) = triangles.transpose(1, 2, 0)
+            left_of = [
+                (bx - ax) * (y - ay) - (by - ay) * (x - ax),
+                (cx - bx) * (y - by) - (cy - by) * (x - bx),
+                (ax - cx) * (y - cy) - (ay - cy) * (x - cx),
+            ]
+            inside = np.all(np.array(left_of) > -1e-12, axis=0)
+            assert inside.any() == floor.wet(x, y), (x, y)
+
+
+def test_floor_and_path_come_once_a_second_and_the_path_grows():
+    times, lengths = [], []
+    for _, _, robot, drawn in walked('hexapod_smooth_dry_flat', 4.0):
+        if ('path', 0) in drawn:
+            times.append(robot.time)
+            points = drawn['path', 0].points
+            lengths.append(points[-1].x - points[0].x)
+            gaps = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise(points)]
+            assert all(gap == 0.0 or gap > 0.015 for gap in gaps)
+    assert times == pytest.approx([DT, 1.004, 2.004, 3.004])
+    assert lengths == sorted(lengths)
+    assert lengths[-1] > 0.2
+
+
+def test_the_leg_on_its_rail_is_drawn_too():
+    *_, robot, drawn = next(walked('leg_wet_flat', 0.1))
+    assert {name for name, _ in drawn} >= {'soles', 'forces', 'body', 'path'}
+    assert drawn['body', 0].points[0].x == pytest.approx(robot.body[0] - 0.05)
