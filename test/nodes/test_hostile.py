@@ -12,6 +12,7 @@ from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.logging import LoggingSeverity
 from rclpy.logging import set_logger_level
 from rclpy.node import Node
@@ -519,7 +520,9 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
         publisher = topic.publisher(attacker, 1)
         until(publisher.get_subscription_count)
         for data in TORN:
-            publisher.publish(data)
+            # In one process the middleware may tell the sender too; a later one is heard of.
+            with contextlib.suppress(RCLError):
+                publisher.publish(data)
             count = len(heard)
             until(lambda count=count: len(heard) > count, what='a pressure')  # it lives
         attacker.destroy_publisher(publisher)
