@@ -210,7 +210,11 @@ def _alicat() -> Target:
 
 
 def _smc_itv() -> Target:
-    seeds = [b'0\n12\n0\n0\n12\n511\n511\n510\n', b'UNKNOWN COMMAND\n', b'1023\n1024\n-1\n']
+    seeds = [
+        b'0\n12\n0\n0\n12\n512\n512\n510\n921\n921\n920',
+        b'UNKNOWN COMMAND\n',
+        b'1023\n1024\n-1\n',
+    ]
     return _device('smc_itv', seeds, full_scale=100e3)
 
 
@@ -255,7 +259,8 @@ def _feet() -> Target:
 def _scenes() -> Target:
     with _watched_imports():
         from ros_pad.simulation.scene import Scene
-    return Target(_file(Scene.load, 'scene.yaml'), _shipped('scenes'))
+    seeds = _shipped('scenes')[::-1]  # those of benches, which are no scenes of robots, last
+    return Target(_file(Scene.load, 'scene.yaml'), seeds)
 
 
 def _bags() -> Target:
