@@ -11,6 +11,7 @@ import difflib
 import math
 import os
 import pathlib
+import reprlib
 import sys
 from collections.abc import Iterator
 from collections.abc import Sequence
@@ -87,6 +88,16 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+_REPR = reprlib.Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
+_REPR.maxlevel = 3
+
+
+def shown(value: Any) -> str:
+    """Return a value as an error is to show it: in short where aliases of YAML make it vast."""
+    return _REPR.repr(value)
+
+
 class Table:
     """One mapping of a YAML file, read key by key.
 
@@ -100,7 +111,7 @@ class Table:
 
     def __init__(self, values: Any, origin: str) -> None:
         if not isinstance(values, dict):
-            raise ConfigError(f'{origin}: expected a table of keys, found {values!r}')
+            raise ConfigError(f'{origin}: expected a table of keys, found {shown(values)}')
         self._values = dict(values)
         self._taken: set[str] = set()
         self.origin = origin
@@ -112,16 +123,24 @@ class Table:
             text = pathlib.Path(path).read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f'{os.fspath(path)}: cannot be read: {error}') from error
+        return cls.parse(text, os.fspath(path))
+
+    @classmethod
+    def parse(cls, text: str, origin: str) -> Table:
+        """Read YAML in a text; a syntax error names origin, line and column."""
         try:
             values = yaml.load(text, Loader=_Loader)
         except yaml.YAMLError as error:
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
             problem = getattr(error, 'problem', None) or str(error)
-            raise ConfigError(f'{os.fspath(path)}{place}: not valid YAML: {problem}') from error
-        except ValueError as error:  # of a date or a number that only looks like one: 2026-99-99
-            raise ConfigError(f'{os.fspath(path)}: not valid YAML: {error}') from error
-        return cls(values, os.fspath(path))
+            raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
+        except Exception as error:
+            # PyYAML has no word for what only looks like a date or a number (2026-99-99,
+            # !!int ''), nor for what is nested too deeply: each fails in a way of its own.
+            problem = str(error) or type(error).__name__
+            raise ConfigError(f'{origin}: not valid YAML: {problem}') from error
+        return cls(values, origin)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
@@ -156,7 +175,7 @@ class Table:
         largest = sys.float_info.max
         if not number or not max(low, -largest) <= value <= min(high, largest):
             raise ConfigError(
-                f'{self.origin}: {key} = {value!r} is not allowed: '
+                f'{self.origin}: {key} = {shown(value)} is not allowed: '
                 f'a number from {low:g} to {high:g} {unit} is needed'
             )
         return float(value)
@@ -166,7 +185,7 @@ class Table:
         value = self._take(key, default)
         if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
             raise ConfigError(
-                f'{self.origin}: {key} = {value!r} is not allowed: '
+                f'{self.origin}: {key} = {shown(value)} is not allowed: '
                 f'a whole number from {low} to {high} is needed'
             )
         return value
@@ -176,7 +195,7 @@ class Table:
         value = self._take(key, default)
         if value not in allowed:
             raise ConfigError(
-                f'{self.origin}: {key} = {value!r} is not allowed: '
+                f'{self.origin}: {key} = {shown(value)} is not allowed: '
                 f'one of {", ".join(allowed)} is needed'
             )
         return str(value)
@@ -185,7 +204,9 @@ class Table:
         """Take a string."""
         value = self._take(key, default)
         if not isinstance(value, str):
-            raise ConfigError(f'{self.origin}: {key} = {value!r} is not allowed: text is needed')
+            raise ConfigError(
+                f'{self.origin}: {key} = {shown(value)} is not allowed: text is needed'
+            )
         return value
 
     @contextmanager

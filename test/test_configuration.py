@@ -152,6 +152,11 @@ def test_unknown_key_in_a_nested_table(tmp_path):
         ('a: \x01', 'not valid YAML'),
         ('a: 2026-99-99', 'not valid YAML: month must be in 1..12'),
         ('a: 0x_', 'not valid YAML: invalid literal'),
+        # PyYAML has other errors of its own for these.
+        ("a: !!int ''", 'not valid YAML: string index out of range'),
+        ('a: !!bool maybe', "not valid YAML: 'maybe'"),
+        ('a: !!timestamp soon', 'not valid YAML: '),
+        ('a: ' + '[' * 5000, 'not valid YAML: maximum recursion depth'),
         ('', 'expected a table of keys, found None'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),
@@ -161,6 +166,15 @@ def test_bad_yaml(tmp_path, text, message):
     with pytest.raises(ConfigError, match=message) as caught:
         table(text, tmp_path)
     assert 'some.yaml' in str(caught.value)
+
+
+def test_what_aliases_make_vast_is_shown_in_short(tmp_path):
+    lines = ['a0: &a0 [x, x, x, x, x, x, x, x, x]']
+    lines += [f'a{n}: &a{n} [{", ".join(9 * [f"*a{n - 1}"])}]' for n in range(1, 9)]
+    values = table('\n'.join(lines), tmp_path)
+    with pytest.raises(ConfigError, match=r'a8 = .* is not allowed') as caught:
+        values.number('a8', 'Pa')
+    assert len(str(caught.value)) < 5000
 
 
 def test_unreadable_files(tmp_path):

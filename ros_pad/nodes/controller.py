@@ -134,15 +134,20 @@ class _Leg:
             # Where the foot is, nobody knows.
             self.tell_shape()
             return
-        point = deserialize_message(self._position, PointStamped).point
-        if not math.isfinite(self._load + message.data + point.x + point.y):
+        x, y = position_in(self._position)
+        if not math.isfinite(self._load + message.data + x + y):
             # A load that is no number is no lift-off. No set-point follows from it either: if it
             # stays so, the regulators vent.
             self.tell_shape()
             return
         weight = max(self._heaviest, self._load)  # the load where no wrench came since
         self._heaviest = -math.inf
-        gauge = controller.update(self.leg, weight, message.data, (point.x, point.y))
+        try:
+            gauge = controller.update(self.leg, weight, message.data, (x, y))
+        except InvalidInput as error:  # no probability: as above, no set-point follows from it
+            node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
+            self.tell_shape()
+            return
         if self.leg in controller.refusals:
             node.get_logger().warning(
                 f'leg {self.leg} stays flat: {controller.refusals[self.leg]}',
@@ -261,13 +266,29 @@ def normal_force(data: bytes) -> float:
     """Return force.z, N, of a WrenchStamped as it travels: twenty times as fast as reading all.
 
     CDR: four bytes of encapsulation, a stamp of eight, the frame's length and text, and then,
-    aligned to eight, six doubles.
+    aligned to eight, six doubles. NaN where the bytes are too few: anybody can publish any.
     """
+    try:
+        return _normal_force(data)
+    except (IndexError, struct.error):
+        return math.nan
+
+
+def _normal_force(data: bytes) -> float:
     order = '<' if data[1] & 1 else '>'
     (length,) = struct.unpack_from(order + 'I', data, 12)
     force: float
     (force,) = struct.unpack_from(order + 'd', data, 4 + (12 + length + 7) // 8 * 8 + 16)
     return force
+
+
+def position_in(data: bytes) -> tuple[float, float]:
+    """Return x and y, m, of a PointStamped as it travels; NaN where the bytes are none."""
+    try:
+        point = deserialize_message(data, PointStamped).point
+    except Exception:  # whatever the middleware says: anybody can publish any bytes
+        return math.nan, math.nan
+    return point.x, point.y
 
 
 def main(args: list[str] | None = None) -> int:

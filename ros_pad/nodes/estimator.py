@@ -29,6 +29,7 @@ from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.nodes import topics
+from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -78,6 +79,13 @@ PARAMETERS = (
 SILENCE = 0.4
 """Time without a sample after which a foot is said not to be heard, s."""
 
+LARGEST_FORCE = 1e5
+LARGEST_POSITION = 1e6
+LARGEST_PRESSURE = 1e7
+LARGEST_MOMENT = 1e5
+"""What is believed of a sensor in either direction, N, m, Pa gauge, N m: what is larger, though a
+number, would leave its mark on sums and means for good."""
+
 _HEALTH_PERIOD_NS = 100_000_000  # of the look at which feet are heard
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
@@ -122,12 +130,28 @@ class _Leg:
         topics.WRENCH.subscription(node, self._on_wrench, leg)
         topics.POSITION.subscription(node, self._on_position, leg)
 
+    def _is_ours(self, frame: str) -> bool:
+        """Whether a frame is not that of another leg; if it is, say so."""
+        try:
+            check_frame(frame, self._leg)
+        except InvalidInput as error:
+            self._refuse(error)
+            return False
+        return True
+
+    def _refuse(self, error: InvalidInput) -> None:
+        self._refusal = str(error)
+        self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
+
     def _on_pressure(self, message: FluidPressure) -> None:
         # A device that does not answer may be told of so: what it said last counts.
-        if math.isfinite(message.fluid_pressure):
-            self._pressure = message.fluid_pressure - self._ambient
+        gauge = message.fluid_pressure - self._ambient
+        if abs(gauge) <= LARGEST_PRESSURE and self._is_ours(message.header.frame_id):
+            self._pressure = gauge
 
     def _on_wrench(self, message: WrenchStamped) -> None:
+        if not self._is_ours(message.header.frame_id):
+            return
         if self._wrench is not None and self._position is not None:
             # No position came with the wrench before: its marker was out of sight, or it is
             # slower than the force. Use the last one.
@@ -137,6 +161,8 @@ class _Leg:
             self._take(message, self._position)
 
     def _on_position(self, message: PointStamped) -> None:
+        if not self._is_ours(message.header.frame_id):
+            return
         point = message.point
         if math.isfinite(point.x + point.y + point.z):
             self._position = message
@@ -155,19 +181,24 @@ class _Leg:
         if position is not self._used:
             # Its own stamp may be of another clock.
             self._used, self._used_ns = position, stamp_ns
-        force, point = wrench.wrench.force, position.point
+        force = (wrench.wrench.force.x, wrench.wrench.force.y, wrench.wrench.force.z)
+        point = (position.point.x, position.point.y, position.point.z)
+        moment = wrench.wrench.torque.z if self._moments else None
         try:
+            for name, values, largest, unit in (
+                ('force', force, LARGEST_FORCE, 'N'),
+                ('position', point, LARGEST_POSITION, 'm'),
+                ('moment', (moment or 0.0,), LARGEST_MOMENT, 'N m'),
+            ):
+                if any(largest < abs(value) < math.inf for value in values):
+                    raise InvalidInput(
+                        f'{name} = {values!r} {unit}: at most {largest:g} {unit} is believed'
+                    )
             estimate = self._estimator.update(
-                stamp_ns * 1e-9,
-                (force.x, force.y, force.z),
-                (point.x, point.y, point.z),
-                self._pressure,
-                wrench.wrench.torque.z if self._moments else None,
-                self._used_ns * 1e-9,
+                stamp_ns * 1e-9, force, point, self._pressure, moment, self._used_ns * 1e-9
             )
         except InvalidInput as error:
-            self._refusal = str(error)
-            self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
+            self._refuse(error)
             return
         self.samples += 1
         self._heard_ns, self._refusal = None, ''

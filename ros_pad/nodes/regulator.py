@@ -29,6 +29,7 @@ from ros_pad.errors import LimitError
 from ros_pad.errors import PadError
 from ros_pad.errors import ProtocolError
 from ros_pad.nodes import topics
+from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import FOOT
@@ -92,10 +93,10 @@ class _Channel:
         self.regulator = regulator
         self.publisher = publisher
         self.watch = PadWatch(regulator.ceiling)
-        self.commanded_ns: int | None = None  # last command that was accepted
+        self.commanded_ns: int | None = None  # when the last command was accepted
         self.command = 0.0  # what it was, gauge Pa
         self.sent: float | None = None  # set-point in force; None where no device confirmed it
-        self.moved_ns = 0  # when it was last on its way to the command
+        self.moved_ns = 0  # when it was last on its way to the command, on the same clock
         self.commands = 0
         self.refusals = 0
         self.refusal = ''  # what /diagnostics has yet to say
@@ -123,11 +124,11 @@ class RegulatorNode(LifecycleNode):
     """A lifecycle node that serves one regulator for each leg; see :data:`PARAMETERS`.
 
     *configure* opens the devices, *activate* accepts set-points, *deactivate* vents, *cleanup*
-    closes. Set-points that are stale, from the future, not finite, or above the ceiling are
-    refused and reported on ``/diagnostics``; when none comes for ``command_timeout`` the pad is
-    vented. ``~/vent`` deactivates: the pads are vented and stay so until somebody activates the
-    node again, whatever the controller sends. Options of the backend are parameters
-    ``backend_options.*``.
+    closes. Set-points that are stale, from the future, not finite, above the ceiling, or whose
+    frame names another leg, are refused and reported on ``/diagnostics``; when none comes for
+    ``command_timeout`` the pad is vented. ``~/vent`` deactivates: the pads are vented and stay so
+    until somebody activates the node again, whatever the controller sends. Options of the
+    backend are parameters ``backend_options.*``.
 
     A pad whose pressure passes the ceiling by more than ``ceiling_tolerance`` is vented, and its
     set-points are refused until the next activation: it is held. Each pad is watched: one that
@@ -155,7 +156,8 @@ class RegulatorNode(LifecycleNode):
         self._said: list[str] = []
         self.channels: dict[int, _Channel] = {}
         self._active = False
-        self._now_ns = 0
+        self._now_ns = 0  # of the last tick, in the time of the stamps ...
+        self._elapsed_ns = 0  # ... and on the clock by which commands grow old
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why it was not configured
         self._foot: Foot = self._values['foot']
@@ -193,7 +195,11 @@ class RegulatorNode(LifecycleNode):
 
     def _last_tick(self) -> float:
         """Time of the last tick, s: the clock of the simulated backend in simulated time."""
-        return self._now_ns * 1e-9
+        return self._elapsed_ns * 1e-9
+
+    def _elapsed(self, now_ns: int) -> int:
+        """Return the time by which commands grow old, ns: nobody can set that clock back."""
+        return now_ns if self._simulated_time else time.monotonic_ns()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the devices and vent them: nobody knows who left them at what."""
@@ -250,7 +256,7 @@ class RegulatorNode(LifecycleNode):
             channel.held = ''
             channel.watch = PadWatch(channel.regulator.ceiling)
             # Or a device that falls silent at once would not be missed.
-            channel.watch.update(self._last_tick(), None, channel.pressure)
+            channel.watch.update(self._elapsed(self._now_ns) * 1e-9, None, channel.pressure)
         self._active = True
         return super().on_activate(state)
 
@@ -345,19 +351,24 @@ class RegulatorNode(LifecycleNode):
             if channel is None or not self._active:
                 return
             now_ns = self.get_clock().now().nanoseconds
+            elapsed_ns = self._elapsed(now_ns)
+            # Here too, so that no flood of set-points comes before the end of another's time.
+            for each in self.channels.values():
+                self._expire(each, elapsed_ns)
             try:
                 gauge = self._permitted(channel, message, now_ns)
-                self._approach(channel, gauge, now_ns)
+                self._approach(channel, gauge, elapsed_ns)
             except PadError as error:
                 self._refuse(channel, error)
                 return
             channel.commands += 1
-            channel.commanded_ns = now_ns
+            channel.commanded_ns = elapsed_ns
 
         topics.PRESSURE_SETPOINT.subscription(self, on_setpoint, leg)
 
     def _permitted(self, channel: _Channel, message: FluidPressure, now_ns: int) -> float:
         """Return the gauge pressure that a message commands; raise what is wrong with it."""
+        check_frame(message.header.frame_id, channel.leg)
         age = (now_ns - nanoseconds(message.header.stamp)) * 1e-9
         if abs(age) > self._values['command_timeout']:
             stamped = f'{age:.3f} s old' if age > 0.0 else f'{-age:.3f} s ahead of the clock here'
@@ -380,14 +391,14 @@ class RegulatorNode(LifecycleNode):
             f'leg {channel.leg}: set-point refused: {error}', throttle_duration_sec=1.0
         )
 
-    def _approach(self, channel: _Channel, command: float, now_ns: int) -> None:
+    def _approach(self, channel: _Channel, command: float, elapsed_ns: int) -> None:
         """Send a command, or a set-point as near to it as the slew limit allows by now."""
-        elapsed = max(0, now_ns - channel.moved_ns) * 1e-9
+        elapsed = max(0, elapsed_ns - channel.moved_ns) * 1e-9
         slew_limit = self._values['slew_limit']
         step = slew_limit * elapsed if slew_limit else math.inf
         start = channel.setpoint if channel.sent is None else channel.sent
         setpoint = min(max(command, start - step), start + step)
-        channel.moved_ns = now_ns  # answered or not: time without an answer is not saved up
+        channel.moved_ns = elapsed_ns  # answered or not: time without an answer is not saved up
         try:
             channel.regulator.set_pressure(setpoint)
         except (InvalidInput, LimitError):
@@ -399,31 +410,42 @@ class RegulatorNode(LifecycleNode):
         channel.command, channel.sent = command, setpoint
         channel.vented = setpoint == command == 0.0
 
-    def _proceed(self, channel: _Channel, now_ns: int) -> None:
+    def _proceed(self, channel: _Channel, elapsed_ns: int) -> None:
         """Go on towards a command that the slew limit did not let through at once."""
         if channel.sent == channel.command:
-            channel.moved_ns = now_ns
+            channel.moved_ns = elapsed_ns
         elif channel.sent is not None:
             try:
-                self._approach(channel, channel.command, now_ns)
+                self._approach(channel, channel.command, elapsed_ns)
             except PadError as error:
                 self.get_logger().error(f'leg {channel.leg}: {error}', throttle_duration_sec=1.0)
 
-    def _tick(self, now_ns: int) -> None:
-        self._now_ns = now_ns
+    def _expire(self, channel: _Channel, elapsed_ns: int) -> None:
+        """Vent a pad whose last command is too old."""
+        if channel.commanded_ns is None:
+            return
         timeout = self._values['command_timeout']
+        # A command may be ahead of the tick: simulated time comes on two ways.
+        if abs(elapsed_ns - channel.commanded_ns) > timeout * 1e9:
+            self._vent(channel, channel.held or f'no set-point for {timeout:g} s')
+
+    def _tick(self, now_ns: int) -> None:
+        elapsed_ns = self._elapsed(now_ns)
+        set_back = elapsed_ns < self._elapsed_ns
+        self._now_ns, self._elapsed_ns = now_ns, elapsed_ns
         for channel in self.channels.values():
-            # Time may also have been set back, and then nobody knows how old the command is.
-            age_ns = abs(now_ns - (channel.commanded_ns or 0))
-            if channel.commanded_ns is not None and age_ns > timeout * 1e9:
+            if set_back and channel.commanded_ns is not None:
+                # Simulated time can be: nobody knows then how old the command is.
                 channel.commanded_ns = None
+                self._vent(channel, 'time was set back')
+            self._expire(channel, elapsed_ns)
             if not channel.vented and channel.commanded_ns is None:
                 # Tried again at each tick, until the device obeys.
-                self._vent(channel, channel.held or f'no set-point for {timeout:g} s')
+                self._vent(channel, channel.held or 'the device did not obey before')
         if self._pace.due(now_ns):
             for channel in self.channels.values():
                 self._publish(channel, now_ns)
-                self._proceed(channel, now_ns)
+                self._proceed(channel, elapsed_ns)
         if self._look_pace.due(now_ns):
             self._look(now_ns)
 
@@ -438,13 +460,13 @@ class RegulatorNode(LifecycleNode):
         except PadError as error:
             channel.faults = (str(error),)
             channel.unread_ns = now_ns
-            watch.update(now_ns * 1e-9, aim, None)
+            watch.update(self._last_tick(), aim, None)
             lasting = watch.reason  # one answer that is lost is not worth a vent
             self.get_logger().error(f'leg {channel.leg}: {error}', throttle_duration_sec=1.0)
         else:
             channel.faults = reading.faults
             channel.pressure, channel.setpoint = reading.pressure, reading.setpoint
-            watch.update(now_ns * 1e-9, aim, reading.pressure)
+            watch.update(self._last_tick(), aim, reading.pressure)
             lasting = channel.trouble
             message = self._message
             set_stamp(message.header.stamp, now_ns)

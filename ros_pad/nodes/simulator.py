@@ -56,6 +56,9 @@ PARAMETERS = (
     AMBIENT_PRESSURE,
 )
 
+HIGHEST = 1e6
+"""Highest gauge pressure that is believed, Pa: what no regulator's ceiling may exceed."""
+
 _SLOWEST = 50.0  # Hz: what scenes allow
 
 
@@ -123,6 +126,12 @@ class SimulatorNode(Node):
         def callback(message: FluidPressure) -> None:
             gauge = message.fluid_pressure - self._ambient
             if not math.isfinite(gauge):
+                return
+            if gauge > HIGHEST:
+                self.get_logger().warning(
+                    f'pressure ignored: {gauge:g} Pa: at most {HIGHEST:g} Pa gauge is allowed',
+                    throttle_duration_sec=1.0,
+                )
                 return
             # A sensor at rest may read a little below ambient; a pad cannot be sucked in.
             self.pressures[index] = max(0.0, gauge)

@@ -137,6 +137,8 @@ class SerialTextRegulator(SerialRegulator):
             raise self._fails('not a reply as read_reply has it', self._read_command, reply)
         zero, span = self._monitor
         pressure = (float(found['value']) - zero) / span * self._full_scale
+        if not math.isfinite(pressure):  # 1e999 is a number to the pattern, and infinite here
+            raise self._fails('not a pressure', self._read_command, reply)
         return Frame(pressure, self._in_force, self._resolution)
 
     def _set(self, ask: Ask, setpoint: float) -> None:

@@ -50,9 +50,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
-
 from ros_pad.configuration import Table
+from ros_pad.configuration import shown
 from ros_pad.contact.pad import choice
 from ros_pad.contact.pad import number
 from ros_pad.errors import ConfigError
@@ -197,10 +196,7 @@ class Fault:
         >>> Fault.parse('{kind: silence, legs: [1, 4], start: 3.0}').legs
         (1, 4)
         """
-        try:
-            return cls.read(Table(yaml.safe_load(text), f'fault {text!r}'))
-        except (yaml.YAMLError, ValueError) as error:  # ValueError: no such date or number
-            raise ConfigError(f'fault {text!r}: not valid YAML') from error
+        return cls.read(Table.parse(text, f'fault {shown(text)}'))
 
     def __str__(self) -> str:
         """Return the text that :meth:`parse` makes the same fault of."""
@@ -280,7 +276,7 @@ def _legs(table: Table) -> tuple[int, ...]:
     whole = isinstance(legs, list) and all(type(leg) is int and 1 <= leg <= 6 for leg in legs)
     if not whole or len(set(legs)) < len(legs) or ('legs' in table and not legs):
         raise ConfigError(
-            f'{table.origin}: legs = {legs!r} is not allowed: '
+            f'{table.origin}: legs = {shown(legs)} is not allowed: '
             'a list of different whole numbers from 1 to 6 is needed'
         )
     return tuple(legs)
@@ -296,7 +292,9 @@ def listed(table: Table) -> tuple[Fault, ...]:
     """
     entries = table._take('faults', [])
     if not isinstance(entries, list):
-        raise ConfigError(f'{table.origin}: faults = {entries!r} is not allowed: a list is needed')
+        raise ConfigError(
+            f'{table.origin}: faults = {shown(entries)} is not allowed: a list is needed'
+        )
     return tuple(
         Fault.read(Table(entry, f'{table.origin}: fault {place}'))
         for place, entry in enumerate(entries, start=1)

@@ -31,7 +31,6 @@ from typing import Any
 
 import yaml
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Channel
 from mcap.records import Chunk
@@ -497,6 +496,10 @@ class BagReader:
         files = self._files_of_folder() if self.path.is_dir() else [self.path]
         self._files = [(file, _scan(file)) for file in files]
         parts = [contents for _, contents in self._files]
+        for file, part in self._files:
+            for channel in part.channels.values():
+                if channel.schema_id and channel.schema_id not in part.schemas:
+                    raise BagError(f'{file}: is damaged: no message type of {channel.topic}')
         self.topics = {
             channel.topic: part.schemas[channel.schema_id].name if channel.schema_id else ''
             for part in parts
@@ -529,10 +532,10 @@ class BagReader:
             content = yaml.safe_load(metadata.read_text(encoding='utf-8'))
             information = content['rosbag2_bagfile_information']
             storage = information['storage_identifier']
-            compression = information.get('compression_mode', '')
+            compression = str(information.get('compression_mode', ''))
             names = [str(name) for name in information['relative_file_paths']]
             self.custom_data = dict(information.get('custom_data') or {})
-        except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+        except Exception as error:  # YAML, or what it says, may be wrong in any way
             raise BagError(f'{metadata}: is not the metadata of a bag: {error!r}') from error
         if storage != 'mcap' or compression.lower() not in ('', 'none'):
             raise BagError(
@@ -569,7 +572,7 @@ class BagReader:
                 topic, decode = decoders[channel_id]
                 try:
                     message = decode(data)
-                except (struct.error, ValueError, IndexError) as error:
+                except Exception as error:  # bytes that are not of its type fail in any way
                     raise BagError(
                         f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}'
                     ) from error
@@ -603,7 +606,7 @@ def _scan(path: pathlib.Path) -> _Contents:
         stream.seek(0)
         try:
             summary = make_reader(stream).get_summary()
-        except (McapError, OSError, struct.error, ValueError):
+        except Exception:  # what is torn fails in any way; the records from the start count then
             summary = None
     if summary is not None and summary.statistics is not None:
         statistics = summary.statistics
@@ -612,6 +615,8 @@ def _scan(path: pathlib.Path) -> _Contents:
         contents.channels = summary.channels
         contents.chunks = summary.chunk_indexes
         for channel_id, count in statistics.channel_message_counts.items():
+            if channel_id not in summary.channels:
+                raise BagError(f'{path}: is damaged: it counts messages of no topic')
             contents.counts[summary.channels[channel_id].topic] += count
         contents.start = statistics.message_start_time
         contents.end = statistics.message_end_time
@@ -626,6 +631,8 @@ def _scan(path: pathlib.Path) -> _Contents:
                 contents.start = contents.end = record.log_time
             contents.start = min(contents.start, record.log_time)
             contents.end = max(contents.end, record.log_time)
+            if record.channel_id not in contents.channels:
+                raise BagError(f'{path}: is damaged: a message is on no topic')
             contents.counts[contents.channels[record.channel_id].topic] += 1
     return contents
 
@@ -658,8 +665,8 @@ def _raw_messages(
                 channel_id in wanted for channel_id in index.message_index_offsets
             ):
                 continue
-            stream.seek(index.chunk_start_offset + _RECORD_HEADER_SIZE)
             try:
+                stream.seek(index.chunk_start_offset + _RECORD_HEADER_SIZE)
                 chunk = Chunk.read(ReadDataStream(stream))
                 records, size = get_chunk_data_stream(chunk, validate_crc=True)
             except Exception as error:  # each decompressor has an error of its own
@@ -685,7 +692,12 @@ def _messages_of_chunk(data: bytes, wanted: Collection[int]) -> Iterator[tuple[i
 def _decoder(channel: Channel, schemas: Mapping[int, Schema]) -> Callable[[bytes], Any]:
     """Return a function from CDR bytes to a message."""
     schema = schemas.get(channel.schema_id)
-    decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+    try:
+        decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
+    except Exception as error:  # a definition that is no text, or makes no sense
+        raise BagError(
+            f'topic {channel.topic}: its message type cannot be understood: {error}'
+        ) from error
     if decode is None:
         encoding = schema.encoding if schema else 'nothing'
         raise BagError(

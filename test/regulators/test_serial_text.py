@@ -135,3 +135,9 @@ def test_bad_options_say_what_is_needed(options, words):
     with pytest.raises(ConfigError) as caught:
         create('serial_text', port='somewhere', **options)
     assert words in str(caught.value)
+
+
+def test_a_number_too_large_to_be_one_is_no_pressure():
+    regulator = create('serial_text', port='none')
+    with pytest.raises(ProtocolError, match=r"not a pressure: port none, .* reply '1 1e999'"):
+        regulator._poll(lambda command, reply=True: '1 1e999')

@@ -341,6 +341,8 @@ BAD = [
     ('silence', "expected a table of keys, found 'silence'"),
     ('{kind: leak', 'not valid YAML'),
     ('{kind: silence, start: 2026-99-99}', 'not valid YAML'),
+    ("{kind: silence, start: !!int ''}", 'not valid YAML'),
+    ('{kind: silence, kind: leak}', "key 'kind' is there twice"),
 ]
 
 

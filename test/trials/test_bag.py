@@ -499,3 +499,51 @@ def test_what_is_no_bag_is_refused(tmp_path):
     refused(text.replace('trial_0', 'trial_7'), 'has lost its file trial_7.mcap')
     shutil.copy(folder / 'trial_0.mcap', tmp_path / 'alone.mcap')
     assert BagReader(tmp_path / 'alone.mcap').message_count == 10
+
+
+def write_mcap(path, definition=b'float64 data\n', schema_id=None, channel_id=None):
+    """A file with one topic and one message, without checksums, to be wrong as one likes."""
+    with path.open('wb') as stream:
+        writer = Writer(stream, enable_crcs=False)
+        writer.start(profile='ros2')
+        schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', definition)
+        channel = writer.register_channel('/a', 'cdr', schema_id or schema)
+        writer.add_message(channel_id or channel, 1, bytes(12), 1)
+        writer.finish()
+
+
+@pytest.mark.parametrize(
+    'wrong, message',
+    [
+        ({'definition': b'float64 \x8d\n'}, 'topic /a: its message type cannot be understood'),
+        ({'definition': b'no/Such thing\n'}, ': '),
+        ({'definition': b'float64[] data\n'}, None),
+        ({'definition': b'string data\nint32[<=\n'}, 'cannot be understood'),
+        ({'schema_id': 7}, 'is damaged: no message type of /a'),
+        ({'channel_id': 7}, 'is damaged: it counts messages of no topic'),
+    ],
+)
+def test_a_bag_that_makes_no_sense_is_an_error_of_ours(tmp_path, wrong, message):
+    path = tmp_path / 'bag.mcap'
+    write_mcap(path, **wrong)
+    if message is None:
+        assert len(list(BagReader(path).messages())) == 1
+        return
+    with pytest.raises(BagError, match=message):
+        list(BagReader(path).messages())
+
+
+@pytest.mark.parametrize('mode', ['null', '[]', '5', 'zstd'])
+def test_metadata_may_say_anything_of_compression(tmp_path, mode):
+    folder = tmp_path / 'bag'
+    folder.mkdir()
+    write_mcap(folder / 'bag_0.mcap')
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information: {storage_identifier: mcap,'
+        f' relative_file_paths: [bag_0.mcap], compression_mode: {mode}}}'
+    )
+    if mode == 'null':
+        assert len(list(BagReader(folder).messages())) == 1
+        return
+    with pytest.raises(BagError, match='compression mode'):
+        BagReader(folder)

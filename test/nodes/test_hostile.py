@@ -1,0 +1,545 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever comes from the graph, the nodes live and no pad is told more than it may be."""
+
+import contextlib
+import math
+import struct
+import types
+
+import pytest
+from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import WrenchStamped
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.logging import LoggingSeverity
+from rclpy.logging import set_logger_level
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Float64
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import TransportError
+from ros_pad.nodes import regulator as module
+from ros_pad.nodes import topics
+from ros_pad.nodes.controller import ControllerNode
+from ros_pad.nodes.controller import normal_force
+from ros_pad.nodes.controller import position_in
+from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.frames import check_frame
+from ros_pad.nodes.regulator import RegulatorNode
+from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.nodes.stamps import set_stamp
+from ros_pad.regulators import BACKENDS
+from ros_pad.regulators import Reading
+
+AMBIENT = 101325.0
+CEILING = 80e3
+LEGS = (1, 2)
+TICK_NS = 10_000_000
+START_NS = 1_000_000_000_000
+LAST_NS = 2**31 * 10**9 - 1  # in 2038, where stamps end
+
+numbers = st.one_of(
+    st.floats(),
+    st.floats(width=32),
+    st.sampled_from([
+        math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, -1.0, 1.7976931348623157e308, -1e308,
+        1e300,
+    ]),
+)  # fmt: skip
+frames = st.one_of(
+    st.sampled_from(['', 'leg_1_pad', 'leg_2_pad', 'leg_1_sole', 'a/leg_2_pad', 'world']),
+    st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=20),
+)
+# As ROS has them: a whole number of 32 bit, and one without sign.
+stamps = st.tuples(st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
+
+
+def deliver(node, name, message):
+    """Hand a message to a node's subscriptions as an executor does."""
+    for subscription in node.subscriptions:
+        if subscription.topic_name == '/' + name.removeprefix('/'):
+            subscription.callback(serialize_message(message) if subscription.raw else message)
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    """Thousands of refusals are not to be read."""
+    names = ('regulator', 'estimator', 'controller', 'simulator')
+    for name in names:
+        set_logger_level(name, LoggingSeverity.FATAL)
+    yield
+    for name in names:
+        set_logger_level(name, LoggingSeverity.UNSET)
+
+
+class Device:
+    """Writes down what it is told; its cable may break, and then nobody knows what arrived."""
+
+    made = ()
+
+    def __init__(self, ceiling, clock=None, pad_volume=0.0):
+        self.ceiling, self.setpoint, self.told = ceiling, 0.0, []
+        self.broken = False
+        Device.made = (*Device.made, self)
+
+    def open(self):
+        pass
+
+    def set_pressure(self, gauge_pa):
+        self.told.append(gauge_pa)
+        self.setpoint = gauge_pa
+        self._talk()
+
+    def read(self):
+        self._talk()
+        return Reading(self.setpoint, self.setpoint, (), 0.0)
+
+    def vent(self):
+        self._talk()
+        self.setpoint = 0.0
+
+    def close(self):
+        pass
+
+    def _talk(self):
+        if self.broken:
+            raise TransportError('cable')
+
+
+class Bench:
+    """A regulator node in simulated time, and what must be true of it."""
+
+    def __init__(self, node):
+        self.node = node
+        self.time_ns = START_NS
+        self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
+
+    def begin(self):
+        """Start an example: an active node with sound devices."""
+        with contextlib.suppress(Exception):  # it may be so already
+            self.node.trigger_deactivate()
+        self.node.trigger_cleanup()
+        Device.made = ()
+        changed = self.node.set_parameters(
+            [Parameter('command_timeout', value=0.5), Parameter('slew_limit', value=0.0),
+             Parameter('on_fault', value='report')]
+        )  # fmt: skip
+        assert all(each.successful for each in changed)
+        self.node.trigger_configure()
+        self.node.trigger_activate()
+        assert self.node._active
+        assert len(Device.made) == len(LEGS)
+        self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
+        self.tick(START_NS - self.time_ns)
+
+    def device(self, leg):
+        channel = self.node.channels.get(leg)
+        return channel and channel.regulator
+
+    def tick(self, step_ns):
+        back = step_ns < 0
+        self.time_ns = min(max(self.time_ns + step_ns, 1), LAST_NS)
+        clock = topics.CLOCK.message()
+        set_stamp(clock.clock, self.time_ns)
+        deliver(self.node, '/clock', clock)
+        assert self.node._now_ns == self.time_ns
+        timeout_ns = self.node._values['command_timeout'] * 1e9
+        for leg in LEGS:
+            device = self.device(leg)
+            if device is None or device.broken:
+                continue
+            if back or self.time_ns - self.accepted_ns[leg] > timeout_ns:
+                assert device.setpoint == 0.0
+        self.check()
+
+    def send(self, leg, pressure, stamp, frame, variance):
+        message = FluidPressure(fluid_pressure=pressure, variance=variance)
+        message.header.frame_id = frame
+        message.header.stamp.sec, message.header.stamp.nanosec = stamp
+        channel = self.node.channels.get(leg)
+        before = channel and channel.commands
+        deliver(self.node, topics.PRESSURE_SETPOINT.name(leg), message)
+        if channel and channel.commands > before:
+            self.accepted_ns[leg] = self.time_ns
+            assert frame != f'leg_{3 - leg}_pad'
+        self.check()
+
+    def send_now(self, leg, gauge, frame=''):
+        self.send(leg, AMBIENT + gauge, divmod(self.time_ns, 10**9), frame, 0.0)
+
+    def transit(self, name):
+        with contextlib.suppress(Exception):  # rclpy refuses those that are not possible now
+            getattr(self.node, f'trigger_{name}')()
+        self.check()
+
+    def vent(self):
+        answer = self.node._on_vent(Trigger.Request(), Trigger.Response())
+        assert answer.success != any(d.broken for d in map(self.device, LEGS) if d)
+        self.check()
+
+    def set(self, name, value):
+        self.node.set_parameters([Parameter(name, value=value)])
+
+    def cable(self, leg, broken):
+        if device := self.device(leg):
+            device.broken = broken
+
+    def check(self):
+        for device in Device.made:
+            assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.told)
+
+
+legs = st.sampled_from(LEGS)
+ACTIONS = st.one_of(
+    st.tuples(st.just('send_now'), legs, st.floats(0.0, CEILING)),
+    st.tuples(st.just('send_now'), legs, st.floats(0.9 * CEILING, 1.2 * CEILING), frames),
+    st.tuples(st.just('send_now'), legs, numbers),
+    st.tuples(st.just('send'), legs, numbers, stamps, frames, numbers),
+    st.tuples(
+        st.just('tick'),
+        st.one_of(st.integers(0, 10**9), st.integers(-(10**9), 0), st.integers(-(2**62), 2**61)),
+    ),
+    st.tuples(st.just('vent')),
+    st.tuples(
+        st.just('transit'), st.sampled_from(['configure', 'activate', 'deactivate', 'cleanup'])
+    ),
+    st.tuples(st.just('set'), st.just('command_timeout'), numbers),
+    st.tuples(st.just('set'), st.just('slew_limit'), numbers),
+    st.tuples(st.just('set'), st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
+    st.tuples(st.just('set'), st.sampled_from(['ceiling', 'ambient_pressure']), numbers),
+    st.tuples(st.just('cable'), legs, st.booleans()),
+)  # fmt: skip
+
+
+@pytest.fixture
+def bench(context, monkeypatch):
+    monkeypatch.setitem(BACKENDS, 'simulated', Device)
+    monkeypatch.setattr(Device, 'made', ())
+    overrides = {'legs': list(LEGS), 'use_sim_time': True, 'ceiling': CEILING}
+    node = RegulatorNode(
+        context=context,
+        parameter_overrides=[Parameter(name, value=v) for name, v in overrides.items()],
+    )
+    yield Bench(node)
+    node.destroy_node()
+
+
+def test_no_sequence_of_messages_moves_a_pad_past_its_ceiling_or_stops_the_watchdog(bench):
+    @settings(max_examples=300, deadline=None)
+    @given(st.lists(ACTIONS, max_size=25))
+    def behave(actions):
+        bench.begin()
+        for name, *arguments in actions:
+            getattr(bench, name)(*arguments)
+        for leg in LEGS:
+            bench.cable(leg, broken=False)
+        timeout_ns = round(bench.node._values['command_timeout'] * 1e9)
+        bench.time_ns = min(bench.time_ns, LAST_NS - timeout_ns - TICK_NS)
+        bench.tick(timeout_ns)
+        bench.tick(TICK_NS)
+        assert all(device.setpoint == 0.0 for device in Device.made if bench.node.channels)
+        bench.transit('configure')
+        bench.transit('activate')
+        if bench.time_ns < LAST_NS:
+            bench.tick(TICK_NS)
+            bench.send_now(1, 30e3)
+            assert bench.node.channels[1].commands
+
+    behave()
+
+
+def test_a_clock_that_is_set_back_keeps_no_pad_up(bench):
+    bench.begin()
+    bench.send_now(1, 50e3)
+    bench.tick(TICK_NS)
+    assert Device.made[0].setpoint == 50e3
+    bench.tick(-2 * TICK_NS)
+    assert Device.made[0].setpoint == 0.0
+
+
+def test_the_time_of_day_does_not_make_a_command_last(context, monkeypatch):
+    """Set back at each tick, as by a bad time server: the age is told by another clock."""
+    monkeypatch.setattr(Device, 'made', ())
+    monkeypatch.setitem(BACKENDS, 'simulated', Device)
+    node = RegulatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
+    try:
+        steady_ns = 10**12
+        monkeypatch.setattr(module, 'time', types.SimpleNamespace(monotonic_ns=lambda: steady_ns))
+        now_ns = node.get_clock().now().nanoseconds
+        node._tick(now_ns)
+        message = FluidPressure(fluid_pressure=AMBIENT + 50e3)
+        set_stamp(message.header.stamp, now_ns)
+        deliver(node, 'leg_1/pressure_setpoint', message)
+        (device,) = Device.made
+        for step in range(1, 51):
+            assert device.setpoint == 50e3
+            steady_ns += TICK_NS
+            node._tick(now_ns - step * TICK_NS)
+        steady_ns += TICK_NS
+        node._tick(now_ns - 51 * TICK_NS)
+        assert device.setpoint == 0.0
+    finally:
+        node.destroy_node()
+
+
+def test_set_points_of_one_leg_do_not_keep_the_watchdog_from_another(bench):
+    """No tick comes between them, as if set-points were all that a flood leaves time for."""
+    bench.begin()
+    bench.send_now(2, 50e3)
+    clock = topics.CLOCK.message()
+    set_stamp(clock.clock, bench.time_ns + 500_000_001)
+    for subscription in bench.node.subscriptions:
+        if subscription.topic_name == '/clock' and not subscription.raw:
+            subscription.callback(clock)
+    assert Device.made[1].setpoint == 50e3
+    bench.send(1, math.nan, (0, 0), '', 0.0)
+    assert Device.made[1].setpoint == 0.0
+
+
+@pytest.mark.parametrize('frame', ['', 'leg_2_pad', 'robot/leg_2_pad', 'world', 'my_leg_3_thing'])
+def test_frames_that_name_no_other_leg_are_allowed(frame):
+    check_frame(frame, 2)
+
+
+@pytest.mark.parametrize('frame', ['leg_1_pad', 'robot/leg_12_pad', 'leg_20_pad', 'a\n/leg_1_x'])
+def test_frames_of_another_leg_are_refused(frame):
+    with pytest.raises(InvalidInput, match=r'frame_id = .* is not allowed on a topic of leg 2'):
+        check_frame(frame, 2)
+
+
+def test_a_set_point_in_the_frame_of_another_leg_is_refused_and_told_of(bench):
+    bench.begin()
+    stamp = divmod(bench.time_ns, 10**9)
+    bench.send(1, AMBIENT + 50e3, stamp, 'leg_2_pad', 0.0)
+    channel = bench.node.channels[1]
+    assert (channel.commands, channel.refusals) == (0, 1)
+    assert channel.refusal.startswith("frame_id = 'leg_2_pad' is not allowed on a topic of leg 1")
+    bench.send(1, AMBIENT + 50e3, stamp, 'leg_1_pad', 0.0)
+    assert channel.commands == 1
+
+
+class Outbox(list):
+    """Takes the place of a publisher."""
+
+    def publish(self, message):
+        self.append(message.fluid_pressure if isinstance(message, FluidPressure) else message.data)
+
+
+wrenches = st.builds(
+    lambda stamp, frame, f, t: ('wrench', stamp, frame, f, t),
+    stamps, frames, st.tuples(numbers, numbers, numbers), numbers,
+)  # fmt: skip
+positions = st.builds(
+    lambda stamp, frame, p: ('position', stamp, frame, p),
+    stamps, frames, st.tuples(numbers, numbers, numbers),
+)  # fmt: skip
+pressures = st.tuples(st.just('pressure'), stamps, frames, numbers)
+paired = st.builds(
+    lambda stamp, frame, f, p: [('position', stamp, frame, p), ('wrench', stamp, frame, f, 0.0)],
+    stamps, frames, st.tuples(numbers, numbers, numbers), st.tuples(numbers, numbers, numbers),
+)  # fmt: skip
+samples = st.builds(
+    lambda number, load, way: [
+        ('position', (1000 + number // 100, number % 100 * 10**7), '', (way, 0.0, 0.0)),
+        ('wrench', (1000 + number // 100, number % 100 * 10**7), '', (0.1, 0.0, load), 0.0),
+    ],
+    st.integers(0, 400), st.floats(-1.0, 20.0), st.floats(0.0, 1.0),
+)  # fmt: skip
+
+
+def message_of(kind, stamp, frame, *values):
+    if kind == 'wrench':
+        message = WrenchStamped()
+        f = message.wrench.force
+        (f.x, f.y, f.z), message.wrench.torque.z = values
+    elif kind == 'position':
+        message = PointStamped()
+        p = message.point
+        ((p.x, p.y, p.z),) = values
+    else:
+        message = FluidPressure(fluid_pressure=values[0])
+    message.header.frame_id = frame
+    message.header.stamp.sec, message.header.stamp.nanosec = stamp
+    return message
+
+
+def sensed(node, action):
+    deliver(node, f'leg_1/{action[0]}', message_of(*action))
+
+
+@pytest.mark.parametrize('moment_noise', [0.0, 0.01])
+def test_the_estimator_lives_and_says_only_what_can_be(context, moment_noise):
+    overrides = {'legs': [1], 'publish_rate': 1000.0, 'moment_noise': moment_noise}
+    node = EstimatorNode(
+        context=context,
+        parameter_overrides=[Parameter(name, value=v) for name, v in overrides.items()],
+    )
+    leg = node.legs[1]
+    leg._wetness, leg._friction = Outbox(), Outbox()
+
+    @settings(max_examples=300, deadline=None)
+    @given(st.lists(st.one_of(wrenches, positions, pressures, paired, samples), max_size=20))
+    def behave(groups):
+        for group in groups:
+            for action in group if isinstance(group, list) else [group]:
+                sensed(node, action)
+                node._tick(START_NS)
+        assert all(0.0 <= each <= 1.0 for each in leg._wetness)
+        assert all(math.isfinite(each) and each >= 0.0 for each in leg._friction)
+        # And a sound sample is taken afterwards: one of these is far from the last.
+        taken = leg.samples
+        for second in (100, 200_000):
+            sensed(node, ('position', (second, 0), '', (0.0, 0.0, 0.0)))
+            sensed(node, ('wrench', (second, 0), '', (0.0, 0.0, 7.0), 0.0))
+        assert leg.samples > taken
+        leg._wetness.clear()
+        leg._friction.clear()
+
+    try:
+        behave()
+    finally:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('policy', ['adaptive', 'dome'])
+def test_the_controller_lives_and_asks_for_no_more_than_the_ceiling(context, policy):
+    node = ControllerNode(
+        context=context,
+        parameter_overrides=[Parameter('legs', value=[1]), Parameter('policy', value=policy)],
+    )
+    (leg,) = node._legs
+    leg._setpoints = sent = Outbox()
+    wetnesses = st.tuples(st.just('wetness'), st.one_of(numbers, st.floats(0.0, 1.0)))
+    doubts = st.tuples(st.just('doubt'), st.text(max_size=40))
+    broken = st.tuples(st.sampled_from(['raw_wrench', 'raw_position']), st.binary(max_size=120))
+
+    @settings(max_examples=300, deadline=None)
+    @given(
+        st.lists(
+            st.one_of(
+                wrenches,
+                positions,
+                pressures,
+                paired,
+                samples,
+                wetnesses,
+                doubts,
+                broken,
+                st.just(('tick',)),
+            ),
+            max_size=25,
+        )
+    )
+    def behave(groups):
+        for group in groups:
+            for action in group if isinstance(group, list) else [group]:
+                kind, *values = action
+                if kind == 'wetness':
+                    deliver(node, 'leg_1/wetness', Float64(data=values[0]))
+                elif kind == 'doubt':
+                    deliver(node, 'leg_1/doubt', String(data=values[0]))
+                elif kind == 'raw_wrench':
+                    leg._on_wrench(values[0])
+                elif kind == 'raw_position':
+                    leg._on_position(values[0])
+                elif kind == 'tick':
+                    node._tick(node.get_clock().now().nanoseconds)
+                else:
+                    sensed(node, action)
+        ceiling = node.get_parameter('ambient_pressure').value + 90e3
+        assert all(AMBIENT <= each <= ceiling for each in sent)
+        # And sound input is answered afterwards.
+        sent.clear()
+        sensed(node, ('position', (5, 0), '', (0.0, 0.0, 0.0)))
+        sensed(node, ('wrench', (5, 0), '', (0.0, 0.0, 7.0), 0.0))
+        deliver(node, 'leg_1/wetness', Float64(data=0.5))
+        assert len(sent) == 1
+        sent.clear()
+
+    try:
+        behave()
+    finally:
+        node.destroy_node()
+
+
+def test_the_simulator_lives(context):
+    overrides = {'scene': 'leg_wet_dome_40', 'free_running': False, 'fidelity': 'L0'}
+    node = SimulatorNode(
+        context=context,
+        parameter_overrides=[Parameter(name, value=v) for name, v in overrides.items()],
+    )
+    leg = node.scene.legs[0]
+
+    @settings(max_examples=100, deadline=None)
+    @given(st.lists(pressures, max_size=5))
+    def behave(actions):
+        for action in actions:
+            deliver(node, topics.PRESSURE.name(leg), message_of(*action))
+            node.step()
+
+    try:
+        behave()
+    finally:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('data', [b'', b'\0', b'\0\1\0\0', bytes(16), b'\0\1\0\0' + b'\xff' * 40])
+def test_bytes_that_are_no_message_have_no_force_and_no_place(data):
+    assert math.isnan(normal_force(data))
+    assert all(map(math.isnan, position_in(data))) or data[4:] == b'\xff' * 40
+
+
+TORN = (
+    b'', b'\0\1\0\0', b'\0\1\0\0' + b'\1' * 10, b'\7' * 40,
+    struct.pack('<4xiII', 1, 2, 0x7FFFFFFF) + b'abc', struct.pack('<4xI4s', 4, b'\xff\xfe\xc3\0'),
+)  # fmt: skip
+
+
+def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
+    nodes = [
+        RegulatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])]),
+        EstimatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])]),
+        ControllerNode(context=context, parameter_overrides=[Parameter('legs', value=[1])]),
+    ]
+    attacker = Node('attacker', context=context)
+    for node in (*nodes, attacker):
+        executor.add_node(node)
+    heard = []
+    topics.PRESSURE.subscription(attacker, heard.append, 1)
+    for topic in (
+        topics.PRESSURE_SETPOINT, topics.PRESSURE, topics.WRENCH, topics.POSITION,
+        topics.WETNESS, topics.DOUBT,
+    ):  # fmt: skip
+        publisher = topic.publisher(attacker, 1)
+        until(publisher.get_subscription_count)
+        for data in TORN:
+            # In one process the middleware may tell the sender too; a later one is heard of.
+            with contextlib.suppress(RCLError):
+                publisher.publish(data)
+            count = len(heard)
+            until(lambda count=count: len(heard) > count, what='a pressure')  # it lives
+        attacker.destroy_publisher(publisher)
+    # All of them have dealt with what came, for they still take what is sound.
+    wrench, position = (topic.publisher(attacker, 1) for topic in (topics.WRENCH, topics.POSITION))
+    until(lambda: wrench.get_subscription_count() == position.get_subscription_count() == 2)
+    before = nodes[0].answered
+
+    def answered():
+        now = attacker.get_clock().now().to_msg()
+        sound = WrenchStamped()
+        sound.wrench.force.z = 7.0
+        sound.header.stamp = now
+        wrench.publish(sound)
+        place = PointStamped()
+        place.header.stamp = now
+        position.publish(place)
+        return nodes[1].samples and nodes[0].answered > before
+
+    until(answered, what='a set-point after a sound sample')

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The policy for SROS 2 names what the nodes have, and ``pad run`` keeps to itself."""
+
+import fnmatch
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import xml.etree.ElementTree
+
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ros_pad.nodes import topics
+from ros_pad.nodes.controller import ControllerNode
+from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.recorder import RecorderNode
+from ros_pad.nodes.regulator import RegulatorNode
+from ros_pad.nodes.simulator import SimulatorNode
+
+POLICY = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'security' / 'policy.xml'
+NODES = {
+    'regulator': RegulatorNode,
+    'estimator': EstimatorNode,
+    'controller': ControllerNode,
+    'simulator': SimulatorNode,
+    'recorder': RecorderNode,
+}
+OWN = {
+    'simulator': {'scene': 'hexapod_patches', 'publish_clock': True, 'free_running': False},
+    'recorder': {},
+}
+SETPOINT = topics.PRESSURE_SETPOINT.name('?')
+# What a node may do and does not always: joints are those of L2, the clock that of a simulation.
+AT_TIMES = {
+    ('simulator', 'publish', '/joint_states'),
+    ('regulator', 'subscribe', '/clock'),
+    ('estimator', 'subscribe', '/clock'),
+    ('controller', 'subscribe', '/clock'),
+    ('simulator', 'subscribe', '/clock'),
+}
+
+
+def allowed():
+    """Each enclave's expressions by what they allow: {(enclave, kind): {name, ...}}."""
+    found = {}
+    root = xml.etree.ElementTree.parse(POLICY).getroot()
+    for enclave in root.find('enclaves'):
+        name = enclave.attrib['path'].removeprefix('/ros_pad/')
+        (profile,) = enclave.iter('profile')
+        assert (profile.attrib['ns'], profile.attrib['node']) == ('/', name)
+        for group in profile:
+            for kind, rule in group.attrib.items():
+                assert rule == 'ALLOW'
+                names = found.setdefault((name, kind), set())
+                for entry in group:
+                    text = entry.text.replace('~', f'/{name}', 1)
+                    names.add(text if text.startswith('/') else f'/{text}')
+    return found
+
+
+def test_sros2_can_read_the_file():
+    """It takes comments among enclaves for enclaves, and knows this version of policies alone."""
+    builder = xml.etree.ElementTree.TreeBuilder(insert_comments=True)
+    parser = xml.etree.ElementTree.XMLParser(target=builder)
+    root = xml.etree.ElementTree.parse(POLICY, parser).getroot()
+    assert (root.tag, root.attrib) == ('policy', {'version': '0.2.0'})
+    (enclaves,) = root
+    assert [each.tag for each in enclaves] == ['enclave'] * 6
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, tmp_path, name):
+    parameters = {'legs': list(topics.LEGS), 'use_sim_time': name == 'regulator'}
+    parameters = OWN.get(name, parameters)
+    if name == 'recorder':
+        parameters = {'legs': list(topics.LEGS), 'folder': str(tmp_path / 'bag')}
+    node = NODES[name](
+        context=context,
+        parameter_overrides=[Parameter(key, value=value) for key, value in parameters.items()],
+    )
+    executor.add_node(node)
+    observer = Node('observer', context=context)
+    executor.add_node(observer)
+    until(lambda: f'/{name}/get_parameters' in dict(observer.get_service_names_and_types()))
+
+    def live():
+        """What others see of the node."""
+        return {
+            'publish': observer.get_publisher_names_and_types_by_node(name, '/'),
+            'subscribe': observer.get_subscriber_names_and_types_by_node(name, '/'),
+            'reply': observer.get_service_names_and_types_by_node(name, '/'),
+            'request': observer.get_client_names_and_types_by_node(name, '/'),
+        }
+
+    own = len(list(node.publishers)) + len(list(node.subscriptions)) + len(list(node.services))
+    until(lambda: sum(map(len, live().values())) >= own - 2, what='the whole node')
+    policy = allowed()
+    for kind, entries in live().items():
+        names = {each for each, _ in entries}
+        expressions = policy.get((name, kind), set())
+        unnamed = {
+            each for each in names if not any(fnmatch.fnmatchcase(each, e) for e in expressions)
+        }
+        assert not unnamed, f'{name} may not {kind} {unnamed}'
+        spare = {e for e in expressions if not fnmatch.filter(names, e)}
+        assert {(name, kind, each) for each in spare} <= AT_TIMES
+
+
+def test_only_the_controller_may_move_pads_and_only_an_operator_may_call():
+    policy = allowed()
+    movers = {
+        name
+        for (name, kind), expressions in policy.items()
+        if kind == 'publish' and any(fnmatch.fnmatchcase(f'/{SETPOINT}', e) for e in expressions)
+    }
+    assert movers == {'controller'}
+    assert {name for name, kind in policy if kind == 'request'} == {'operator'}
+
+
+def test_an_operator_may_call_whatever_there_is_and_hear_every_topic():
+    policy = allowed()
+    offered = set().union(*(policy[name, 'reply'] for name in NODES))
+    assert policy['operator', 'request'] == offered
+    heard = policy['operator', 'subscribe']
+    for name in topics.names(topics.LEGS):
+        full = f'/{name.removeprefix("/")}'
+        assert any(fnmatch.fnmatchcase(full, each) for each in heard), name
+
+
+def test_pad_run_is_heard_by_nobody_unless_it_is_to_be_live(context, executor, until, tmp_path):
+    """The one that is not live starts first: were it open, it would be found before the other."""
+    observer = Node('observer', context=context)
+    executor.add_node(observer)
+    walks = []
+
+    def walk(name, *options):
+        command = [sys.executable, '-m', 'ros_pad.cli', 'run', 'leg_wet_flat', '--cycles', '5000']
+        walks.append(
+            subprocess.Popen(
+                [*command, '--no-compare', '--out', str(tmp_path / name), *options],
+                stderr=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                env=os.environ | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'},
+            )
+        )
+
+    def walking(name):
+        bag = tmp_path / name / 'bag' / 'bag_0.mcap'
+        return bag.exists() and bag.stat().st_size > 200_000
+
+    try:
+        walk('closed')
+        until(lambda: walking('closed'), timeout=60.0, what='the closed walk')
+        walk('live', '--live')
+        until(
+            lambda: observer.count_publishers('/leg_1/pressure_setpoint'),
+            timeout=60.0,
+            what='the live walk',
+        )
+        until(lambda: walking('live'), timeout=60.0)
+        assert [each.poll() for each in walks] == [None, None]  # both of them still walk
+        assert observer.count_publishers('/leg_1/pressure_setpoint') == 1
+    finally:
+        for each in walks:
+            each.send_signal(signal.SIGINT)
+        for each in walks:
+            try:
+                each.wait(30.0)
+            except subprocess.TimeoutExpired:
+                each.kill()
