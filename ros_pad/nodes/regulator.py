@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from array import array
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -154,6 +155,7 @@ class RegulatorNode(LifecycleNode):
         self._look_pace = Pace(_LOOK_PERIOD_NS)
         self._said: list[str] = []
         self.channels: dict[int, _Channel] = {}
+        self._unheard: dict[int, str] = {}  # set-points that QoS keeps from a leg
         self._active = False
         self._now_ns = 0
         self._starting: bool = self._values['autostart']
@@ -353,8 +355,10 @@ class RegulatorNode(LifecycleNode):
                 return
             channel.commands += 1
             channel.commanded_ns = now_ns
+            self._unheard.pop(leg, None)
 
-        topics.PRESSURE_SETPOINT.subscription(self, on_setpoint, leg)
+        unheard = partial(self._unheard.__setitem__, leg)
+        topics.PRESSURE_SETPOINT.subscription(self, on_setpoint, leg, unheard=unheard)
 
     def _permitted(self, channel: _Channel, message: FluidPressure, now_ns: int) -> float:
         """Return the gauge pressure that a message commands; raise what is wrong with it."""
@@ -499,7 +503,10 @@ class RegulatorNode(LifecycleNode):
         if any(trouble):
             return DiagnosticStatus.ERROR, '; '.join(filter(None, trouble))
         if channel.commanded_ns is None and self._active:
-            return DiagnosticStatus.STALE, 'no set-points: vented'
+            unheard = self._unheard.get(channel.leg)
+            return DiagnosticStatus.STALE, '; '.join(
+                filter(None, ('no set-points: vented', unheard))
+            )
         return DiagnosticStatus.OK, 'vented' if channel.vented else 'under pressure'
 
     def _supply(self) -> tuple[bytes, str]:
