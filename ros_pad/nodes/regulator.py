@@ -141,6 +141,9 @@ class RegulatorNode(LifecycleNode):
         super().__init__(
             'regulator', automatically_declare_parameters_from_overrides=True, **kwargs
         )
+        # From here on it may be destroyed: Kilted's contexts do so, even of a node half made.
+        self.channels: dict[int, _Channel] = {}
+        self._active = False
         self._values = declare(self, PARAMETERS)
         self._simulated_time: bool = self.get_parameter('use_sim_time').value
         if self._simulated_time and self._values['backend'] != 'simulated':
@@ -154,9 +157,7 @@ class RegulatorNode(LifecycleNode):
         self._diagnostics_pace = Pace(1_000_000_000)
         self._look_pace = Pace(_LOOK_PERIOD_NS)
         self._said: list[str] = []
-        self.channels: dict[int, _Channel] = {}
         self._unheard: dict[int, str] = {}  # set-points that QoS keeps from a leg
-        self._active = False
         self._now_ns = 0
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why it was not configured
