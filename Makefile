@@ -14,11 +14,12 @@ unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help run test clean FORCE
+.PHONY: help run test test-matrix clean FORCE
 
 help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
 	@echo 'make test   ruff, mypy and every test'
+	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
 	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
 	@echo 'The first two make .venv if need be; PYTHON=python3.12 chooses its Python.'
 
@@ -35,6 +36,41 @@ test: .venv/test.stamp
 # pytest's status when ARGS chose tests of one of the two runs only. What is measured against the
 # clock has the processors to itself.
 NONE_CHOSEN := [ $$? -eq 5 ]
+
+# A row is a version of Python, alone or with what it is to run on. Rows without ROS test the core,
+# and so that it needs none; `oldest` is the NumPy and SciPy of Ubuntu 24.04; `jazzy` and `kilted`
+# test the nodes. `make test-matrix MATRIX=3.12-kilted` runs one row, which is not among the others
+# because it fails: QUALITY_DECLARATION.md says where.
+MATRIX ?= 3.11 3.12 3.13 3.12-oldest 3.12-jazzy 3.13-jazzy
+NODE_TESTS := test/nodes test/trials/test_bag.py test/trials/test_recorded.py test/test_cli.py
+
+test-matrix:
+	@mkdir -p .matrix && : > .matrix/summary
+	@set -f; for row in $(MATRIX); do $(MATRIX_ROW); done
+	@echo && cat .matrix/summary && ! grep -q FAILED .matrix/summary
+
+# Where Pythons are managed by pyenv, PYENV_VERSION makes python3.13 mean what it says.
+define MATRIX_ROW
+  version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='test --ignore test/nodes'; \
+  case $$row in \
+    *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
+    *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
+    *-kilted) packages='.[kilted,test]'; tests='$(NODE_TESTS)' ;; \
+    *) packages='.[test]' ;; \
+  esac; \
+  if ! PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \
+    echo "$$row: not run: python$$version is missing, or cannot make a virtual environment" \
+      | tee -a .matrix/summary; \
+    continue; \
+  fi; \
+  echo "$$row: installing $$packages into .matrix/$$row ..."; \
+  if PYENV_VERSION=$$version python$$version -m venv .matrix/$$row && \
+     $$python -m pip install --quiet --editable $$packages && \
+     $$python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime' $$tests $(ARGS); \
+  then verdict=passed; else verdict=FAILED; fi; \
+  echo "$$row: $$verdict, with $$($$python -m pip freeze | grep -iE '^(numpy|scipy|rclpy)==' \
+    | xargs)" >> .matrix/summary
+endef
 
 # A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
 STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
@@ -64,5 +100,5 @@ define MAKE_VENV
 endef
 
 clean:
-	rm -rf .venv build install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .matrix build install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

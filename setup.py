@@ -12,14 +12,34 @@ NODES = ['controller', 'estimator', 'recorder', 'regulator', 'simulator']
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
-    """Return what goes under ``share/``: ament's marker, package.xml, the tree of config/."""
+    """Return what goes under ``share/``: ament's marker, package.xml, launch/, all of config/."""
     files = [
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ]
     for folder, _, _ in os.walk('config'):
         files.append((f'share/{NAME}/{folder}', sorted(glob(f'{folder}/*.*'))))
     return files
+
+
+def ros(distribution: str) -> list[str]:
+    """Return the wheels of a ROS 2 distribution that the nodes need."""
+    packages = [
+        'rclpy[fastrtps]',
+        'ament-index-python',
+        'builtin-interfaces',
+        'diagnostic-msgs',
+        'geometry-msgs',
+        'lifecycle-msgs',
+        'rcl-interfaces',
+        'rosgraph-msgs',
+        'sensor-msgs',
+        'std-msgs',
+        'std-srvs',
+        'visualization-msgs',
+    ]
+    return [f'ros-{distribution}-{package}' for package in packages]
 
 
 setup(
@@ -47,21 +67,9 @@ setup(
         'pyserial>=3.5',
     ],
     extras_require={
-        # ROS 2 Jazzy as wheels; leave this extra out where Jazzy is installed from apt.
-        'ros': [
-            'ros-jazzy-rclpy[fastrtps]',
-            'ros-jazzy-ament-index-python',
-            'ros-jazzy-builtin-interfaces',
-            'ros-jazzy-diagnostic-msgs',
-            'ros-jazzy-geometry-msgs',
-            'ros-jazzy-lifecycle-msgs',
-            'ros-jazzy-rcl-interfaces',
-            'ros-jazzy-rosgraph-msgs',
-            'ros-jazzy-sensor-msgs',
-            'ros-jazzy-std-msgs',
-            'ros-jazzy-std-srvs',
-            'ros-jazzy-visualization-msgs',
-        ],
+        # ROS 2 as wheels; leave these extras out where ROS is installed from apt.
+        'ros': ros('jazzy'),
+        'kilted': ros('kilted'),
         # The hexapod with joints (L2), and compiled loops of the planar one.
         'mujoco': ['mujoco>=3.2'],
         'fast': ['numba>=0.60'],

@@ -162,6 +162,8 @@ def test_quoted_constants_of_modules_agree():
     checked = 0
     for row in ROWS:
         if row.pattern.endswith('.py') and row.key.isupper():
+            if row.pattern.startswith('nodes/'):
+                pytest.importorskip('rclpy', reason='constants of nodes need ROS 2')
             part = importlib.import_module('ros_pad.' + row.pattern[:-3].replace('/', '.'))
             assert row.number == pytest.approx(getattr(part, row.key), rel=1e-12), row
             checked += 1

@@ -22,12 +22,20 @@ EXECUTABLES = NODES | {'pad'}
 # Read off ros/rosdistro: packages of jazzy/distribution.yaml, keys of rosdep/python.yaml.
 ROSDEP_KEYS = {
     *('ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
-    *('lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs'),
-    *('std_msgs', 'std_srvs', 'visualization_msgs'),
+    *('launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs'),
+    *('sensor_msgs', 'std_msgs', 'std_srvs', 'visualization_msgs'),
     *('mcap-ros2-support', 'python3-hypothesis', 'python3-matplotlib', 'python3-numpy'),
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
     *('python3-serial', 'python3-sympy', 'python3-tqdm', 'python3-yaml'),
 }
+
+TWO_TESTS = """
+def test_the_package_is_there():
+    import ros_pad
+
+def test_nothing():
+    pass
+"""
 
 
 @pytest.fixture(scope='module', params=[[], ['--symlink-install']], ids=['copied', 'linked'])
@@ -38,19 +46,26 @@ def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     source.mkdir(parents=True)
     for name in ('package.xml', 'setup.py', 'setup.cfg', 'LICENSE'):
         shutil.copy(ROOT / name, source)
-    for name in ('config', 'resource', 'ros_pad'):
+    for name in ('config', 'launch', 'resource', 'ros_pad'):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
-    build = subprocess.run(
-        [sys.executable, '-m', 'colcon', 'build', *request.param],
-        cwd=folder,
-        env=os.environ | {'COLCON_HOME': str(folder)},
+    (source / 'test').mkdir()
+    (source / 'test' / 'test_two.py').write_text(TWO_TESTS, encoding='utf-8')
+    assert '1 package finished' in colcon(folder, 'build', *request.param)
+    return folder
+
+
+def colcon(workspace: pathlib.Path, *arguments: str) -> str:
+    """Return what a command of colcon prints in a workspace; it must succeed."""
+    child = subprocess.run(
+        [sys.executable, '-m', 'colcon', *arguments],
+        cwd=workspace,
+        env=os.environ | {'COLCON_HOME': str(workspace)},
         capture_output=True,
         text=True,
         timeout=120,
     )
-    assert build.returncode == 0, build.stdout + build.stderr
-    assert '1 package finished' in build.stdout
-    return folder
+    assert child.returncode == 0, child.stdout + child.stderr
+    return child.stdout
 
 
 def in_workspace(workspace: pathlib.Path, *command: str) -> str:
@@ -78,9 +93,10 @@ def test_the_ament_index_lists_package_and_executables(
     assert found == EXECUTABLES
 
 
-def test_every_config_file_is_shared(workspace: pathlib.Path):
+@pytest.mark.parametrize('folder', ['config', 'launch'])
+def test_every_file_is_shared(workspace: pathlib.Path, folder: str):
     shared = workspace / 'install' / 'ros_pad' / 'share' / 'ros_pad'
-    files = [path for path in (ROOT / 'config').rglob('*') if path.is_file()]
+    files = [path for path in (ROOT / folder).rglob('*.*') if path.suffix != '.pyc']
     assert files
     for path in files:
         assert (shared / path.relative_to(ROOT)).read_bytes() == path.read_bytes()
@@ -91,6 +107,25 @@ def test_the_command_runs_and_finds_its_scenes(workspace: pathlib.Path):
     pad = 'install/ros_pad/lib/ros_pad/pad'
     assert 'pad run' in in_workspace(workspace, pad, 'run', '--help')
     assert 'hexapod_patches' in in_workspace(workspace, pad, 'scenes')
+
+
+def test_the_nodes_find_their_files_through_the_ament_index(workspace: pathlib.Path):
+    """As `ros2 run` starts them: there is no source tree beside the package."""
+    folder = in_workspace(workspace, sys.executable, '-c', SHARED_FOLDER).strip()
+    assert (pathlib.Path(folder) / 'params.yaml').is_file()
+    assert pathlib.Path(folder).resolve().is_relative_to(workspace.resolve())
+
+
+SHARED_FOLDER = """
+from ros_pad.configuration import shared_folder
+print(shared_folder())
+"""
+
+
+def test_colcon_runs_the_tests_and_keeps_their_results(workspace: pathlib.Path):
+    colcon(workspace, 'test', '--pytest-args', '-p', 'no:cacheprovider')
+    summary = colcon(workspace, 'test-result')
+    assert 'Summary: 2 tests, 0 errors, 0 failures, 0 skipped' in summary
 
 
 ENTRY_POINTS = """

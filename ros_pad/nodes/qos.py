@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import yaml
@@ -76,10 +77,51 @@ _DURABILITY = {
     DurabilityPolicy.VOLATILE: 'volatile',
 }
 _LIVELINESS = {
+    LivelinessPolicy.SYSTEM_DEFAULT: 'automatic',
     LivelinessPolicy.AUTOMATIC: 'automatic',
     LivelinessPolicy.MANUAL_BY_TOPIC: 'manual_by_topic',
 }
-_INFINITE = {'sec': 9223372036, 'nsec': 854775807}  # RMW_DURATION_INFINITE, 2**63 - 1 ns
+_INFINITE_NS = 2**63 - 1  # RMW_DURATION_INFINITE
+
+
+@dataclasses.dataclass(frozen=True)
+class Mismatch:
+    """A policy for which DDS keeps a publisher and a subscription apart, and both its values."""
+
+    policy: str
+    offered: str
+    asked: str
+
+
+def mismatches(offered: QoSProfile, asked: QoSProfile) -> list[Mismatch]:
+    """Return where a publisher offers less than a subscription asks for; empty if they match.
+
+    rclpy's ``qos_check_compatible`` takes a duration that was left unspecified for a very short
+    one, and so finds fault where there is none.
+    """
+    found = []
+    for policy, words, strict in (
+        ('reliability', _RELIABILITY, ReliabilityPolicy.RELIABLE),
+        ('durability', _DURABILITY, DurabilityPolicy.TRANSIENT_LOCAL),
+        ('liveliness', _LIVELINESS, LivelinessPolicy.MANUAL_BY_TOPIC),
+    ):
+        given, wanted = getattr(offered, policy), getattr(asked, policy)
+        if wanted == strict and given != strict:
+            found.append(Mismatch(policy, words.get(given, 'unknown'), words[wanted]))
+    for policy in ('deadline', 'liveliness_lease_duration'):
+        given_ns, wanted_ns = (_bound(getattr(each, policy)) for each in (offered, asked))
+        if given_ns > wanted_ns:
+            found.append(Mismatch(policy, _seconds(given_ns), _seconds(wanted_ns)))
+    return found
+
+
+def _bound(duration: Duration) -> int:
+    """Return a duration in ns; one of zero means unspecified, and that is infinite."""
+    return duration.nanoseconds or _INFINITE_NS
+
+
+def _seconds(bound_ns: int) -> str:
+    return 'infinite' if bound_ns >= _INFINITE_NS else f'{bound_ns * 1e-9:g} s'
 
 
 def offered_profiles(*profiles: QoSProfile) -> str:
@@ -90,9 +132,7 @@ def offered_profiles(*profiles: QoSProfile) -> str:
     """
 
     def duration(value: Duration) -> dict[str, int]:
-        if value.nanoseconds == 0:
-            return dict(_INFINITE)
-        seconds, nanoseconds = divmod(value.nanoseconds, 10**9)
+        seconds, nanoseconds = divmod(_bound(value), 10**9)
         return {'sec': seconds, 'nsec': nanoseconds}
 
     return yaml.safe_dump(

@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from array import array
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -141,6 +142,9 @@ class RegulatorNode(LifecycleNode):
         super().__init__(
             'regulator', automatically_declare_parameters_from_overrides=True, **kwargs
         )
+        # From here on it may be destroyed: Kilted's contexts do so, even of a node half made.
+        self.channels: dict[int, _Channel] = {}
+        self._active = False
         self._values = declare(self, PARAMETERS)
         self._simulated_time: bool = self.get_parameter('use_sim_time').value
         if self._simulated_time and self._values['backend'] != 'simulated':
@@ -154,8 +158,7 @@ class RegulatorNode(LifecycleNode):
         self._diagnostics_pace = Pace(1_000_000_000)
         self._look_pace = Pace(_LOOK_PERIOD_NS)
         self._said: list[str] = []
-        self.channels: dict[int, _Channel] = {}
-        self._active = False
+        self._unheard: dict[int, str] = {}  # set-points that QoS keeps from a leg
         self._now_ns = 0  # of the last tick, in the time of the stamps ...
         self._elapsed_ns = 0  # ... and on the clock by which commands grow old
         self._starting: bool = self._values['autostart']
@@ -363,8 +366,10 @@ class RegulatorNode(LifecycleNode):
                 return
             channel.commands += 1
             channel.commanded_ns = elapsed_ns
+            self._unheard.pop(leg, None)
 
-        topics.PRESSURE_SETPOINT.subscription(self, on_setpoint, leg)
+        unheard = partial(self._unheard.__setitem__, leg)
+        topics.PRESSURE_SETPOINT.subscription(self, on_setpoint, leg, unheard=unheard)
 
     def _permitted(self, channel: _Channel, message: FluidPressure, now_ns: int) -> float:
         """Return the gauge pressure that a message commands; raise what is wrong with it."""
@@ -521,7 +526,10 @@ class RegulatorNode(LifecycleNode):
         if any(trouble):
             return DiagnosticStatus.ERROR, '; '.join(filter(None, trouble))
         if channel.commanded_ns is None and self._active:
-            return DiagnosticStatus.STALE, 'no set-points: vented'
+            unheard = self._unheard.get(channel.leg)
+            return DiagnosticStatus.STALE, '; '.join(
+                filter(None, ('no set-points: vented', unheard))
+            )
         return DiagnosticStatus.OK, 'vented' if channel.vented else 'under pressure'
 
     def _supply(self) -> tuple[bytes, str]:

@@ -17,10 +17,13 @@ from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from geometry_msgs.msg import WrenchStamped
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import JointState
@@ -66,8 +69,27 @@ class Topic:
         return self.pattern.format(leg=leg)
 
     def publisher(self, node: Node, leg: int | None = None) -> Publisher:
-        """Create a publisher of this topic in a node."""
-        return node.create_publisher(self.message, self.name(leg), self.publish)
+        """Create a publisher of this topic in a node, which warns of subscriptions that it misses.
+
+        Those ask for more than is offered, and DDS keeps them apart.
+        """
+        name = node.resolve_topic_name(self.name(leg))
+
+        def warn(event: Any) -> None:
+            for peer in node.get_subscriptions_info_by_topic(name):
+                for each in qos.mismatches(self.publish, peer.qos_profile):
+                    node.get_logger().warning(
+                        f'{name}: {_owner(peer, name)} hears nothing from here: its subscription'
+                        f' asks for {each.policy} {each.asked}, and {each.offered} is offered;'
+                        f' let it ask for {each.policy} {each.offered}'
+                    )
+
+        return node.create_publisher(
+            self.message,
+            self.name(leg),
+            self.publish,
+            event_callbacks=PublisherEventCallbacks(incompatible_qos=warn),
+        )
 
     def subscription(
         self,
@@ -75,11 +97,43 @@ class Topic:
         callback: Callable[[Any], None],
         leg: int | None = None,
         raw: bool = False,
+        unheard: Callable[[str], None] | None = None,
     ) -> Subscription:
-        """Create a subscription to this topic in a node; a raw one hands over bytes (CDR)."""
+        """Create a subscription to this topic in a node; a raw one hands over bytes (CDR).
+
+        Of publishers that offer less than is asked for nothing is heard. The node warns of them,
+        and passes the words on to `unheard`.
+        """
+        name = node.resolve_topic_name(self.name(leg))
+
+        def warn(event: Any) -> None:
+            for peer in node.get_publishers_info_by_topic(name):
+                for each in qos.mismatches(peer.qos_profile, self.subscribe):
+                    words = (
+                        f'{name}: nothing of {_owner(peer, name)} is heard: its publisher offers'
+                        f' {each.policy} {each.offered}, and {each.asked} is asked for;'
+                        f' let it offer {each.policy} {each.asked}'
+                    )
+                    node.get_logger().warning(words)
+                    if unheard:
+                        unheard(words)
+
         return node.create_subscription(
-            self.message, self.name(leg), callback, self.subscribe, raw=raw
+            self.message,
+            self.name(leg),
+            callback,
+            self.subscribe,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=warn),
+            raw=raw,
         )
+
+
+def _owner(peer: TopicEndpointInfo, topic: str) -> str:
+    """Return which node one end of a topic belongs to."""
+    # The ends of a process that has just come are known before its nodes are.
+    if 'UNKNOWN' in peer.node_name:
+        return f'a node that `ros2 topic info --verbose {topic}` names'
+    return f'node {peer.node_namespace.rstrip("/")}/{peer.node_name}'
 
 
 def _measured(pattern: str, message: type) -> Topic:

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start the nodes of ros_pad, each in a process of its own, in real time.
+
+``ros2 launch ros_pad ros_pad.launch.py --show-args`` lists the arguments. What is not among them
+is set in ``params_file``: backend and ceiling of the regulators, foot, load, policy.
+"""
+
+from launch import LaunchContext
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.actions import OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch.utilities.type_utils import perform_typed_substitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from ros_pad.configuration import shared_folder
+
+ARGUMENTS = {
+    'namespace': ('', 'Namespace of every node and topic, such as robot_1; empty: none. [text]'),
+    'params_file': (
+        '',
+        'Parameters of the nodes in SI units, a copy of config/params.yaml; empty: that file'
+        ' itself. [path]',
+    ),
+    'simulate': ('true', 'Start a simulator; false where a robot takes its place. [true, false]'),
+    'scene': ('', 'Scene that the simulator walks; empty: that of params_file. [name or path]'),
+    'record': ('true', 'Record every topic into a bag. [true, false]'),
+    'folder': (
+        '',
+        'Folder of the bag, which must not exist; empty: that of params_file, or named after the'
+        ' time, where launch was called. [path]',
+    ),
+    'use_sim_time': (
+        'false',
+        'Take the time from /clock, which the simulator publishes then. Regulators other than'
+        ' simulated ones refuse it. [true, false]',
+    ),
+}
+"""Default and description of each launch argument."""
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return what ``ros2 launch`` carries out."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, (default, description) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=nodes)])
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Return the nodes that the arguments ask for."""
+
+    def text(name: str) -> str:
+        return LaunchConfiguration(name).perform(context)
+
+    def flag(name: str) -> bool:
+        return perform_typed_substitution(context, [LaunchConfiguration(name)], bool)
+
+    def node(executable: str, **parameters: object) -> Node:
+        return Node(
+            package='ros_pad',
+            executable=executable,
+            namespace=text('namespace'),
+            # What is empty is left to the file; of two values the later one counts.
+            parameters=[
+                text('params_file') or str(shared_folder() / 'params.yaml'),
+                {
+                    name: ParameterValue(value, value_type=type(value))  # '1' is a name here
+                    for name, value in parameters.items()
+                    if value != ''
+                },
+            ],
+            output='screen',
+        )
+
+    use_sim_time = flag('use_sim_time')
+    # The recorder first and the simulator last: a walk is recorded from its first step on.
+    chosen = []
+    if flag('record'):
+        chosen.append(node('recorder_node', use_sim_time=use_sim_time, folder=text('folder')))
+    chosen.append(node('regulator_node', use_sim_time=use_sim_time))
+    chosen.append(node('estimator_node', use_sim_time=use_sim_time))
+    chosen.append(node('controller_node', use_sim_time=use_sim_time))
+    if flag('simulate'):
+        chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=text('scene')))
+    return chosen

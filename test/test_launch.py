@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launch file starts what is there, and says what each argument is.
+
+What it says of itself is read off its source, for launch is not on PyPI; where launch is
+installed, it is also carried out.
+"""
+
+import ast
+import pathlib
+import re
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+FILE = ROOT / 'launch' / 'ros_pad.launch.py'
+NODES = ('recorder_node', 'regulator_node', 'estimator_node', 'controller_node', 'simulator_node')
+
+
+def assigned(tree: ast.Module, name: str) -> object:
+    """Return the value of a literal that is assigned to a name at the top of a module."""
+    (value,) = (
+        each.value
+        for each in tree.body
+        if isinstance(each, ast.Assign) and each.targets[0].id == name
+    )
+    return ast.literal_eval(value)
+
+
+@pytest.fixture(scope='module')
+def tree() -> ast.Module:
+    return ast.parse(FILE.read_text(encoding='utf-8'))
+
+
+def first_arguments(tree: ast.Module, function: str) -> set[str]:
+    """Return the first argument of each call of a function, where it is spelt out."""
+    return {
+        call.args[0].value
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call)
+        and getattr(call.func, 'id', '') == function
+        and isinstance(call.args[0], ast.Constant)
+    }
+
+
+def test_every_node_is_an_executable_of_the_package(tree: ast.Module):
+    setup = ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8'))
+    executables = {f'{name}_node' for name in assigned(setup, 'NODES')}
+    assert first_arguments(tree, 'node') == executables == set(NODES)
+
+
+def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree: ast.Module):
+    arguments = assigned(tree, 'ARGUMENTS')
+    flags = first_arguments(tree, 'flag')
+    assert flags | first_arguments(tree, 'text') == set(arguments)
+    for name, (default, description) in arguments.items():
+        assert re.fullmatch(r'[A-Z].*\. \[[a-zA-Z, ]+\]', description), name
+        assert (default in ('true', 'false')) == (name in flags), name
+
+
+@pytest.mark.parametrize(
+    ('given', 'missing'),
+    [
+        ({}, set()),
+        ({'simulate': 'false'}, {'simulator_node'}),
+        ({'simulate': 'false', 'record': 'false'}, {'simulator_node', 'recorder_node'}),
+    ],
+    ids=['all', 'robot', 'robot, not recorded'],
+)
+def test_it_starts_the_nodes_that_are_asked_for(given: dict[str, str], missing: set[str]):
+    pytest.importorskip('launch_ros', reason='launch is not installed')
+    from launch import LaunchContext
+    from launch.actions import OpaqueFunction
+    from launch.launch_description_sources import get_launch_description_from_python_launch_file
+
+    context = LaunchContext()
+    context.launch_configurations.update(given)
+    started = []
+    for entity in get_launch_description_from_python_launch_file(str(FILE)).entities:
+        made = entity.execute(context)
+        if isinstance(entity, OpaqueFunction):
+            started = [node.node_executable for node in made]
+    assert started == [name for name in NODES if name not in missing]
+
+
+def test_a_flag_that_is_neither_true_nor_false_is_refused():
+    pytest.importorskip('launch_ros', reason='launch is not installed')
+    from launch import LaunchContext
+    from launch.actions import OpaqueFunction
+    from launch.launch_description_sources import get_launch_description_from_python_launch_file
+
+    context = LaunchContext()
+    context.launch_configurations['simulate'] = 'perhaps'
+    with pytest.raises(ValueError, match='perhaps'):
+        for entity in get_launch_description_from_python_launch_file(str(FILE)).entities:
+            entity.execute(context)
+    assert isinstance(entity, OpaqueFunction)
