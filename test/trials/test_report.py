@@ -19,12 +19,15 @@ from ros_pad.errors import PadError
 from ros_pad.estimation import DOUBTS
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.trials import page as page_of
+from ros_pad.trials import pictures
 from ros_pad.trials import report
 from ros_pad.trials import run
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
-VOID = {'meta', 'img', 'br', 'hr', 'link'}
+# Shapes of a drawing are closed where they begin.
+VOID = {'meta', 'img', 'br', 'hr', 'link', 'input'}
 SLOW = ('slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
         'slip_speed', 'slipping', 'dome')  # fmt: skip
 FAST = ('time', 'body', 'force', 'position')
@@ -46,11 +49,14 @@ class Page(html.parser.HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append(tag)
+
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if self.open and self.open[-1] != 'style':
+        if self.open and self.open[-1] not in ('style', 'script'):
             self.words.append(data)
 
     @property
@@ -143,15 +149,18 @@ def walk():
     return trial
 
 
-def test_a_report_needs_no_other_file_and_no_script(walk, tmp_path):
+def test_a_report_needs_no_other_file_and_no_network(walk, tmp_path):
     path = tmp_path / 'new' / 'report.html'
     report.write(walk, path, others=[dataclasses.replace(walk, policy='flat')])
     text = path.read_text(encoding='utf-8')
     assert len(text) < 4_000_000
     seen = Page(text)
-    assert not {'script', 'link', 'iframe', 'object'} & set(seen.tags)
-    assert not re.search(r'https?://|@import|url\(', text)
-    assert len(seen.images) == 5
+    assert not {'link', 'iframe', 'object'} & set(seen.tags)
+    assert seen.tags.count('script') == 2 and '<script src' not in text
+    assert not re.search(r'https?://|@import|url\(|fetch\(|XMLHttp', text)
+    # A browser would refuse anything from elsewhere.
+    assert "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'" in text
+    assert len(seen.images) == 6
     for image in seen.images:
         kind, data = image['src'].split(',', 1)
         assert kind == 'data:image/svg+xml;base64'
@@ -280,8 +289,8 @@ def test_footprints_window_and_omissions(tmp_path):
 
 
 def test_reliability_counts_what_was_wet():
-    view = report._view(made_up(), [])
-    believed, wet = report._beliefs(view)
+    view = pictures.view_of(made_up())
+    believed, wet = pictures.beliefs(view)
     # On the floor of made_up, all stances before 10 s are dry and believed so at 0.1; later ones
     # are wet and believed so at 0.9.
     assert sorted(believed.tolist()) == [0.1] * 10 + [0.9] * 5
@@ -294,7 +303,7 @@ def test_reliability_counts_what_was_wet():
 )
 def test_wilson_intervals_of_the_literature(hits, count, low, high):
     # 81 of 263: Newcombe (1998), table I, method 3.
-    assert report._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
+    assert pictures._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
 
 
 def without(names, trial=None):
@@ -387,25 +396,25 @@ def test_lead_picture(walk, tmp_path):
         dataclasses.replace(walk, policy='flat', metrics=dataclasses.replace(walk.metrics)),
     ]
     path = tmp_path / 'lead.png'
-    report.lead_picture(trials, path)
+    pictures.lead_picture(trials, path)
     data = path.read_bytes()
     assert len(data) < 400_000
     picture = matplotlib.image.imread(io.BytesIO(data))
     height, width, _ = picture.shape
     assert width == 1600 and 300 < height < 1200
     colours = {tuple(pixel) for pixel in np.round(255 * picture[..., :3]).reshape(-1, 3).tolist()}
-    for colour in (report.WET, report.BLUE, report.VERMILION):
+    for colour in (page_of.WET, page_of.BLUE, page_of.VERMILION):
         assert tuple(float(int(colour[k : k + 2], 16)) for k in (1, 3, 5)) in colours
     with pytest.raises(PadError, match='exists'):
-        report.lead_picture(trials, path)
-    report.lead_picture(trials, path, force=True)
+        pictures.lead_picture(trials, path)
+    pictures.lead_picture(trials, path, force=True)
     assert path.read_bytes() == data
 
 
 def test_lead_picture_of_trials_that_do_not_belong_together(tmp_path):
     for trials in ([], [made_up(), dataclasses.replace(made_up(), seed=8)]):
         with pytest.raises(InvalidInput, match='one scene and seed'):
-            report.lead_picture(trials, tmp_path / 'lead.png')
+            pictures.lead_picture(trials, tmp_path / 'lead.png')
 
 
 def test_settings_survive_json(tmp_path):
