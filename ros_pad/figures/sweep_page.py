@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote
 
 import matplotlib
 import numpy as np
@@ -274,7 +275,7 @@ def _swept(found: Found) -> str:
         ('all numbers', 'trials.csv beside this page, a row a trial'),
     ]
     reports = [
-        f'<a href="{html.escape(each.relative_to(found.folder).as_posix())}">'
+        f'<a href="{quote(each.relative_to(found.folder).as_posix())}">'
         f'{html.escape(each.parent.name)}</a>'
         for each in sorted(found.folder.glob('*/report.html'))
     ]

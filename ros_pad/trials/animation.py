@@ -579,8 +579,13 @@ const linked = () => {
   return found;
 };
 addEventListener('hashchange', linked);
-new ResizeObserver(() => show(shown)).observe(document.getElementById('walk'));
 if (!linked()) show(0);
+let wide = part('near').clientWidth;
+new ResizeObserver(() => {
+  if (part('near').clientWidth === wide) return;  // our own doing
+  wide = part('near').clientWidth;
+  requestAnimationFrame(() => show(shown));
+}).observe(document.getElementById('walk'));
 })();
 """.replace('WETRGB', str([*(int(WET[k : k + 2], 16) for k in (1, 3, 5)), 255]))
     .replace('VERMILION', VERMILION)
