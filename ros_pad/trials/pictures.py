@@ -324,10 +324,10 @@ def _map_tall(view: View, rows: int, width: float) -> float:
 def _path_figure(view: View) -> Figure:
     """Draw the body's path over the map of wet ground, to scale."""
     rows = _map_rows(_map_extent(view))
-    width = WIDE - 0.6
+    width = WIDE - 0.74
     tall = _map_tall(view, rows, width) + 0.66
     figure = Figure(figsize=(WIDE, tall))
-    _draw_map(figure, view, rows, 0.5, 0.36, width, size=3.6)
+    _draw_map(figure, view, rows, 0.62, 0.36, width, size=3.6)
     figure.legend(handles=_map_legend(view), loc='upper left', ncols=6)
     return figure
 
@@ -656,10 +656,13 @@ def _reserves_figure(view: View, margins: np.ndarray, used: np.ndarray | None) -
                 ax.stairs(counts / counts.max(), edges, fill=True, color=colour, alpha=0.55)
                 ax.plot(np.median(own), 1.12, 'v', color=BLACK, markersize=3.0)
                 beyond = np.mean(own < edge if side == 'below' else own > edge)
+                # On the side where fewer values are.
+                left = np.median(own) > 0.5 * (low + high)
                 ax.annotate(
-                    f'{100.0 * beyond:.1f} % {side} {edge:g}', (1.0, 0.98),
-                    xycoords='axes fraction', ha='right', va='top', fontsize=7.0,
-                    bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.8}, zorder=4,
+                    f'{100.0 * beyond:.1f} % {side} {edge:g}', (0.0 if left else 1.0, 0.98),
+                    xycoords='axes fraction', ha='left' if left else 'right', va='top',
+                    bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.8}, fontsize=7.0,
+                    zorder=4,
                 )  # fmt: skip
             else:
                 ax.annotate(
