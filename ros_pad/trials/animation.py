@@ -489,12 +489,19 @@ const drawFar = () => {
   const scale = Math.min((wide - 24) / (right - left + 0.2), 180 / (high - low + 0.2));
   const height = Math.round((high - low + 0.2) * scale);
   const pen = sharp(canvas, height);
-  const toX = x => 12 + (x - left + 0.1) * scale, toY = y => height - (y - low + 0.1) * scale;
+  const margin = (wide - (right - left) * scale) / 2;
+  const toX = x => margin + (x - left) * scale, toY = y => height - (y - low + 0.1) * scale;
   drawGround(pen, toX, toY, scale);
   if (body) {
     const every = Math.max(1, Math.floor(last / 2000));
     pen.strokeStyle = 'PALE'; pen.lineWidth = 2; line(pen, toX, toY, last, every);
     pen.strokeStyle = 'BLACK'; line(pen, toX, toY, Math.floor(shown), every);
+  }
+  const now = walk.start + shown * walk.step;
+  // Without a body, feet show the way.
+  for (const [, begin, , x, y] of body ? [] : walk.steps) {
+    pen.fillStyle = begin <= now ? 'BLACK' : 'PALE';
+    pen.beginPath(); pen.arc(toX(x / 1000), toY(y / 1000), 2, 0, 7); pen.fill();
   }
   const [x, y] = centre(shown);
   pen.fillStyle = 'VERMILION'; pen.beginPath(); pen.arc(toX(x), toY(y), 5, 0, 7); pen.fill();

@@ -284,6 +284,13 @@ slide(0);  // as wide as the page has become
 const first = image();
 slide(250);
 found.push(said(), image() !== first);
+const grounds = [];
+for (let second = 0; second < 20; second++) {
+  slide(25 * second + 12);
+  const cells = [...document.querySelectorAll('#walk-legs tr')].map(row => row.cells[5]);
+  grounds.push(cells.map(cell => cell.textContent).join(' '));
+}
+found.push(grounds);
 slide(0);
 found.push(image() === first);
 key('ArrowRight');
@@ -305,12 +312,20 @@ const wait = setInterval(() => {
 @needs_browser
 def test_slider_keys_and_play_move_the_picture(tmp_path):
     page = tmp_path / 'report.html'
-    report.write(walk(), page)
+    # Stripes of 60 mm, of which the first that is wet begins at 10 mm.
+    stripes = Floor(np.array([[True, False]]), 0.06, (0.01, 0.0), 3e-4)
+    report.write(dataclasses.replace(walk(), floor=stripes), page)
     page.write_text(page.read_text(encoding='utf-8').replace('</body>', MOVE), encoding='utf-8')
     child = browser(page.as_uri(), tmp_path, '--dump-dom')
     assert 'CONSOLE' not in child.stderr, child.stderr
     title = child.stdout.partition('<title>')[2].partition('</title>')[0]
-    first, there, moved, back, stepped, again, playing, stopped, seconds = json.loads(title)
+    first, there, moved, grounds, back, *rest = json.loads(title)
+    stepped, again, playing, stopped, seconds = rest
+    # The foot that stands is 0.2 m ahead of where the body was at the start of the second.
+    words = ['dry' if (100 * second + 190) // 60 % 2 else 'wet' for second in range(20)]
+    assert grounds == [
+        f'– {word}' if second % 2 else f'{word} –' for second, word in enumerate(words)
+    ]
     # It does not play by itself.
     assert first.startswith('0.00 s')
     assert there.startswith('10.00 s') and moved and back
