@@ -765,7 +765,7 @@ def _reserves(view: View, margins: np.ndarray, used: np.ndarray | None) -> Drawn
     caption = (
         'How often each value came, leg by leg, while the foot stood; triangles are medians, the '
         'last bars hold what is beyond. Margin: 5 % quantile of friction less the ratio of '
-        'tangential to normal force; below 0 the estimator expects slip.'
+        'tangential to normal force; below 0 slip is not ruled out.'
     )
     if used is None:
         caption += ' The foot is not on record, so its force limit is not known.'
