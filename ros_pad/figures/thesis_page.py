@@ -90,7 +90,7 @@ _WORDS = {
 def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -> list[Explained]:
     """Work out and draw some of the thesis' figures, in its order.
 
-    All of them take about a minute, nearly all of it for the walks of figures 41 to 44.
+    All of them take about half a minute, nearly all of it for the walks of figures 41 to 44.
 
     Parameters
     ----------
