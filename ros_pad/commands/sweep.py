@@ -35,7 +35,7 @@ def add(commands: Commands) -> None:
         'sweep',
         run,
         'Walk every combination of scenes, policies, seeds and parameters, without ROS, on all '
-        'cores or on a Dask cluster: trials.csv, and a picture with confidence intervals.',
+        'cores or on a Dask cluster: trials.csv, a picture with confidence intervals, and a page.',
         'pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 '
         '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing',
     )
@@ -126,6 +126,7 @@ def run(options: argparse.Namespace) -> int:
         with contextlib.suppress(OSError):  # nothing came of it: the name stays free
             folder.rmdir()
     points = sweeps.points(rows, sweep.parameters)
+    from ros_pad.figures import sweep_page
     from ros_pad.figures.sweep import draw
 
     picture: pathlib.Path | None = folder / 'sweep.png'
@@ -135,6 +136,8 @@ def run(options: argparse.Namespace) -> int:
     except InvalidInput as error:
         picture = None
         notes.append(f'no picture: {error}')
+    page = folder / 'report.html'
+    sweep_page.write(sweep_page.read(folder), page, force=True)
     failed = [row for row in rows if row['error']]
     tables = [path for path in _tables(folder) if path.exists()]
     if options.json:
@@ -147,6 +150,7 @@ def run(options: argparse.Namespace) -> int:
                     'ended_early': sum(bool(row['verdict']) for row in rows),
                     'tables': [str(path) for path in tables],
                     'picture': None if picture is None else str(picture),
+                    'report': str(page),
                     'notes': notes,
                     'points': [_flat(point) for point in points],
                 }
@@ -156,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
         _show(points, sweep)
         for note in notes:
             print(note)
-        for path in (*tables, *([picture] if picture else [])):
+        for path in (*tables, *([picture] if picture else []), page):
             print(path)
     if failed:
         return complain(

@@ -11,17 +11,16 @@ from collections.abc import Sequence
 import matplotlib
 
 import ros_pad
-from ros_pad.figures.thesis import WIDE
-from ros_pad.figures.thesis import Drawn
 from ros_pad.trials.bench import FIDELITY
 from ros_pad.trials.bench import BenchTrial
 from ros_pad.trials.bench import Claim
 from ros_pad.trials.bench import Row
-from ros_pad.trials.report import PAPER_STYLE
-from ros_pad.trials.report import embedded
-from ros_pad.trials.report import page
-from ros_pad.trials.report import save
-from ros_pad.trials.report import table
+from ros_pad.trials.page import PAPER_STYLE
+from ros_pad.trials.page import Drawn
+from ros_pad.trials.page import embedded
+from ros_pad.trials.page import page
+from ros_pad.trials.page import save
+from ros_pad.trials.page import table
 
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'cannot be checked'}
 HEAD = (
@@ -79,10 +78,7 @@ def write(trial: BenchTrial, drawn: Mapping[str, Drawn], path: str | os.PathLike
         for each in drawn.values():
             caption = html.escape(each.caption)
             parts.append(f'<h2>{html.escape(each.title)}</h2>')
-            width = 100.0 * each.figure.get_figwidth() / WIDE
-            parts.append(
-                embedded(each.figure, each.alt, caption, f' style="max-width: {width:.0f}%"')
-            )
+            parts.append(embedded(each.figure, each.alt, caption))
     parts.append('<h2>Point by point</h2>')
     parts.append(
         table(

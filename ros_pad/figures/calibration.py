@@ -17,11 +17,11 @@ from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Pad
-from ros_pad.trials.report import BLACK
-from ros_pad.trials.report import BLUE
-from ros_pad.trials.report import PALE
-from ros_pad.trials.report import STYLE
-from ros_pad.trials.report import VERMILION
+from ros_pad.trials.page import BLACK
+from ros_pad.trials.page import BLUE
+from ros_pad.trials.page import PALE
+from ros_pad.trials.page import STYLE
+from ros_pad.trials.page import VERMILION
 
 _SHAPE = ('height', 'depth', 'contact_radius', 'gap')
 _MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^'}

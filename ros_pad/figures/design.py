@@ -17,10 +17,10 @@ from ros_pad.contact import foot_force
 from ros_pad.contact import rise_height
 from ros_pad.contact.design import DOME
 from ros_pad.errors import InvalidInput
-from ros_pad.trials.report import BLACK
-from ros_pad.trials.report import BLUE
-from ros_pad.trials.report import STANCE
-from ros_pad.trials.report import VERMILION
+from ros_pad.trials.page import BLACK
+from ros_pad.trials.page import BLUE
+from ros_pad.trials.page import STANCE
+from ros_pad.trials.page import VERMILION
 
 CLAIMED = (0.3, 0.8)  # mm, the thesis' optimum
 _STYLE: dict[Any, Any] = {

@@ -15,12 +15,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.errors import InvalidInput
-from ros_pad.figures.design import _STYLE
-from ros_pad.trials.report import BLACK
-from ros_pad.trials.report import BLUE
-from ros_pad.trials.report import GREEN
-from ros_pad.trials.report import PALE
-from ros_pad.trials.report import VERMILION
+from ros_pad.trials.page import BLACK
+from ros_pad.trials.page import BLUE
+from ros_pad.trials.page import COLUMN
+from ros_pad.trials.page import GREEN
+from ros_pad.trials.page import PALE
+from ros_pad.trials.page import PAPER_STYLE
+from ros_pad.trials.page import VERMILION
+from ros_pad.trials.page import WIDE
+from ros_pad.trials.page import Drawn
+from ros_pad.trials.page import rendered
+from ros_pad.trials.page import save
 from ros_pad.trials.sweep import Point
 from ros_pad.trials.sweep import Sweep
 
@@ -34,10 +39,7 @@ PANELS = 48
 
 
 def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) -> None:
-    """Draw the means of a sweep with their 95 % intervals over seeds.
-
-    The first parameter that has several values is the axis, the second gives columns, and scenes
-    and all other parameters rows.
+    """Write the figure of a sweep, see :func:`figure`.
 
     Parameters
     ----------
@@ -56,6 +58,21 @@ def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) ->
     text = os.fspath(path)
     if not text.endswith(('.png', '.svg', '.pdf')):
         raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    with matplotlib.rc_context(PAPER_STYLE):
+        save(path, rendered(figure(points, sweep).figure, text.rpartition('.')[2], dpi=200))
+
+
+def figure(points: Sequence[Point], sweep: Sweep) -> Drawn:
+    """Draw the means of a sweep with their 95 % intervals over seeds.
+
+    The first parameter that has several values is the axis, the second gives columns, and scenes
+    and all other parameters rows. Save it under ``matplotlib.rc_context(PAPER_STYLE)``.
+
+    Raises
+    ------
+    InvalidInput
+        For more panels than 48.
+    """
     several = {name: list(each) for name, each in sweep.parameters.items() if len(each) > 1}
     scenes = {'scene': list(sweep.scenes)}
     # Without a parameter, scenes are what is compared.
@@ -69,10 +86,11 @@ def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) ->
         raise InvalidInput(
             f'{len(rows) * len(columns)} panels are more than {PANELS}: draw trials.csv yourself'
         )
-    with matplotlib.rc_context(_STYLE):
-        size = (1.3 + 2.6 * max(len(columns), 1.6), 0.9 + 2.1 * len(rows))
-        figure = Figure(figsize=size, layout='constrained')
-        grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    with matplotlib.rc_context(PAPER_STYLE):
+        wide = len(columns) > 1 or len(values[axis]) > 6
+        found = Figure(figsize=(WIDE if wide else COLUMN, 0.9 + 1.7 * len(rows)))
+        found.set_layout_engine('constrained')
+        grid = found.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
         for axes_row, row in zip(grid, rows, strict=True):
             for axes, column in zip(axes_row, columns, strict=True):
                 wanted = row | column
@@ -81,9 +99,23 @@ def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) ->
                 axes.set_title('\n'.join(f'{name} = {_text(v)}' for name, v in wanted.items()))
         for axes in grid[-1]:
             axes.set_xlabel(axis)
-        figure.supylabel('distance a cycle, mm', fontsize=9)
-        _legend(figure, points)
-        figure.savefig(text, dpi=150)
+        found.supylabel('advance a cycle / mm', fontsize=8)
+        _legend(found, points, 4 if wide else 2)
+    known = [each for each in points if each.mean is not None]
+    return Drawn(
+        found,
+        f'Advance per gait cycle over {axis}',
+        f'Mean advance per gait cycle over {axis}, a line a policy: '
+        + (
+            f'{1e3 * min(each.mean or 0.0 for each in known):.0f} to '
+            f'{1e3 * max(each.mean or 0.0 for each in known):.0f} mm'
+            if known
+            else 'no walk that counts'
+        ),
+        'Means over seeds with their 95 % intervals (Student\'s t). Points are set side by side '
+        'so that none hides another. Open points: some walks failed or ended early and are left '
+        'out.',
+    )  # fmt: skip
 
 
 def _combinations(values: Mapping[str, list[Any]], names: Sequence[str]) -> list[dict[str, Any]]:
@@ -141,7 +173,7 @@ def _mark(axes: Axes, x: float, point: Point, policy: str) -> None:
     axes.plot(x, 1e3 * point.mean, mark, color=colour, mfc=inside, ms=4.5)
 
 
-def _legend(figure: Figure, points: Sequence[Point]) -> None:
+def _legend(figure: Figure, points: Sequence[Point], columns: int) -> None:
     policies = dict.fromkeys(point.labels['policy'] for point in points)
     lines = [
         Line2D([], [], color=LOOKS[each][0], marker=LOOKS[each][1], ms=4.5, lw=1.4, label=each)
@@ -154,7 +186,7 @@ def _legend(figure: Figure, points: Sequence[Point]) -> None:
             Line2D([], [], color=PALE, marker='o', mfc='white', lw=0, label='some walks left out')
         )
     figure.legend(
-        handles=lines, loc='outside upper left', ncols=len(lines), fontsize=8, title=said,
+        handles=lines, loc='outside upper left', ncols=columns, title=said,
         title_fontsize=8, alignment='left',
     )  # fmt: skip
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Sequence
 from typing import Any
-from typing import NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -31,36 +29,20 @@ from ros_pad.trials.bench import WET
 from ros_pad.trials.bench import BenchTrial
 from ros_pad.trials.bench import Row
 from ros_pad.trials.bench import shape_name
-from ros_pad.trials.report import BLACK
-from ros_pad.trials.report import BLUE
-from ros_pad.trials.report import GREEN
-from ros_pad.trials.report import PALE
-from ros_pad.trials.report import PAPER_STYLE
-from ros_pad.trials.report import STANCE
-from ros_pad.trials.report import VERMILION
+from ros_pad.trials.page import BLACK
+from ros_pad.trials.page import BLUE
+from ros_pad.trials.page import COLUMN
+from ros_pad.trials.page import GREEN
+from ros_pad.trials.page import PALE
+from ros_pad.trials.page import PAPER_STYLE
+from ros_pad.trials.page import STANCE
+from ros_pad.trials.page import VERMILION
+from ros_pad.trials.page import WIDE
+from ros_pad.trials.page import Drawn
+from ros_pad.trials.page import legend
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)
-WIDE = 7.2  # inches: both columns of a paper
-
-
-class Drawn(NamedTuple):
-    """A figure with its words.
-
-    Attributes
-    ----------
-    figure : Figure
-    title : str
-    alt : str
-        What it shows, for those who cannot see it.
-    caption : str
-        How to read it.
-    """
-
-    figure: Figure
-    title: str
-    alt: str
-    caption: str
 
 
 def draw(trial: BenchTrial) -> dict[str, Drawn]:
@@ -78,7 +60,7 @@ def draw(trial: BenchTrial) -> dict[str, Drawn]:
 def figure_14(trial: BenchTrial) -> Drawn:
     """Draw the profiles of free domes: of the model, and measured."""
     radius = trial.scene.pad.radius
-    figure = Figure(figsize=(4.6, 2.6), layout='constrained')
+    figure = Figure(figsize=(COLUMN, 2.95), layout='constrained')
     ax = figure.subplots()
     ax.plot(1e3 * np.array([-radius, radius]), [0.0, 0.0], color=PALE, lw=2.0)
     handles: list[Any] = []
@@ -97,7 +79,7 @@ def figure_14(trial: BenchTrial) -> Drawn:
     ax.set_xlabel('x / mm')
     ax.set_ylabel('z / mm')
     ax.set_ylim(-0.05, None)
-    ax.legend(handles=handles, loc='upper left', bbox_to_anchor=(1.02, 1.0))
+    legend(figure, handles, columns=3)
     return Drawn(
         figure,
         'Figure 14: free domes',
@@ -111,7 +93,7 @@ def figure_15(trial: BenchTrial) -> Drawn:
     """Draw height and radius of free domes over pressure, their errors, and the stiffness."""
     setup = trial.scene.setup
     assert isinstance(setup, InflationBench)
-    figure = Figure(figsize=(WIDE, 4.9), layout='constrained')
+    figure = Figure(figsize=(WIDE, 4.6), layout='constrained')
     axes = figure.subplots(2, 2, sharex=True)
     heights = trial.pick('height')
     low = 0.75 * min(_pressures(heights))  # kPa; below it the sphere grows without end
@@ -158,7 +140,7 @@ def figure_15(trial: BenchTrial) -> Drawn:
         ax.set_xlabel('gauge pressure / kPa')
     for column in axes.T:
         figure.align_ylabels(column)
-    _above(
+    legend(
         figure,
         [
             Line2D([], [], color=BLUE, label=f'model, k = {rows[0].modelled:g} N/m'),
@@ -183,7 +165,7 @@ def figure_16(trial: BenchTrial) -> Drawn:
     """Draw the profiles of pressed domes with either reading of the forces."""
     radius = trial.scene.pad.radius
     readings = [name for name in (CODED, TEXT) if trial.pick('gap', 'thesis', name)]
-    figure = Figure(figsize=(WIDE if len(readings) > 1 else 4.6, 2.9), layout='constrained')
+    figure = Figure(figsize=(WIDE if len(readings) > 1 else COLUMN, 2.75), layout='constrained')
     axes = figure.subplots(1, len(readings), sharey=True, squeeze=False)[0]
     free = trial.pick('free height')
     highest = max(
@@ -224,7 +206,7 @@ def figure_16(trial: BenchTrial) -> Drawn:
         ax.set_xlim(-1.63e3 * radius, 1.17e3 * radius)
         ax.set_ylim(-0.05, 1.13e3 * highest)
     axes[0].set_ylabel('z / mm')
-    _above(
+    legend(
         figure,
         [
             Line2D([], [], color=BLACK, label='thesis model'),
@@ -325,7 +307,7 @@ def _over_force(trial: BenchTrial, figure: Figure, quantities: Sequence[str]) ->
                 label="measured, the text's force",
             )
         )
-    _above(figure, handles)
+    legend(figure, handles)
 
 
 # --- tangential ----------------------------------------------------------------------------------
@@ -367,7 +349,7 @@ def figure_20(trial: BenchTrial) -> Drawn:
     ratio.margins(y=0.15)
     ratio.set_title('(b) domes, over the normal force, enlarged')
     ratio.set_ylabel('tangential / normal force')
-    _above(
+    legend(
         figure,
         [
             *(
@@ -391,7 +373,7 @@ def figure_20(trial: BenchTrial) -> Drawn:
 
 def figure_21(trial: BenchTrial) -> Drawn:
     """Draw the capillary force over pressure by each reading."""
-    figure = Figure(figsize=(5.2, 3.3), layout='constrained')
+    figure = Figure(figsize=(COLUMN, 3.1), layout='constrained')
     ax = figure.subplots()
     rows = trial.pick('capillary force')
     styles = zip(
@@ -419,7 +401,7 @@ def figure_21(trial: BenchTrial) -> Drawn:
     ax.set_xticks([1e-3 * pressure for pressure in pressures])
     ax.set_xlabel('gauge pressure / kPa')
     ax.set_ylabel('capillary force / mN')
-    _above(figure, ax.get_legend_handles_labels()[0], columns=2)
+    legend(figure, ax.get_legend_handles_labels()[0], columns=2)
     load = min(row.force for row in rows if row.force is not None)
     return Drawn(
         figure,
@@ -436,7 +418,7 @@ def figure_10(trial: BenchTrial) -> Drawn:
     """Draw the height of rise between domes over the pad radius by each reading."""
     setup = trial.scene.setup
     assert isinstance(setup, TangentialBench)
-    figure = Figure(figsize=(5.2, 3.3), layout='constrained')
+    figure = Figure(figsize=(COLUMN, 3.1), layout='constrained')
     ax = figure.subplots()
     claimed = (1e3 * setup.claimed_smallest, 1e3 * setup.claimed_largest)
     ax.axvspan(*claimed, color=STANCE, lw=0.0)
@@ -467,7 +449,7 @@ def figure_10(trial: BenchTrial) -> Drawn:
     ax.set_ylim(0.0, 1.13 * highest)
     ax.set_xlabel('pad radius / mm')
     ax.set_ylabel('height of rise / mm')
-    _above(figure, handles, columns=2)
+    legend(figure, handles, columns=2)
     return Drawn(
         figure,
         'Figure 10: rise of liquid between the domes',
@@ -564,14 +546,3 @@ def _label_errors(ax: Axes, rows: Sequence[Row], x: Array, y: Array, below: bool
             textcoords='offset points', ha='left' if below else 'center',
             va='top' if below else 'bottom', fontsize=8.0,
         )  # fmt: skip
-
-
-def _above(figure: Figure, handles: Sequence[Any], columns: int | None = None) -> None:
-    """Add a legend above all axes, in one row or in some columns."""
-    columns = columns or len(handles)
-    lines = -(-len(handles) // columns)
-    figure.legend(handles=handles, loc='upper left', ncols=columns)
-    layout = figure.get_layout_engine()
-    assert isinstance(layout, ConstrainedLayoutEngine)
-    # In inches, because matplotlib before 3.7 cannot place a legend outside by itself.
-    layout.set(rect=(0.0, 0.0, 1.0, 1.0 - (0.14 + 0.18 * lines) / figure.get_figheight()))

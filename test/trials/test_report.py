@@ -13,18 +13,23 @@ import xml.etree.ElementTree as ElementTree
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.estimation import DOUBTS
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.trials import conditions
+from ros_pad.trials import page as page_of
+from ros_pad.trials import pictures
 from ros_pad.trials import report
 from ros_pad.trials import run
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
-VOID = {'meta', 'img', 'br', 'hr', 'link'}
+# Shapes of a drawing are closed where they begin.
+VOID = {'meta', 'img', 'br', 'hr', 'link', 'input'}
 SLOW = ('slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
         'slip_speed', 'slipping', 'dome')  # fmt: skip
 FAST = ('time', 'body', 'force', 'position')
@@ -46,11 +51,14 @@ class Page(html.parser.HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append(tag)
+
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if self.open and self.open[-1] != 'style':
+        if self.open and self.open[-1] not in ('style', 'script'):
             self.words.append(data)
 
     @property
@@ -143,15 +151,18 @@ def walk():
     return trial
 
 
-def test_a_report_needs_no_other_file_and_no_script(walk, tmp_path):
+def test_a_report_needs_no_other_file_and_no_network(walk, tmp_path):
     path = tmp_path / 'new' / 'report.html'
     report.write(walk, path, others=[dataclasses.replace(walk, policy='flat')])
     text = path.read_text(encoding='utf-8')
     assert len(text) < 4_000_000
     seen = Page(text)
-    assert not {'script', 'link', 'iframe', 'object'} & set(seen.tags)
-    assert not re.search(r'https?://|@import|url\(', text)
-    assert len(seen.images) == 5
+    assert not {'link', 'iframe', 'object'} & set(seen.tags)
+    assert seen.tags.count('script') == 2 and '<script src' not in text
+    assert not re.search(r'https?://|@import|url\(|fetch\(|XMLHttp', text)
+    # A browser would refuse anything from elsewhere.
+    assert "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'" in text
+    assert len(seen.images) == 6
     for image in seen.images:
         kind, data = image['src'].split(',', 1)
         assert kind == 'data:image/svg+xml;base64'
@@ -280,8 +291,8 @@ def test_footprints_window_and_omissions(tmp_path):
 
 
 def test_reliability_counts_what_was_wet():
-    view = report._view(made_up(), [])
-    believed, wet = report._beliefs(view)
+    view = pictures.view_of(made_up())
+    believed, wet = pictures.beliefs(view)
     # On the floor of made_up, all stances before 10 s are dry and believed so at 0.1; later ones
     # are wet and believed so at 0.9.
     assert sorted(believed.tolist()) == [0.1] * 10 + [0.9] * 5
@@ -294,7 +305,7 @@ def test_reliability_counts_what_was_wet():
 )
 def test_wilson_intervals_of_the_literature(hits, count, low, high):
     # 81 of 263: Newcombe (1998), table I, method 3.
-    assert report._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
+    assert pictures._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
 
 
 def without(names, trial=None):
@@ -387,25 +398,25 @@ def test_lead_picture(walk, tmp_path):
         dataclasses.replace(walk, policy='flat', metrics=dataclasses.replace(walk.metrics)),
     ]
     path = tmp_path / 'lead.png'
-    report.lead_picture(trials, path)
+    pictures.lead_picture(trials, path)
     data = path.read_bytes()
     assert len(data) < 400_000
     picture = matplotlib.image.imread(io.BytesIO(data))
     height, width, _ = picture.shape
     assert width == 1600 and 300 < height < 1200
     colours = {tuple(pixel) for pixel in np.round(255 * picture[..., :3]).reshape(-1, 3).tolist()}
-    for colour in (report.WET, report.BLUE, report.VERMILION):
+    for colour in (page_of.WET, page_of.BLUE, page_of.VERMILION):
         assert tuple(float(int(colour[k : k + 2], 16)) for k in (1, 3, 5)) in colours
     with pytest.raises(PadError, match='exists'):
-        report.lead_picture(trials, path)
-    report.lead_picture(trials, path, force=True)
+        pictures.lead_picture(trials, path)
+    pictures.lead_picture(trials, path, force=True)
     assert path.read_bytes() == data
 
 
 def test_lead_picture_of_trials_that_do_not_belong_together(tmp_path):
     for trials in ([], [made_up(), dataclasses.replace(made_up(), seed=8)]):
         with pytest.raises(InvalidInput, match='one scene and seed'):
-            report.lead_picture(trials, tmp_path / 'lead.png')
+            pictures.lead_picture(trials, tmp_path / 'lead.png')
 
 
 def test_settings_survive_json(tmp_path):
@@ -441,3 +452,148 @@ def test_what_feet_knew_is_told_by_stance():
 
 def test_a_bag_without_doubts_says_nothing_of_them():
     assert report._doubts(made_up(), 3.0) == ''
+
+
+# --- conditions ----------------------------------------------------------------------------------
+
+
+def test_conditions_of_a_shipped_scene(walk):
+    rows = dict(conditions.rows(walk))
+    assert 'shipped scene' in rows['conditions']
+    assert rows['scene'].startswith('hexapod_patches; ') and '30 gait cycles' in rows['scene']
+    assert rows['robot'].startswith('hexapod: mass 2.09 kg, inertia 0.03 kg m²')
+    assert rows['foot'].startswith('large37, pad radius 0.0015 m, pad stiffness 40 N/m')
+    assert 'wet fraction 0.45' in rows['floor'] and 'viscosity 0.001 Pa s' in rows['floor']
+    assert 'weight 9 N' in rows['towed load']
+    noise = 'rate 250 Hz, force 0.03 N, position 0.00015 m, moment 0 N m'
+    assert rows['sensors: rate, noise (standard deviation)'] == noise
+    assert rows['regulator and hose'] == 'hose diameter 0.004 m, hose length 1 m'
+    assert rows['seed of floor and noise'] == '0' and rows['policy'] == 'adaptive'
+    assert rows['git'] == 'not on record'
+    assert rows['walked again by'] == (
+        'pad run hexapod_patches --policy adaptive --seed 0 --fidelity L2 --cycles 30'
+        ' --foot large37'
+    )
+
+
+def test_conditions_as_recorded_count_before_the_shipped_scene(walk):
+    scene = dataclasses.replace(Scene.load('hexapod_patches'), dome_pressure=70e3)
+    said = conditions.described(scene)
+    said['tow']['weight'] = 7.5
+    settings = walk.settings | {
+        'conditions': json.loads(json.dumps(said)),
+        'versions': {'numpy': '2.0.1'},
+        'git': 'v0.1-3-gabcdef',
+    }
+    rows = dict(conditions.rows(dataclasses.replace(walk, settings=settings)))
+    assert rows['conditions'] == 'as recorded with the trial'
+    assert 'weight 7.5 N' in rows['towed load']
+    assert rows['pressure of a dome'] == '70000 Pa gauge, fixed'
+    assert rows['versions'].endswith('numpy 2.0.1') and rows['git'] == 'v0.1-3-gabcdef'
+
+
+def test_a_shipped_scene_that_has_changed_since_is_not_told(walk):
+    settings = walk.settings | {'stride_m': 0.10}
+    rows = dict(conditions.rows(dataclasses.replace(walk, settings=settings)))
+    assert 'has changed since' in rows['conditions']
+    assert 'robot' not in rows and rows['foot'] == 'large37'
+
+
+def test_conditions_stand_in_the_report_of_whatever_there_is(tmp_path):
+    report.write(POOR['robot'](), tmp_path / 'r.html')
+    text = page(tmp_path / 'r.html').text
+    assert 'no scene is on record' in text and 'walked again by' not in text
+    report.write(made_up(), tmp_path / 's.html')
+    assert 'of the scene only its name is on record' in page(tmp_path / 's.html').text
+
+
+# --- reserves ------------------------------------------------------------------------------------
+
+
+def test_use_of_the_force_limit():
+    """37 pads at 75 kPa carry 37 x 0.2833 N, by the line through the thesis' limits."""
+    trial = made_up()
+    trial.settings['foot'] = 'large37'
+    trial.pressure = np.where(trial.dome, 75e3, 0.0)
+    used = pictures.limit_use(pictures.view_of(trial))
+    standing = trial.slow_time % 2.0 >= 1.0
+    domed = trial.slow_time > 10.0
+    sure = np.abs(trial.slow_time % 1.0 - 0.5) < 0.4  # away from steps
+    assert np.isnan(used[:, 0]).all()
+    assert np.isnan(used[sure & ~(standing & domed), 1]).all()
+    assert used[sure & standing & domed, 1] == pytest.approx(10.0 / (37 * 0.2833), rel=1e-3)
+
+
+def test_margins_are_those_of_standing_feet():
+    trial = made_up()
+    trial.margin = np.full_like(trial.margin, -0.1)
+    margins = pictures.standing_margins(pictures.view_of(trial))
+    sure = np.abs(trial.slow_time % 1.0 - 0.5) < 0.4
+    assert np.isnan(margins[sure & (trial.slow_time % 2.0 >= 1.0), 0]).all()
+    assert (margins[sure & (trial.slow_time % 2.0 < 1.0), 0] == -0.1).all()
+
+
+# --- figures for a paper -------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def printed(tmp_path_factory):
+    """Figures of a trial; two of them, which differ most, drawn and written twice."""
+    trial = made_up()
+    trial.settings['foot'] = 'large37'
+    trial.settings['comparison'] = [{'policy': 'flat', **metrics(0.1).as_dict()}]
+    folders = [tmp_path_factory.mktemp('one'), tmp_path_factory.mktemp('two')]
+    page_of.write_figures(report.drawn(trial), folders[0])
+    again = report.drawn(trial)
+    page_of.write_figures({name: again[name] for name in ('path', 'reliability')}, folders[1])
+    return folders
+
+
+def test_figures_of_a_trial_for_a_paper(printed):
+    one, two = printed
+    names = {path.name for path in one.iterdir()}
+    stems = ('comparison', 'path', 'trial', 'window', 'reserves', 'reliability')
+    assert names == {f'{stem}.{kind}' for stem in stems for kind in ('pdf', 'png')}
+    twice = {path.name for path in two.iterdir()}
+    assert len(twice) == 4
+    for name in twice:
+        assert (one / name).read_bytes() == (two / name).read_bytes(), name
+
+
+def test_figures_have_the_width_of_columns_and_fonts_inside(printed):
+    for path in printed[0].glob('*.pdf'):
+        data = path.read_bytes()
+        wide = float(re.search(rb'/MediaBox \[ 0 0 ([0-9.]+)', data)[1]) / 72.0 * 25.4
+        column = path.stem in ('comparison', 'reliability')
+        assert wide == pytest.approx(85.0 if column else 175.0, abs=0.01)
+        # TrueType fonts that an editor can use, and no date.
+        assert b'/FontFile2' in data and b'/Type3' not in data
+        assert b'CreationDate' not in data and b'/Producer' not in data
+        picture = matplotlib.image.imread(path.with_suffix('.png'))
+        assert picture.shape[1] == pytest.approx(wide / 25.4 * 300, abs=1.5)
+
+
+def test_figures_are_not_cut_off():
+    trial = made_up()
+    trial.settings['foot'] = 'large37'
+    trial.settings['comparison'] = [{'policy': 'oracle', **metrics(0.1).as_dict()}]
+    for name, each in report.drawn(trial).items():
+        with matplotlib.rc_context(page_of.PAPER_STYLE):
+            canvas = FigureCanvasAgg(each.figure)
+            canvas.draw()
+            box = each.figure.get_tightbbox(canvas.get_renderer())
+        width, height = each.figure.get_size_inches()
+        assert box.x0 > -0.01 and box.y0 > -0.01, name
+        assert box.x1 < width + 0.01 and box.y1 < height + 0.01, name
+
+
+def test_figures_replace_nothing_unless_forced(printed, tmp_path):
+    mine = tmp_path / 'reliability.png'
+    mine.write_text('mine')
+    drawn = report.drawn(made_up())
+    drawn = {name: drawn[name] for name in ('reserves', 'reliability')}
+    with pytest.raises(PadError, match=r'reliability\.png: exists'):
+        page_of.write_figures(drawn, tmp_path)
+    assert list(tmp_path.iterdir()) == [mine]
+    page_of.write_figures(drawn, tmp_path, force=True)
+    assert mine.read_bytes().startswith(b'\x89PNG')

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Under what conditions a trial was walked: all that a reader needs to walk it again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from ros_pad.errors import ConfigError
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.label import AMBIENT_PRESSURE
+from ros_pad.trials.trial import Trial
+
+# Units of what a scene and a foot are described by, by name; what has none is not listed.
+_UNITS = {
+    'mass': 'kg', 'inertia': 'kg m²', 'height': 'm', 'homes': 'm', 'coxa': 'm', 'femur': 'm',
+    'tibia': 'm', 'leg_stiffness': 'N/m', 'rolling_drag': 'N', 'load': 'N', 'goal': 'm',
+    'cycle': 's', 'stride': 'm', 'lift': 'm', 'stroke': 'm', 'stance': 's', 'swing': 's',
+    'heading_gain': '1/s', 'film_thickness': 'm', 'viscosity': 'Pa s', 'patch_length': 'm',
+    'cell': 'm', 'slope': 'rad', 'roughness': 'm', 'unevenness': 'm', 'weight': 'N',
+    'distance': 'm', 'stiffness': 'N/m', 'rate': 'Hz', 'force': 'N', 'position': 'm',
+    'moment': 'N m', 'hose_diameter': 'm', 'hose_length': 'm', 'hose_conductance': 'm³/(s Pa)',
+    'radius': 'm', 'adhesion_energy': 'J/m²', 'sole_radius': 'm', 'shear_strength': 'Pa',
+    'conforming_pressure': 'Pa', 'critical_film': 'm', 'shear_stiffness': 'N/m',
+    'chamber_volume': 'm³', 'ceiling': 'Pa', 'dome_pressure': 'Pa', 'settle': 's',
+    'pressure': 'Pa', 'ambient_pressure': 'Pa',
+}  # fmt: skip
+
+# What is told in a row of its own; all else of a scene goes into one row.
+_PARTS = {
+    'body': 'robot', 'gait': 'gait', 'foot': 'foot', 'floor': 'floor', 'tow': 'towed load',
+    'sensors': 'sensors: rate, noise (standard deviation)', 'regulator': 'regulator and hose',
+}  # fmt: skip
+
+
+def described(scene: Scene) -> dict[str, Any]:
+    """Return a scene as plain values for JSON: nested as its YAML is, in SI units."""
+    values: dict[str, Any] = asdict(scene)
+    # Tables that a foot keeps for speed follow from the rest.
+    values['foot'] = {
+        name: each for name, each in values['foot'].items() if not name.startswith('_')
+    }
+    values['faults'] = [str(fault) for fault in scene.faults]
+    return values
+
+
+def rows(trial: Trial) -> list[tuple[str, str]]:
+    """Return the conditions of a trial: what, and its values with units as text.
+
+    ``settings['conditions']``, where a bag has it, is what :func:`described` said when the trial
+    was walked. Without it the shipped scene of the same name is told, if it agrees with what the
+    bag does say; the first row says so.
+    """
+    settings = trial.settings
+    said, source = settings.get('conditions'), 'as recorded with the trial'
+    if not isinstance(said, Mapping):
+        said, source = _shipped(trial)
+    found = [('conditions', source)]
+    if trial.scene:
+        found.append(('scene', _scene_words(trial, said)))
+    found.append(('policy', trial.policy or 'not on record'))
+    if trial.scene:
+        found.append(('seed of floor and noise', str(trial.seed)))
+    if trial.fidelity:
+        found.append(('simulation', trial.fidelity))
+    for key, name in _PARTS.items():
+        if key in said:
+            text = _listed(said[key])
+            if key == 'body':
+                text = f'{said.get("robot", "robot")}: {text}'
+                text += f', steering {said.get("heading_gain", 0.0):g} 1/s'
+            found.append((name, text))
+        elif key == 'foot' and settings.get('foot'):
+            found.append((name, str(settings['foot'])))
+    if said.get('dome_pressure'):
+        found.append(('pressure of a dome', f'{said["dome_pressure"]:g} Pa gauge, fixed'))
+    elif said:
+        found.append(('pressure of a dome', 'from the load and the measured force limit'))
+    # Simulated trials have the one that their bags are written with.
+    ambient = settings.get('ambient_pressure', AMBIENT_PRESSURE if trial.fidelity else None)
+    if ambient is not None:
+        found.append(('ambient pressure', f'{ambient:g} Pa'))
+    found.append(('faults on the schedule', '; '.join(settings.get('faults', ())) or 'none'))
+    if 'recorded' in settings:
+        found.append(('recorded', str(settings['recorded'])))
+    versions = {'ros_pad': settings['version']} if 'version' in settings else {}
+    versions |= settings.get('versions') or {}
+    found.append(
+        (
+            'versions',
+            ', '.join(f'{name} {each}' for name, each in versions.items()) or 'not on record',
+        )
+    )
+    found.append(('git', str(settings.get('git') or 'not on record')))
+    if again := repeated_by(trial):
+        found.append(('walked again by', again))
+    return found
+
+
+def repeated_by(trial: Trial) -> str | None:
+    """Return the command that walks a trial of a simulation again; None for a robot's."""
+    own = trial.metrics
+    if not trial.scene or not trial.fidelity or own is None:
+        return None
+    words = ['pad', 'run', trial.scene, '--policy', trial.policy, '--seed', str(trial.seed)]
+    words += ['--fidelity', trial.fidelity]
+    whole = not own.verdict and not trial.settings.get('interrupted')
+    if whole and own.cycles >= 1.0 and abs(own.cycles - round(own.cycles)) < 0.01:
+        words += ['--cycles', str(round(own.cycles))]
+    if trial.settings.get('foot'):
+        words += ['--foot', str(trial.settings['foot'])]
+    return shlex.join(words)
+
+
+def _shipped(trial: Trial) -> tuple[Mapping[str, Any], str]:
+    """Return the shipped scene of a trial's name, and where that comes from."""
+    if not trial.scene:
+        return {}, 'no scene is on record: what follows is all that the bag says'
+    try:
+        scene = Scene.load(trial.scene)
+    except ConfigError:
+        return {}, 'of the scene only its name is on record'
+    recorded = trial.settings
+    known = {
+        'foot': scene.foot.source,
+        'expected_load': scene.expected_load,
+        'stride_m': scene.stride,
+        'cycle_s': scene.gait.cycle,
+        'settle_s': scene.settle,
+    }
+    if any(name in recorded and recorded[name] != each for name, each in known.items()):
+        return {}, 'of the scene only its name is on record; the shipped scene has changed since'
+    values = described(scene)
+    # Cycles may have been asked for at the command line.
+    del values['cycles']
+    return (
+        values,
+        'of the shipped scene of this name, which agrees with what the bag has on record',
+    )
+
+
+def _scene_words(trial: Trial, said: Mapping[str, Any]) -> str:
+    words = [trial.scene]
+    if said.get('description'):
+        words.append(str(said['description']))
+    if trial.metrics is not None:
+        words.append(f'{trial.metrics.cycles:.4g} gait cycles')
+    return '; '.join(words)
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    return ', '.join(_items(values))
+
+
+def _items(values: Mapping[str, Any], of: str = '') -> Iterator[str]:
+    for name, each in values.items():
+        words = f'{of}{name.replace("_", " ")}'
+        if each is None or each == () or each == [] or name == 'homes':
+            continue
+        if name in ('cell', 'wet_fraction', 'patch_length') and not each:  # of other floors
+            continue
+        if isinstance(each, Mapping):
+            yield from _items(each, f'{words} ')
+        elif isinstance(each, bool) or not isinstance(each, (int, float)):
+            yield f'{words} {each}' if name != 'source' else str(each)
+        else:
+            unit = _UNITS.get(name, '')
+            if of.endswith('measured limit '):
+                unit = {'slope': 'N/Pa'}.get(name, unit)
+            yield f'{words} {each:.6g} {unit}'.rstrip()
+
+
+__all__ = ['described', 'repeated_by', 'rows']
