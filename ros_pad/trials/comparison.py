@@ -10,6 +10,10 @@ from dataclasses import field
 
 import numpy as np
 
+ROUNDING = 1e-12
+"""Difference, of the larger of the number and 1, that another processor may make: NumPy has an
+exponential of its own for each, and they differ in the last bit."""
+
 
 @dataclass
 class Track:
@@ -83,6 +87,8 @@ class Comparison:
         In the unit of the message; None for text.
     first_difference_s : float or None
         When they part, s since the bag begins.
+    rounded : bool
+        Whether no difference is larger than :data:`ROUNDING`.
     excused : bool
         Whether all differences come after a gap in what the nodes heard: what was not recorded
         cannot be replayed, so nobody knows whether they would be there without it.
@@ -99,13 +105,16 @@ class Comparison:
     not_recorded: int
     largest_difference: float | None
     first_difference_s: float | None
+    rounded: bool
     excused: bool
 
     @property
     def verdict(self) -> str:
-        """One of ``equal``, ``different`` and, if excused, ``gap``."""
+        """One of ``equal``, ``rounding``, ``different`` and, if excused, ``gap``."""
         if self.first_difference_s is None:
             return 'equal'
+        if self.rounded:
+            return 'rounding'
         return 'gap' if self.excused else 'different'
 
 
@@ -150,25 +159,26 @@ def compare(
     own &= near
     theirs = rows[place[own]]
     times = np.array(recorded.times, dtype=np.int64)
+    lost = np.empty(0, dtype=np.int64)
     largest: float | None = None
     if recorded.width:
-        a, b = recorded.values[own], replayed.values[theirs]
-        same = ((a == b) | (np.isnan(a) & np.isnan(b))).all(axis=1)
+        before, after = recorded.values[own], replayed.values[theirs]
+        both_nan = np.isnan(before) & np.isnan(after)
+        same = (before == after) | both_nan
         with np.errstate(invalid='ignore'):
-            apart = np.nan_to_num(np.abs(a - b)[~same], nan=math.inf, posinf=math.inf)
-        both_nan = (np.isnan(a) & np.isnan(b))[~same]
-        largest = float(np.max(apart, where=~both_nan, initial=0.0))
-        lost = np.empty(0, dtype=np.int64)
+            apart = np.nan_to_num(np.abs(before - after), nan=math.inf, posinf=math.inf)
+        apart[same] = 0.0
+        largest = float(apart.max(initial=0.0))
+        far = (apart > ROUNDING * np.maximum(1.0, np.abs(np.nan_to_num(before)))).any(axis=1)
+        same = same.all(axis=1)
     else:
-        same = np.array(
-            [recorded.texts[i] == replayed.texts[j]
-             for i, j in zip(np.flatnonzero(own), theirs, strict=True)],
-            dtype=bool,
-        )  # fmt: skip
+        pairs = zip(np.flatnonzero(own), theirs, strict=True)
+        same = np.array([recorded.texts[i] == replayed.texts[j] for i, j in pairs], dtype=bool)
+        far = ~same
         # Text is sent when it changes: one more is a difference.
         lost = np.delete(np.array(replayed.times, dtype=np.int64), theirs)
     parting = np.concatenate([times[own][~same], times[~own], lost])
-    first_ns = int(parting.min()) if len(parting) else None
+    grave = np.concatenate([times[own][far], times[~own], lost])
     return Comparison(
         topic=topic,
         leg=leg,
@@ -180,6 +190,7 @@ def compare(
         missing=int((~own).sum()),
         not_recorded=len(replayed) - int(own.sum()),
         largest_difference=largest,
-        first_difference_s=None if first_ns is None else (first_ns - start_ns) * 1e-9,
-        excused=first_ns is not None and gap_ns is not None and first_ns >= gap_ns,
+        first_difference_s=(int(parting.min()) - start_ns) * 1e-9 if len(parting) else None,
+        rounded=not len(grave),
+        excused=gap_ns is not None and len(grave) > 0 and int(grave.min()) >= gap_ns,
     )

@@ -24,6 +24,7 @@ from ros_pad.control.morphology import Policy
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import LimitError
 from ros_pad.estimation import Tuning
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import Scene
@@ -66,6 +67,10 @@ class Settings:
         Estimates a second, Hz.
     floor : Floor or None
         That an oracle sees.
+    scene : str
+        That was walked; empty where the bag does not say.
+    seed : int
+        Of floor and noise.
     legs : tuple of int
         That the robot had; empty where the bag does not say.
     assumed : tuple of str
@@ -82,6 +87,8 @@ class Settings:
     ambient_pressure: float = AMBIENT_PRESSURE
     publish_rate: float = 50.0
     floor: Floor | None = None
+    scene: str = ''
+    seed: int = 0
     legs: tuple[int, ...] = ()
     assumed: tuple[str, ...] = ()
 
@@ -107,10 +114,9 @@ class Settings:
             told = said.get('settings') or {}
             load = float(told.get('expected_load', 6.83))
             ambient = float(said.get('ambient_pressure', AMBIENT_PRESSURE))
-            floor = (
-                FloorPlan(**said['floor']).build(int(said['seed'])) if said.get('floor') else None
-            )
-            policy, source = said.get('policy') or 'adaptive', said.get('scene')
+            policy = str(said.get('policy') or 'adaptive')
+            source, seed = str(said.get('scene') or ''), int(said.get('seed') or 0)
+            floor = FloorPlan(**said['floor']).build(seed) if said.get('floor') else None
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BagError(
                 f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
@@ -122,6 +128,8 @@ class Settings:
             policy,
             ambient_pressure=ambient,
             floor=floor,
+            scene=source,
+            seed=seed,
         )
         if not said:
             return replace(
@@ -200,7 +208,7 @@ class Settings:
             settings = replace(self, **changes)
             settings.rules()
             settings.controller(settings.legs or (1,))
-        except InvalidInput as error:
+        except (InvalidInput, LimitError) as error:
             given = ', '.join(f'{name}={value}' for name, value in (values or {}).items())
             raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
         return settings

@@ -229,6 +229,11 @@ def _described(bag: BagReader) -> dict[str, Any]:
         ) from error
 
 
+def message_type(kind: str) -> str:
+    """Return the message type of a kind of topic, such as ``wetness``."""
+    return _KINDS[kind][0]
+
+
 def wanted_topics(
     bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
 ) -> dict[str, tuple[int, str]]:
@@ -356,4 +361,4 @@ def _read(
         progress(1.0)
 
 
-__all__ = ['load', 'wanted_topics']
+__all__ = ['load', 'message_type', 'wanted_topics']

@@ -61,6 +61,9 @@ CLOCK_TYPE = 'rosgraph_msgs/msg/Clock'
 LONGER = 1.6
 """Times the usual one, a time between two messages is a gap: one may be lost."""
 
+LONGEST_SILENCE_NS = 10_000_000_000
+"""Of a bag, through which the nodes are taken to have looked whether feet are heard, ns."""
+
 Progress: TypeAlias = Callable[[float], None]
 
 _REPORT_EVERY = 5_000  # messages
@@ -140,12 +143,12 @@ class Replay:
 
     @property
     def verdict(self) -> str:
-        """One of ``equal``, ``different``, ``gap`` and, where nothing was compared, ``nothing``.
+        """The worst of its comparisons, or ``nothing`` where nothing was recorded to compare.
 
         See :class:`Comparison`.
         """
         verdicts = {each.verdict for each in self.comparisons if each.recorded}
-        for worst in ('different', 'gap', 'equal'):
+        for worst in ('different', 'gap', 'rounding', 'equal'):
             if worst in verdicts:
                 return worst
         return 'nothing'
@@ -311,8 +314,10 @@ class _Player:
 
     def _pass_time(self, until_ns: int) -> None:
         """Tick as the timers of the nodes do."""
-        if self._next_tick_ns is None:
-            self._next_tick_ns = until_ns
+        if self._next_tick_ns is None or until_ns < self._next_tick_ns - 2 * LISTEN_PERIOD_NS:
+            self._next_tick_ns = until_ns  # or the clock was set back
+        # Silence that lasts has no more to tell.
+        self._next_tick_ns = max(self._next_tick_ns, until_ns - LONGEST_SILENCE_NS)
         while self._next_tick_ns <= until_ns:
             self.now_ns = self.log_ns = self._next_tick_ns
             self._tick()
