@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from array import array
 from dataclasses import dataclass
@@ -59,7 +60,7 @@ class Track:
 
     def at(self, time_ns: int) -> float | None:
         """Return the first number of the last message until then."""
-        place = int(np.searchsorted(np.array(self.times, dtype=np.int64), time_ns, 'right'))
+        place = bisect.bisect_right(self.times, time_ns)
         return self.numbers[(place - 1) * self.width] if place else None
 
 

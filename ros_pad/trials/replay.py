@@ -9,6 +9,7 @@ have changed in what was estimated and decided; the robot walks as it walked.
 
 from __future__ import annotations
 
+import bisect
 import math
 import os
 import pathlib
@@ -207,6 +208,9 @@ class _Leg:
             self._refuse,
         )
         self.heard = LegListener(player.controller, leg, lambda place: place)
+        self._obeyed = player.recorded[leg, 'pressure_setpoint']
+        self._period_ns = round(1e9 / settings.publish_rate)
+        self._parted = False  # whether the set-point is another than was recorded
         self.refused, self.refusal = 0, ''
         self.inputs: dict[str, tuple[array[int], array[int]]] = {
             kind: (array('q'), array('q')) for kind in INPUTS
@@ -241,7 +245,8 @@ class _Leg:
         self._note('pressure', message, log_ns)
         gauge = message.fluid_pressure - self._ambient
         self.foot.pressure(gauge)
-        self.heard.pressure(gauge)
+        if not self._parted:
+            self.heard.pressure(gauge)
 
     def _follow_stance(self, log_ns: int) -> None:
         standing = self.estimator.estimate.standing
@@ -265,10 +270,29 @@ class _Leg:
         self._player.later.append(lambda: setattr(self.heard, 'trouble', trouble_in(doubt)))
 
     def _decide(self, log_ns: int, wet: float) -> None:
+        self._part()
         gauge = self.heard.estimate(self._player.now_ns * 1e-9, wet)
         self.tell_shape(log_ns)
         if gauge is not None:
             self._told['pressure_setpoint'].add(log_ns, (gauge + self._ambient,))
+
+    def _part(self) -> None:
+        """Let a pad that was told something else then have what it is told now.
+
+        What its pressure was says nothing of the set-points of a replay that went another way:
+        the controller would call the pad stuck.
+        """
+        told, obeyed = self._told['pressure_setpoint'], self._obeyed
+        if not len(told):
+            return
+        until_ns = told.times[-1] + self._period_ns // 2
+        place = bisect.bisect_right(obeyed.times, until_ns)
+        if not len(obeyed):
+            self._parted = True  # nobody told it anything
+        elif place and obeyed.times[place - 1] > until_ns - self._period_ns:
+            self._parted = obeyed.numbers[place - 1] != told.numbers[-1]
+        if self._parted:
+            self.heard.pressure(told.numbers[-1] - self._ambient)
 
     def tell_shape(self, log_ns: int) -> None:
         shape = self.heard.new_shape()
@@ -289,7 +313,7 @@ class _Player:
 
     def __init__(self, settings: Settings, legs: Sequence[int], clocked: bool) -> None:
         self.controller = settings.controller(legs)
-        self.replayed = _tracks(legs)
+        self.recorded, self.replayed = _tracks(legs), _tracks(legs)
         self.now_ns = self.log_ns = 0
         self.later: list[Callable[[], None]] = []
         self.legs = {leg: _Leg(self, leg, settings) for leg in legs}
@@ -439,7 +463,8 @@ def replay(
         leg for leg in legs if leg not in settings.legs
     )
     clock = _clock(bag)
-    player, recorded = _Player(settings, legs, clock is not None), _tracks(legs)
+    player = _Player(settings, legs, clock is not None)
+    recorded = player.recorded
     takers: dict[str, Callable[[Any, int], None]] = {}
     for topic, (leg, kind) in wanted.items():
         if leg in player.legs and kind in INPUTS:
