@@ -6,6 +6,7 @@ import pathlib
 import shutil
 
 import pytest
+from mcap.reader import make_reader
 
 from ros_pad import cli
 from ros_pad import configuration
@@ -143,7 +144,8 @@ def test_a_bag_that_cannot_be_read_is_bad_input(
     lone = tmp_path / 'lone.mcap'
     shutil.copy(SAMPLE / 'bag_0.mcap', lone)
     with lone.open('r+b') as stream:
-        stream.seek(400_000)
-        stream.write(bytes(100_000))
+        chunk = make_reader(stream).get_summary().chunk_indexes[5]
+        stream.seek(chunk.chunk_start_offset + chunk.chunk_length - 100)
+        stream.write(bytes(50))
     assert cli.main(['replay', str(lone)]) == 2
     assert 'damaged' in capsys.readouterr().err
