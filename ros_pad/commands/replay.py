@@ -22,6 +22,7 @@ from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import Settings
 from ros_pad.trials.node_settings import Value
 
+UNITS = {'slip': ' m/s', 'pressure_setpoint': ' Pa'}  # of what is no probability, share or number
 WORDS = {
     'equal': 'equal to the bit',
     'rounding': 'equal but for rounding: recorded on another kind of processor',
@@ -202,15 +203,15 @@ def _row(gathered: tuple[str, list[Comparison]]) -> list[str]:
         name,
         str(sum(each.compared for each in topics)),
         str(sum(each.equal for each in topics)),
-        _largest(max(largest)) if largest else 'text',
+        _largest(max(largest), topics[0].kind) if largest else 'text',
         f'{min(apart):.3f} s{after}' if apart else '-',
         str(sum(each.missing for each in topics)),
         str(sum(each.not_recorded for each in topics)),
     ]
 
 
-def _largest(value: float) -> str:
-    return 'number or none' if value == math.inf else f'{value:.3g}'
+def _largest(value: float, kind: str) -> str:
+    return 'number or none' if value == math.inf else f'{value:.3g}{UNITS.get(kind, "")}'
 
 
 def _pair(pair: tuple[int | None, int]) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bisect
 import math
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field
 
@@ -52,6 +53,14 @@ class Track:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def since(self, time_ns: int) -> Track:
+        """Return the texts from a time on."""
+        made = Track(self.width)
+        for at_ns, text in zip(self.times, self.texts, strict=True):
+            if at_ns >= time_ns:
+                made.say(at_ns, text)
+        return made
 
     @property
     def values(self) -> np.ndarray:
@@ -128,6 +137,7 @@ def compare(
     start_ns: int = 0,
     period_ns: int = 20_000_000,
     gap_ns: int | None = None,
+    look_ns: int = 0,
 ) -> Comparison:
     """Compare a topic with its replay, message by message.
 
@@ -147,18 +157,18 @@ def compare(
         Between messages.
     gap_ns : int or None
         Since when what was not recorded may tell.
+    look_ns : int
+        Where texts are told when somebody looks, and nobody knows when that was: how far they
+        may be apart. How long a silence lasted by then is not compared.
     """
-    one, other = np.array(recorded.keys, dtype=np.int64), np.array(replayed.keys, dtype=np.int64)
-    rows = np.argsort(other, kind='stable')
-    place = np.searchsorted(other[rows], one + period_ns // 10, 'right') - 1
-    near = place >= 0
-    near[near] = one[near] - other[rows[place[near]]] < 9 * period_ns // 10
-    # The first of several that fit is the one.
-    _, first = np.unique(np.where(near, place, -1), return_index=True)
-    own = np.zeros(len(one), dtype=bool)
-    own[first] = True
-    own &= near
-    theirs = rows[place[own]]
+    said = _without_length if look_ns else str
+    early_ns, late_ns = period_ns // 10, 9 * period_ns // 10
+    if look_ns and not recorded.width:
+        early_ns = late_ns = look_ns
+    pairs = _pairs(recorded, replayed, early_ns, late_ns, said)
+    own = np.zeros(len(recorded), dtype=bool)
+    own[[i for i, _ in pairs]] = True
+    theirs = np.array([j for _, j in sorted(pairs)], dtype=int)
     times = np.array(recorded.times, dtype=np.int64)
     lost = np.empty(0, dtype=np.int64)
     largest: float | None = None
@@ -173,8 +183,10 @@ def compare(
         far = (apart > ROUNDING * np.maximum(1.0, np.abs(np.nan_to_num(before)))).any(axis=1)
         same = same.all(axis=1)
     else:
-        pairs = zip(np.flatnonzero(own), theirs, strict=True)
-        same = np.array([recorded.texts[i] == replayed.texts[j] for i, j in pairs], dtype=bool)
+        same = np.array(
+            [said(recorded.texts[i]) == said(replayed.texts[j]) for i, j in sorted(pairs)],
+            dtype=bool,
+        )
         far = ~same
         # Text is sent when it changes: one more is a difference.
         lost = np.delete(np.array(replayed.times, dtype=np.int64), theirs)
@@ -195,3 +207,42 @@ def compare(
         rounded=not len(grave),
         excused=gap_ns is not None and len(grave) > 0 and int(grave.min()) >= gap_ns,
     )
+
+
+def _pairs(
+    recorded: Track, replayed: Track, early_ns: int, late_ns: int, said: Callable[[str], str]
+) -> list[tuple[int, int]]:
+    """Return the places of messages that belong together, in order: each is used once.
+
+    Of several that fit, the nearest one is taken, or of texts the first that says the same.
+    """
+    rows = sorted(range(len(recorded)), key=recorded.keys.__getitem__)
+    theirs = sorted(range(len(replayed)), key=replayed.keys.__getitem__)
+    found, at = [], 0
+
+    def fits(place: int, key: int) -> bool:
+        return place < len(theirs) and replayed.keys[theirs[place]] <= key + early_ns
+
+    for row in rows:
+        key = recorded.keys[row]
+        while at < len(theirs) and replayed.keys[theirs[at]] <= key - late_ns:
+            at += 1
+        best = at
+        if recorded.width:
+            while fits(best + 1, key) and abs(replayed.keys[theirs[best + 1]] - key) < abs(
+                replayed.keys[theirs[best]] - key
+            ):
+                best += 1
+        else:
+            text = said(recorded.texts[row])
+            while fits(best, key) and said(replayed.texts[theirs[best]]) != text:
+                best += 1
+            best = best if fits(best, key) else at
+        if fits(best, key):
+            found.append((row, theirs[best]))
+            at = best + 1
+    return found
+
+
+def _without_length(text: str) -> str:
+    return text.partition(':')[0] if text.startswith(('no wrench', 'no position')) else text

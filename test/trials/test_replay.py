@@ -55,7 +55,7 @@ def copy(
     folder,
     name=lambda topic: topic,
     keep=lambda topic, number: True,
-    time=lambda ns, number: ns,
+    time=lambda ns, number, topic: ns,
     begin=0.0,
     end=2.0,
     storage=StoragePlugin.MCAP,
@@ -86,7 +86,7 @@ def copy(
                     msgdef=connection.msgdef.data,
                     rihs01=connection.digest,
                 )
-            writer.write(connections[topic], time(ns, number), data)
+            writer.write(connections[topic], time(ns, number, topic), data)
     return folder
 
 
@@ -282,14 +282,47 @@ def test_a_leg_may_be_another_one(tmp_path):
 
 def test_times_of_day_that_jitter_are_no_difference(tmp_path):
     start = 1_750_000_000 * 10**9
-    # Each message a little after the one before, as they come in over a network.
-    bag = copy(
-        tmp_path / 'bag', without_clock, time=lambda ns, number: start + ns + number % 97 * 9000
-    )
+
+    # Each message a little after the one before, as they come in over a network, and friction
+    # later than the estimate after it.
+    def time(ns, number, topic):
+        return start + ns + number % 97 * 9000 + (35 * MS if topic.endswith('friction') else 0)
+
+    bag = copy(tmp_path / 'bag', without_clock, time=time)
     found = found_in(bag, TOLD)
     assert found.verdict in ('equal', 'rounding')
     compared = {each.kind: each.compared for each in found.comparisons if each.leg == 3}
     assert compared['wetness'] == compared['slip'] == 101
+
+
+def test_what_the_estimator_had_not_heard_yet_is_left_out(tmp_path):
+    """A recorder that is there first: the estimator found the sensors at 4 ms."""
+    bag = tmp_path / 'bag'
+    with (
+        AnyReader([SAMPLE]) as reader,
+        Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
+    ):
+        connections = {
+            each.topic: writer.add_connection(
+                each.topic, each.msgtype, msgdef=each.msgdef.data, rihs01=each.digest
+            )
+            for each in reader.connections
+            if each.topic.startswith('/leg_1/')
+        }
+        wanted = [each for each in reader.connections if each.topic in connections]
+        messages = [each for each in reader.messages(wanted) if each[1] <= 1000 * MS]
+        for ms in (1, 2, 3):
+            for connection, _, data in messages[:2]:
+                assert connection.topic.endswith(('wrench', 'position'))
+                # The nanoseconds of the stamp, behind the CDR header and the seconds.
+                early = data[:8] + (ms * MS).to_bytes(4, 'little') + data[12:]
+                writer.write(connections[connection.topic], ms * MS, early)
+        for connection, ns, data in messages:
+            writer.write(connections[connection.topic], ns, data)
+    found = found_in(bag, TOLD)
+    assert found.verdict in ('equal', 'rounding')
+    assert found.notes[-1].startswith('leg 1: the estimator heard of it later')
+    assert found.samples == {1: 250}
 
 
 def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
