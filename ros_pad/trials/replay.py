@@ -708,14 +708,18 @@ def _notes(
         notes.append(
             f'leg {", ".join(without["pressure"])}: no pressure, its pads are taken to be flat'
         )
-    excused = any(each.verdict == 'gap' for each in comparisons)
-    for leg, each in player.legs.items():
-        gap = _gap(each)
-        if excused and gap is not None and gap[0] >= 0:
+    if any(each.verdict == 'gap' for each in comparisons):
+        alike: dict[str, list[tuple[int, int]]] = {}
+        for leg, each in player.legs.items():
+            if (gap := _gap(each)) and gap[0] >= 0:
+                alike.setdefault(gap[1], []).append((gap[0], leg))
+        for words, found in alike.items():
             notes.append(
-                f'leg {leg}: {gap[1]}, the first {(gap[0] - bag.start) * 1e-9:.3f} s after the'
-                ' beginning: what was not recorded cannot be replayed'
+                f'leg {", ".join(str(leg) for _, leg in found)}: {words}, the first'
+                f' {(min(found)[0] - bag.start) * 1e-9:.3f} s after the beginning: what was not'
+                ' recorded cannot be replayed'
             )
+    for leg, each in player.legs.items():
         if each.refused:
             notes.append(
                 f'leg {leg}: {each.refused} samples refused, the last one: {each.refusal}'
