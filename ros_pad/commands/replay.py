@@ -27,7 +27,7 @@ WORDS = {
     'equal': 'equal to the bit',
     'rounding': 'equal but for rounding: recorded on another kind of processor',
     'different': 'different',
-    'gap': 'equal as far as can be told: what differs comes after a gap in what was recorded',
+    'gap': 'equal up to a gap in what was recorded; what differs after it, nobody can judge',
     'nothing': 'nothing to compare: no estimates and no decisions were recorded',
 }
 

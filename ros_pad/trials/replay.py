@@ -603,7 +603,7 @@ def _compared(
     gaps = {leg: gap[0] for leg, each in player.legs.items() if (gap := _gap(each))}
     # Legs know of one another by what the controller decides.
     of_all = min(gaps.values(), default=None)
-    if not set(settings.legs) <= set(player.legs):
+    if _absent(player, there, settings):
         of_all = -1
     period_ns = round(1e9 / settings.publish_rate)
     found = []
@@ -620,6 +620,13 @@ def _compared(
                 )
             )  # fmt: skip
     return found
+
+
+def _absent(
+    player: _Player, there: Mapping[tuple[int, str], str], settings: Settings
+) -> list[int]:
+    """Return the legs that the robot had, and that cannot be replayed."""
+    return sorted(({*settings.legs} | {leg for leg, _ in there}) - set(player.legs))
 
 
 def _matched(
@@ -692,10 +699,11 @@ def _notes(
     notes = list(settings.assumed)
     if bag.problem:
         notes.append(bag.problem)
-    absent = [str(leg) for leg in settings.legs if leg not in player.legs]
+    absent = _absent(player, there, settings)
     if absent:
         notes.append(
-            f'leg {", ".join(absent)}: no wrench; what it would have told the others is missing'
+            f'leg {", ".join(map(str, absent))}: no wrench; what it would have told the others'
+            ' is missing'
         )
     without = {
         kind: [str(leg) for leg in player.legs if (leg, kind) not in there] for kind in INPUTS

@@ -101,9 +101,12 @@ def without_clock(topic):
 # --- our own bags -------------------------------------------------------------------------------
 
 
+SHARES = []
+
+
 @pytest.fixture(scope='module')
 def sample():
-    return found_in(SAMPLE)
+    return replay(open_bag(SAMPLE), progress=SHARES.append)
 
 
 def test_the_shipped_bag_is_replayed_as_it_was_recorded(sample):
@@ -263,7 +266,7 @@ def test_remapped_topics_in_a_namespace_without_clock(tmp_path):
     assert 'does not say' in found.notes[0]
 
 
-def test_a_leg_may_be_another_one(tmp_path):
+def test_a_leg_may_be_another_one(sample, tmp_path):
     def name(topic):
         return topic.replace('/leg_4/', '/left/') if topic in inputs else None
 
@@ -272,11 +275,10 @@ def test_a_leg_may_be_another_one(tmp_path):
     remaps = {each.replace('/leg_4/', 'leg_2/'): each.replace('leg_4', 'left') for each in inputs}
     found = found_in(bag, TOLD, remaps=remaps)
     assert found.legs == (2,) and found.verdict == 'nothing'
-    own = found_in(SAMPLE)
     rows = len(found.replayed[2, 'slip'])
     assert rows == 101
     for kind in ('slip', 'wetness', 'friction_margin'):
-        one, other = found.replayed[2, kind], own.replayed[4, kind]
+        one, other = found.replayed[2, kind], sample.replayed[4, kind]
         np.testing.assert_array_equal(one.values, other.values[:rows])
 
 
@@ -326,7 +328,10 @@ def test_what_the_estimator_had_not_heard_yet_is_left_out(tmp_path):
 
 
 def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
-    bag = copy(tmp_path / 'bag', lambda topic: None if '/leg_3/wrench' in topic else topic, end=7)
+    def name(topic):
+        return None if topic.startswith('/leg_3/') else topic
+
+    bag = copy(tmp_path / 'bag', name, end=7)
     # The description travels with the bag, or nobody knew that there was a third leg.
     metadata = yaml.safe_load((SAMPLE / 'metadata.yaml').read_text())
     said = metadata['rosbag2_bagfile_information']['custom_data']
@@ -343,6 +348,14 @@ def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
         if each.kind in ('morphology', 'pressure_setpoint'):
             expected += ('gap',)
         assert each.verdict in expected, each
+
+
+def test_a_leg_that_only_spoke_is_missed(tmp_path):
+    # Nothing says how many legs there were, but somebody estimated leg 3.
+    bag = copy(tmp_path / 'bag', lambda topic: None if '/leg_3/wrench' in topic else topic, end=7)
+    found = found_in(bag, TOLD)
+    assert any(note.startswith('leg 3: no wrench') for note in found.notes)
+    assert found.verdict == 'gap'
 
 
 def test_drop_outs_are_said_and_not_called_a_difference(tmp_path):
@@ -586,10 +599,8 @@ def test_texts_count_each():
     assert found.verdict == 'different' and found.first_difference_s == pytest.approx(0.09)
 
 
-def test_progress_ends_at_one(tmp_path):
-    shares = []
-    replay(open_bag(SAMPLE), progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0 and len(shares) >= 5
+def test_progress_ends_at_one(sample):
+    assert SHARES == sorted(SHARES) and SHARES[-1] == 1.0 and len(SHARES) >= 5
 
 
 def test_a_scene_that_is_not_here_is_said(tmp_path):
