@@ -101,12 +101,12 @@ def without_clock(topic):
 # --- our own bags -------------------------------------------------------------------------------
 
 
-SHARES = []
+shown = []
 
 
 @pytest.fixture(scope='module')
 def sample():
-    return replay(open_bag(SAMPLE), progress=SHARES.append)
+    return replay(open_bag(SAMPLE), progress=shown.append)
 
 
 def test_the_shipped_bag_is_replayed_as_it_was_recorded(sample):
@@ -600,7 +600,7 @@ def test_texts_count_each():
 
 
 def test_progress_ends_at_one(sample):
-    assert SHARES == sorted(SHARES) and SHARES[-1] == 1.0 and len(SHARES) >= 5
+    assert shown == sorted(shown) and shown[-1] == 1.0 and len(shown) >= 5
 
 
 def test_a_scene_that_is_not_here_is_said(tmp_path):
