@@ -17,6 +17,7 @@ from ros_pad.commands import chart
 from ros_pad.commands import contact
 from ros_pad.commands import design
 from ros_pad.commands import emulate
+from ros_pad.commands import replay
 from ros_pad.commands import report
 from ros_pad.commands import run
 from ros_pad.commands import scenes
@@ -33,6 +34,7 @@ COMMANDS = (
     scenes,
     sweep,
     report,
+    replay,
     bag,
     contact,
     calibrate,

@@ -23,6 +23,8 @@ from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_shapes
 from ros_pad.control import policy_named
+from ros_pad.control.listening import LOOK_PERIOD_NS
+from ros_pad.control.listening import LegListener
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
@@ -40,10 +42,6 @@ from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import Pace
 from ros_pad.simulation.scene import Scene
-
-OLD = 0.2  # s after which the last position of a foot serves no more
-
-LOOK_PERIOD_NS = 100_000_000  # how often legs without estimates are looked after, and news told
 
 
 def _set_margin(node: ControllerNode, margin: float) -> None:
@@ -74,95 +72,56 @@ PARAMETERS = (
 
 
 class _Leg:
-    """What the node has heard of one leg, and what it last said of it."""
+    """What the node hears of one leg, and what it says of it."""
 
     def __init__(self, node: ControllerNode, leg: int) -> None:
-        self.node, self.leg = node, leg
-        # Wrenches and positions come at the rate of the sensors. Of positions only the last one
-        # counts when an estimate comes: it is kept as it travelled, and read then. Of loads the
-        # heaviest since the last estimate counts: feet that bounce have not stepped.
-        self._position = b''
-        self._positions = self._positions_taken = 0
-        self._position_time = 0.0  # when an estimate last found a new position, s
-        self._load, self._heaviest = math.nan, -math.inf
-        self._pressure: float | None = None  # since the last look
-        self._shape = ''
-        self._trouble = ''
-        self.observed: float | None = None  # time of the last look, s
+        self._node, self.leg = node, leg
+        # Wrenches and positions come at the rate of the sensors, and are read as they travel.
+        self.heard = LegListener(node.controller, leg, position_in)
         self._setpoints = topics.PRESSURE_SETPOINT.publisher(node, leg)
         self._shapes = topics.MORPHOLOGY.publisher(node, leg)
         self._message = FluidPressure()
         self._message.header.frame_id = f'leg_{leg}_pad'
         topics.WRENCH.subscription(node, self._on_wrench, leg, raw=True)
-        topics.POSITION.subscription(node, self._on_position, leg, raw=True)
+        topics.POSITION.subscription(node, self.heard.position, leg, raw=True)
         topics.PRESSURE.subscription(node, self._on_pressure, leg)
         topics.DOUBT.subscription(node, self._on_doubt, leg)
         topics.WETNESS.subscription(node, self._on_wetness, leg)
 
     def _on_wrench(self, data: bytes) -> None:
-        self._load = normal_force(data)
-        if self._heaviest < self._load < math.inf:  # an infinite one is no load, refused below
-            self._heaviest = self._load
-        self.node.wrenches += 1
-
-    def _on_position(self, data: bytes) -> None:
-        self._position = data
-        self._positions += 1
+        self.heard.wrench(normal_force(data))
+        self._node.wrenches += 1
 
     def _on_pressure(self, message: FluidPressure) -> None:
-        self._pressure = message.fluid_pressure - self.node.ambient
+        self.heard.pressure(message.fluid_pressure - self._node.ambient)
 
     def _on_doubt(self, message: String) -> None:
-        self._trouble = trouble_in(message.data)
-
-    def observe(self, now: float) -> None:
-        """Hand over what is known of sensors and pad at a time, s."""
-        self.node.controller.doubt(self.leg, self._trouble)
-        pressure, self._pressure = self._pressure, None
-        self.observed = now
-        self.node.controller.observe(self.leg, now, pressure)
+        self.heard.trouble = trouble_in(message.data)
 
     def _on_wetness(self, message: Float64) -> None:
-        node, controller = self.node, self.node.controller
+        node, controller = self._node, self._node.controller
         stamp = node.get_clock().now()
-        now = stamp.nanoseconds * 1e-9
-        self.observe(now)
-        if self._positions != self._positions_taken:
-            self._positions_taken = self._positions
-            self._position_time = now
-        if not self._position or now - self._position_time > OLD:
-            # Where the foot is, nobody knows.
-            self.tell_shape()
-            return
-        x, y = position_in(self._position)
-        if not math.isfinite(self._load + message.data + x + y):
-            # A load that is no number is no lift-off. No set-point follows from it either: if it
-            # stays so, the regulators vent.
-            self.tell_shape()
-            return
-        weight = max(self._heaviest, self._load)  # the load where no wrench came since
-        self._heaviest = -math.inf
         try:
-            gauge = controller.update(self.leg, weight, message.data, (x, y))
-        except InvalidInput as error:  # no probability: as above, no set-point follows from it
+            gauge = self.heard.estimate(stamp.nanoseconds * 1e-9, message.data)
+        except InvalidInput as error:  # no probability, and no set-point follows from it
             node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
-            self.tell_shape()
-            return
+            gauge = None
         if self.leg in controller.refusals:
             node.get_logger().warning(
                 f'leg {self.leg} stays flat: {controller.refusals[self.leg]}',
                 throttle_duration_sec=10.0,
             )
         self.tell_shape()
+        if gauge is None:
+            return
         self._message.header.stamp = stamp.to_msg()
         self._message.fluid_pressure = gauge + node.ambient
         self._setpoints.publish(self._message)
 
     def tell_shape(self) -> None:
         """Publish the shape if it is another one."""
-        shape = self.node.controller.morphology(self.leg)
-        if shape != self._shape:
-            self._shape = shape
+        shape = self.heard.new_shape()
+        if shape is not None:
             self._shapes.publish(String(data=shape))
 
 
@@ -218,10 +177,7 @@ class ControllerNode(Node):
             return
         now = now_ns * 1e-9
         for each in self._legs:
-            if each.observed is None:
-                each.observed = now
-            elif abs(now - each.observed) > LOOK_PERIOD_NS * 1e-9:
-                each.observe(now)
+            if each.heard.look(now):
                 each.tell_shape()
         faults = [self.controller.fault(each.leg) for each in self._legs]
         if self._diagnostics_pace.due(now_ns) or faults != self._said:

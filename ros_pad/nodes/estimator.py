@@ -28,6 +28,8 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation.listening import LISTEN_PERIOD_NS
+from ros_pad.estimation.listening import FootListener
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -76,21 +78,10 @@ PARAMETERS = (
     Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 5.0, 1000.0),
 )  # fmt: skip
 
-SILENCE = 0.4
-"""Time without a sample after which a foot is said not to be heard, s."""
-
-LARGEST_FORCE = 1e5
-LARGEST_POSITION = 1e6
-LARGEST_PRESSURE = 1e7
-LARGEST_MOMENT = 1e5
-"""What is believed of a sensor in either direction, N, m, Pa gauge, N m: what is larger, though a
-number, would leave its mark on sums and means for good."""
-
-_HEALTH_PERIOD_NS = 100_000_000  # of the look at which feet are heard
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
 
-class _Leg:
+class _Leg(FootListener):
     """Estimator of one leg, the messages it waits for, and those it sends."""
 
     def __init__(
@@ -102,22 +93,12 @@ class _Leg:
         ambient: float,
         moments: bool,
     ) -> None:
+        super().__init__(
+            estimator, period_ns, moments, self._publish, self._publish_doubt, self._warn
+        )
         self._node = node
         self._leg = leg
-        self._estimator = estimator
-        self._moments = moments
-        self._pace = Pace(period_ns)
         self._ambient = ambient
-        self._pressure = 0.0
-        self._wrench: WrenchStamped | None = None
-        self._position: PointStamped | None = None
-        self._used: PointStamped | None = None  # position of the last sample ...
-        self._used_ns = 0  # ... and when it was first used
-        self._heard_ns: int | None = None  # when the last sample came
-        self._refusal = ''
-        self.samples = 0
-        self.doubt: str | None = None
-        self.sound = True
         self._slip = topics.SLIP.publisher(node, leg)
         self._slipping = topics.SLIPPING.publisher(node, leg)
         self._friction = topics.FRICTION.publisher(node, leg)
@@ -135,98 +116,35 @@ class _Leg:
         try:
             check_frame(frame, self._leg)
         except InvalidInput as error:
-            self._refuse(error)
+            self.refused(error)
             return False
         return True
 
-    def _refuse(self, error: InvalidInput) -> None:
-        self._refusal = str(error)
-        self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
-
     def _on_pressure(self, message: FluidPressure) -> None:
-        # A device that does not answer may be told of so: what it said last counts.
-        gauge = message.fluid_pressure - self._ambient
-        if abs(gauge) <= LARGEST_PRESSURE and self._is_ours(message.header.frame_id):
-            self._pressure = gauge
+        if self._is_ours(message.header.frame_id):
+            self.pressure(message.fluid_pressure - self._ambient)
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         if not self._is_ours(message.header.frame_id):
             return
-        if self._wrench is not None and self._position is not None:
-            # No position came with the wrench before: its marker was out of sight, or it is
-            # slower than the force. Use the last one.
-            self._update(self._wrench, self._position)
-        self._wrench = message
-        if self._position is not None and self._position.header.stamp == message.header.stamp:
-            self._take(message, self._position)
+        force = message.wrench.force
+        self.wrench(
+            nanoseconds(message.header.stamp),
+            (force.x, force.y, force.z),
+            message.wrench.torque.z,
+        )
 
     def _on_position(self, message: PointStamped) -> None:
         if not self._is_ours(message.header.frame_id):
             return
         point = message.point
-        if math.isfinite(point.x + point.y + point.z):
-            self._position = message
-        # Some motion capture says so when a marker is out of sight: then the last one counts.
-        elif self._position is None:
-            return
-        if self._wrench is not None and self._wrench.header.stamp == message.header.stamp:
-            self._take(self._wrench, self._position)
+        self.position(nanoseconds(message.header.stamp), (point.x, point.y, point.z))
 
-    def _take(self, wrench: WrenchStamped, position: PointStamped) -> None:
-        self._wrench = None
-        self._update(wrench, position)
+    def _warn(self, error: InvalidInput) -> None:
+        self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
 
-    def _update(self, wrench: WrenchStamped, position: PointStamped) -> None:
-        stamp_ns = nanoseconds(wrench.header.stamp)
-        if position is not self._used:
-            # Its own stamp may be of another clock.
-            self._used, self._used_ns = position, stamp_ns
-        force = (wrench.wrench.force.x, wrench.wrench.force.y, wrench.wrench.force.z)
-        point = (position.point.x, position.point.y, position.point.z)
-        moment = wrench.wrench.torque.z if self._moments else None
-        try:
-            for name, values, largest, unit in (
-                ('force', force, LARGEST_FORCE, 'N'),
-                ('position', point, LARGEST_POSITION, 'm'),
-                ('moment', (moment or 0.0,), LARGEST_MOMENT, 'N m'),
-            ):
-                if any(largest < abs(value) < math.inf for value in values):
-                    raise InvalidInput(
-                        f'{name} = {values!r} {unit}: at most {largest:g} {unit} is believed'
-                    )
-            estimate = self._estimator.update(
-                stamp_ns * 1e-9, force, point, self._pressure, moment, self._used_ns * 1e-9
-            )
-        except InvalidInput as error:
-            self._refuse(error)
-            return
-        self.samples += 1
-        self._heard_ns, self._refusal = None, ''
-        self._say(estimate.doubt, estimate.sound)
-        if self._pace.due(stamp_ns):
-            self._publish(wrench, estimate)
-
-    def _say(self, doubt: str, sound: bool) -> None:
-        # Details, after the colon, may change with every sample.
-        news = self.doubt is None or doubt.partition(':')[0] != self.doubt.partition(':')[0]
-        self.doubt, self.sound = doubt, sound
-        if news:
-            self._doubts.publish(String(data=doubt))
-
-    def listen(self, now_ns: int) -> None:
-        """Say so when no sample has come for long."""
-        if self._heard_ns is None:
-            self._heard_ns = now_ns
-        silence = (now_ns - self._heard_ns) * 1e-9
-        if silence > SILENCE:
-            self._say(self._missing(silence), False)
-
-    def _missing(self, silence: float) -> str:
-        if self._refusal:
-            return f'sample refused: {self._refusal}'
-        if self._position is None and self._wrench is not None:
-            return f'no position: for {silence:.1f} s'
-        return f'no wrench: for {silence:.1f} s'
+    def _publish_doubt(self, doubt: str) -> None:
+        self._doubts.publish(String(data=doubt))
 
     def status(self) -> DiagnosticStatus:
         """Return how the foot is doing, for ``/diagnostics``."""
@@ -244,9 +162,9 @@ class _Leg:
             ],
         )
 
-    def _publish(self, wrench: WrenchStamped, estimate: Estimate) -> None:
+    def _publish(self, stamp_ns: int, estimate: Estimate) -> None:
         slip = self._slip_message
-        slip.header.stamp = wrench.header.stamp
+        set_stamp(slip.header.stamp, stamp_ns)
         slip.twist.twist.linear.x, slip.twist.twist.linear.y = estimate.slip_velocity
         variance = estimate.slip_speed_sd**2
         slip.twist.covariance[0] = slip.twist.covariance[7] = variance
@@ -289,8 +207,8 @@ class EstimatorNode(Node):
         self._diagnostics = topics.DIAGNOSTICS.publisher(self)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
-        self._health_pace = Pace(_HEALTH_PERIOD_NS)
-        on_tick(self, _HEALTH_PERIOD_NS * 1e-9, self._tick)
+        self._health_pace = Pace(LISTEN_PERIOD_NS)
+        on_tick(self, LISTEN_PERIOD_NS * 1e-9, self._tick)
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):

@@ -11,6 +11,7 @@ from typing import Any
 import rclpy
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _ros
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -54,7 +55,10 @@ def run(
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make()
+        try:
+            node = make()
+        except _ros.RCLError as error:  # such as keys that SROS 2 asks for and does not find
+            raise PadError(f'ROS 2 refuses the node: {error}') from error
         try:
             executor = executor_type()
             executor.add_node(node)

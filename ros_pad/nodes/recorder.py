@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import struct
 import sys
 import time
 from array import array
@@ -30,6 +29,7 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
+from ros_pad.nodes.stamps import clock_time
 from ros_pad.trials import label
 from ros_pad.trials.bag import FLUSH_PERIOD
 from ros_pad.trials.bag import BagWriter
@@ -40,9 +40,6 @@ PARAMETERS = (
         'folder', '', 'Folder of the bag, which must not exist; empty: named after the time.'
     ),
 )
-
-_CLOCK_STAMP = struct.Struct('<iI')  # seconds and nanoseconds, behind the CDR header
-_CDR_HEADER_SIZE = 4
 
 
 class RecorderNode(Node):
@@ -227,10 +224,12 @@ class RecorderNode(Node):
         write = self._writer(name)
 
         def callback(data: bytes) -> None:
-            seconds, nanoseconds = _CLOCK_STAMP.unpack_from(data, _CDR_HEADER_SIZE)
-            self._clock_ns = seconds * 10**9 + nanoseconds
-            if self._simulated:
-                self._now = self._simulated_time
+            now_ns = clock_time(data)
+            # A bag knows no time before 0.
+            if now_ns is not None and now_ns >= 0:
+                self._clock_ns = now_ns
+                if self._simulated:
+                    self._now = self._simulated_time
             write(data)
 
         return callback

@@ -24,6 +24,19 @@ def set_stamp(stamp: Time, time_ns: int) -> None:
     stamp.sec, stamp.nanosec = divmod(time_ns, 1_000_000_000)
 
 
+def clock_time(data: bytes) -> int | None:
+    """Return the time in ns in a ``/clock`` message as it travels; None where the bytes are none.
+
+    It comes with every sample, and most nodes only glance at it. CDR: four bytes of
+    encapsulation, seconds, nanoseconds.
+    """
+    if len(data) < 12:  # anybody can publish any bytes
+        return None
+    order = '<' if data[1] & 1 else '>'
+    seconds, nanoseconds = struct.unpack_from(order + 'iI', data, 4)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
+
+
 def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
     """Call back with the node's time in ns, every ``period`` seconds or faster.
 
@@ -34,10 +47,9 @@ def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
     if node.get_parameter('use_sim_time').value:
 
         def tick(data: bytes) -> None:
-            # As it travels (CDR): it comes with every sample, and most nodes only glance at it.
-            order = '<' if data[1] & 1 else '>'
-            seconds, nanoseconds = struct.unpack_from(order + 'iI', data, 4)
-            callback(seconds * 1_000_000_000 + nanoseconds)
+            now_ns = clock_time(data)
+            if now_ns is not None:
+                callback(now_ns)
 
         topics.CLOCK.subscription(node, tick, raw=True)
     else:

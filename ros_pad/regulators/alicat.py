@@ -188,7 +188,7 @@ class AlicatRegulator(SerialRegulator):
     def _check_source(self, ask: Ask) -> None:
         command = f'{self.address}LSS'
         reply = self._ask(ask, command)
-        if self._words(command, reply)[-1] == 'A':
+        if self._words(command, reply)[-1:] == ['A']:
             raise self._refuses(
                 'the set-point source is analogue, set-points on this line are ignored; set it'
                 ' to serial on the device',

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import difflib
 import json
 import math
 import os
@@ -19,11 +20,13 @@ import re
 from array import array
 from collections.abc import Callable
 from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ros_pad.errors import BagError
+from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.bag import BagReader
@@ -121,6 +124,7 @@ def load(
     folder: str | os.PathLike[str],
     namespace: str | None = None,
     progress: Progress | None = None,
+    remaps: Mapping[str, str] | None = None,
 ) -> Trial:
     """Read a trial from a bag.
 
@@ -132,6 +136,8 @@ def load(
         Namespace of the robot, such as ``/robot_1``; None takes the only one.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
+    remaps : mapping or None
+        See :func:`wanted_topics`.
 
     Returns
     -------
@@ -147,7 +153,7 @@ def load(
         topic has another message type than ros_pad gives it.
     """
     bag = BagReader(folder)
-    wanted = _wanted(bag, namespace)
+    wanted = wanted_topics(bag, namespace, remaps)
     series = {key: _Series(_KINDS[key[1]][1]) for key in wanted.values()}
     _read(bag, wanted, series, progress)
     legs = tuple(sorted({leg for leg, _ in series if leg != _BODY}))
@@ -223,18 +229,45 @@ def _described(bag: BagReader) -> dict[str, Any]:
         ) from error
 
 
-def _wanted(bag: BagReader, namespace: str | None) -> dict[str, tuple[int, str]]:
-    """Return leg (or ``_BODY``) and kind of each topic that a trial is read from."""
+def message_type(kind: str) -> str:
+    """Return the message type of a kind of topic, such as ``wetness``."""
+    return _KINDS[kind][0]
+
+
+def wanted_topics(
+    bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
+) -> dict[str, tuple[int, str]]:
+    """Return leg (0 for the body's pose) and kind of each topic that a trial is read from.
+
+    Parameters
+    ----------
+    bag : BagReader
+        What was recorded.
+    namespace : str or None
+        Namespace of the robot, such as ``/robot_1``; None takes the only one.
+    remaps : mapping or None
+        Topic of the bag by its name in ros_pad, as in ROS: ``{'leg_1/wrench': '/ft'}``, or, for
+        all legs, ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``. A topic without a slash before it is
+        in the namespace.
+
+    Raises
+    ------
+    BagError
+        When there is no topic of a leg or several robots, or when a topic has another message
+        type than ros_pad gives it.
+    InvalidInput
+        For a remap of what is no topic, or to what the bag does not have.
+    """
     found: dict[str, dict[str, tuple[int, str]]] = {}
-    for name, type_name in bag.topics.items():
-        match = _TOPIC.fullmatch(name)
+    for name, known_as in _names(bag, namespace, remaps or {}):
+        match = _TOPIC.fullmatch(known_as)
         if not match or match['kind'] not in _KINDS or not bag.counts[name]:
             continue
         if (match['kind'] == 'body/pose') != (match['leg'] is None):
             continue
         expected = _KINDS[match['kind']][0]
-        if type_name != expected:
-            raise BagError(f'{bag.path}: {name} is a {type_name}: {expected} is needed')
+        if bag.topics[name] != expected:
+            raise BagError(f'{bag.path}: {name} is a {bag.topics[name]}: {expected} is needed')
         leg = int(match['leg'] or _BODY)
         found.setdefault(match['namespace'], {})[name] = leg, match['kind']
     robots = {
@@ -243,13 +276,60 @@ def _wanted(bag: BagReader, namespace: str | None) -> dict[str, tuple[int, str]]
         if any(leg != _BODY for leg, _ in topics.values())
     }
     if namespace is not None:
-        prefix = f'/{namespace.strip("/")}/'.replace('//', '/')
+        prefix = _prefix(namespace)
         if prefix not in robots:
             raise BagError(f'{bag.path}: no legs in namespace {prefix}: {_listed(robots)}')
         return robots[prefix]
     if len(robots) != 1:
         raise BagError(f'{bag.path}: one robot is needed, there are {_listed(robots)}')
     return next(iter(robots.values()))
+
+
+def _prefix(namespace: str | None) -> str:
+    return f'/{(namespace or "").strip("/")}/'.replace('//', '/')
+
+
+def _names(
+    bag: BagReader, namespace: str | None, remaps: Mapping[str, str]
+) -> list[tuple[str, str]]:
+    """Return each topic of a bag with the name that ros_pad knows it by, in full."""
+    prefix = _prefix(namespace)
+    renamed: dict[str, str] = {}  # topic of the bag by the name that ros_pad has for it
+    for own, other in remaps.items():
+        given = f'--remap {own}:={other}'
+        kind = own.removeprefix('/').partition('/')[2]
+        leg = own.removeprefix('/').partition('/')[0].removeprefix('leg_')
+        if not (own == 'body/pose' or (kind in _KINDS and (leg.isdecimal() or leg == '{leg}'))):
+            near = difflib.get_close_matches(kind or own, _KINDS, n=1)
+            hint = f' Did you mean leg_{{leg}}/{near[0]}?' if near else ''
+            raise InvalidInput(
+                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: body/pose, and'
+                f' leg_{{leg}}/ or leg_1/ before one of'
+                f' {", ".join(each for each in _KINDS if "/" not in each)}'
+            )
+        if (leg == '{leg}') != ('{leg}' in other):
+            raise InvalidInput(f'{given}: {{leg}} is needed on both sides, or on none')
+        full = other if other.startswith('/') else prefix + other
+        pattern = re.escape(full).replace(r'\{leg\}', r'(?P<leg>\d+)', 1)
+        pattern = pattern.replace(r'\{leg\}', '(?P=leg)')
+        fits = [match for topic in bag.topics if (match := re.fullmatch(pattern, topic))]
+        if not fits:
+            near = difflib.get_close_matches(full, bag.topics, n=3, cutoff=0.0)
+            raise InvalidInput(
+                f'{given}: {bag.path} has no topic {full}, the nearest are {", ".join(near)}'
+            )
+        for match in fits:
+            number = match.groupdict().get('leg') or leg
+            name = own.removeprefix('/').replace('{leg}', number)
+            if renamed.setdefault(prefix + name, match[0]) != match[0]:
+                raise InvalidInput(
+                    f'{given}: {name} is {renamed[prefix + name]} already, by another remap'
+                )
+    moved = set(renamed.values())
+    return [
+        *((topic, name) for name, topic in renamed.items()),
+        *((topic, topic) for topic in bag.topics if topic not in moved | set(renamed)),
+    ]
 
 
 def _listed(robots: Iterable[str]) -> str:
@@ -281,4 +361,4 @@ def _read(
         progress(1.0)
 
 
-__all__ = ['load']
+__all__ = ['load', 'message_type', 'wanted_topics']

@@ -84,6 +84,16 @@ def test_a_node_that_cannot_be_made(capfd):
     assert not rclpy.ok()
 
 
+def test_a_node_that_ros_refuses_says_why(monkeypatch, tmp_path, capfd):
+    # SROS 2 is asked for, and there are no keys.
+    monkeypatch.setenv('ROS_SECURITY_ENABLE', 'true')
+    monkeypatch.setenv('ROS_SECURITY_STRATEGY', 'Enforce')
+    monkeypatch.setenv('ROS_SECURITY_KEYSTORE', str(tmp_path))
+    assert run(lambda: Probe(lambda: None, []), []) == 1
+    assert 'ros_pad: ROS 2 refuses the node: ' in capfd.readouterr().err
+    assert not rclpy.ok()
+
+
 def test_arguments_that_ros_cannot_read(capfd):
     assert run(lambda: fail(AssertionError), ['probe', '--ros-args', '-p', 'rubbish']) == 2
     assert 'rubbish' in capfd.readouterr().err

@@ -5,6 +5,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ros_pad.nodes import topics
+from ros_pad.nodes.stamps import clock_time
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
@@ -54,3 +55,17 @@ def test_in_real_time_a_timer_ticks(context, executor, until):
     until(lambda: len(ticks) == 5)
     assert ticks[0] > before
     assert ticks[-1] - ticks[0] == pytest.approx(40_000_000, abs=30_000_000)
+
+
+@pytest.mark.parametrize(
+    ('data', 'time_ns'),
+    [
+        (b'\0\1\0\0' + b'\1\0\0\0' + b'\2\0\0\0', 1_000_000_002),
+        (b'\0\0\0\0' + b'\0\0\0\1' + b'\0\0\0\2', 1_000_000_002),  # the other byte order
+        (b'\0\1\0\0' + b'\xff\xff\xff\xff' + b'\0\0\0\0', -1_000_000_000),
+        (b'\0\1\0\0' + b'\1\0\0\0', None),
+        (b'', None),
+    ],
+)
+def test_a_clock_is_read_as_it_travels_and_torn_bytes_are_no_time(data, time_ns):
+    assert clock_time(data) == time_ns
