@@ -169,7 +169,6 @@ def test_what_is_imported_is_declared():
     for name in foreign - set(EXTRAS):
         key = name if name in ROS else ROSDEP_KEY.get(name, f'python3-{name}')
         assert f'<exec_depend>{key}</exec_depend>' in package_xml
-        pip_name = (
-            f'ros-jazzy-{name.replace("_", "-")}' if name in ROS else PIP_NAME.get(name, name)
-        )
+        # setup.py puts the distribution before those of ROS.
+        pip_name = name.replace('_', '-') if name in ROS else PIP_NAME.get(name, name)
         assert re.search(rf"'{pip_name}['>\[]", setup_py), f'{pip_name} is not in setup.py'

@@ -13,12 +13,14 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from typing import Any
 
+from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import ListParameters
+from rclpy.client import Client
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
@@ -98,7 +100,8 @@ class RecorderNode(Node):
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             self._record(full_name, topic, qos.recording([topic.publish]))
         self._said: dict[str, dict[str, Any]] = {}
-        self._asked: dict[str, AsyncParameterClient] = {}
+        self._known: set[str] = set()  # nodes of the robot
+        self._mute: dict[str, tuple[Client, Client]] = {}  # those that are not yet asked
         # Of wall time, whatever the clock of the trial does.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._asks = custom_data is None
@@ -187,20 +190,30 @@ class RecorderNode(Node):
         self._bag.flush()
 
     def _ask_nodes(self) -> None:
+        """Ask every node of the robot, once its services are there, for its parameters."""
         for name, namespace in self.get_node_names_and_namespaces():
-            full_name = f'{namespace.rstrip("/")}/{name}'
+            node = f'{namespace.rstrip("/")}/{name}'
             hidden = name.startswith('_')
-            if hidden or namespace != self.get_namespace() or full_name in self._asked:
+            if hidden or namespace != self.get_namespace() or node in self._known:
                 continue
-            client = AsyncParameterClient(self, full_name)
-            if client.services_are_ready():
-                self._asked[full_name] = client
-                self._ask(full_name, client)
+            self._known.add(node)
+            try:
+                lister = self.create_client(ListParameters, f'{node}/list_parameters')
+                getter = self.create_client(GetParameters, f'{node}/get_parameters')
+            except RuntimeError as error:  # SROS 2 may forbid it
+                self.get_logger().warning(f'the bag will lack the parameters of {node}: {error}')
+                continue
+            self._mute[node] = lister, getter
+        for node, (lister, getter) in list(self._mute.items()):
+            if lister.service_is_ready() and getter.service_is_ready():
+                del self._mute[node]
+                self._ask(node, lister, getter)
 
-    def _ask(self, node: str, client: AsyncParameterClient) -> None:
+    def _ask(self, node: str, lister: Client, getter: Client) -> None:
         def named(future: Future) -> None:
             names = list(future.result().result.names)
-            client.get_parameters(names, lambda values: told(names, values))
+            values = getter.call_async(GetParameters.Request(names=names))
+            values.add_done_callback(lambda future: told(names, future))
 
         def told(names: list[str], future: Future) -> None:
             values = map(parameter_value_to_python, future.result().values)
@@ -210,7 +223,7 @@ class RecorderNode(Node):
             }
             self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
 
-        client.list_parameters(callback=named)
+        lister.call_async(ListParameters.Request()).add_done_callback(named)
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

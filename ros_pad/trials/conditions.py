@@ -6,12 +6,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.label import AMBIENT_PRESSURE
+from ros_pad.trials.label import described
 from ros_pad.trials.trial import Trial
 
 # Units of what a scene and a foot are described by, by name; what has none is not listed.
@@ -36,23 +36,12 @@ _PARTS = {
 }  # fmt: skip
 
 
-def described(scene: Scene) -> dict[str, Any]:
-    """Return a scene as plain values for JSON: nested as its YAML is, in SI units."""
-    values: dict[str, Any] = asdict(scene)
-    # Tables that a foot keeps for speed follow from the rest.
-    values['foot'] = {
-        name: each for name, each in values['foot'].items() if not name.startswith('_')
-    }
-    values['faults'] = [str(fault) for fault in scene.faults]
-    return values
-
-
 def rows(trial: Trial) -> list[tuple[str, str]]:
     """Return the conditions of a trial: what, and its values with units as text.
 
-    ``settings['conditions']``, where a bag has it, is what :func:`described` said when the trial
-    was walked. Without it the shipped scene of the same name is told, if it agrees with what the
-    bag does say; the first row says so.
+    ``settings['conditions']``, where a bag has it, is what `ros_pad.trials.label.described` said
+    when the trial was walked. Without it the shipped scene of the same name is told, if it agrees
+    with what the bag does say; the first row says so.
     """
     settings = trial.settings
     said, source = settings.get('conditions'), 'as recorded with the trial'
@@ -173,4 +162,4 @@ def _items(values: Mapping[str, Any], of: str = '') -> Iterator[str]:
             yield f'{words} {each:.6g} {unit}'.rstrip()
 
 
-__all__ = ['described', 'repeated_by', 'rows']
+__all__ = ['repeated_by', 'rows']

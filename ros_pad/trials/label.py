@@ -13,8 +13,6 @@ import platform
 import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict
-from dataclasses import fields
-from dataclasses import is_dataclass
 from importlib import metadata
 from typing import Any
 
@@ -71,7 +69,6 @@ def label(
                 'seed': seed,
                 'fidelity': fidelity,
                 'floor': asdict(scene.floor),
-                'conditions': _plain(scene),
                 'ambient_pressure': AMBIENT_PRESSURE,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,
@@ -118,20 +115,6 @@ def _git(folder: pathlib.Path, *words: str) -> str:
     return said.stdout.strip() if said.returncode == 0 else ''
 
 
-def _plain(thing: Any) -> Any:
-    """Return a scene as JSON has it: by the names of its attributes, without what is derived."""
-    if is_dataclass(thing) and not isinstance(thing, type):
-        public = [each.name for each in fields(thing) if not each.name.startswith('_')]
-        return {name: _plain(getattr(thing, name)) for name in public}
-    if isinstance(thing, dict):
-        return {str(key): _plain(value) for key, value in thing.items()}
-    if isinstance(thing, (list, tuple)):
-        return [_plain(each) for each in thing]
-    if isinstance(thing, float) and not math.isfinite(thing):
-        return str(thing)
-    return thing if isinstance(thing, (str, int, float, bool, type(None))) else str(thing)
-
-
 def promise(trial: Trial) -> str:
     """Return in words how far the distance of a trial can be trusted."""
     if trial.metrics is not None and trial.metrics.verdict:
@@ -154,4 +137,18 @@ def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
         'fidelity_note': choice.note,
         'omitted': [asdict(each) for each in ladder.omitted(scene, choice.rung, policy)],
         'version': ros_pad.__version__,
+        'versions': {name: each for name, each in made_with().items() if name != 'git'},
+        'git': made_with().get('git'),
+        'conditions': described(scene),
     }
+
+
+def described(scene: Scene) -> dict[str, Any]:
+    """Return a scene as plain values for JSON: nested as its YAML is, in SI units."""
+    values: dict[str, Any] = asdict(scene)
+    # Tables that a foot keeps for speed follow from the rest.
+    values['foot'] = {
+        name: each for name, each in values['foot'].items() if not name.startswith('_')
+    }
+    values['faults'] = [str(fault) for fault in scene.faults]
+    return values

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import os
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ from ros_pad.trials import loop
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
+from ros_pad.trials.label import PARAMETERS
 
 SETTABLE = ('expected_load', 'dome_pressure', 'margin', 'ambient_pressure', 'publish_rate')
 """What may be set by its own name: parameters of the estimator and controller nodes."""
@@ -102,6 +104,9 @@ class Settings:
     def of(cls, bag: BagReader) -> Settings:
         """Return what the nodes of a bag were told, and the nodes' defaults where it is silent.
 
+        The parameters of estimator and controller count where the bag has them, as those of
+        ros_pad's recorder do; else what it says of its scene.
+
         Raises
         ------
         BagError
@@ -131,6 +136,9 @@ class Settings:
             scene=source,
             seed=seed,
         )
+        told_nodes = _told(bag)
+        if told_nodes:
+            return _of_nodes(settings, *told_nodes)
         if not said:
             return replace(
                 settings,
@@ -232,3 +240,45 @@ class Settings:
             margin=self.margin,
             fixed_pressure=self.dome_pressure or None,
         )
+
+
+def _told(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """Return the parameters of estimator and controller; None unless the bag has one of each."""
+    try:
+        nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
+        # By what they have: their names may be others.
+        estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
+        controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
+    except (AttributeError, TypeError, ValueError) as error:
+        raise BagError(
+            f'{bag.path}: custom data {PARAMETERS!r} are no parameters of nodes: {error}'
+        ) from error
+    if len(estimators) == len(controllers) == 1:
+        return estimators[0], controllers[0]
+    return None
+
+
+def _of_nodes(
+    settings: Settings, estimator: dict[str, Any], controller: dict[str, Any]
+) -> Settings:
+    """Return settings with what the nodes themselves were told."""
+    tuning = {each.name: estimator[each.name] for each in fields(Tuning) if each.name in estimator}
+    tuning['force_range'] = tuning['force_range'] or math.inf
+    floor, seed = settings.floor, settings.seed
+    if floor is None and controller.get('scene'):
+        seed = int(controller.get('seed', 0))
+        floor = Scene.load(controller['scene']).floor.build(seed)
+    return replace(
+        settings,
+        foot=Foot.load(controller['foot']),
+        expected_load=float(controller['expected_load']),
+        tuning=Tuning(**tuning),
+        policy=str(controller['policy']),
+        dome_pressure=float(controller['dome_pressure']),
+        margin=float(controller['margin']),
+        ambient_pressure=float(controller['ambient_pressure']),
+        publish_rate=float(estimator['publish_rate']),
+        floor=floor,
+        seed=seed,
+        legs=tuple(controller['legs']),
+    )

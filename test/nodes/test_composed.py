@@ -235,7 +235,7 @@ def test_the_same_seed_gives_the_same_messages(tmp_path):
         composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name)
     one, two, other = (raw_messages(tmp_path / name) for name in ('first', 'second', 'other'))
     assert set(one) == set(two)
-    assert len(one) == 6 * 11 + 4  # eleven of each leg; pose, joints, clock, diagnostics
+    assert len(one) == 6 * 11 + 5  # eleven of each leg; pose, joints, clock, diagnostics
     for topic in set(one) - {'/diagnostics'}:
         assert one[topic] == two[topic], topic
     assert one['/leg_1/wrench'][:250] != other['/leg_1/wrench'][:250]

@@ -448,7 +448,7 @@ def test_the_controller_lives_and_asks_for_no_more_than_the_ceiling(context, pol
                 elif kind == 'raw_wrench':
                     leg._on_wrench(values[0])
                 elif kind == 'raw_position':
-                    leg._on_position(values[0])
+                    leg.heard.position(values[0])
                 elif kind == 'tick':
                     node._tick(node.get_clock().now().nanoseconds)
                 else:

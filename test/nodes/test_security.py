@@ -40,6 +40,12 @@ AT_TIMES = {
     ('estimator', 'subscribe', '/clock'),
     ('controller', 'subscribe', '/clock'),
     ('simulator', 'subscribe', '/clock'),
+    # The recorder asks those that are there.
+    *(
+        ('recorder', 'request', f'/{node}/{verb}_parameters')
+        for node in ('regulator', 'estimator', 'controller', 'simulator')
+        for verb in ('list', 'get')
+    ),
 }
 
 
@@ -82,7 +88,7 @@ def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, 
         parameter_overrides=[Parameter(key, value=value) for key, value in parameters.items()],
     )
     executor.add_node(node)
-    observer = Node('observer', context=context)
+    observer = Node('observer', context=context, start_parameter_services=False)
     executor.add_node(observer)
     until(lambda: f'/{name}/get_parameters' in dict(observer.get_service_names_and_types()))
 
@@ -117,7 +123,12 @@ def test_only_the_controller_may_move_pads_and_only_an_operator_may_call():
         if kind == 'publish' and any(fnmatch.fnmatchcase(f'/{SETPOINT}', e) for e in expressions)
     }
     assert movers == {'controller'}
-    assert {name for name, kind in policy if kind == 'request'} == {'operator'}
+    assert {name for name, kind in policy if kind == 'request'} == {'operator', 'recorder'}
+    # The recorder may ask, and no more.
+    assert all(
+        each.endswith(('/list_parameters', '/get_parameters'))
+        for each in policy['recorder', 'request']
+    )
 
 
 def test_an_operator_may_call_whatever_there_is_and_hear_every_topic():

@@ -25,6 +25,7 @@ from ros_pad.trials import page as page_of
 from ros_pad.trials import pictures
 from ros_pad.trials import report
 from ros_pad.trials import run
+from ros_pad.trials.label import described
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
@@ -457,8 +458,25 @@ def test_a_bag_without_doubts_says_nothing_of_them():
 # --- conditions ----------------------------------------------------------------------------------
 
 
-def test_conditions_of_a_shipped_scene(walk):
+def of_an_old_bag(trial, **changes):
+    """Return a trial whose bag said less, as those of earlier versions did."""
+    said = {
+        name: each
+        for name, each in trial.settings.items()
+        if name not in ('conditions', 'versions', 'git')
+    }
+    return dataclasses.replace(trial, settings=said | changes)
+
+
+def test_conditions_of_a_walk_are_on_record(walk):
     rows = dict(conditions.rows(walk))
+    assert rows['conditions'] == 'as recorded with the trial'
+    assert rows['robot'] == dict(conditions.rows(of_an_old_bag(walk)))['robot']
+    assert f'numpy {np.__version__}' in rows['versions'] and 'python 3.' in rows['versions']
+
+
+def test_conditions_of_a_shipped_scene(walk):
+    rows = dict(conditions.rows(of_an_old_bag(walk)))
     assert 'shipped scene' in rows['conditions']
     assert rows['scene'].startswith('hexapod_patches; ') and '30 gait cycles' in rows['scene']
     assert rows['robot'].startswith('hexapod: mass 2.09 kg, inertia 0.03 kg m²')
@@ -478,7 +496,7 @@ def test_conditions_of_a_shipped_scene(walk):
 
 def test_conditions_as_recorded_count_before_the_shipped_scene(walk):
     scene = dataclasses.replace(Scene.load('hexapod_patches'), dome_pressure=70e3)
-    said = conditions.described(scene)
+    said = described(scene)
     said['tow']['weight'] = 7.5
     settings = walk.settings | {
         'conditions': json.loads(json.dumps(said)),
@@ -493,8 +511,7 @@ def test_conditions_as_recorded_count_before_the_shipped_scene(walk):
 
 
 def test_a_shipped_scene_that_has_changed_since_is_not_told(walk):
-    settings = walk.settings | {'stride_m': 0.10}
-    rows = dict(conditions.rows(dataclasses.replace(walk, settings=settings)))
+    rows = dict(conditions.rows(of_an_old_bag(walk, stride_m=0.10)))
     assert 'has changed since' in rows['conditions']
     assert 'robot' not in rows and rows['foot'] == 'large37'
 
