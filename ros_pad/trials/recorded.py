@@ -32,6 +32,7 @@ from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
+from ros_pad.trials.label import LOST
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
@@ -220,7 +221,11 @@ def _described(bag: BagReader) -> dict[str, Any]:
             'seed': seed,
             'floor': FloorPlan(**said['floor']).build(seed) if said.get('floor') else None,
             'metrics': Metrics(**said['metrics']) if said.get('metrics') else None,
-            'settings': (said.get('settings') or {}) | {'ambient_pressure': ambient},
+            'settings': (said.get('settings') or {})
+            | {
+                'ambient_pressure': ambient,
+                'lost': dict(json.loads(bag.custom_data.get(LOST, '{}'))),
+            },
             'real_time_factor': said.get('real_time_factor'),
         }
     except (AttributeError, TypeError, ValueError) as error:

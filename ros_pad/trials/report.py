@@ -310,6 +310,9 @@ def _warnings(trial: Trial) -> list[str]:
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
         found += told(trial.metrics.faults)
+    if lost := trial.settings.get('lost'):
+        words = ', '.join(f'{count} on {topic}' for topic, count in sorted(lost.items()))
+        found.append(f'Messages were lost on the way to the recorder: {words}.')
     if trial.settings.get('problem'):
         found.append(str(trial.settings['problem']))
     return found

@@ -95,6 +95,7 @@ def record(trial, folder):
         'seed': trial.seed,
         'fidelity': trial.fidelity,
         'ambient_pressure': 101325.0,
+        'lost': {},
         'metrics': trial.metrics.as_dict(),
         'real_time_factor': 4.5,
         'settings': {'expected_load': 6.8, 'omitted': []},
@@ -213,6 +214,13 @@ def test_messages_out_of_order_and_without_stamp(tmp_path):
     trial = recorded.load(tmp_path / 'bag')
     np.testing.assert_allclose(trial.time, [0.010, 0.020, 0.030])
     np.testing.assert_array_equal(trial.force[:, 0, 2], [1.0, 2.0, 3.0])
+
+
+def test_what_the_recorder_missed_is_known(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/leg_1/wrench', wrench(0.0, 0.0, 1.0), 0, 0)
+        bag.writer.describe({'ros_pad_lost': '{"/leg_1/wrench": 3}'})
+    assert recorded.load(tmp_path / 'bag').settings['lost'] == {'/leg_1/wrench': 3}
 
 
 def test_ambient_pressure_comes_from_the_bag(tmp_path):
