@@ -25,6 +25,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import LEGS
@@ -93,6 +94,7 @@ class RecorderNode(Node):
             raise
         self._recordings: dict[str, Subscription] = {}
         self._lost: Counter[str] = Counter()
+        self._failed = False  # whether the bag takes no more
         # The clock comes first: an executor that finds several messages waiting takes them in
         # the order of their subscriptions.
         for name, topic in recorded.items():
@@ -185,9 +187,15 @@ class RecorderNode(Node):
 
     def _look(self) -> None:
         """Write down what has come, also when nothing comes any more, and who has appeared."""
+        if self._failed:
+            return
         if self._asks:
             self._ask_nodes()
-        self._bag.flush()
+        try:
+            self._bag.flush()
+        except BagError:
+            self._failed = True
+            raise
 
     def _ask_nodes(self) -> None:
         """Ask every node of the robot, once its services are there, for its parameters."""
@@ -229,7 +237,13 @@ class RecorderNode(Node):
         write = self._bag.write
 
         def callback(data: bytes) -> None:
-            write(name, data, self._now())
+            try:
+                write(name, data, self._now())
+            except BagError:
+                # Once is enough: what has been on its way since finds the bag closed.
+                if not self._failed:
+                    self._failed = True
+                    raise
 
         return callback
 
