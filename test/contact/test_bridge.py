@@ -68,7 +68,11 @@ def shot(found, plane, weight=0.0):
     least = minimize_scalar(
         miss, bounds=(s[k - 1], s[k + 1]), method='bounded', options={'xatol': 1e-12 * size}
     )
-    _, _, phi, volume = path(least.x)
+    # A distance is flat where it is least, and its place known to 1e-8: along the tangent to the
+    # foot of the perpendicular, or a volume that is a small difference would be wrong by it.
+    r, z, phi, _ = path(least.x)
+    foot = least.x + (edge - r) * math.cos(phi) + (top - z) * math.sin(phi)
+    _, _, phi, volume = path(foot)
     return least.fun, phi, volume - cap(found.filling_angle)
 
 

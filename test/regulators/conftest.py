@@ -67,8 +67,8 @@ class Dialogue:
                 # Only what needs no answer may be followed by more.
                 if heard == expected or (heard.startswith(expected) and not reply):
                     heard = heard.removeprefix(expected)
+                    self.said += 1  # before whoever waits for the reply can look
                     os.write(self._near, reply.encode('latin-1'))
-                    self.said += 1
                 elif expected.startswith(heard):
                     break
                 else:
