@@ -15,10 +15,10 @@ import os
 import pathlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import uuid
 from collections.abc import Callable
@@ -397,12 +397,23 @@ def loopback(patience: float = LOOPBACK) -> Finding:
         )
         for end in ('hear', 'say')
     ]
+    # One that hangs, say on a lock that a dead process left, says nothing for ever.
+    limit = threading.Timer(STARTING, lambda: [child.kill() for child in children])
+    limit.start()
     try:
         for child in children:
             assert child.stdout is not None
             if child.stdout.readline() != 'ready\n':
-                said = child.communicate(timeout=STARTING)[1]
-                return Finding('loopback', 'problem', _last_line(said), _RMW + '; ' + _domain())
+                _end([child])
+                assert child.stderr is not None
+                said = _last_line(child.stderr.read())
+                return Finding(
+                    'loopback',
+                    'problem',
+                    f'a node does not start: {said}',
+                    f'{_RMW}; {_silence()}',
+                )
+        limit.cancel()
         started = time.monotonic()
         if children[0].wait(patience) == 0:
             return Finding(
@@ -414,10 +425,8 @@ def loopback(patience: float = LOOPBACK) -> Finding:
     except subprocess.TimeoutExpired:
         pass
     finally:
-        for child in children:
-            with contextlib.suppress(OSError):
-                child.send_signal(signal.SIGKILL if child.poll() is None else 0)
-            child.communicate()
+        limit.cancel()
+        _end(children)
     return Finding(
         'loopback',
         'problem',
@@ -425,6 +434,18 @@ def loopback(patience: float = LOOPBACK) -> Finding:
         ' find one another (pad run without --live does not need it)',
         _silence(),
     )
+
+
+def _end(children: Sequence[subprocess.Popen[str]]) -> None:
+    """End processes; first in peace, so that they leave nothing in shared memory."""
+    for child in children:
+        child.terminate()
+    for child in children:
+        try:
+            child.wait(5.0)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
 
 
 def _domain() -> str:
@@ -442,8 +463,8 @@ def _silence() -> str:
         hints.append('ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps processes apart: LOCALHOST')
     elif not reach:
         hints.append(
-            'no multicast on this network (VPN, container, firewall): export'
-            ' ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, or open UDP 7400 to 7500 on the loopback'
+            'no multicast on this network (VPN, container): export'
+            ' ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST'
         )
     if os.environ.get('ROS_LOCALHOST_ONLY'):
         hints.append(
@@ -457,6 +478,10 @@ def _silence() -> str:
         size = int(pathlib.Path('/proc/sys/net/core/rmem_max').read_text())
         if size < BUFFER:
             hints.append(f'sudo sysctl -w net.core.rmem_max={BUFFER}: it is {size}')
+    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if domain.isdecimal():
+        port = 7400 + 250 * int(domain)  # as DDS has it
+        hints.append(f'let the firewall pass UDP {port} to {port + 249} on the loopback')
     hints.append('fastdds shm clean, when no node runs')
     hints.append(_domain())
     return '; '.join(hints)

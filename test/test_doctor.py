@@ -237,6 +237,20 @@ def test_processes_that_are_kept_apart_are_a_problem(alone: pytest.MonkeyPatch):
     assert finding.advice.startswith('ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps')
 
 
+def test_nodes_that_hang_are_not_waited_for(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'rclpy.py').write_text('import time; time.sleep(3600)')
+    monkeypatch.setattr(doctor, 'STARTING', 0.5)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    imported = one(doctor.ros())
+    assert imported.status == 'problem' and 'within 0.5 s' in imported.found
+    started = doctor.loopback(0.5)
+    assert started.status == 'problem' and 'does not start' in started.found
+    assert 'shm clean' in started.advice
+
+
 def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch):
     alone.setenv('ROS_DOMAIN_ID', 'blue')
     finding = doctor.loopback(1.0)
@@ -251,7 +265,9 @@ def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch):
         ('ROS_DISCOVERY_SERVER', 'host:11811', 'unset ROS_DISCOVERY_SERVER'),
         ('FASTRTPS_DEFAULT_PROFILES_FILE', 'x.xml', 'unset FASTRTPS_DEFAULT'),
         ('ROS_DOMAIN_ID', '102', 'from 0 to 101'),
+        ('ROS_DOMAIN_ID', '2', 'UDP 7900 to 8149'),
         ('ROS_AUTOMATIC_DISCOVERY_RANGE', '', 'no multicast'),
+        ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF', 'LOCALHOST'),
     ],
 )
 def test_hints_come_from_the_settings(

@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import String
 
 PERIOD = 0.05  # s, from one message to the next
@@ -39,8 +40,10 @@ def main() -> int:
         end = time.monotonic() + options.seconds
         while options.word not in heard and time.monotonic() < end:
             rclpy.spin_once(node, timeout_sec=0.1)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
     finally:
-        rclpy.shutdown()
+        rclpy.try_shutdown()
     return 0 if options.word in heard else 1
 
 
