@@ -47,7 +47,7 @@ _DESCRIPTION = (
 _EPILOG = """\
 exit status:
   0    done
-  1    a failure at run time, or a difference: no such shape, a device that is silent, a full disk,
+  1    a failure at run time, or a difference: no such shape, a silent device, a full disk;
        a replay that differs, trials that failed, a problem that pad doctor found
   2    bad usage or input: an option, scene, foot, table or bag that is not there, or is none
   130  stopped by Ctrl-C or SIGTERM

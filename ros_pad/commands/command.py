@@ -28,6 +28,12 @@ class Help(argparse.HelpFormatter):
         width = min(shutil.get_terminal_size().columns - 2, WIDEST)
         super().__init__(prog, max_help_position=30, width=width)
 
+    def add_argument(self, action: argparse.Action) -> None:
+        super().add_argument(action)
+        if isinstance(action, argparse._SubParsersAction):
+            # argparse forgets that commands are indented, and breaks the line of the longest.
+            self._action_max_length += self._indent_increment
+
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return '\n'.join(_folded(indent + line, width) for line in text.splitlines())
 
