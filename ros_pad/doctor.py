@@ -126,17 +126,21 @@ def python(version: Sequence[int] = sys.version_info) -> Iterator[Finding]:
 
 def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
     """Look for what ros_pad imports, and for its own version."""
-    broken = {}
+    missing, broken = [], []
     for name in names:
         try:
             importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            missing.append(name if error.name == name else f'{name} (for want of {error.name})')
         except Exception as error:  # whatever a broken package raises
-            broken[name] = f'{type(error).__name__}: {error}'
-    if broken:
+            broken.append(f'{name}: {type(error).__name__}: {error}')
+    if missing or broken:
+        if missing:
+            broken.insert(0, f'not installed: {", ".join(missing)}')
         yield Finding(
             'packages',
             'problem',
-            '; '.join(f'{name}: {error}' for name, error in broken.items()),
+            '; '.join(broken),
             'make .venv anew (make clean run), pip install --editable . in the folder of ros_pad,'
             ' or rosdep install --from-paths src --ignore-src',
         )

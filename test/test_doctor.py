@@ -51,7 +51,7 @@ import sys
 class Missing:
     def find_spec(self, name, path=None, target=None):
         if name.split('.')[0] in {missing}:
-            raise ModuleNotFoundError(f'No module named {{name!r}}')
+            raise ModuleNotFoundError(f'No module named {{name!r}}', name=name)
 
 sys.meta_path.insert(0, Missing())
 from ros_pad import cli
@@ -82,9 +82,24 @@ def test_a_missing_package_is_named_and_the_doctor_goes_on(missing: str, tmp_pat
     )
     assert status == 1
     assert found['packages']['status'] == 'problem'
-    assert f"No module named '{missing}" in found['packages']['found']
+    said = found['packages']['found']
+    assert said.startswith(f'not installed: {missing}') or f', {missing}' in said
     assert 'pip install' in found['packages']['advice']
     assert found['terminal']['status'] == 'ok'  # the last one
+
+
+def test_a_broken_package_is_told_from_a_missing_one(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'broken_pad.py').write_text('raise OSError("libgfortran.so.5")')
+    (tmp_path / 'half_pad.py').write_text('import not_there_pad')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    finding = one(doctor.packages(['json', 'nowhere_pad', 'half_pad', 'broken_pad']))
+    assert finding.status == 'problem'
+    assert finding.found == (
+        'not installed: nowhere_pad, half_pad (for want of not_there_pad);'
+        ' broken_pad: OSError: libgfortran.so.5'
+    )
 
 
 def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch):

@@ -29,6 +29,7 @@ class Help(argparse.HelpFormatter):
         super().__init__(prog, max_help_position=30, width=width)
 
     def add_argument(self, action: argparse.Action) -> None:
+        """Add an argument to what the columns are measured by."""
         super().add_argument(action)
         if isinstance(action, argparse._SubParsersAction):
             # argparse forgets that commands are indented, and breaks the line of the longest.
