@@ -17,6 +17,7 @@ from ros_pad.regulators import emulate
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TUTORIALS = ROOT / 'docs' / 'tutorials'
+SPEED = re.compile(r'[0-9.]+ times real time$')  # of the machine
 PAGES = [*sorted(TUTORIALS.glob('*.md')), ROOT / 'docs' / 'foxglove.md']
 
 
@@ -65,8 +66,21 @@ def shown(said: str, page: pathlib.Path, first: str) -> None:
     (block,) = (each for each in blocks(page) if each.startswith(first))
     lines = [line.rstrip() for line in said.splitlines()]
     for line in block.splitlines():
-        beginning = line.removesuffix('...').rstrip()
+        beginning = SPEED.sub('', line.removesuffix('...').rstrip())
         assert any(each.startswith(beginning) for each in lines), line
+
+
+def test_first_walk(
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    page = TUTORIALS / 'first_walk.md'
+    monkeypatch.chdir(tmp_path)
+    words = next(words for words in commands(page) if words[1] == 'run')
+    assert '--no-ros' in words
+    assert cli.main(words[1:]) == 0
+    shown(capsys.readouterr().out, page, 'leg_wet_dome_75')
 
 
 def test_own_foot(
