@@ -68,3 +68,13 @@ def test_bad_input_writes_nothing(here, capsys, arguments, complaint):
     assert cli.main(['calibrate', *arguments]) == 2
     assert complaint in capsys.readouterr().err
     assert list(here.iterdir()) == []
+
+
+def test_no_foot_is_left_behind_when_its_picture_cannot_be_written(here, capsys):
+    (here / 'own.yaml').write_text('what was there')
+    figure = ['--figure', 'none/own.png']
+    for out in ('own.yaml', 'other.yaml'):
+        assert cli.main(['calibrate', THESIS, '--out', out, *figure, '--force']) == 1
+        assert 'none' in capsys.readouterr().err
+    assert [path.name for path in here.iterdir()] == ['own.yaml']
+    assert (here / 'own.yaml').read_text() == 'what was there'

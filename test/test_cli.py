@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ``pad`` command as a user types it: output, exit status, and what it says of bad input."""
 
+import errno
 import json
 import math
 import os
@@ -15,6 +16,7 @@ import pytest
 
 from ros_pad import cli
 from ros_pad import configuration
+from ros_pad.errors import BagError
 from ros_pad.trials.bag import BagReader
 
 SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'
@@ -151,8 +153,16 @@ def test_contact_prints_the_thesis_height(capsys: pytest.CaptureFixture[str]):
 
 
 def test_contact_outside_the_model_says_so(capsys: pytest.CaptureFixture[str]):
-    assert cli.main(['contact', '--pressure', '75e3', '--force', '0.6']) == 1
-    assert 'flattened' in capsys.readouterr().err
+    flattened = ['contact', '--pressure', '75e3', '--force', '0.6']
+    assert cli.main(flattened) == 1
+    said = capsys.readouterr()
+    assert 'flattened' in said.err
+    # What there is is shown: the free dome, and what one pad carries.
+    assert '0.00194127 m' in said.out and '0.2833 N' in said.out
+    assert cli.main([*flattened, '--json']) == 1
+    values = json.loads(capsys.readouterr().out)
+    assert values['free']['height_m'] == pytest.approx(1.94126819416e-3, rel=1e-11)
+    assert values['pressed'] == {'status': 'flattened'} and 'meniscus' not in values
     assert cli.main(['contact', '--pressure', 'nan']) == 2
     assert 'pressure' in capsys.readouterr().err
 
@@ -177,9 +187,89 @@ def test_a_pad_that_sticks_flat_is_told_to_need_pressure(capsys: pytest.CaptureF
     assert 'adhesion alone holds it' in capsys.readouterr().err
 
 
-def test_bag_that_is_not_there(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(['bag', 'info', str(tmp_path / 'none')]) == 1
-    assert 'no such bag' in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ('words', 'reason'),
+    [
+        (['bag', 'info', 'nothere'], 'nothere: no such bag'),
+        (['bag', 'repair', 'nothere'], 'nothere: no such bag'),
+        (['bag', 'info', 'scene.yaml'], 'no MCAP file'),
+        (['bag', 'info', 'empty'], 'no metadata.yaml'),
+        (['replay', 'nothere'], 'no such bag'),
+        (['report', 'nothere'], 'no such bag'),
+        (['report', 'empty'], 'no metadata.yaml'),
+        (['run', 'nothere.yaml'], 'no such file'),
+        (['run', 'scene.yaml', '--no-ros'], 'scene.yaml'),
+        (['run', 'leg_dry_flat', '--no-ros', '--foot', 'nothere.yaml'], 'no such file'),
+        (['run', 'leg_dry_flat', '--no-ros', '--out', 'empty'], 'exists already'),
+        (['sweep', 'nothere'], 'no scene named'),
+        (['contact', '--pressure', '1e3', '--foot', 'nothere'], 'no foot named'),
+        (['calibrate', 'nothere.csv'], 'nothere.csv'),
+        (['calibrate', 'scene.yaml'], 'scene.yaml'),
+        (['design', '--load', '7'], '--area'),
+        (['emulate', 'alicat', '--channels', '3'], '--channels'),
+    ],
+)
+def test_bad_input_is_status_2(
+    words: list[str],
+    reason: str,
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'empty').mkdir()
+    (tmp_path / 'scene.yaml').write_text('what: nothing that is known\n')
+    assert cli.main(words) == 2
+    said = capsys.readouterr()
+    assert said.out == '' and reason in said.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['empty', 'scene.yaml']
+
+
+def test_what_the_system_refuses_is_status_1(
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    def full(*_: object) -> None:
+        try:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise BagError('bag: cannot be written') from error
+
+    monkeypatch.setattr('ros_pad.trials.repair.inspect', full)
+    assert cli.main(['bag', 'repair', str(tmp_path)]) == 1
+    assert 'cannot be written' in capsys.readouterr().err
+    # A picture into a folder that is not there.
+    figure = str(tmp_path / 'none' / 'design.png')
+    assert cli.main(['design', '--load', '7', '--foot', 'large37', '--figure', figure]) == 1
+
+
+INTERRUPTED_IMPORT = """
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == 'ros_pad.contact':
+            os.kill(os.getpid(), signal.{signal})
+
+sys.meta_path.insert(0, Interrupt())
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from ros_pad import cli
+sys.exit(cli.main(['contact', '--pressure', '75e3']))
+"""
+
+
+@pytest.mark.parametrize('number', ['SIGINT', 'SIGTERM'])
+def test_a_stop_during_imports_leaves_no_traceback(number: str):
+    child = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED_IMPORT.format(signal=number)],
+        cwd=SCENE.parent.parent.parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (child.returncode, child.stdout) == (cli.INTERRUPTED, '')
+    assert child.stderr == 'pad: stopped\n'
 
 
 @pytest.fixture
@@ -257,8 +347,7 @@ def test_readme_names_every_scene_and_command():
     readme = (SCENE.parent.parent.parent / 'README.md').read_text(encoding='utf-8')
     for name in configuration.names('scenes'):
         assert f'`{name}`' in readme
-    for module in cli.COMMANDS:
-        command = module.__name__.rpartition('.')[2]
+    for command in cli.COMMANDS:
         assert f'`pad {command}' in readme
 
 

@@ -123,7 +123,9 @@ def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     assert path.read_bytes().startswith(b'\x89PNG')
     # A supply under which no pad carries anything leaves nothing to draw on a logarithm.
     arguments = ['--load', '7', '--area', '1e-3', '--pressure', '5e4']
-    assert said(capsys, *arguments, '--figure', str(path))
+    assert cli.main(['design', *arguments, '--figure', str(path)]) == 2  # not overwritten
+    assert 'exists already' in capsys.readouterr().err
+    assert said(capsys, *arguments, '--figure', str(tmp_path / 'other.png'))
     missing = tmp_path / 'none' / 'design.svg'
     assert cli.main(['design', '--load', '7', '--area', '1e-3', '--figure', str(missing)]) == 1
     assert str(missing) in capsys.readouterr().err

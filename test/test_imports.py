@@ -27,7 +27,8 @@ MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
 MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials'}
 MAY_IMPORT['figures'] = MAY_IMPORT['ladders'] | {'ladders'}
 MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
-MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes'}
+MAY_IMPORT['doctor'] = MAY_IMPORT['trials'] | {'trials'}
+MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes', 'doctor'}
 MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
 
 NUMERICS = {'numpy', 'scipy', 'yaml'}
@@ -48,8 +49,9 @@ FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'ladders': NUMERICS | FILES | {'mpmath', 'mujoco'},
     'figures': NUMERICS | FILES,
     'nodes': NUMERICS | FILES | ROS,
+    'doctor': {'serial'},
     'commands': NUMERICS | FILES,
-    'cli': set(),
+    'cli': {'argcomplete'},
 }
 
 
@@ -169,6 +171,6 @@ def test_what_is_imported_is_declared():
     for name in foreign - set(EXTRAS):
         key = name if name in ROS else ROSDEP_KEY.get(name, f'python3-{name}')
         assert f'<exec_depend>{key}</exec_depend>' in package_xml
-        # setup.py puts the distribution before those of ROS.
+        # The wheels of ROS have the distribution before their name.
         pip_name = name.replace('_', '-') if name in ROS else PIP_NAME.get(name, name)
         assert re.search(rf"'{pip_name}['>\[]", setup_py), f'{pip_name} is not in setup.py'

@@ -24,7 +24,8 @@ ROSDEP_KEYS = {
     *('ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs'),
     *('sensor_msgs', 'std_msgs', 'std_srvs', 'visualization_msgs'),
-    *('mcap-ros2-support', 'python3-hypothesis', 'python3-matplotlib', 'python3-numpy'),
+    *('mcap-ros2-support', 'python3-argcomplete', 'python3-hypothesis', 'python3-matplotlib'),
+    'python3-numpy',
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
     *('python3-serial', 'python3-sympy', 'python3-tqdm', 'python3-yaml'),
 }

@@ -143,7 +143,7 @@ def test_help_has_units_and_an_example(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit):
         cli.main(['sweep', '--help'])
     said = capsys.readouterr().out
-    assert 'example: pad sweep hexapod_patches' in said
+    assert 'example:\n  pad sweep hexapod_patches' in said
     assert 'tow.weight, N' in ' '.join(said.split())
 
 

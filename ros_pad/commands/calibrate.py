@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import math
 import pathlib
@@ -90,15 +91,28 @@ def run(options: argparse.Namespace) -> int:
         options.film_thickness,
         options.viscosity,
     )
-    figure = draw(found)
-    foot_path.write_text(foot_file(found), encoding='utf-8')
-    figure.savefig(figure_path, dpi=150)
+    picture = io.BytesIO()
+    draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
+    _write({figure_path: picture.getvalue(), foot_path: foot_file(found).encode()})
     if options.json:
         print(json.dumps(_values(found, foot_path, figure_path)))
     else:
         _show(found)
         print(f'\nfoot:    {foot_path}\npicture: {figure_path}')
     return 0
+
+
+def _write(contents: dict[pathlib.Path, bytes]) -> None:
+    """Write all of the files, or none: a foot without its picture would have to be removed."""
+    written = {path: path.with_name(f'.{path.name}.part') for path in contents}
+    try:
+        for path, part in written.items():
+            part.write_bytes(contents[path])
+        for path, part in written.items():
+            part.replace(path)
+    finally:
+        for part in written.values():
+            part.unlink(missing_ok=True)
 
 
 def _values(

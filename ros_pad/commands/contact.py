@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterator
 from typing import Any
 
 from ros_pad import contact
@@ -96,34 +97,13 @@ def run(options: argparse.Namespace) -> int:
         'pressure_pa': pressure,
         'force_n': force,
     }
+    trouble: NoEquilibrium | None = None
     try:
-        free = contact.inflate(pad, pressure)
-        values['free'] = {
-            'height_m': free.height,
-            'sphere_radius_m': free.sphere_radius,
-            'volume_m3': free.volume,
-        }
-        pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
-        values['pressed'] = {
-            'height_m': pressed.height,
-            'depth_m': pressed.depth,
-            'contact_radius_m': pressed.contact_radius,
-            'sphere_radius_m': pressed.sphere_radius,
-            'gap_m': pressed.gap,
-            'status': pressed.status,
-        }
-        if force > 0.0:  # the ring of a dome that only touches has no size to speak of
-            wet = contact.meniscus(pressed, liquid)
-            values['meniscus'] = {
-                'height_m': wet.height,
-                'ring_radius_m': wet.ring_radius,
-                'tangential_force_n': wet.tangential_force,
-                'status': wet.status,
-            }
-        else:
-            values['meniscus'] = {'status': 'no_contact'}
-    except NoEquilibrium as error:
-        return complain(f'{error} (status {error.status})', 1)
+        for part, shape in _shapes(pad, liquid, options):
+            values[part] = shape
+    except NoEquilibrium as error:  # what is known up to there is still told
+        trouble = error
+        values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # A shape may be known where a limit is not: the membrane goes on, measurements end.
     ends = {each: largest_pressure(pad, each) for each in ('measured', 'max_depth', 'flattening')}
     values['force_limit_n'] = {
@@ -132,9 +112,57 @@ def run(options: argparse.Namespace) -> int:
     }
     if options.json:
         print(json.dumps(values))
-        return 0
-    print(f'{name}, {pressure:g} Pa gauge, {force:g} N')
+    else:
+        _show(f'{name}, {pressure:g} Pa gauge, {force:g} N', values, ends, pad.radius)
+    return 0 if trouble is None else complain(f'{trouble} (status {trouble.status})', 1)
+
+
+def _shapes(
+    pad: contact.Pad, liquid: contact.Liquid, options: argparse.Namespace
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the free dome, the pressed one and its ring of liquid, as far as there are such."""
+    pressure, force = options.pressure, options.force
+    free = contact.inflate(pad, pressure)
+    yield (
+        'free',
+        {
+            'height_m': free.height,
+            'sphere_radius_m': free.sphere_radius,
+            'volume_m3': free.volume,
+        },
+    )
+    pressed = contact.press(pad, pressure, force, options.adhesion, options.model)
+    yield (
+        'pressed',
+        {
+            'height_m': pressed.height,
+            'depth_m': pressed.depth,
+            'contact_radius_m': pressed.contact_radius,
+            'sphere_radius_m': pressed.sphere_radius,
+            'gap_m': pressed.gap,
+            'status': pressed.status,
+        },
+    )
+    if not force > 0.0:  # the ring of a dome that only touches has no size to speak of
+        yield 'meniscus', {'status': 'no_contact'}
+        return
+    wet = contact.meniscus(pressed, liquid)
+    yield (
+        'meniscus',
+        {
+            'height_m': wet.height,
+            'ring_radius_m': wet.ring_radius,
+            'tangential_force_n': wet.tangential_force,
+            'status': wet.status,
+        },
+    )
+
+
+def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radius: float) -> None:
+    print(heading)
     for part, title in _TITLES.items():
+        if part not in values:
+            continue
         print(title)
         for key, value in values[part].items():
             words, _, unit = key.rpartition('_') if part != 'force_limit_n' else (key, '', 'n')
@@ -144,6 +172,5 @@ def run(options: argparse.Namespace) -> int:
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
-        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad.radius:
+        if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
             print('  (wider than the pad: this balance does not hold, see docs/errata.md)')
-    return 0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import pathlib
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import replace
@@ -73,14 +74,19 @@ def add(commands: Commands) -> None:
     )
     part.add_argument(
         '--figure',
+        type=pathlib.Path,
         metavar='FILE',
-        help='draw load and rise over the pad radius: .png, .pdf or .svg',
+        help='draw load and rise over the pad radius into a new .png, .pdf or .svg',
     )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
+    if options.figure is not None and options.figure.exists():
+        raise InvalidInput(
+            f'--figure {options.figure}: exists already, and nothing is ever overwritten'
+        )
     foot = None if options.foot is None else Foot.load(options.foot)
     pad = LARGE_PAD if foot is None else foot.pad
     if options.stiffness is not None:
@@ -127,7 +133,7 @@ def run(options: argparse.Namespace) -> int:
                     'designs': [{'name': name, **values(each)} for name, each in designs.items()],
                     'radii': [values(each) for row in rows for each in row],
                     'says': says,
-                    'figure': options.figure,
+                    'figure': None if options.figure is None else str(options.figure),
                 }
             )
         )

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a shell offers where the parser alone does not know: scenes, feet, bags."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from collections.abc import Iterator
+from typing import Any
+
+from ros_pad import configuration
+
+DEEPEST = 4
+"""Folders below the one that was typed in which bags are looked for."""
+
+MOST = 2000
+"""Folders looked at: a shell does not wait for a whole disk."""
+
+
+def attach(parser: argparse.ArgumentParser) -> None:
+    """Tell argcomplete how to complete the arguments of a parser and of its commands."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for part in action.choices.values():
+                attach(part)
+        elif action.type in (int, float):
+            action.completer = _nothing
+        elif action.dest in _COMPLETERS and not action.choices:
+            action.completer = _COMPLETERS[action.dest]
+
+
+def bags(prefix: str, **_: Any) -> list[str]:
+    """Return bags and single MCAP files whose path begins so, or else the folders there."""
+    found = [path for path in _below(os.path.dirname(prefix)) if path.startswith(prefix)]
+    return found or _paths(prefix, '')
+
+
+def _below(folder: str) -> Iterator[str]:
+    for looked, (root, folders, files) in enumerate(os.walk(folder or '.')):
+        shown = root if folder else root[2:]  # without ./, which nobody typed
+        folders[:] = sorted(name for name in folders if not name.startswith('.'))
+        if looked >= MOST or root.count('/') - folder.count('/') >= DEEPEST:
+            folders.clear()
+        if 'metadata.yaml' in files:
+            folders.clear()  # the files of a bag are part of it
+            yield shown
+        else:
+            yield from (os.path.join(shown, name) for name in files if name.endswith('.mcap'))
+
+
+def _paths(prefix: str, ending: str) -> list[str]:
+    """Return files with that ending, if any, and folders whose path begins so."""
+    here, start = os.path.split(prefix)
+    try:
+        entries = sorted(os.scandir(here or '.'), key=lambda each: each.name)
+    except OSError:
+        return []
+    return [
+        os.path.join(here, each.name) + ('/' if each.is_dir() else '')
+        for each in entries
+        if each.name.startswith(start)
+        and (each.is_dir() or (ending and each.name.endswith(ending)))
+    ]
+
+
+def _shipped(kind: str) -> Callable[..., list[str]]:
+    """Return what completes the names that ship of a kind, and YAML files of one's own."""
+
+    def complete(prefix: str, **_: Any) -> list[str]:
+        return [name for name in configuration.names(kind) if name.startswith(prefix)] or _paths(
+            prefix, '.yaml'
+        )
+
+    return complete
+
+
+def _policies(prefix: str, **_: Any) -> list[str]:
+    """Complete the last of several policies with commas between them."""
+    from ros_pad.control import POLICIES  # takes its time, and few ask for it
+
+    before, comma, _last = prefix.rpartition(',')
+    return [f'{before}{comma}{name}' for name in POLICIES if name not in before.split(',')]
+
+
+def _nothing(**_: Any) -> list[str]:
+    """Offer no file names where a number is wanted."""
+    return []
+
+
+_COMPLETERS: dict[str, Callable[..., list[str]]] = {
+    'scene': _shipped('scenes'),
+    'scenes': _shipped('scenes'),
+    'foot': _shipped('feet'),
+    'policy': _policies,
+    'bag': bags,
+    'path': bags,
+}

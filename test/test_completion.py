@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What shells are offered: by argcomplete's protocol, and in bash itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from ros_pad import cli
+from ros_pad import configuration
+from ros_pad.commands import completion
+from ros_pad.control import POLICIES
+
+pytest.importorskip('argcomplete')
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+def offered(line: str, folder: pathlib.Path, shell: str = 'bash') -> list[str]:
+    """Return what a shell is told, by argcomplete's protocol, with the cursor at the end."""
+    answer = folder / '.answer'
+    answer.unlink(missing_ok=True)
+    environment = {
+        **os.environ,
+        'PYTHONPATH': str(ROOT),
+        '_ARGCOMPLETE': '1',
+        '_ARGCOMPLETE_SHELL': shell,
+        '_ARGCOMPLETE_IFS': '\n',
+        '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
+        'COMP_LINE': line,
+        'COMP_POINT': str(len(line.encode())),
+        'COMP_TYPE': '9',
+        '_ARGCOMPLETE_SUPPRESS_SPACE': '1',
+    }
+    # Descriptor 9 is where argcomplete writes what it thinks.
+    child = subprocess.run(
+        ['bash', '-c', 'exec "$0" -m ros_pad.cli 9>/dev/null', sys.executable],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (child.returncode, child.stdout, child.stderr) == (0, '', '')
+    return [word.strip() for word in answer.read_text().split('\n') if word]
+
+
+@pytest.fixture
+def here(tmp_path: pathlib.Path) -> pathlib.Path:
+    """Return a folder with two bags, a lone MCAP file, a foot and a folder that is none."""
+    for name in ('runs/walk/bag', 'runs/walk_2/bag'):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / 'metadata.yaml').touch()
+        (tmp_path / name / 'bag_0.mcap').touch()
+    (tmp_path / 'runs' / 'lone.mcap').touch()
+    (tmp_path / 'empty').mkdir()
+    (tmp_path / 'my_foot.yaml').touch()
+    return tmp_path
+
+
+def test_commands(here: pathlib.Path):
+    assert {'run', 'report', 'replay'} <= set(offered('pad r', here))
+    assert set(cli.COMMANDS) <= set(offered('pad ', here))
+    assert offered('pad doc', here) == ['doctor']
+    assert f'doctor:{cli.COMMANDS["doctor"]}' in offered('pad doc', here, 'zsh')
+
+
+@pytest.mark.parametrize(
+    ('line', 'expected'),
+    [
+        ('pad scenes --j', ['--json']),
+        ('pad contact --pad ', ['large', 'small']),
+        ('pad contact --force ', []),  # a number, and no file
+        ('pad contact --foot large1', ['large19']),
+        ('pad sweep leg_wet_dome_4', ['leg_wet_dome_40']),
+        ('pad bag ', ['info', 'repair']),
+        ('pad bag info runs/walk_', ['runs/walk_2/bag']),
+    ],
+)
+def test_arguments(line: str, expected: list[str], here: pathlib.Path):
+    found = offered(line, here)
+    if line.endswith(' '):  # where a word may come, an option may, too
+        found = [word for word in found if not word.startswith('--')]
+    assert sorted(found) == expected
+
+
+@pytest.mark.parametrize(
+    ('command', 'argument', 'prefix', 'expected'),
+    [
+        ('bag', 'bag', 'runs/', ['runs/lone.mcap', 'runs/walk/bag', 'runs/walk_2/bag']),
+        ('replay', 'bag', 'runs/walk_', ['runs/walk_2/bag']),
+        ('report', 'path', './runs/walk_', ['./runs/walk_2/bag']),
+        ('report', 'path', 'em', ['empty/']),
+        ('run', 'foot', 'my', ['my_foot.yaml']),
+        ('run', 'scene', '', configuration.names('scenes')),
+        ('sweep', 'scenes', 'hexapod_p', ['hexapod_patches']),
+        ('sweep', 'policy', '', list(POLICIES)),
+        ('sweep', 'policy', 'flat,', [f'flat,{each}' for each in POLICIES if each != 'flat']),
+        ('run', 'seed', '', []),
+    ],
+)
+def test_what_the_parser_does_not_know(
+    command: str,
+    argument: str,
+    prefix: str,
+    expected: list[str],
+    here: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.chdir(here)
+    top = cli.parser(command)
+    completion.attach(top)
+    (commands,) = (each for each in top._actions if each.dest == 'COMMAND' or each.choices)
+    (action,) = (each for each in commands.choices[command]._actions if each.dest == argument)
+    assert sorted(action.completer(prefix=prefix)) == sorted(expected)
+
+
+REGISTER = 'register-python-argcomplete'
+BASH = """
+eval "$(register-python-argcomplete pad)"
+COMP_LINE='pad replay runs/walk_'; COMP_POINT=${#COMP_LINE}; COMP_TYPE=9; COMP_CWORD=2
+COMP_WORDS=(pad replay runs/walk_)
+$(complete -p pad | sed 's/.*-F \\([^ ]*\\).*/\\1/') pad runs/walk_ replay
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+def test_bash_completes_a_bag(here: pathlib.Path):
+    scripts = pathlib.Path(sys.executable).parent
+    if not (shutil.which('bash') and (scripts / REGISTER).exists()):
+        pytest.skip(f'needs bash, and {REGISTER} beside {sys.executable}')
+    tool = here / 'bin' / 'pad'
+    tool.parent.mkdir()
+    tool.write_text(f'#!/bin/sh\nexec {sys.executable} -m ros_pad.cli "$@"\n')
+    tool.chmod(0o755)
+    path = os.pathsep.join([str(tool.parent), str(scripts), os.environ['PATH']])
+    child = subprocess.run(
+        ['bash', '-c', BASH],
+        cwd=here,
+        env={**os.environ, 'PATH': path, 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert child.stdout.split() == ['runs/walk_2/bag'], child.stderr
+
+
+def test_what_no_shell_asks_for_does_not_import_argcomplete():
+    code = 'import sys; from ros_pad import cli; cli.parser(); print(sorted(sys.modules))'
+    child = subprocess.run(
+        [sys.executable, '-c', code], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    modules = json.loads(child.stdout.replace("'", '"'))
+    # What takes time: a second, with all of the commands.
+    assert not {'argcomplete', 'numpy', 'scipy', 'matplotlib', 'mcap'} & set(modules)
+    assert 'ros_pad.commands.command' in modules

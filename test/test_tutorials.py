@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tutorials: their commands are understood, and what is quick to run prints what they show."""
+
+import json
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from ros_pad import cli
+from ros_pad.regulators import emulate
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+TUTORIALS = ROOT / 'docs' / 'tutorials'
+SPEED = re.compile(r'[0-9.]+ times real time$')  # of the machine
+PAGES = [*sorted(TUTORIALS.glob('*.md')), ROOT / 'docs' / 'foxglove.md']
+
+
+def blocks(page: pathlib.Path, kind: str = '') -> list[str]:
+    """Return what stands between fences of a kind on a page."""
+    text = page.read_text(encoding='utf-8')
+    fenced = re.findall(r'^```(\w*)\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)
+    return [block for each, block in fenced if each == kind]
+
+
+def commands(page: pathlib.Path) -> list[list[str]]:
+    """Return the words of every ``pad`` command on a page."""
+    lines = '\n'.join(blocks(page)).replace('\\\n', ' ').splitlines()
+    # `pad of my_foot.yaml, ...` is what a command says.
+    return [shlex.split(line, comments=True) for line in lines if re.match('pad (?!of )', line)]
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
+def test_every_command_is_understood(page: pathlib.Path):
+    found = commands(page)
+    assert found
+    for _, *words in found:
+        assert callable(cli.parser(words[0]).parse_args(words).command)
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
+def test_every_link_leads_somewhere(page: pathlib.Path):
+    for link in re.findall(r'\]\((?!http)([^)]+)\)', page.read_text(encoding='utf-8')):
+        path, _, place = link.partition('#')
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        if place:
+            heads = re.findall(r'^#+ (.*)$', target.read_text(encoding='utf-8'), re.MULTILINE)
+            slugs = [re.sub(r'[^\w -]', '', head.lower()).replace(' ', '-') for head in heads]
+            assert place in slugs, link
+
+
+def test_the_readme_lists_them():
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    for page in TUTORIALS.glob('*.md'):
+        assert f'(docs/tutorials/{page.name})' in readme
+
+
+def shown(said: str, page: pathlib.Path, first: str) -> None:
+    """Assert that the block with that first word shows what was said; dots leave lines out."""
+    (block,) = (each for each in blocks(page) if each.startswith(first))
+    lines = [line.rstrip() for line in said.splitlines()]
+    for line in block.splitlines():
+        beginning = SPEED.sub('', line.removesuffix('...').rstrip())
+        assert any(each.startswith(beginning) for each in lines), line
+
+
+def test_first_walk(
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    page = TUTORIALS / 'first_walk.md'
+    monkeypatch.chdir(tmp_path)
+    words = next(words for words in commands(page) if words[1] == 'run')
+    assert '--no-ros' in words
+    assert cli.main(words[1:]) == 0
+    shown(capsys.readouterr().out, page, 'leg_wet_dome_75')
+
+
+def test_own_foot(
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    page = TUTORIALS / 'own_foot.md'
+    monkeypatch.chdir(tmp_path)
+    (table,) = (each for each in blocks(page) if 'pressure [kPa]' in each)
+    (tmp_path / 'my_pads.csv').write_text(table, encoding='utf-8')
+    by_name = {words[1]: words[1:] for words in commands(page)}
+    for name, first in (('calibrate', 'constant'), ('contact', 'pad of'), ('design', '6.8 N')):
+        assert cli.main(by_name[name]) == 0
+        shown(capsys.readouterr().out, page, first)
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {'my_pads.csv', 'my_foot.yaml', 'my_foot.png', 'design.png'}
+
+
+def test_own_regulator(tmp_path: pathlib.Path):
+    page = TUTORIALS / 'own_regulator.md'
+    (program,) = blocks(page, 'python')
+    (settings,) = blocks(page, 'yaml')
+    port = tmp_path / 'regulators'
+    words = next(words for words in commands(page) if words[1] == 'emulate')
+    options = cli.parser('emulate').parse_args(words[1:])
+    device = emulate.EMULATORS[options.device](unit_ids=options.unit_ids, schedule=options.fault)
+    script = tmp_path / 'try_it.py'
+    script.write_text(program.replace(options.link, str(port)))
+    with emulate.Emulator(device, str(port)):
+        child = subprocess.run(
+            [sys.executable, str(script)],
+            env={**os.environ, 'PYTHONPATH': str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    assert child.returncode == 0, child.stderr
+    (expected,) = (each for each in blocks(page) if each.startswith('Reading('))
+    assert child.stdout.partition(', time=')[0] == expected.partition(', time=')[0]
+    given = yaml.safe_load(settings)['/**/regulator']['ros__parameters']
+    assert given['backend_options']['port'] == options.link
+    assert ''.join(given['backend_options']['unit_id']) == options.unit_ids
+
+
+def test_a_layout_for_a_namespace():
+    page = ROOT / 'docs' / 'foxglove.md'
+    (line,) = (each for each in '\n'.join(blocks(page)).splitlines() if each.startswith('sed '))
+    made = subprocess.run(
+        ['sh', '-c', line.partition('>')[0]], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    layout = json.loads(made)['configById']
+    paths = [path['value'] for each in layout.values() for path in each.get('paths', [])]
+    assert len(paths) > 40
+    paths += layout['3D!walk']['topics']
+    paths.append(layout['Plot!path']['xAxisPath']['value'])
+    assert all(path.startswith('/robot_1/') for path in paths)
+    assert layout['DiagnosticSummary!health']['topicToRender'] == '/diagnostics'
