@@ -43,7 +43,7 @@ def test_other_parameters_picture_and_bag(
     topics = {each['topic']: each for each in said['topics']}
     assert len(topics) == 48
     wetness = topics['/leg_1/wetness']
-    assert wetness['verdict'] == 'different' and wetness['compared'] == 351
+    assert wetness['verdict'] == 'different' and wetness['compared'] == 301
     assert 0.1 < wetness['largest_difference'] < 1.0
     assert wetness['first_difference_s'] < 0.1
     assert topics['/leg_1/slip']['verdict'] in ('equal', 'rounding')

@@ -37,7 +37,7 @@ from rosbags.rosbag2 import Writer
 SAMPLE = configuration.shared_folder().parent / 'bags' / 'hexapod_patches' / 'bag'
 RENEW = (
     'rm -r bags/hexapod_patches && '
-    'pad run hexapod_patches --seed 9 --cycles 6 --no-compare --out bags/hexapod_patches'
+    'pad run hexapod_patches --seed 9 --cycles 5 --no-compare --out bags/hexapod_patches'
 )
 LEGS = (1, 2, 3, 4, 5, 6)
 MS = 1_000_000
@@ -127,7 +127,7 @@ def test_the_shipped_bag_is_replayed_as_it_was_recorded(sample):
         assert each.missing == each.not_recorded == 0
         if each.kind in ('doubt', 'morphology', 'slipping', 'pressure_setpoint'):
             assert each.equal == each.compared
-    assert set(sample.samples.values()) == {7 * 250}  # 1 s to settle, 6 cycles
+    assert set(sample.samples.values()) == {6 * 250}  # 1 s to settle, 5 cycles
 
 
 def test_the_shipped_bag_is_small_and_has_something_to_see(sample):
@@ -206,16 +206,16 @@ def test_an_oracle_sees_the_floor_of_the_bag():
             other.replayed[leg, 'morphology'],
             other.replayed[leg, 'pressure_setpoint'],
         )
-        assert shapes.texts[0] == 'flat' and len(setpoints) == 351
+        assert shapes.texts[0] == 'flat' and len(setpoints) == 301
     assert sum(each.switches[1] for each in other.outcomes) > 3
     assert (other.settings.floor.wet_map == floor.wet_map).all()
 
 
 def test_estimates_may_be_told_more_often(sample):
     other = found_in(SAMPLE, {'publish_rate': 125.0})
-    # Samples at 4, 8 ... 7000 ms: the first of each period.
-    assert len(sample.replayed[1, 'wetness']) == 7000 // 20 + 1
-    assert len(other.replayed[1, 'wetness']) == 7000 // 8 + 1
+    # Samples at 4, 8 ... 6000 ms: the first of each period.
+    assert len(sample.replayed[1, 'wetness']) == 6000 // 20 + 1
+    assert len(other.replayed[1, 'wetness']) == 6000 // 8 + 1
 
 
 @pytest.mark.parametrize(
@@ -329,10 +329,10 @@ def test_what_the_estimator_had_not_heard_yet_is_left_out(tmp_path):
 
 def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
     def name(topic):
-        return None if topic.startswith('/leg_3/') else topic
+        return None if topic.startswith('/leg_6/') else topic
 
     bag = copy(tmp_path / 'bag', name, end=7)
-    # The description travels with the bag, or nobody knew that there was a third leg.
+    # The description travels with the bag, or nobody knew that there was a sixth leg.
     metadata = yaml.safe_load((SAMPLE / 'metadata.yaml').read_text())
     said = metadata['rosbag2_bagfile_information']['custom_data']
     path = bag / 'metadata.yaml'
@@ -340,8 +340,8 @@ def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
     copied['rosbag2_bagfile_information']['custom_data'] = said
     path.write_text(yaml.dump(copied))
     found = found_in(bag)
-    assert found.legs == (1, 2, 4, 5, 6)
-    assert any(note.startswith('leg 3: no wrench') for note in found.notes)
+    assert found.legs == (1, 2, 3, 4, 5)
+    assert any(note.startswith('leg 6: no wrench') for note in found.notes)
     assert found.verdict == 'gap'
     for each in found.comparisons:
         expected = ('equal', 'rounding')
@@ -351,10 +351,10 @@ def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):
 
 
 def test_a_leg_that_only_spoke_is_missed(tmp_path):
-    # Nothing says how many legs there were, but somebody estimated leg 3.
-    bag = copy(tmp_path / 'bag', lambda topic: None if '/leg_3/wrench' in topic else topic, end=7)
+    # Nothing says how many legs there were, but somebody estimated leg 6.
+    bag = copy(tmp_path / 'bag', lambda topic: None if '/leg_6/wrench' in topic else topic, end=7)
     found = found_in(bag, TOLD)
-    assert any(note.startswith('leg 3: no wrench') for note in found.notes)
+    assert any(note.startswith('leg 6: no wrench') for note in found.notes)
     assert found.verdict == 'gap'
 
 
