@@ -21,7 +21,7 @@ help:
 	@echo 'make test   ruff, mypy and every test'
 	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
 	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
-	@echo 'The first two make .venv if need be; PYTHON=python3.12 chooses its Python.'
+	@echo 'run and test make .venv if need be; PYTHON=python3.12 chooses its Python.'
 
 run: .venv/ros.stamp
 	@$(BIN)/pad run hexapod_patches $(ARGS)
@@ -42,6 +42,7 @@ NONE_CHOSEN := [ $$? -eq 5 ]
 # test the nodes. `make test-matrix MATRIX=3.12-kilted` runs one row, which is not among the others
 # because it fails: QUALITY_DECLARATION.md says where.
 MATRIX ?= 3.11 3.12 3.13 3.12-oldest 3.12-jazzy 3.13-jazzy
+CORE_TESTS := test --ignore test/nodes
 NODE_TESTS := test/nodes test/trials/test_bag.py test/trials/test_recorded.py test/test_cli.py
 
 test-matrix:
@@ -51,7 +52,7 @@ test-matrix:
 
 # Where Pythons are managed by pyenv, PYENV_VERSION makes python3.13 mean what it says.
 define MATRIX_ROW
-  version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='test --ignore test/nodes'; \
+  version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='$(CORE_TESTS)'; \
   case $$row in \
     *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
     *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
