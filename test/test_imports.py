@@ -18,13 +18,14 @@ MAY_IMPORT = {
     'pace': {'errors'},
     'configuration': {'errors'},
     'contact': GROUND,
+    'capillary': GROUND | {'contact'},
     'estimation': GROUND | {'contact'},
     'control': GROUND | {'contact'},
     'simulation': GROUND | {'contact'},
     'regulators': GROUND | {'contact', 'estimation', 'control', 'simulation'},
 }
 MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
-MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials'}
+MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials', 'capillary'}
 MAY_IMPORT['figures'] = MAY_IMPORT['ladders'] | {'ladders'}
 MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
 MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes'}
@@ -39,9 +40,16 @@ ROS = {
 }
 # What an extra brings: imported inside the functions that need it, missing where it is not asked
 # for.
-EXTRAS = {'mujoco': 'mujoco', 'numba': 'fast', 'distributed': 'sweep', 'pyarrow': 'sweep'}
+EXTRAS = {
+    'mujoco': 'mujoco',
+    'numba': 'fast',
+    'distributed': 'sweep',
+    'pyarrow': 'sweep',
+    'meshio': 'mesh',
+}
 FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'errors': set(),
+    'capillary': NUMERICS | {'meshio'},
     'simulation': NUMERICS | {'mujoco', 'numba'},
     'regulators': NUMERICS | {'serial'},
     'trials': NUMERICS | FILES | {'distributed', 'pyarrow'},
