@@ -22,6 +22,7 @@ from ros_pad.commands import report
 from ros_pad.commands import run
 from ros_pad.commands import scenes
 from ros_pad.commands import sweep
+from ros_pad.commands import wet
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import complain
 from ros_pad.errors import ConfigError
@@ -39,6 +40,7 @@ COMMANDS = (
     contact,
     calibrate,
     design,
+    wet,
     chart,
     emulate,
 )

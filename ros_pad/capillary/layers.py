@@ -67,6 +67,7 @@ class Wet:
     status : array of str, shape (slices,)
     axis : tuple of float, x and y of the axis, m.
     top : float, height of the mesh, m.
+    floor_angle : float, rad, between floor and liquid.
     balance : str
     liquid : Liquid
     """
@@ -80,6 +81,7 @@ class Wet:
     status: npt.NDArray[np.str_]
     axis: tuple[float, float]
     top: float
+    floor_angle: float
     balance: str
     liquid: Liquid
 
@@ -132,6 +134,22 @@ class Wet:
         tension = self.liquid.surface_tension
         return float(hysteresis_force(0.5 * width, tension, advancing_angle, receding_angle))
 
+    def surface(self, count: int = 17) -> Array:
+        """Return points of the liquid's surface, shape (slices, count, 3), m, from floor to wall.
+
+        Slices without an answer are NaN.
+        """
+        _whole('count', count, 2, 1000)
+        start = math.cos(self.floor_angle)
+        last = np.arccos(np.clip(start - self.heights / self.curvature_radius, -1.0, 1.0))
+        turn = self.floor_angle + np.linspace(0.0, 1.0, count) * (last - self.floor_angle)[:, None]
+        curvature = self.curvature_radius[:, None]
+        inward = curvature * (np.sin(turn) - math.sin(self.floor_angle))
+        r, z = self.floor_radii[:, None] - inward, curvature * (start - np.cos(turn))
+        x = self.axis[0] + r * np.cos(self.azimuths)[:, None]
+        y = self.axis[1] + r * np.sin(self.azimuths)[:, None]
+        return np.stack([x, y, z], axis=2)
+
     def _across(self, direction: float | npt.ArrayLike) -> Array:
         """Return the contact line's points measured across a direction, closed, m."""
         forward = _azimuth(direction)
@@ -160,6 +178,7 @@ class WetPattern:
     void_area : float, m², between the pads at that height.
     status : str, as for :class:`Wet`.
     area : float, m², of the whole pattern.
+    pads : int, how often the mesh stands there.
     balance : str
     """
 
@@ -169,6 +188,7 @@ class WetPattern:
     void_area: float
     status: str
     area: float
+    pads: int
     balance: str
 
     @property
@@ -297,6 +317,7 @@ def _climb(
         status=status,
         axis=axis,
         top=float(z[-1]),
+        floor_angle=floor_angle,
         balance=balance,
         liquid=liquid,
     )
@@ -419,6 +440,7 @@ def _fill(
         void_area=here(void),
         status=status,
         area=float(area),
+        pads=pads,
         balance=balance,
     )
 

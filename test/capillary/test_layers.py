@@ -16,6 +16,7 @@ from ros_pad.capillary import wet
 from ros_pad.capillary import wet_pattern
 from ros_pad.capillary.layers import BALANCES
 from ros_pad.capillary.layers import STATUSES
+from ros_pad.capillary.layers import timed
 from ros_pad.capillary.mesh import _revolved
 from ros_pad.contact import WATER
 from ros_pad.contact import Liquid
@@ -386,6 +387,13 @@ def test_what_is_asked_is_checked(dome: Mesh, options, part: str):
 def test_directions_that_point_nowhere(dome: Mesh, direction):
     with pytest.raises(InvalidInput, match='direction'):
         wet(dome, WATER, slices=4).force(direction)
+
+
+@pytest.mark.realtime
+def test_a_large_mesh_takes_less_than_a_fifth_of_a_second():
+    mesh = Mesh.dome(R, B, rings=100, sectors=100)
+    assert len(mesh.faces) > 20_000
+    assert timed(mesh, WATER, layers=100, slices=36) < 0.2
 
 
 # --- Many pads ---------------------------------------------------------------------------------
