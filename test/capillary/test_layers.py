@@ -287,7 +287,7 @@ def test_any_shape_has_a_height_within_it_or_says_why_not(
         Mesh.cone(bottom, top, height, rings=10, sectors=40),
         lambda a, z: 1.0 + depth * np.cos(waves * a) + bulge * np.sin(math.pi * z),
     )
-    found = wet(mesh, liquid(degrees, tension), balance, layers=40, slices=12)
+    found = wet(mesh, liquid(degrees, tension), balance, 40, 12, axis=(0.0, 0.0))
     assert set(found.status) <= set(STATUSES)
     good = found.status == 'ok'
     for values in (found.heights, found.ring_radii, found.curvature_radius, found.pressure):
@@ -305,9 +305,11 @@ def test_any_shape_has_a_height_within_it_or_says_why_not(
 # --- Where there is no answer ------------------------------------------------------------------
 
 
+@pytest.mark.parametrize('degrees', [90.0, 95.0, 179.0])
 @pytest.mark.parametrize('balance', BALANCES)
-def test_a_wall_that_is_not_wetted_is_dry(balance: str):
-    found = wet(Mesh.cylinder(1e-3, 5e-3), liquid(95.0), balance)
+def test_a_wall_that_is_not_wetted_is_dry(balance: str, degrees: float):
+    # At 90 degrees an upright wall has a circle of infinite radius.
+    found = wet(Mesh.cylinder(1e-3, 5e-3), liquid(degrees), balance)
     assert set(found.status) == {'dry'}
     assert np.isnan(found.heights).all()
 
@@ -470,6 +472,33 @@ def test_pads_that_do_not_fit_are_refused():
         wet_pattern(mesh, WATER, area=1e-4, pads=0)
     with pytest.raises(InvalidInput, match='area = -1'):
         wet_pattern(mesh, WATER, area=-1.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    contact=st.floats(0.0, 1.4e-3),
+    cut=st.floats(0.05, 0.99),
+    room=st.floats(1.01, 30.0),
+    degrees=st.floats(0.0, 179.0),
+    tension=st.floats(1e-4, 0.5),
+    density=st.floats(1e-2, 1e4),
+    balance=st.sampled_from(BALANCES),
+)
+def test_any_pattern_has_a_height_within_it_or_says_why_not(
+    contact, cut, room, degrees, tension, density, balance
+):
+    top = cut * (math.sqrt(1.5e-3**2 - contact**2) + 1.5e-3)
+    mesh = Mesh.dome(1.5e-3, contact, top, rings=12, sectors=16)
+    area = room * math.pi * 1.5e-3**2
+    found = wet_pattern(mesh, liquid(degrees, tension, density), area, 1, balance, layers=60)
+    assert found.status in STATUSES
+    numbers = np.array([found.height, found.pressure, found.volume, found.void_area, found.force])
+    if found.status == 'ok':
+        assert np.isfinite(numbers).all()
+        assert 0.0 < found.height < mesh.height
+        assert 0.0 < found.volume < area * found.height
+    else:
+        assert np.isnan(numbers).all()
 
 
 def test_sections_of_a_body_with_a_bore():
