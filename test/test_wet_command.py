@@ -8,6 +8,7 @@ import pathlib
 import pytest
 
 from ros_pad import cli
+from ros_pad import configuration
 from ros_pad.capillary import Mesh
 from ros_pad.capillary import wet
 from ros_pad.contact import THESIS_LIQUID
@@ -29,6 +30,11 @@ def test_a_dome_in_json_is_what_python_says(capsys: pytest.CaptureFixture[str]):
     assert values['height_m'] == pytest.approx(found.mean_height)
     assert values['heights_m'] == pytest.approx(found.heights.tolist())
     assert values['force_n'] == pytest.approx(found.force(math.radians(30.0)))
+    assert values['capillary_force_n'] == abs(values['force_n'])
+    pinned = asked([*DOME, *SMALL, '--balance', 'force', '--hysteresis', '100', '60'], capsys)
+    assert pinned['capillary_force_n'] == pytest.approx(
+        found.hysteresis_force(0.0, math.radians(100.0), math.radians(60.0))
+    )
     assert values['pressure_pa'] == pytest.approx(found.pressure.mean())
     assert len(values['azimuths_deg']) == 36
 
@@ -56,9 +62,24 @@ def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
     pattern = ['wet', 'pattern', '--pads', '7', *sizes, '--height', '2.6e-3', *SMALL]
     area = str(math.sqrt(0.75) * 4.4e-3**2 * 7)
     one = [*DOME, *SMALL, '--height', '2.6e-3', '--pads', '7', '--area', area]
-    assert asked(pattern, capsys)['height_m'] == pytest.approx(
-        asked(one, capsys)['height_m'], rel=1e-6
-    )
+    all_at_once, one_by_one = asked(pattern, capsys), asked(one, capsys)
+    for name in ('height_m', 'force_n', 'capillary_force_n'):
+        assert all_at_once[name] == pytest.approx(one_by_one[name], rel=1e-6)
+    assert one_by_one['capillary_force_n'] == pytest.approx(-one_by_one['force_n'] / 7)
+
+
+def test_a_foot_takes_the_force(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    force = asked([*DOME, *SMALL, '--hysteresis', '100', '60'], capsys)['capillary_force_n']
+    shipped = configuration.locate('feet', 'large37').read_text()
+    foot = tmp_path / 'wetter.yaml'
+    foot.write_text(f'{shipped}capillary_force: {force!r}\n')
+    walk = ['run', 'hexapod_smooth_wet_dome', '--no-ros', '--no-compare', '--cycles', '1']
+    here = ['--fidelity', 'L1', '--out']
+    without = asked([*walk, *here, str(tmp_path / 'a')], capsys)
+    within = asked([*walk, *here, str(tmp_path / 'b'), '--foot', str(foot)], capsys)
+    terms = [{row['term'] for row in each['omitted']} for each in (without, within)]
+    assert terms[0] - terms[1] == {'capillary force of the pads'}
+    assert sum(within['slip_path_m']) < sum(without['slip_path_m'])
 
 
 def test_pictures(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
@@ -98,6 +119,8 @@ def test_no_answer_is_a_failure_with_advice(
         ([*DOME, '--scale', '1'], '--scale means nothing to a dome'),
         ([*DOME, '--flip'], '--flip means nothing to a dome'),
         ([*DOME, '--pads', '3'], '--pads needs --area'),
+        ([*DOME, '--area', '1', '--hysteresis', '90', '60'], '--hysteresis is for a single pad'),
+        ([*DOME, *SMALL, '--hysteresis', '60', '90'], 'advancing_angle - receding_angle'),
         ([*DOME, '--area', '1', '--slices', '4'], '--slices is for a single pad'),
         ([*DOME, '--area', '1e-6'], 'the pads overlap'),
         ([*DOME, '--tension', '0.05'], '--tension needs --angle'),

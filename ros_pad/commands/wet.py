@@ -61,7 +61,9 @@ With --area, or for a pattern, the liquid stands between many pads with a level 
 
   pressure   of the liquid over the air: below 0 it pulls
   force      pressure times projected section, a bound: what one side of the pad feels. On the
-             other side the liquid pulls back, and nothing is left of it round a symmetric pad"""
+             other side the liquid pulls back, and nothing is left of it round a symmetric pad
+  capillary force  what a scene may be given: capillary_force in the file of its foot, N for each
+             pad; the size of that bound, or with --hysteresis what the pinned line holds"""
 
 
 def add(commands: Commands) -> None:
@@ -108,6 +110,13 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--direction', type=float, default=0.0, metavar='DEG', help='of the force, degrees (0)'
     )
+    part.add_argument(
+        '--hysteresis',
+        type=float,
+        nargs=2,
+        metavar=('ADVANCING', 'RECEDING'),
+        help='contact angles, degrees: the capillary force is then what pinning holds',
+    )
     part.add_argument('--figure', metavar='FILE', help='draw the wetted mesh: .png, .pdf or .svg')
     part.add_argument('--html', metavar='FILE', help='a page with the mesh, to be turned')
     part.add_argument('--json', action='store_true', help='print one JSON object')
@@ -131,6 +140,7 @@ def run(options: argparse.Namespace) -> int:
         'density_kg_per_m3': liquid.density,
         'balance': found.balance,
         **_values(found, math.radians(options.direction)),
+        'capillary_force_n': _of_a_foot(found, options),
         'figure': options.figure,
         'html': options.html,
     }
@@ -209,6 +219,8 @@ def _round(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet:
 
 
 def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPattern:
+    if options.hysteresis is not None:
+        raise InvalidInput('--hysteresis is for a single pad, which has one contact line')
     if options.slices is not None:
         raise InvalidInput('--slices is for a single pad: between many the surface is level')
     pads, area = options.pads or 1, options.area
@@ -252,6 +264,17 @@ def _values(found: Wet | WetPattern, direction: float) -> dict[str, Any]:
         'heights_m': found.heights,
         'statuses': found.status,
     }
+
+
+def _of_a_foot(found: Wet | WetPattern, options: argparse.Namespace) -> float:
+    """Return what goes under ``capillary_force`` into the file of a foot: N for each pad."""
+    direction = math.radians(options.direction)
+    if isinstance(found, WetPattern):
+        return abs(found.force) / (options.pads or 1)
+    if options.hysteresis is None:
+        return abs(found.force(direction))
+    advancing, receding = map(math.radians, options.hysteresis)
+    return found.hysteresis_force(direction, advancing, receding)
 
 
 _UNITS = {
