@@ -32,7 +32,7 @@ MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes'}
 MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
 
 NUMERICS = {'numpy', 'scipy', 'yaml'}
-FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'tqdm'}
+FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'mpl_toolkits', 'tqdm'}  # the fourth is of the third
 ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
@@ -160,8 +160,14 @@ ROSDEP_KEY = {
     'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
     'mpmath': 'python3-sympy',
+    'mpl_toolkits': 'python3-matplotlib',
 }
-PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support', 'serial': 'pyserial'}
+PIP_NAME = {
+    'yaml': 'pyyaml',
+    'mcap_ros2': 'mcap-ros2-support',
+    'mpl_toolkits': 'matplotlib',
+    'serial': 'pyserial',
+}
 
 
 def test_what_is_imported_is_declared():
