@@ -125,6 +125,13 @@ def test_broken_meshes_are_refused(points, faces, part: str):
     assert str(error.value).startswith('changed: ')
 
 
+def test_what_files_miss_the_floor_by_is_taken_off():
+    for low in (-5e-9, 5e-9):
+        mesh = changed(CUBE_POINTS + np.array([0, 0, low]))
+        assert mesh.points[:, 2].min() == 0.0
+        assert mesh.height == pytest.approx(1e-3, rel=1e-9)
+
+
 def test_two_bodies_are_a_mesh():
     assert changed(TWO, np.concatenate([CUBE_FACES, 8 + CUBE_FACES])).volume == pytest.approx(2e-9)
 
