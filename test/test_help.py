@@ -10,7 +10,7 @@ import pytest
 from ros_pad import cli
 
 # Of what unit a number is, or that it counts or names something.
-UNITS = re.compile(r"(?<![\w.'])(Pa|kPa|N|N/m|m|m²|s|Pa s|Hz|rad)(?![\w/])")
+UNITS = re.compile(r"(?<![\w.'])(Pa|kPa|N|N/m|m|m²|kg/m³|s|Pa s|Hz|rad|degrees)(?![\w/])")
 COUNTS = re.compile(
     r'how many|number|cycles|processes|figures of these|seed|of floor and noise|factor'
 )

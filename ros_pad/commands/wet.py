@@ -51,19 +51,19 @@ _ADVICE = {
 _DESCRIPTION = """\
 How high liquid climbs a pad that stands on a wet floor, and how it pulls.
 
-MESH is a closed STL, OBJ, PLY or MSH file (pip install 'ros_pad[mesh]'), z up, the floor at
-z = 0, or one of these shapes:
+MESH is a closed STL, OBJ, PLY or MSH file (pip install 'ros_pad[mesh]'), z up, \
+the floor at z = 0, or one of these shapes:
   dome      --radius (of the sphere) --contact-radius [--height]
   cone      --contact-radius --top-radius --height
   cylinder  --radius --height
   pattern   --pads --pitch --radius --contact-radius [--height]: domes in a hexagonal layout
 With --area, or for a pattern, the liquid stands between many pads with a level surface.
 
-  pressure   of the liquid over the air: below 0 it pulls
-  force      pressure times projected section, a bound: what one side of the pad feels. On the
-             other side the liquid pulls back, and nothing is left of it round a symmetric pad
-  capillary force  what a scene may be given: capillary_force in the file of its foot, N for each
-             pad; the size of that bound, or with --hysteresis what the pinned line holds"""
+  pressure         of the liquid over the air: below 0 it pulls
+  force            pressure times projected section, a bound: what one side of the pad feels. On \
+the other side the liquid pulls back, and nothing is left of it round a symmetric pad
+  capillary force  what a scene may be given: capillary_force in the file of its foot, N for each \
+pad; the size of that bound, or with --hysteresis what the pinned line holds"""
 
 
 def add(commands: Commands) -> None:
@@ -72,10 +72,9 @@ def add(commands: Commands) -> None:
         commands,
         'wet',
         run,
-        'How high liquid climbs a pad of any shape (a mesh), its pressure and force.',
+        _DESCRIPTION,
         'pad wet dome --radius 1.55e-3 --contact-radius 0.6e-3 --figure dome.png',
     )
-    part.description = _DESCRIPTION
     part.add_argument('mesh', metavar='MESH', help=f'a file, or one of: {", ".join(SHAPES)}')
     shape = part.add_argument_group('shapes')
     shape.add_argument('--radius', type=float, metavar='M', help='of sphere or cylinder, m')
@@ -83,8 +82,12 @@ def add(commands: Commands) -> None:
     shape.add_argument('--top-radius', type=float, metavar='M', help='of a cone, m')
     shape.add_argument('--height', type=float, metavar='M', help='m (of a dome: up to its widest)')
     shape.add_argument('--pitch', type=float, metavar='M', help='of a pattern, m')
-    shape.add_argument('--rings', type=int, metavar='N', help='bands of triangles going up')
-    shape.add_argument('--sectors', type=int, metavar='N', help='triangles round the axis')
+    shape.add_argument(
+        '--rings', type=int, metavar='N', help='number of bands of triangles going up'
+    )
+    shape.add_argument(
+        '--sectors', type=int, metavar='N', help='number of triangles round the axis'
+    )
     file = part.add_argument_group('files')
     file.add_argument(
         '--scale', type=float, metavar='S', help='unit of the file in m: 1e-3 for mm (1)'
@@ -102,11 +105,18 @@ def add(commands: Commands) -> None:
     liquid.add_argument('--angle', type=float, metavar='DEG', help='of contact, degrees')
     liquid.add_argument('--density', type=float, metavar='KG/M3', help='kg/m³ (1000)')
     many = part.add_argument_group('many pads')
-    many.add_argument('--pads', type=int, metavar='N', help='how many stand on the area')
+    many.add_argument('--pads', type=int, metavar='N', help='number that stands on the area')
     many.add_argument('--area', type=float, metavar='M2', help='of all of them, m²')
-    part.add_argument('--balance', choices=BALANCES, default='energy', help='(%(default)s)')
-    part.add_argument('--layers', type=int, metavar='N', help='floor to top (100, pattern 200)')
-    part.add_argument('--slices', type=int, metavar='N', help='round the axis (36)')
+    part.add_argument(
+        '--balance',
+        choices=BALANCES,
+        default='energy',
+        help='how the height is found (%(default)s)',
+    )
+    part.add_argument(
+        '--layers', type=int, metavar='N', help='number from floor to top (100, pattern 200)'
+    )
+    part.add_argument('--slices', type=int, metavar='N', help='number round the axis (36)')
     part.add_argument(
         '--direction', type=float, default=0.0, metavar='DEG', help='of the force, degrees (0)'
     )

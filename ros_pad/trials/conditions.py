@@ -26,7 +26,7 @@ _UNITS = {
     'radius': 'm', 'adhesion_energy': 'J/m²', 'sole_radius': 'm', 'shear_strength': 'Pa',
     'conforming_pressure': 'Pa', 'critical_film': 'm', 'shear_stiffness': 'N/m',
     'chamber_volume': 'm³', 'ceiling': 'Pa', 'dome_pressure': 'Pa', 'settle': 's',
-    'pressure': 'Pa', 'ambient_pressure': 'Pa',
+    'pressure': 'Pa', 'ambient_pressure': 'Pa', 'capillary_force': 'N',
 }  # fmt: skip
 
 # What is told in a row of its own; all else of a scene goes into one row.
