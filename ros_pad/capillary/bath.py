@@ -34,7 +34,7 @@ from ros_pad.errors import NoSurface
 # No surface of a bath is higher than two capillary lengths; the wall is searched in so many steps.
 HIGHEST, STEPS = 2.0, 24
 # Relative errors of heights while searching, and at the end.
-COARSE, FINE = 1e-4, 1e-11
+COARSE, FINE = 1e-6, 1e-11
 POINTS = 400  # of a surface
 
 

@@ -28,7 +28,7 @@ def rise(wall, degrees):
     return bath_meniscus(wall=wall, liquid=unit_liquid(degrees), gravity=1.0)
 
 
-@pytest.mark.parametrize('row', DOMES, ids=lambda row: f'{row["gl"]}-{row["gs_gl"]}')
+@pytest.mark.parametrize('row', DOMES[::2], ids=lambda row: f'{row["gl"]}-{row["gs_gl"]}')
 def test_dome_of_the_reference_table(row):
     liquid = Liquid(row['gl'], row['gs_gl'] * row['gl'])
     found = bath_meniscus(1.55e-3, 0.583e-3, liquid=liquid)
@@ -109,7 +109,7 @@ def test_force_is_pull_and_suction():
     assert found.volume == pytest.approx(volume, rel=5e-3)
 
 
-@pytest.mark.parametrize('row', FIBRES[::5], ids=lambda r: f'{r["theta"]}-{r["r_over_lambda"]}')
+@pytest.mark.parametrize('row', FIBRES[::7], ids=lambda r: f'{r["theta"]}-{r["r_over_lambda"]}')
 def test_cylinder_is_a_fibre(row):
     found = rise(Wall.cylinder(row['r_over_lambda']), row['theta'])
     assert found.height == pytest.approx(row['h_over_lambda'], rel=1e-7)
