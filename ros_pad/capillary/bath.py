@@ -31,8 +31,8 @@ from ros_pad.contact.pad import quantity
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
-# No surface of a bath is higher than two capillary lengths; the wall is searched in so many steps.
-HIGHEST, STEPS = 2.0, 24
+# No surface of a bath is higher than this, in capillary lengths.
+HIGHEST = 2.0
 # Relative errors of heights while searching, and at the end.
 COARSE, FINE = 1e-6, 1e-11
 POINTS = 400  # of a surface
@@ -53,12 +53,15 @@ class Wall:
         The place where the wall ends above, over ``floor``.
     bottom : float
         The place where it ends below: below ``floor`` if the pad dips into the bath.
+    steps : int
+        In how many steps the wall is searched for where the liquid stands.
     """
 
     meridian: Callable[[float], tuple[float, float, float]]
     floor: float
     top: float
     bottom: float
+    steps: int = 8
 
     @classmethod
     def dome(cls, sphere_radius: float, contact_radius: float, height: float = math.inf) -> Wall:
@@ -158,7 +161,7 @@ class Wall:
         def meridian(height: float) -> tuple[float, float, float]:
             return float(curve(height)), height, math.atan2(1.0, float(slope(height)))
 
-        return cls(meridian, 0.0, float(z[-1]), float(z[0]))
+        return cls(meridian, 0.0, float(z[-1]), float(z[0]), steps=32)
 
 
 @dataclass(frozen=True)
@@ -282,11 +285,14 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
     def slope(place: float) -> float:
         return math.pi - wall.meridian(place)[2] - angle
 
+    start = slope(wall.floor)
+
     def excess(place: float, tolerance: float) -> float:
+        if place == wall.floor:  # the sign is that of the slope, which may be near pi here
+            return start
         radius, height, _ = wall.meridian(place)
         return _height(radius / length, slope(place), tolerance) - height / length
 
-    start = slope(wall.floor)
     if abs(start) < 1e-12:
         return wall.floor, 0.0, 'ok'
     end = wall.top if start > 0.0 else wall.bottom
@@ -294,20 +300,20 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
         return wall.floor, 0.0, 'dry'
     end = _reach(wall, end, length)
     # Closer near the floor, where a wedge holds its liquid.
-    places = wall.floor + (end - wall.floor) * (np.arange(1, STEPS + 1) / STEPS) ** 2
+    places = wall.floor + (end - wall.floor) * (np.arange(1, wall.steps + 1) / wall.steps) ** 2
     signs = [math.copysign(1.0, start)]
     signs += [math.copysign(1.0, excess(float(place), COARSE)) for place in places]
     turns = np.flatnonzero(np.diff(signs))
     if not turns.size:
         return end, _held(wall, end, length, slope(end)), 'rim'
     from scipy.optimize import brentq
+    from scipy.optimize import newton
 
     first = int(turns[0])
-    low = float(places[first - 1]) if first else wall.floor + 1e-3 * (places[0] - wall.floor)
-    high = float(places[first])
-    if excess(low, FINE) * excess(high, FINE) > 0.0:  # a root within the coarse error of a step
-        low, high = low - 1e-2 * (high - low), high + 1e-2 * (high - low)
-    place = float(brentq(excess, low, high, args=(FINE,), xtol=1e-13 * abs(end), rtol=1e-13))
+    low, high = places[first - 1] if first else wall.floor, places[first]
+    step = abs(high - low)
+    near = brentq(excess, low, high, args=(COARSE,), xtol=1e-5 * step)
+    place = float(newton(excess, near, x1=near + 1e-5 * step, args=(FINE,), tol=1e-12 * step))
     return place, slope(place), 'ok' if turns.size == 1 else 'several'
 
 
