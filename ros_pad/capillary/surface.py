@@ -65,15 +65,15 @@ class Face:
         cls, radii: npt.ArrayLike, heights: npt.ArrayLike, centre: tuple[float, float] = (0.0, 0.0)
     ) -> Face:
         """Return a face of revolution through points of its meridian, m, shape (n,)."""
-        points = np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1)
-        rail = _even(points)
+        rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
         return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
 
     @classmethod
     def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
         """Return the face of a pad that is round about its axis, from the floor to its top."""
         places = np.linspace(wall.floor, wall.top, KNOTS)
-        return cls.revolution(*np.transpose([wall.meridian(float(p))[:2] for p in places]), centre)
+        radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
+        return cls.revolution(radii, heights, centre)
 
     @classmethod
     def plane(
@@ -297,7 +297,14 @@ def minimise(
         )
     size = float(np.ptp(points[np.unique(corners)], axis=0).max())
     system = _System(
-        tension, heavy * size**2 / tension, size, pressure, volume, points, corners, tuple(lines)
+        tension=tension,
+        weight=heavy * size**2 / tension,
+        size=size,
+        volume=None if volume is None else number('volume', volume, 'm³', above=True),
+        points=points / size,
+        triangles=corners,
+        lines=tuple(lines),
+        multiplier=0.0 if pressure is None else float(pressure) * size / tension,
     )
     history = []
     for level in range(refinements + 1):
@@ -317,22 +324,12 @@ class _System:
     tension: float
     weight: float
     size: float
-    pressure: float | None
     volume: float | None
     points: Array
     triangles: Integers
     lines: tuple[Line, ...]
-    multiplier: float = 0.0
+    multiplier: float
     residual: float = math.nan
-    scaled: bool = False
-
-    def __post_init__(self) -> None:
-        if not self.scaled:
-            object.__setattr__(self, 'points', self.points / self.size)
-            object.__setattr__(self, 'scaled', True)
-            if self.pressure is not None:
-                push = self.pressure * self.size / self.tension
-                object.__setattr__(self, 'multiplier', push)
 
     def area(self) -> float:
         corners = self.points[self.triangles]
@@ -347,61 +344,35 @@ class _System:
 
         rails = _Rails(self)
         target = None if self.volume is None else self.volume / self.size**3
-        multiplier = self.multiplier
-        stiffness = 0.0 if target is None else 30.0 / max(target, 1e-3) ** (4.0 / 3.0)
-        q = rails.start
-        diagonal = rails.matrix(q, multiplier).diagonal()
-        scale = 1.0 / np.sqrt(np.maximum(abs(diagonal), 1e-6 * abs(diagonal).max()))
-        miss = math.inf
+        goal = _Goal(rails, self.multiplier, target)
         for _ in range(40):
-
-            def push(volume: float, p: float = multiplier) -> float:
-                return p if target is None else p - stiffness * (volume - target)
-
-            def value(y: Array, p: float = multiplier) -> tuple[float, Array]:
-                energy, volume, slope, volume_slope = rails.energy(scale * y)
-                over = 0.0 if target is None else volume - target
-                total = energy - p * volume + 0.5 * stiffness * over**2
-                return total, scale * (slope - push(volume, p) * volume_slope)
-
-            def product(y: Array, z: Array, p: float = multiplier) -> Array:
-                _, volume, _, volume_slope = cached(y)
-                matrix = held(y, push(volume, p))
-                along = matrix @ (scale * z)
-                along = along + stiffness * volume_slope * (volume_slope @ (scale * z))
-                return scale * along
-
-            cached, held = (
-                _last(lambda y: rails.energy(scale * y)),
-                _last(lambda y, p: rails.matrix(scale * y, p)),
-            )
             found = minimize(
-                value,
-                q / scale,
+                goal.value,
+                goal.y,
                 jac=True,
-                hessp=product,
+                hessp=goal.product,
                 method='trust-ncg',
                 options={'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1},
             )
-            q = scale * found.x
-            energy, volume, slope, volume_slope = rails.energy(q)
-            multiplier = push(volume)
-            rails.check(q)
-            miss = 0.0 if target is None else abs(volume / target - 1.0)
-            if miss < 1e-9:
+            rails.check(goal.scale * found.x)
+            goal.y = found.x
+            if goal.improve() < 1e-9:
                 break
-        residual = float(np.max(abs(scale * (slope - multiplier * volume_slope)))) ** 2
-        if miss > 1e-6 or residual > 1e-10:
+        residual, miss = float(np.max(abs(found.jac))) ** 2, goal.miss
+        if miss > 1e-6 or residual > 1e-12:
             raise NoSurface(
-                'the surface has not settled: a vertex could still gain'
-                f' {residual:.2g} of the energy, the volume is {miss:.2g} off',
+                f'the surface has not settled: a vertex could still gain {residual:.2g} of its'
+                f' energy, and the volume is off by {miss:.2g}',
                 'no_convergence',
             )
+        q = goal.scale * goal.y
         points, places = rails.positions(q)
         lines = tuple(
             replace(line, places=place) for line, place in zip(self.lines, places, strict=True)
         )
-        return replace(self, points=points, lines=lines, multiplier=multiplier, residual=residual)
+        return replace(
+            self, points=points, lines=lines, multiplier=goal.multiplier, residual=residual
+        )
 
     def averaged(self) -> _System:
         """Return the surface with inner vertices moved within it, towards their neighbours."""
@@ -420,11 +391,11 @@ class _System:
         """Return the surface with each triangle split into four."""
         edges = _edges(self.triangles)
         first = len(self.points)
-        index = {(int(a), int(b)): first + k for k, (a, b) in enumerate(edges)}
+        index = {frozenset((int(a), int(b))): first + k for k, (a, b) in enumerate(edges)}
         points = np.vstack([self.points, self.points[edges].mean(axis=1)])
         middles = np.array(
             [
-                [index[tuple(sorted((int(t[k]), int(t[k - 2]))))] for k in range(3)]
+                [index[frozenset((int(t[k]), int(t[k - 2])))] for k in range(3)]
                 for t in self.triangles
             ]
         )  # middle k is between corners k and k + 1
@@ -442,7 +413,7 @@ class _System:
             pairs = [(x, y) for x, y in rim if x in at and y in at]
             i, j = (np.array([at[pair[end]] for pair in pairs]) for end in (0, 1))
             gap = np.mod(line.azimuths[j] - line.azimuths[i] + math.pi, 2 * math.pi) - math.pi
-            new = np.array([index[tuple(sorted(pair))] for pair in pairs], dtype=np.int64)
+            new = np.array([index[frozenset(pair)] for pair in pairs], dtype=np.int64)
             lines.append(
                 replace(
                     line,
@@ -473,17 +444,51 @@ class _System:
         )
 
 
-def _last(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that remembers its last answer: Newton-CG asks often at one place."""
-    memory: list[Any] = [None, None]
+class _Goal:
+    """What is minimised: the energy, with an augmented Lagrangian where the volume is given.
 
-    def remembered(y: Array, *rest: float) -> Any:
-        key = (y.tobytes(), *rest)
-        if memory[0] != key:
-            memory[:] = key, function(y, *rest)
-        return memory[1]
+    The unknowns ``y`` are the places on the rails, scaled so that the Hessian's diagonal is 1.
+    """
 
-    return remembered
+    def __init__(self, rails: _Rails, multiplier: float, target: float | None) -> None:
+        self.rails, self.multiplier, self.target = rails, multiplier, target
+        self.stiffness = 0.0 if target is None else 30.0 / target ** (4.0 / 3.0)
+        self.miss = 0.0
+        diagonal = abs(rails.matrix(rails.start, multiplier).diagonal())
+        self.scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-6 * diagonal.max()))
+        self.y = rails.start / self.scale
+        self._at: Array | None = None
+
+    def _over(self, volume: float) -> float:
+        return 0.0 if self.target is None else volume - self.target
+
+    def value(self, y: Array) -> tuple[float, Array]:
+        """Return the value and its gradient."""
+        energy, volume, slope, volume_slope = self.rails.energy(self.scale * y)
+        over = self._over(volume)
+        value = energy - self.multiplier * volume + 0.5 * self.stiffness * over**2
+        push = self.multiplier - self.stiffness * over
+        return value, self.scale * (slope - push * volume_slope)
+
+    def product(self, y: Array, direction: Array) -> Array:
+        """Return the Hessian times a direction; Newton-CG asks often at one place."""
+        if self._at is None or not np.array_equal(self._at, y):
+            q = self.scale * y
+            _, volume, _, self._volume_slope = self.rails.energy(q)
+            push = self.multiplier - self.stiffness * self._over(volume)
+            self._matrix, self._at = self.rails.matrix(q, push), y.copy()
+        step = self.scale * direction
+        across = self.stiffness * (self._volume_slope @ step)
+        result: Array = self.scale * (self._matrix @ step + across * self._volume_slope)
+        return result
+
+    def improve(self) -> float:
+        """Improve the multiplier; return by how much the volume is off, relative."""
+        over = self._over(self.rails.energy(self.scale * self.y)[1])
+        self.multiplier -= self.stiffness * over
+        self._at = None
+        self.miss = abs(over / self.target) if self.target else 0.0
+        return self.miss
 
 
 class _Rails:
@@ -568,24 +573,19 @@ class _Rails:
         on[..., 2] += self.weight * up[:, None] * (z + total[:, None]) / 24.0
         on_volume = mean[:, None, None] * flat
         on_volume[..., 2] += up[:, None] / 6.0
-        sums = []
-        for part in (on, on_volume):
-            sums.append(
-                np.stack(
-                    [
-                        np.bincount(self.triangles.ravel(), part[..., k].ravel(), minlength=len(x))
-                        for k in range(3)
-                    ],
-                    axis=1,
-                )
-            )
         return (
             0.5 * float(length.sum()),
             float(square @ up),
             float(mean @ up),
-            sums[0],
-            sums[1],
+            self._gathered(on),
+            self._gathered(on_volume),
         )
+
+    def _gathered(self, on: Array) -> Array:
+        """Return what corners of triangles have, (t, 3, 3), summed at vertices."""
+        where, count = self.triangles.ravel(), len(self.base)
+        columns = [np.bincount(where, on[..., k].ravel(), minlength=count) for k in range(3)]
+        return np.stack(columns, axis=1)
 
     def matrix(self, q: Array, pressure: float) -> Any:
         """Return the Hessian of energy less pressure times volume, sparse."""
@@ -635,7 +635,7 @@ class _Rails:
         return coo_matrix((data, (i, j)), shape=(q.size, q.size)).tocsr()
 
     def forces(self, pressure: float) -> Array:
-        """Return the force of the liquid on each face: what it costs to move it, its line along."""
+        """Return the force of the liquid on each face, which moves with its line."""
         _, _, _, on, on_volume = self._on_vertices(self.place(self.start)[0])
         forces = []
         for rail in self.on_lines:
