@@ -55,10 +55,13 @@ class Face:
         nearly so.
     centre : array, shape (2,)
         Where the axis is, m.
+    under : bool
+        The liquid stands on this face, as on a floor; else the face is beside or above it.
     """
 
     rails: Callable[[Array], Array]
     centre: tuple[float, float] = (0.0, 0.0)
+    under: bool = False
 
     @classmethod
     def revolution(
@@ -76,10 +79,13 @@ class Face:
         return cls.revolution(radii, heights, centre)
 
     @classmethod
-    def plane(
-        cls, radius: float, height: float = 0.0, centre: tuple[float, float] = (0.0, 0.0)
-    ) -> Face:
-        """Return a level disc, wetted from its middle: a floor at height 0, or a plate above."""
+    def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return a disc of the floor, m, wetted from its middle."""
+        return replace(cls.plate(radius, 0.0, centre), under=True)
+
+    @classmethod
+    def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return the underside of a level disc, m, wetted from its middle."""
         size = number('radius', radius, 'm', above=True)
         return cls.revolution([0.0, size], [height, height], centre)
 
@@ -452,11 +458,13 @@ class _Goal:
 
     def __init__(self, rails: _Rails, multiplier: float, target: float | None) -> None:
         self.rails, self.multiplier, self.target = rails, multiplier, target
-        self.stiffness = 0.0 if target is None else 30.0 / target ** (4.0 / 3.0)
+        self.stiffness = 0.0 if target is None else 30.0 * rails.area / target**2
         self.miss = 0.0
         diagonal = abs(rails.matrix(rails.start, multiplier).diagonal())
         self.scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-6 * diagonal.max()))
-        self.y = rails.start / self.scale
+        # A surface in unstable equilibrium, a long cylinder say, has to be pushed off it.
+        push = np.random.default_rng(0).normal(size=rails.start.size)
+        self.y = (rails.start + 1e-2 * rails.shortest * push) / self.scale
         self._at: Array | None = None
 
     def _over(self, volume: float) -> float:
@@ -516,6 +524,9 @@ class _Rails:
                 total += rail.line.vertices.size
                 start.append(rail.start)
         self.start = np.concatenate(start)
+        self.area = system.area()
+        ends = system.points[_edges(self.triangles)]
+        self.shortest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
         self.first_normals = _triangle_normals(self.place(self.start)[0], self.triangles)
 
     def place(self, q: Array) -> tuple[Array, Array, Array]:
@@ -680,6 +691,7 @@ class _LineRails:
         gaps = np.diff(angles, append=angles[0] + 2.0 * math.pi)
         width = np.empty_like(gaps)
         width[order] = 0.5 * (gaps + np.roll(gaps, 1))
+        side = -1.0 if line.face.under else 1.0
         curves = line.face.rails(line.azimuths) / size
         steps = np.hypot(*np.moveaxis(np.diff(curves, axis=1), -1, 0))
         self.length = steps.sum(axis=1)
@@ -698,9 +710,9 @@ class _LineRails:
             (r, z), (rt, zt) = (np.moveaxis(along(t, k), -1, 0) for k in (0, 1))
             ra, za = (_around(value, angles, order) for value in (r, z))
             skew = np.hypot(r * np.hypot(rt, zt), rt * za - zt * ra)
-            return (
-                np.stack([skew, z * r * rt, 0.5 * z**2 * r * rt, r * rt], axis=-1) * width[:, None]
-            )
+            covered = side * r * rt
+            fields = np.stack([skew, z * covered, 0.5 * z**2 * covered, covered], axis=-1)
+            return fields * width[:, None]
 
         cells = rates(inner).reshape(KNOTS - 1, 4, -1, 4)
         sums = np.einsum('kgrf,g->krf', cells, weights) * (0.5 / (KNOTS - 1))
@@ -864,7 +876,7 @@ def bath_surface(
     vertices[rim, 2] = 0.0
     lines = [
         Line.ring(face, ring, place, liquid.angle),
-        Line.ring(Face.plane(far, centre=face.centre), rim, 1.0),
+        Line.ring(Face.floor(far, face.centre), rim, 1.0),
     ]
     return minimise(
         vertices,
