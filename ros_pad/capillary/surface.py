@@ -124,52 +124,59 @@ class Face:
         mesh : object with ``vertices`` (n, 3), m, and ``triangles`` (m, 3), or a pair of these
             The wall alone or the closed pad. Its level parts (bottom and lid) are left out.
         centre : array, shape (2,)
-            A vertical line inside every section of the pad.
+            Of a vertical line inside the pad, m.
 
         Raises
         ------
         MeshError
-            Where a half plane misses the wall, or cuts it more than once at a height.
+            Where the wall does not go once round the line, or leans over itself.
+
+        Notes
+        -----
+        The radius is interpolated between the vertices, over azimuth and height, with continuous
+        slopes (Clough and Tocher), because contact angles are taken from those.
         """
+        from scipy.interpolate import CloughTocher2DInterpolator
+
         vertices, triangles = (
             (mesh.vertices, mesh.triangles) if hasattr(mesh, 'vertices') else mesh
         )
         points = np.asarray(vertices, float) - np.append(centre, 0.0)
-        corners = points[np.asarray(triangles)]
-        level = np.ptp(corners[..., 2], axis=1) < 1e-9 * np.ptp(points)
-        walls = np.asarray(triangles)[~level]
-        edges = np.unique(np.sort(walls[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
-        ends = points[edges]
+        walls = np.asarray(triangles, dtype=np.int64)
+        size = float(np.ptp(points, axis=0).max())
+        walls = walls[np.ptp(points[walls][..., 2], axis=1) > 1e-9 * size]
+        azimuth, z = np.arctan2(points[:, 1], points[:, 0]), points[:, 2]
+        turn = azimuth[walls] - azimuth[walls[:, :1]]
+        turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+        rise = z[walls] - z[walls[:, :1]]
+        seen = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # area in the chart
+        around = abs(abs(seen.sum()) - 4.0 * math.pi * np.ptp(z[walls])) < 1e-6 * size
+        if not (around and ((seen > 0.0).all() or (seen < 0.0).all())):
+            raise MeshError(
+                'the wall of the mesh is not seen once, from the outside, on every half plane'
+                f' through the vertical line at {centre[0]:g}, {centre[1]:g} m: it is open, leans'
+                ' over itself, or does not go round that line'
+            )
+        use = np.unique(walls)
+        mean = float(np.hypot(points[use, 0], points[use, 1]).mean())
+        chart = np.column_stack([azimuth[use], z[use] / mean])
+        turns = [chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)]
+        radius = CloughTocher2DInterpolator(
+            np.concatenate(turns), np.tile(np.hypot(points[use, 0], points[use, 1]), 3)
+        )
+        low, high = float(z[use].min()), float(z[use].max())
+        inset = 1e-5 * (high - low)  # on the very rim the search for a triangle is slow
 
         def rails(azimuths: Array) -> Array:
-            return np.stack([_even(_section(ends, float(angle))) for angle in azimuths])
+            at = np.mod(azimuths + math.pi, 2.0 * math.pi) - math.pi
+            heights = np.broadcast_to(np.linspace(low, high, KNOTS), (at.size, KNOTS))
+            inside = np.clip(heights, low + inset, high - inset)
+            found = radius(np.broadcast_to(at[:, None], heights.shape), inside / mean)
+            if not np.isfinite(found).all():
+                raise MeshError('the rims of the wall are not level')
+            return np.stack([found, heights], axis=-1)
 
         return cls(rails, centre)
-
-
-def _section(ends: Array, azimuth: float) -> Array:
-    """Return radius and height where edges cross the half plane of an azimuth, upwards."""
-    across = ends[..., :2] @ np.array([-math.sin(azimuth), math.cos(azimuth)])
-    along = ends[..., :2] @ np.array([math.cos(azimuth), math.sin(azimuth)])
-    # A half-open rule: an edge that ends on the half plane is met once.
-    cut = (across[:, 0] >= 0.0) != (across[:, 1] >= 0.0)
-    share = (across[cut, 0] / (across[cut, 0] - across[cut, 1]))[:, None]
-    flat = np.stack([along[cut], ends[cut, :, 2]], axis=-1)
-    points = flat[:, 0] + share * (flat[:, 1] - flat[:, 0])
-    points = points[points[:, 0] > 0.0]
-    points = points[np.argsort(points[:, 1], kind='stable')]
-    size = np.ptp(ends)
-    keep = np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-6 * size)
-    points = points[keep]
-    if len(points) < 3:
-        raise MeshError(f'the half plane at azimuth {azimuth:g} rad misses the wall of the mesh')
-    rise, lean = np.diff(points, axis=0).T[::-1]
-    if (rise < 1e-3 * abs(lean)).any() and (rise < 1e-9 * size).any():
-        raise MeshError(
-            f'the half plane at azimuth {azimuth:g} rad cuts the wall more than once at a height:'
-            ' the pad is not star-shaped about this centre'
-        )
-    return points
 
 
 def _even(points: Array) -> Array:
