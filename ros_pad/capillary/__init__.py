@@ -4,5 +4,23 @@
 from ros_pad.capillary.bath import BathMeniscus
 from ros_pad.capillary.bath import Wall
 from ros_pad.capillary.bath import bath_meniscus
+from ros_pad.capillary.faces import Face
+from ros_pad.capillary.menisci import bath_surface
+from ros_pad.capillary.menisci import pattern_surface
+from ros_pad.capillary.menisci import spanned
+from ros_pad.capillary.surface import Line
+from ros_pad.capillary.surface import LiquidSurface
+from ros_pad.capillary.surface import minimise
 
-__all__ = ['BathMeniscus', 'Wall', 'bath_meniscus']
+__all__ = [
+    'BathMeniscus',
+    'Face',
+    'Line',
+    'LiquidSurface',
+    'Wall',
+    'bath_meniscus',
+    'bath_surface',
+    'minimise',
+    'pattern_surface',
+    'spanned',
+]

@@ -18,7 +18,6 @@ Lagrangian holds the volume, whose multiplier is the pressure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
@@ -27,168 +26,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.capillary.bath import Wall
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
+from ros_pad.capillary.faces import KNOTS
+from ros_pad.capillary.faces import Face
+from ros_pad.capillary.faces import Integers
+from ros_pad.capillary.faces import boundary_edges
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
 from ros_pad.errors import NoSurface
 
-Integers = npt.NDArray[np.int64]
-
-KNOTS = 129  # of a rail
 # A triangle this far from equilateral (1 is equilateral) is one that a neck has swallowed.
 THINNEST = 0.01
-
-
-@dataclass(frozen=True)
-class Face:
-    """A solid face round a vertical axis, star-shaped in every section across it.
-
-    Parameters
-    ----------
-    rails : callable
-        From azimuths (rad, shape (n,)) to radii and heights of the face there, m, shape
-        (n, KNOTS, 2), from where wetting begins to where the face ends, evenly in arc length or
-        nearly so.
-    centre : array, shape (2,)
-        Where the axis is, m.
-    under : bool
-        The liquid stands on this face, as on a floor; else the face is beside or above it.
-    """
-
-    rails: Callable[[Array], Array]
-    centre: tuple[float, float] = (0.0, 0.0)
-    under: bool = False
-
-    @classmethod
-    def revolution(
-        cls, radii: npt.ArrayLike, heights: npt.ArrayLike, centre: tuple[float, float] = (0.0, 0.0)
-    ) -> Face:
-        """Return a face of revolution through points of its meridian, m, shape (n,)."""
-        rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
-        return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
-
-    @classmethod
-    def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the face of a pad that is round about its axis, from the floor to its top."""
-        places = np.linspace(wall.floor, wall.top, KNOTS)
-        radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
-        return cls.revolution(radii, heights, centre)
-
-    @classmethod
-    def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return a disc of the floor, m, wetted from its middle."""
-        return replace(cls.plate(radius, 0.0, centre), under=True)
-
-    @classmethod
-    def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the underside of a level disc, m, wetted from its middle."""
-        size = number('radius', radius, 'm', above=True)
-        return cls.revolution([0.0, size], [height, height], centre)
-
-    @classmethod
-    def cell(cls, pitch: float, sides: int, height: float) -> Face:
-        """Return the walls between equal pads: with a contact angle of pi/2 they are mirrors.
-
-        Parameters
-        ----------
-        pitch : float
-            Distance of the pads' axes, m.
-        sides : int
-            4 for a square pattern, 6 for a hexagonal one.
-        height : float
-            m.
-        """
-        size = number('pitch', pitch, 'm', above=True)
-        top = number('height', height, 'm', above=True)
-        if sides not in (4, 6):
-            raise InvalidInput(f'sides = {sides!r} is not allowed: 4 or 6 is needed')
-        sector = 2.0 * math.pi / sides
-
-        def rails(azimuths: Array) -> Array:
-            off = np.mod(azimuths + 0.5 * sector, sector) - 0.5 * sector
-            up = np.broadcast_to(np.linspace(0.0, top, KNOTS), (azimuths.size, KNOTS))
-            return np.stack([0.5 * size / np.cos(off)[:, None] + 0.0 * up, up], axis=-1)
-
-        return cls(rails)
-
-    @classmethod
-    def of_mesh(cls, mesh: Any, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the wall of a meshed pad.
-
-        Parameters
-        ----------
-        mesh : object with ``vertices`` (n, 3), m, and ``triangles`` (m, 3), or a pair of these
-            The wall alone or the closed pad. Its level parts (bottom and lid) are left out.
-        centre : array, shape (2,)
-            Of a vertical line inside the pad, m.
-
-        Raises
-        ------
-        MeshError
-            Where the wall does not go once round the line, or leans over itself.
-
-        Notes
-        -----
-        The radius is interpolated between the vertices, over azimuth and height, with continuous
-        slopes (Clough and Tocher), because contact angles are taken from those.
-        """
-        from scipy.interpolate import CloughTocher2DInterpolator
-
-        vertices, triangles = (
-            (mesh.vertices, mesh.triangles) if hasattr(mesh, 'vertices') else mesh
-        )
-        points = np.asarray(vertices, float) - np.append(centre, 0.0)
-        walls = np.asarray(triangles, dtype=np.int64)
-        size = float(np.ptp(points, axis=0).max())
-        walls = walls[np.ptp(points[walls][..., 2], axis=1) > 1e-9 * size]
-        azimuth, z = np.arctan2(points[:, 1], points[:, 0]), points[:, 2]
-        turn = azimuth[walls] - azimuth[walls[:, :1]]
-        turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
-        rise = z[walls] - z[walls[:, :1]]
-        seen = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # area in the chart
-        around = abs(abs(seen.sum()) - 4.0 * math.pi * np.ptp(z[walls])) < 1e-6 * size
-        if not (around and ((seen > 0.0).all() or (seen < 0.0).all())):
-            raise MeshError(
-                'the wall of the mesh is not seen once, from the outside, on every half plane'
-                f' through the vertical line at {centre[0]:g}, {centre[1]:g} m: it is open, leans'
-                ' over itself, or does not go round that line'
-            )
-        use = np.unique(walls)
-        mean = float(np.hypot(points[use, 0], points[use, 1]).mean())
-        chart = np.column_stack([azimuth[use], z[use] / mean])
-        turns = [chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)]
-        radius = CloughTocher2DInterpolator(
-            np.concatenate(turns), np.tile(np.hypot(points[use, 0], points[use, 1]), 3)
-        )
-        low, high = float(z[use].min()), float(z[use].max())
-        inset = 1e-5 * (high - low)  # on the very rim the search for a triangle is slow
-
-        def rails(azimuths: Array) -> Array:
-            at = np.mod(azimuths + math.pi, 2.0 * math.pi) - math.pi
-            heights = np.broadcast_to(np.linspace(low, high, KNOTS), (at.size, KNOTS))
-            inside = np.clip(heights, low + inset, high - inset)
-            found = radius(np.broadcast_to(at[:, None], heights.shape), inside / mean)
-            if not np.isfinite(found).all():
-                raise MeshError('the rims of the wall are not level')
-            return np.stack([found, heights], axis=-1)
-
-        return cls(rails, centre)
-
-
-def _even(points: Array) -> Array:
-    """Return a curve through points at KNOTS places, evenly in arc length."""
-    from scipy.interpolate import Akima1DInterpolator
-
-    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-    at = np.linspace(0.0, along[-1], KNOTS)
-    if len(points) == 2:
-        return points[0] + (at / along[-1])[:, None] * (points[1] - points[0])
-    curve: Array = Akima1DInterpolator(along, points)(at)
-    return curve
 
 
 @dataclass(frozen=True)
@@ -303,7 +151,7 @@ def minimise(
         raise InvalidInput('exactly one of pressure and volume is needed')
     points, corners = np.array(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
     on_lines = np.concatenate([line.vertices for line in lines])
-    loose = np.setdiff1d(_boundary(corners), on_lines)
+    loose = np.setdiff1d(boundary_edges(corners), on_lines)
     if loose.size:
         raise InvalidInput(
             f'vertex {loose[0]} is not allowed: it is at an edge of the surface, on no line'
@@ -419,7 +267,7 @@ class _System:
                 for new in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
             ]
         )
-        rim = {(int(x), int(y)) for x, y in _boundary_edges(self.triangles)}
+        rim = {(int(x), int(y)) for x, y in boundary_edges(self.triangles)}
         lines = []
         for line in self.lines:
             at = {int(v): k for k, v in enumerate(line.vertices)}
@@ -768,50 +616,11 @@ def _around(values: Array, angles: Array, order: Integers) -> Array:
     return result
 
 
-# --- meshes -----------------------------------------------------------------------------------
-
-
-def strip(
-    first: Array, last: Array, rows: int, growth: float = 1.0
-) -> tuple[Array, Integers, Integers, Integers]:
-    """Return a surface between two rings of points, and the vertices of the rings.
-
-    Parameters
-    ----------
-    first, last : array, shape (n, 3)
-        Counterclockwise from above, m. With the gas outside or above, the first ring is the
-        upper or the inner one.
-    rows : int
-        Of triangles between the rings.
-    growth : float
-        How much longer each row is than the one before, above 0.
-    """
-    n = len(first)
-    share = np.append(0.0, np.cumsum(growth ** np.arange(rows)))
-    share /= share[-1]
-    vertices = (first + share[:, None, None] * (last - first)).reshape(-1, 3)
-    i, j = np.divmod(np.arange(rows * n), n)
-    a, b = i * n + j, i * n + (j + 1) % n
-    c, d = a + n, b + n
-    flip = (i + j) % 2 == 0  # alternate diagonals favour no direction
-    one = np.where(flip, [a, c, d], [a, c, b]).T
-    two = np.where(flip, [a, d, b], [b, c, d]).T
-    ring = np.arange(n)
-    return vertices, np.concatenate([one, two]), ring, rows * n + ring
+# --- meshes ------------------------------------------------------------------------------------
 
 
 def _edges(triangles: Integers) -> Integers:
     return np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
-
-
-def _boundary_edges(triangles: Integers) -> Integers:
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return unique[count == 1]
-
-
-def _boundary(triangles: Integers) -> Integers:
-    return np.unique(_boundary_edges(triangles))
 
 
 def _unit(vectors: Array) -> Array:
@@ -831,66 +640,3 @@ def _normals(points: Array, triangles: Integers) -> Array:
     for corner in triangles.T:
         np.add.at(total, corner, across)
     return _unit(total)
-
-
-# --- what pads need ---------------------------------------------------------------------------
-
-
-def bath_surface(
-    face: Face,
-    liquid: Liquid,
-    gravity: float = GRAVITY,
-    sectors: int = 24,
-    refinements: int = 1,
-    reach: float = 8.0,
-    place: float = 0.2,
-) -> LiquidSurface:
-    """Return the surface of a wide bath at floor level round a pad of any shape.
-
-    Parameters
-    ----------
-    face : Face
-        The wall of the pad.
-    liquid : Liquid
-        Its contact angle on the pad is ``liquid.angle``.
-    gravity : float
-        m/s², above 0.
-    sectors : int
-        Vertices round the pad before refinement, from 6.
-    refinements : int
-        Each halves the triangles.
-    reach : float
-        In capillary lengths: at this distance from the pad the surface is held level. The error
-        is ``exp(-2 reach)``.
-    place : float
-        Where on the face the search begins, from 0 to 1.
-    """
-    heavy = liquid.density * number('gravity', gravity, 'm/s²', above=True)
-    length = math.sqrt(liquid.surface_tension / heavy)
-    azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
-    outwards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
-    rails = face.rails(azimuths)
-    inner = rails[:, round(place * (KNOTS - 1))]
-    far = float(inner[:, 0].max()) + reach * length
-    start = np.column_stack([inner[:, :1] * outwards + face.centre, inner[:, 1]])
-    edge = np.column_stack([far * outwards + face.centre, np.zeros(sectors)])
-    growth, rows = 1.0 + 2.0 * math.pi / sectors, 1
-    first = 2.0 * math.pi * float(inner[:, 0].mean()) / sectors
-    rows = math.ceil(math.log1p((growth - 1.0) * reach * length / first) / math.log(growth))
-    vertices, triangles, ring, rim = strip(start, edge, rows, growth)
-    away = np.hypot(*(vertices[:, :2] - face.centre).T) - np.tile(inner[:, 0], rows + 1)
-    vertices[:, 2] = np.tile(inner[:, 1], rows + 1) * np.exp(-away / length)
-    vertices[rim, 2] = 0.0
-    lines = [
-        Line.ring(face, ring, place, liquid.angle),
-        Line.ring(Face.floor(far, face.centre), rim, 1.0),
-    ]
-    return minimise(
-        vertices,
-        triangles,
-        lines,
-        liquid.surface_tension,
-        heavy,
-        pressure=0.0,
-        refinements=refinements,
-    )
