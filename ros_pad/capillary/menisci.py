@@ -103,6 +103,7 @@ def bath_surface(
     heavy = liquid.density * number('gravity', gravity, 'm/s²', above=True)
     length = math.sqrt(liquid.surface_tension / heavy)
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
+    number('place', place, '(share of the rail)', high=1.0)
     inner = face.rails(azimuths)[:, round(place * (KNOTS - 1))]
     span = reach * length
     far = float(inner[:, 0].max()) + span
@@ -170,6 +171,9 @@ def pattern_surface(
         Where on the face the search begins, from 0 to 1.
     """
     heavy = liquid.density * number('gravity', gravity, 'm/s²')
+    number('place', place, '(share of the rail)', high=1.0)
+    if sides not in (4, 6):
+        raise InvalidInput(f'sides = {sides!r} is not allowed: 4 or 6 is needed')
     if sectors % (2 * sides):
         raise InvalidInput(
             f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} has vertices in the'

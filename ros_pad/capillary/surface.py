@@ -503,13 +503,37 @@ class _Rails:
     def forces(self, pressure: float) -> Array:
         """Return the force of the liquid on each face, which moves with its line."""
         _, _, _, on, on_volume = self._on_vertices(self.place(self.start)[0])
+        cost_of_vertices = on - pressure * on_volume
         forces = []
-        for rail in self.on_lines:
-            cost = (on - pressure * on_volume)[rail.line.vertices].sum(axis=0)
+        for rail, share in zip(self.on_lines, self._shares(), strict=True):
+            cost = share @ cost_of_vertices
             _, under, _, covered = rail.integrals(rail.of(self.start))
             cost[2] += self.weight * under[0].sum() - pressure * covered[0].sum()
             forces.append(-cost)
         return np.array(forces)
+
+    def _shares(self) -> list[Array]:
+        """Return how far each vertex goes with each line: harmonic on the graph of the edges.
+
+        Of a surface in equilibrium any way to go along costs the same. One that is spread over
+        the surface averages what meshes leave unbalanced along it, and the forces on all faces
+        add up to the weight.
+        """
+        from scipy.sparse import coo_matrix
+        from scipy.sparse import diags
+        from scipy.sparse.linalg import factorized
+
+        count, edges = len(self.base), _edges(self.triangles)
+        i, j = np.concatenate([edges, edges[:, ::-1]]).T
+        near = coo_matrix((np.ones(i.size), (i, j)), shape=(count, count)).tocsr()
+        laplace = (diags(np.asarray(near.sum(axis=1)).ravel()) - near).tocsc()
+        shares = [np.zeros(count) for _ in self.on_lines]
+        solve = factorized(laplace[self.free][:, self.free]) if self.free.size else None
+        for share, rail in zip(shares, self.on_lines, strict=True):
+            share[rail.line.vertices] = 1.0
+            if solve:
+                share[self.free] = solve(-(laplace @ share)[self.free])
+        return shares
 
     def check(self, q: Array) -> None:
         """Refuse a surface that has pinched off, turned over, or left a face."""
@@ -547,6 +571,9 @@ class _LineRails:
         width = np.empty_like(gaps)
         width[order] = 0.5 * (gaps + np.roll(gaps, 1))
         side = -1.0 if line.face.under else 1.0
+        # Between its vertices the line is straight; the face has the same corners, so that its
+        # areas fit those of the surface. Else, near complete wetting, films would spread for ever.
+        chord, apothem = np.sinc(0.5 * width / math.pi), np.cos(0.5 * width)
         curves = line.face.rails(line.azimuths) / size
         steps = np.hypot(*np.moveaxis(np.diff(curves, axis=1), -1, 0))
         self.length = steps.sum(axis=1)
@@ -564,8 +591,8 @@ class _LineRails:
             """Wet area, volume, moment and covered floor per rail and unit of t: (t, rail, 4)."""
             (r, z), (rt, zt) = (np.moveaxis(along(t, k), -1, 0) for k in (0, 1))
             ra, za = (_around(value, angles, order) for value in (r, z))
-            skew = np.hypot(r * np.hypot(rt, zt), rt * za - zt * ra)
-            covered = side * r * rt
+            skew = chord * np.hypot(r * np.hypot(apothem * rt, zt), rt * za - zt * ra)
+            covered = side * chord * apothem * r * rt
             fields = np.stack([skew, z * covered, 0.5 * z**2 * covered, covered], axis=-1)
             return fields * width[:, None]
 

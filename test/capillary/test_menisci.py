@@ -50,7 +50,7 @@ def test_bath_round_a_dome_is_the_exact_one_to_second_order(degrees):
     exact = bath_meniscus(SPHERE, REST, liquid=water(degrees))
     errors = []
     for refinements in (0, 1, 2):
-        found = bath_surface(DOME, water(degrees), sectors=16, refinements=refinements)
+        found = bath_surface(DOME, water(degrees), refinements=refinements)
         errors.append(abs(line_heights(found).mean() / exact.height - 1.0))
     assert errors[2] < 1e-3
     assert errors[0] / errors[1] > 3.0 and errors[1] / errors[2] > 3.0
@@ -75,7 +75,8 @@ def test_bath_round_an_oval_pad():
     assert found.forces[0, :2] == pytest.approx([0.0, 0.0], abs=1e-5 * abs(found.forces[0, 2]))
     heights, x = line_heights(found), abs(found.vertices[found.lines[0].vertices, 0])
     # It stands lower at the sharp ends.
-    assert heights[np.argmax(x)] == heights.min() < 0.98 * heights.max()
+    assert heights[np.argmax(x)] < 0.98 * heights.max()
+    assert heights[np.argmax(x)] == pytest.approx(heights.min(), rel=1e-6)
 
 
 @pytest.mark.parametrize(('pitch', 'sides'), [(3.4e-3, 4), (3.4e-3, 6), (6e-3, 6)])
@@ -112,7 +113,7 @@ def test_meshes_that_are_no_wall():
     for wrong in (triangles[3:], triangles[::2], triangles[triangles.max(axis=1) < 400][5:]):
         with pytest.raises(MeshError, match='wall of the mesh'):
             Face.of_mesh((vertices, wrong))
-    with pytest.raises(MeshError, match='0.003, 0 m'):
+    with pytest.raises(MeshError, match=r'0\.003, 0 m'):
         Face.of_mesh((vertices, triangles), centre=(3e-3, 0.0))
     flipped = np.concatenate([triangles[:1, ::-1], triangles[1:]])
     with pytest.raises(MeshError, match='leans over itself'):

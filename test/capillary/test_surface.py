@@ -77,17 +77,17 @@ def test_no_catenoid_beyond_the_critical_distance(half):
     assert refusal.value.status == 'collapsed'
 
 
-@pytest.mark.parametrize('height', [1.0, 3.0, 5.0])
+@pytest.mark.parametrize('height', [2.0, 5.0])
 def test_lateral_stiffness_of_a_cylinder(height):
     found = between_discs(
-        height, 0.01, rows=max(4, int(2 * height)), volume=math.pi * height, refinements=1
+        height, 0.01, 32, int(4 * height), volume=math.pi * height, refinements=1
     )
     side, _, up = found.forces[0]
     assert side == pytest.approx(-0.01 * math.pi / height, rel=2e-3)
     # Its tension pulls the discs together with twice what its pressure pushes.
     assert up == pytest.approx(-math.pi, rel=1e-2)
     assert found.pressure == pytest.approx(1.0, rel=6e-3)
-    assert found.forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-5)
+    assert found.forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-6)
     assert found.volume == pytest.approx(math.pi * height, rel=1e-8)
 
 
@@ -108,11 +108,11 @@ def test_bridge_between_sphere_and_plane(row):
     phi = np.linspace(0.0, 3.0, 300)
     sphere, floor = Face.revolution(np.sin(phi), 1.0 - np.cos(phi)), Face.floor(2.0)
     start = spanned(
-        sphere, floor, (beta / 3.0, row['r0'] / 2.0), (theta, theta), sectors=48, rows=8
+        sphere, floor, (beta / 3.0, row['r0'] / 2.0), (theta, theta), sectors=24, rows=6
     )
-    found = minimise(*start, surface_tension=1.0, volume=row['V_over_R3'])
+    found = minimise(*start, surface_tension=1.0, volume=row['V_over_R3'], refinements=2)
     assert found.forces[0, 2] == pytest.approx(-4 * math.pi * row['F_over_4piRg'], rel=2e-3)
-    assert found.forces[1, 2] == pytest.approx(-found.forces[0, 2], rel=1e-3)
+    assert found.forces[1, 2] == pytest.approx(-found.forces[0, 2], rel=1e-6)
     assert found.pressure == pytest.approx(row['dpR_over_gamma'], rel=5e-3)
     assert 3.0 * found.lines[0].places == pytest.approx(beta, rel=4e-3)
 
@@ -133,7 +133,7 @@ def drop_by_ode(apex_curvature, theta):
     return end[2], end[1], end[0]
 
 
-@pytest.mark.parametrize('degrees', [50, 110])
+@pytest.mark.parametrize('degrees', [80, 110])
 def test_drop_on_the_floor(degrees):
     theta = math.radians(degrees)
     volume, height, radius = drop_by_ode(1.0, theta)
@@ -144,7 +144,7 @@ def test_drop_on_the_floor(degrees):
     triangles = np.column_stack([ring, (ring + 1) % 6, np.full(6, 6)])
     line = Line.ring(Face.floor(4.0), ring, radius / 4.0, theta)
     found = minimise(vertices, triangles, [line], 1.0, 1.0, volume=volume, refinements=4)
-    assert found.vertices[:, 2].max() == pytest.approx(height, rel=2e-3)
+    assert found.vertices[:, 2].max() == pytest.approx(height, rel=3e-3)
     assert 4.0 * found.lines[0].places == pytest.approx(radius, rel=4e-3)
     assert found.pressure == pytest.approx(2.0 + height, rel=4e-3)
     # The floor carries the weight.
