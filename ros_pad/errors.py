@@ -43,8 +43,8 @@ class NoSurface(PadError):
     Attributes
     ----------
     status : str
-        ``blocked`` (the surface would run through the wall), ``collapsed`` (it pinches off) or
-        ``no_convergence``.
+        ``blocked`` (the surface would run through the wall), ``collapsed`` (it pinches off),
+        ``rim`` (it reaches the rim of the pad) or ``no_convergence``.
     """
 
     def __init__(self, message: str, status: str) -> None:

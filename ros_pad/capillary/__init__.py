@@ -4,6 +4,8 @@
 from ros_pad.capillary.bath import BathMeniscus
 from ros_pad.capillary.bath import Wall
 from ros_pad.capillary.bath import bath_meniscus
+from ros_pad.capillary.coupling import WetPad
+from ros_pad.capillary.coupling import press_wet
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.menisci import bath_surface
 from ros_pad.capillary.menisci import pattern_surface
@@ -18,9 +20,11 @@ __all__ = [
     'Line',
     'LiquidSurface',
     'Wall',
+    'WetPad',
     'bath_meniscus',
     'bath_surface',
     'minimise',
     'pattern_surface',
+    'press_wet',
     'spanned',
 ]

@@ -291,7 +291,7 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
         if place == wall.floor:  # the sign is that of the slope, which may be near pi here
             return start
         radius, height, _ = wall.meridian(place)
-        return _height(radius / length, slope(place), tolerance) - height / length
+        return bath_height(radius / length, slope(place), tolerance) - height / length
 
     if abs(start) < 1e-12:
         return wall.floor, 0.0, 'ok'
@@ -331,7 +331,7 @@ def solid_volume(wall: Wall, place: float) -> float:
     return total
 
 
-def _height(radius: float, slope: float, tolerance: float) -> float:
+def bath_height(radius: float, slope: float, tolerance: float = FINE) -> float:
     """Return the height of the surface at a radius and slope, in capillary lengths."""
     return float(_surface(radius, slope, tolerance)[2, -1]) if slope else 0.0
 
@@ -362,7 +362,7 @@ def _held(wall: Wall, end: float, length: float, most: float) -> float:
     radius, height, _ = wall.meridian(end)
     return float(
         brentq(
-            lambda slope: _height(radius / length, slope, FINE) - height / length,
+            lambda slope: bath_height(radius / length, slope, FINE) - height / length,
             1e-9 * most,
             most,
             xtol=1e-12,
