@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
+from ros_pad.capillary.bath import BathMeniscus
+from ros_pad.capillary.bath import Wall
+from ros_pad.capillary.bath import bath_meniscus
 from ros_pad.capillary.faces import KNOTS
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.faces import Integers
@@ -18,6 +22,7 @@ from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoSurface
 
 
 def spanned(
@@ -78,7 +83,6 @@ def bath_surface(
     sectors: int = 24,
     refinements: int = 1,
     reach: float = 8.0,
-    place: float = 0.2,
 ) -> LiquidSurface:
     """Return the surface of a wide bath at floor level round a pad of any shape.
 
@@ -95,21 +99,33 @@ def bath_surface(
     refinements : int
         Each halves the triangles.
     reach : float
-        In capillary lengths: at this distance from the pad the surface is held level. The error
-        is ``exp(-2 reach)``.
-    place : float
-        Where on the face the search begins, from 0 to 1.
+        In capillary lengths, above 0: at this distance from the pad the surface is held level.
+        The error is ``exp(-2 reach)``.
+
+    Raises
+    ------
+    NoSurface
+        ``rim`` where the liquid stays below the floor or reaches the top of the face, and as
+        :func:`minimise` does.
+
+    Notes
+    -----
+    The search begins with the exact meniscus of the pad with the same radius, on average, at each
+    height.
     """
-    heavy = liquid.density * number('gravity', gravity, 'm/s²', above=True)
-    length = math.sqrt(liquid.surface_tension / heavy)
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
-    number('place', place, '(share of the rail)', high=1.0)
-    inner = face.rails(azimuths)[:, round(place * (KNOTS - 1))]
-    span = reach * length
-    far = float(inner[:, 0].max()) + span
-    # Triangles grow outwards in proportion to their distance from the axis.
+    rails = face.rails(azimuths)
+    mean = rails.mean(axis=0)
+    bath = _round_bath(mean, liquid, gravity)
+    place = float(np.interp(bath.height, mean[:, 1], np.linspace(0.0, 1.0, KNOTS)))
+    heavy = liquid.density * gravity
+    length = math.sqrt(liquid.surface_tension / heavy)
+    span = number('reach', reach, '(capillary lengths)', above=True) * length
+    far = float(rails[..., 0].max()) + span
+    # Triangles are as long as wide, or as the surface's curvature needs, and grow outwards.
     step = 2.0 * math.pi / sectors
-    rows = math.ceil(math.log1p(span / float(inner[:, 0].mean())) / math.log1p(step))
+    first = step * min(bath.radius, length)
+    rows = math.ceil(math.log1p(step * span / first) / math.log1p(step))
     vertices, triangles, lines = spanned(
         face,
         Face.floor(far, face.centre),
@@ -119,8 +135,18 @@ def bath_surface(
         rows,
         1.0 + step,
     )
-    away = np.hypot(*(vertices[:, :2] - face.centre).T) - np.tile(inner[:, 0], rows + 1)
-    vertices[:, 2] = np.tile(inner[:, 1], rows + 1) * np.exp(-away / length)
+    along = np.append(0.0, np.cumsum(np.hypot(np.diff(bath.radii), np.diff(bath.heights))))
+    share = np.linalg.norm(
+        (vertices - vertices[:sectors].mean(axis=0)).reshape(-1, sectors, 3), axis=2
+    )
+    share = (share - share[0]).mean(axis=1)
+    radii = np.interp(share, along, bath.radii) - bath.radius
+    heights = np.interp(share, along, bath.heights)
+    line = np.hypot(*(vertices[:sectors, :2] - face.centre).T)
+    outwards = (vertices[:sectors, :2] - face.centre) / line[:, None]
+    grid = (line + radii[:, None])[..., None] * outwards + face.centre
+    vertices[:, :2] = grid.reshape(-1, 2)
+    vertices[:, 2] = np.repeat(heights, sectors)
     return minimise(
         vertices,
         triangles,
@@ -142,7 +168,6 @@ def pattern_surface(
     gravity: float = GRAVITY,
     sectors: int = 24,
     refinements: int = 1,
-    place: float = 0.3,
 ) -> LiquidSurface:
     """Return the surface of the liquid round one of many equal pads.
 
@@ -167,33 +192,35 @@ def pattern_surface(
         Vertices round the pad before refinement, a multiple of twice the sides.
     refinements : int
         Each halves the triangles.
-    place : float
-        Where on the face the search begins, from 0 to 1.
+
+    Raises
+    ------
+    NoSurface
+        As :func:`minimise` does.
     """
     heavy = liquid.density * number('gravity', gravity, 'm/s²')
-    number('place', place, '(share of the rail)', high=1.0)
-    if sides not in (4, 6):
-        raise InvalidInput(f'sides = {sides!r} is not allowed: 4 or 6 is needed')
+    cell = Face.cell(pitch, sides, 1.0)
     if sectors % (2 * sides):
         raise InvalidInput(
             f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} has vertices in the'
             ' corners of the cell'
         )
-    azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
-    rails = face.rails(azimuths)
-    if 2.0 * rails[..., 0].max() >= number('pitch', pitch, 'm', above=True):
+    rails = face.rails(np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False))
+    widest = 2.0 * float(rails[..., 0].max())
+    if widest >= pitch:
         raise InvalidInput(
-            f'pitch = {pitch:g} m is not allowed: above {2.0 * rails[..., 0].max():g} m, where the'
-            ' pads do not touch'
+            f'pitch = {pitch:g} m is not allowed: above {widest:g} m, where the pads do not touch'
         )
+    mean = rails.mean(axis=0)
+    place = _film_place(mean, liquid, cell, volume, gravity)
+    radius, level = mean[round(place * (KNOTS - 1))]
     top = float(rails[..., 1].max())
-    level = float(rails[:, round(place * (KNOTS - 1)), 1].mean())
-    inner = float(rails[:, round(place * (KNOTS - 1)), 0].mean())
-    rows = max(2, round((0.55 * pitch - inner) / (inner + 0.55 * pitch) * sectors / math.pi))
+    middle = 0.55 * pitch
+    rows = max(2, round((middle - radius) / (middle + radius) * sectors / math.pi))
     vertices, triangles, lines = spanned(
         face,
         Face.cell(pitch, sides, top),
-        (place, level / top),
+        (place, float(level) / top),
         (liquid.angle, 0.5 * math.pi),
         sectors,
         rows,
@@ -208,3 +235,36 @@ def pattern_surface(
         volume=volume,
         refinements=refinements,
     )
+
+
+def _round_bath(mean: Array, liquid: Liquid, gravity: float) -> BathMeniscus:
+    """Return the meniscus round the pad with this meridian."""
+    wall = dataclasses.replace(Wall.through(*mean.T), steps=12)  # a start need not be sure
+    found = bath_meniscus(wall=wall, liquid=liquid, gravity=gravity)
+    if found.status in ('dry', 'rim'):
+        raise NoSurface(
+            'the liquid stays below the floor'
+            if found.status == 'dry'
+            else 'the liquid reaches the top of the face',
+            'rim',
+        )
+    return found
+
+
+def _film_place(
+    mean: Array, liquid: Liquid, cell: Face, volume: float | None, gravity: float
+) -> float:
+    """Return about where on the rail the liquid of a pattern stands, from 0 to 1."""
+    places = np.linspace(0.0, 1.0, KNOTS)
+    radii, heights = mean.T
+    if volume is not None:
+        corners = cell.rails(np.linspace(0.0, 2.0 * math.pi, 720, endpoint=False))[:, 0, 0]
+        free = math.pi * (np.mean(corners**2) - radii**2)
+        filled = np.cumsum(0.5 * (free[1:] + free[:-1]) * np.diff(heights))
+        return float(np.clip(np.interp(volume, np.append(0.0, filled), places), 0.02, 0.98))
+    # Between the level film of pads close by and the meniscus of one alone.
+    lean = np.arctan2(np.gradient(heights), np.gradient(radii))
+    level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
+    if gravity > 0.0:
+        level = 0.5 * (level + _round_bath(mean, liquid, gravity).height)
+    return float(np.clip(np.interp(level, heights, places), 0.02, 0.98))
