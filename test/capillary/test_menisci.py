@@ -69,8 +69,16 @@ def test_bath_round_a_meshed_dome():
     azimuths = np.linspace(0.0, 6.0, 7)
     closed = Face.of_mesh(dome_mesh(40, 80, lid=True))  # bottom and lid are no wall
     assert np.array_equal(closed.rails(azimuths), face.rails(azimuths))
-    phi = np.arccos(math.cos(START) - face.rails(azimuths)[..., 1] / SPHERE)
-    assert face.rails(azimuths)[..., 0] == pytest.approx(SPHERE * np.sin(phi), rel=2e-3)
+
+
+def test_radii_of_a_meshed_dome_are_second_order():
+    errors = []
+    for layers in (20, 40, 80):
+        rails = Face.of_mesh(dome_mesh(layers, 2 * layers)).rails(np.linspace(0.0, 6.0, 7))
+        phi = np.arccos(math.cos(START) - rails[..., 1] / SPHERE)
+        errors.append(np.max(abs(rails[..., 0] / (SPHERE * np.sin(phi)) - 1.0)))
+    assert errors[2] < 1e-3
+    assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
 
 
 def test_bath_round_an_oval_pad():
