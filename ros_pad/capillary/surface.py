@@ -149,7 +149,16 @@ def minimise(
     heavy = number('weight', weight, 'N/m³')
     if (pressure is None) == (volume is None):
         raise InvalidInput('exactly one of pressure and volume is needed')
+    push = 0.0 if pressure is None else number('pressure', pressure, 'Pa', low=-math.inf)
+    if not isinstance(refinements, int) or refinements < 0:
+        raise InvalidInput(f'refinements = {refinements!r} is not allowed: an integer from 0')
     points, corners = np.array(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InvalidInput(f'vertices of shape {points.shape} are not allowed: finite (n, 3), m')
+    if corners.ndim != 2 or corners.shape[1] != 3 or not np.all(corners < len(points)):
+        raise InvalidInput(f'triangles of shape {corners.shape} are not allowed: (m, 3) vertices')
+    if not lines:
+        raise InvalidInput('lines are not allowed to be none: the surface ends on at least one')
     on_lines = np.concatenate([line.vertices for line in lines])
     loose = np.setdiff1d(boundary_edges(corners), on_lines)
     if loose.size:
@@ -165,7 +174,7 @@ def minimise(
         points=points / size,
         triangles=corners,
         lines=tuple(lines),
-        multiplier=0.0 if pressure is None else float(pressure) * size / tension,
+        multiplier=push * size / tension,
     )
     history = []
     for level in range(refinements + 1):
@@ -199,6 +208,7 @@ class _System:
 
     # --- relaxing -------------------------------------------------------------------------
 
+    @np.errstate(over='ignore', invalid='ignore')
     def relaxed(self) -> _System:
         """Return the minimum on the present rails."""
         from scipy.optimize import minimize
@@ -207,14 +217,17 @@ class _System:
         target = None if self.volume is None else self.volume / self.size**3
         goal = _Goal(rails, self.multiplier, target)
         for _ in range(40):
-            found = minimize(
-                goal.value,
-                goal.y,
-                jac=True,
-                hessp=goal.product,
-                method='trust-ncg',
-                options={'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1},
-            )
+            try:
+                found = minimize(
+                    goal.value,
+                    goal.y,
+                    jac=True,
+                    hessp=goal.product,
+                    method='trust-ncg',
+                    options={'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1},
+                )
+            except ValueError as error:  # triangles without area have no finite Hessian
+                raise NoSurface(f'the surface collapses: {error}', 'collapsed') from error
             rails.check(goal.scale * found.x)
             goal.y = found.x
             if goal.improve() < 1e-9:

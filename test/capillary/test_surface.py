@@ -159,12 +159,27 @@ def test_drop_on_the_floor(degrees):
         ({'volume': -1.0}, 'volume'),
         ({'pressure': 0.0}, 'pressure and volume'),
         ({'volume': None}, 'pressure and volume'),
+        ({'volume': None, 'pressure': math.nan}, 'pressure'),
+        ({'refinements': 1.5}, 'refinements'),
+        ({'vertices': np.zeros((4, 2))}, 'vertices'),
+        ({'triangles': np.full((4, 3), 999)}, 'triangles'),
+        ({'lines': ()}, 'lines'),
     ],
 )
 def test_bad_input(change, name):
     start = spanned(Face.plate(1.0, 1.0), Face.floor(1.0), (1.0, 1.0), (None, None))
+    asked = dict(zip(('vertices', 'triangles', 'lines'), start, strict=True))
     with pytest.raises(InvalidInput, match=name):
-        minimise(*start, **{'surface_tension': 1.0, 'volume': 3.0, **change})
+        minimise(**{**asked, 'surface_tension': 1.0, 'volume': 3.0, **change})
+
+
+def test_triangles_without_area_are_refused():
+    vertices, triangles, lines = spanned(
+        Face.plate(1.0, 1.0), Face.floor(1.0), (1.0, 1.0), (None, None)
+    )
+    vertices[30:40] = vertices[30]
+    with pytest.raises(NoSurface):
+        minimise(vertices, triangles, lines, 1.0, pressure=0.0)
 
 
 def test_an_edge_on_no_line_is_refused():
