@@ -102,8 +102,10 @@ class Face:
 
         Parameters
         ----------
-        mesh : object with ``vertices`` (n, 3), m, and ``triangles`` (m, 3), or a pair of these
-            The wall alone or the closed pad. Its level parts (bottom and lid) are left out.
+        mesh : Mesh, or pair of arrays
+            Points (n, 3), m, and triangles (m, 3); an object may call them ``points`` and
+            ``faces``, or ``vertices`` and ``triangles``. The wall alone or the closed pad: level
+            parts (bottom and lid) are left out.
         centre : array, shape (2,)
             Of a vertical line inside the pad, m.
 
@@ -118,9 +120,12 @@ class Face:
         quadratics: contact angles are taken from slopes, which facets do not have. Edges of the
         pad are rounded by about two triangles.
         """
-        vertices, triangles = (
-            (mesh.vertices, mesh.triangles) if hasattr(mesh, 'vertices') else mesh
-        )
+        if hasattr(mesh, 'points'):
+            vertices, triangles = mesh.points, mesh.faces
+        elif hasattr(mesh, 'vertices'):
+            vertices, triangles = mesh.vertices, mesh.triangles
+        else:
+            vertices, triangles = mesh
         points = np.asarray(vertices, float) - np.append(centre, 0.0)
         walls = np.asarray(triangles, dtype=np.int64)
         size = float(np.ptp(points, axis=0).max())
@@ -142,8 +147,11 @@ class Face:
         if np.minimum(rim - low, high - rim).max() > 1e-6 * size:
             raise MeshError('the wall of the mesh ends at other heights than its foot and its top')
         use = np.unique(walls)
+        if use.size < 12:
+            raise MeshError(f'the wall of the mesh has {use.size} vertices: from 12 are needed')
         radii = np.hypot(points[use, 0], points[use, 1])
-        scale = float(radii.mean())
+        # Rows and columns of vertices are equally near, however long the triangles are.
+        scale = float(np.mean(abs(rise)) / np.mean(abs(turn)))
         chart = np.column_stack([azimuth[use], z[use] / scale])
         turns = np.concatenate([chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)])
 
