@@ -18,12 +18,12 @@ that the bath stands as high as the contact line. Adhesion is left out, as in th
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
@@ -118,7 +118,7 @@ def press_wet(
     )
     pressed = press(pad, p, load, model='membrane')
     size = pad.radius
-    dry = _dry(case, float(pressed.contact_radius) / size, float(pressed.sphere_radius) / size)
+    dry = _dry(case, float(pressed.contact_radius) / size, float(pressed.gap) / size)
     rigid_wall = _meridian(case, dry[0], dry[2], dry[1], 0.0)
     place, slope, status = contact(_as_wall(rigid_wall), case.angle, case.length)
     if status == 'dry':
@@ -156,8 +156,9 @@ class _Case(NamedTuple):
         return self.tension * math.cos(self.angle)
 
 
-# Radius, height, inclination, area of the wall and volume inside it, over arc length.
-Meridian = Callable[[Any], Any]
+# SciPy's OdeSolution: radius, height, inclination, area of the wall and volume inside it, over
+# arc length.
+Meridian: TypeAlias = Any
 
 
 def _rates(s: float, state: Array, push: float, weight: float, tension: float) -> list[float]:
@@ -224,21 +225,21 @@ def _as_wall(meridian: Any) -> Wall:
     return Wall(at, 0.0, float(meridian.t_max), 0.0)
 
 
-def _dry(case: _Case, b: float, sphere: float) -> tuple[float, float, float]:
+def _dry(case: _Case, b: float, gap: float) -> tuple[float, float, float]:
     """Return contact radius, tension and length of the wall without liquid."""
 
-    def misfit(x: Array) -> list[float]:
-        end = _meridian(case, b, x[1], x[0], 0.0)(x[1])
-        return [end[0] - 1.0, x[0] - _tension(end[3])]
+    def misfit(logs: Array) -> list[float]:
+        tension, length = np.exp(np.minimum(logs, 5.0))
+        path = _meridian(case, b, length, tension, 0.0)
+        end = path(min(length, path.t_max))
+        return [end[0] - 1.0 + length - min(length, path.t_max), tension - _tension(end[3])]
 
-    # Near the sphere through rim and edge of the disc, which ends below or above its equator.
-    rise = math.asin(min(1.0, 1.0 / sphere))
-    for turn in (math.pi - rise, rise):
-        guess = 0.5 * case.pressure * sphere, sphere * (turn - math.asin(b / sphere))
-        with contextlib.suppress(NoSurface):
-            tension, length = _root(misfit, guess, 'the dry pad')
-            return b, tension, length
-    raise NoSurface('the dry pad has not settled', 'no_convergence')
+    # Near the arc that leaves the floor at a tangent.
+    turn = 2.0 * math.atan2(gap, 1.0 - b)
+    length = turn / math.sin(turn) * (1.0 - b)
+    tension = case.pressure * (1.0 - b * b) / (2.0 * math.sin(turn))
+    tension, length = np.exp(_root(misfit, np.log([tension, length]), 'the dry pad'))
+    return b, float(tension), float(length)
 
 
 def _tension(area: float) -> float:
