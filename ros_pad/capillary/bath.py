@@ -228,7 +228,7 @@ def bath_meniscus(
     --------
     >>> from ros_pad.contact import WATER
     >>> round(1e3 * bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER).height, 3)
-    1.128
+    0.889
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
