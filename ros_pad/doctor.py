@@ -42,6 +42,7 @@ EXTRAS = {
     'numba': ('fast', 'compiled L1; without it L1 is ten times slower, and the same to the bit'),
     'distributed': ('sweep', 'sweeps on a Dask cluster'),
     'pyarrow': ('sweep', 'Parquet tables of sweeps'),
+    'meshio': ('mesh', 'meshes of pads from files, for pad wet'),
 }
 """Modules that an extra of ros_pad brings, with its name and what they are for."""
 
