@@ -7,7 +7,6 @@ import datetime
 import json
 import sys
 import time
-from array import array
 from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
@@ -31,6 +30,7 @@ from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import plain
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import clock_time
 from ros_pad.trials import label
@@ -219,19 +219,35 @@ class RecorderNode(Node):
 
     def _ask(self, node: str, lister: Client, getter: Client) -> None:
         def named(future: Future) -> None:
-            names = list(future.result().result.names)
-            values = getter.call_async(GetParameters.Request(names=names))
-            values.add_done_callback(lambda future: told(names, future))
-
-        def told(names: list[str], future: Future) -> None:
-            values = map(parameter_value_to_python, future.result().values)
-            self._said[node] = {
-                name: value.tolist() if isinstance(value, array) else value
-                for name, value in zip(names, values, strict=True)
-            }
-            self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
+            self._ask_for(list(future.result().result.names), node, getter)
 
         lister.call_async(ListParameters.Request()).add_done_callback(named)
+
+    def _ask_for(self, names: list[str], node: str, getter: Client) -> None:
+        """Ask a node for the values of parameters, and let the bag say them."""
+
+        def told(future: Future) -> None:
+            values = future.result().values
+            if len(values) == len(names):
+                try:
+                    said = {
+                        name: plain(parameter_value_to_python(value))
+                        for name, value in zip(names, values, strict=True)
+                    }
+                except RuntimeError as error:  # of a type that ROS does not have
+                    self.get_logger().warning(
+                        f'the bag will lack parameters of {node}: {error}', once=True
+                    )
+                    return
+                self._said.setdefault(node, {}).update(said)
+                self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
+            elif len(names) > 1:
+                # One that is declared without a value keeps a node from telling all others.
+                for name in names:
+                    self._ask_for([name], node, getter)
+
+        request = GetParameters.Request(names=names)
+        getter.call_async(request).add_done_callback(told)
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

@@ -197,6 +197,28 @@ def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
     assert set(said) <= {'/gait', '/robot', '/recorder'}
 
 
+def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
+    context, executor, record, until, tmp_path
+):
+    driver = Node('driver', context=context, enable_rosout=False)
+    # With one that has no value, rclpy and rclcpp answer a question for all with nothing.
+    driver.declare_parameter('serial_number', Parameter.Type.STRING)
+    driver.declare_parameter('rate', 250)
+    driver.declare_parameter('key', [b'\x01', b'\xff'])
+    executor.add_node(driver)
+    recorder = record()
+
+    def told():
+        text = (tmp_path / 'trial' / 'metadata.yaml').read_text(encoding='utf-8')
+        return text.count('/driver') and '255' in text and '250' in text
+
+    until(told)
+    recorder.close()
+    said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])['/driver']
+    assert (said['rate'], said['key']) == (250, [1, 255])
+    assert 'serial_number' not in said
+
+
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
 def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
