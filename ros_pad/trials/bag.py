@@ -361,6 +361,8 @@ class BagWriter:
         try:
             self._writer.finish()
             self._disk.shutdown()
+            if self._synced:
+                self._synced.result()  # the disk tells only once what it could not take
             os.fsync(self._stream.fileno())
             self._stream.close()
             self._stream = None
