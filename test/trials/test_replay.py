@@ -260,7 +260,7 @@ def test_parameters_of_other_nodes_are_an_error_of_ours(tmp_path, changes):
         Settings.of(BagReader(tmp_path / 'bag'))
     del controller['dome_pressure']
     BagWriter(tmp_path / 'other', {PARAMETERS: json.dumps(said)}).close()
-    with pytest.raises(BagError, match="KeyError.*'dome_pressure'"):
+    with pytest.raises(BagError, match=r"KeyError.*'dome_pressure'"):
         Settings.of(BagReader(tmp_path / 'other'))
 
 
