@@ -85,7 +85,7 @@ def _repair(options: argparse.Namespace) -> int:
     ):
         if count:
             print(f'{count:8d}  {words}')
-    if not found.described:
+    if found.closed and not found.described:
         print('metadata.yaml was missing, or said something else than the files')
     return 0
 

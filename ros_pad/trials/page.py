@@ -8,6 +8,7 @@ and strokes say the same once more, so that a grey print can be read too.
 from __future__ import annotations
 
 import base64
+import contextlib
 import html
 import io
 import os
@@ -240,4 +241,6 @@ def save(path: str | os.PathLike[str], data: bytes) -> None:
         new.write_bytes(data)
         new.replace(path)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
         raise PadError(f'{path}: cannot be written: {error.strerror}') from error

@@ -5,6 +5,7 @@ import html.parser
 import io
 import json
 import re
+import resource
 import subprocess
 import sys
 import warnings
@@ -182,6 +183,18 @@ def test_the_same_trial_gives_the_same_file(tmp_path):
     report.write(made_up(), tmp_path / 'one.html')
     report.write(made_up(), tmp_path / 'two.html')
     assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path):
+    path = tmp_path / 'page.html'
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(PadError, match=r'page\.html: cannot be written'):
+            page_of.save(path, bytes(2000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_is_replaced_unless_forced(tmp_path):
