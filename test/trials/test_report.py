@@ -624,7 +624,7 @@ def test_figures_replace_nothing_unless_forced(printed, tmp_path):
     mine.write_text('mine')
     drawn = report.drawn(made_up())
     drawn = {name: drawn[name] for name in ('reserves', 'reliability')}
-    with pytest.raises(PadError, match=r'reliability\.png: exists'):
+    with pytest.raises(InvalidInput, match=r'reliability\.png: exists'):
         page_of.write_figures(drawn, tmp_path)
     assert list(tmp_path.iterdir()) == [mine]
     page_of.write_figures(drawn, tmp_path, force=True)
