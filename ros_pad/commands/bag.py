@@ -7,6 +7,7 @@ import argparse
 import json
 import pathlib
 import warnings
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -78,16 +79,20 @@ def _repair(options: argparse.Namespace) -> int:
         print(f'{source}: is whole, {found.messages} messages; nothing was written')
         return 0
     print(f'{folder}: {found.messages} messages recovered')
-    for count, words in (
-        (found.unread_bytes, 'bytes at the end make no sense'),
-        (found.damaged_chunks, 'damaged chunks were left out'),
-        (found.lost_messages, 'messages lost their topic with a damaged chunk'),
-    ):
-        if count:
-            print(f'{count:8d}  {words}')
+    _tell_losses(asdict(found))
     if found.closed and not found.described:
         print('metadata.yaml was missing, or said something else than the files')
     return 0
+
+
+def _tell_losses(found: Mapping[str, Any]) -> None:
+    for name, words in (
+        ('unread_bytes', 'bytes at the end make no sense'),
+        ('damaged_chunks', 'damaged chunks were left out'),
+        ('lost_messages', 'messages lost their topic with a damaged chunk'),
+    ):
+        if found.get(name):
+            print(f'{found[name]:8d}  {words}')
 
 
 def _beside(source: pathlib.Path) -> pathlib.Path:
@@ -110,7 +115,7 @@ def _said(reader: BagReader, key: str) -> dict[str, Any]:
 
 def _tell(options: argparse.Namespace, reader: BagReader) -> int:
     about, lost = _said(reader, labels.KEY), _said(reader, labels.LOST)
-    made_with = _said(reader, labels.MADE_WITH)
+    made_with, repair = _said(reader, labels.MADE_WITH), _said(reader, repairs.KEY)
     if options.json:
         print(
             json.dumps(
@@ -125,6 +130,7 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
                     },
                     'lost': lost,
                     'problem': reader.problem,
+                    'repair': repair,
                     'trial': about,
                     'made_with': made_with,
                     'parameters': _said(reader, labels.PARAMETERS),
@@ -139,6 +145,9 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
         print(', '.join(words))
     if made_with:
         print('made with', ', '.join(f'{name} {version}' for name, version in made_with.items()))
+    if repair:
+        print('repaired from', repair.get('source', 'a broken bag'))
+        _tell_losses(repair)
     for name in sorted(reader.topics):
         missed = f'  {lost[name]} lost' if name in lost else ''
         print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')

@@ -336,6 +336,9 @@ def test_the_command(trial, tmp_path, capsys):
     assert f'{trial}_repaired: ' in out
     assert 'bytes at the end make no sense' in out
     assert main(['bag', 'info', f'{trial}_repaired']) == 0
+    out = capsys.readouterr().out
+    assert 'repaired from trial\n' in out
+    assert 'bytes at the end make no sense' in out
     assert main(['bag', 'repair', str(trial)]) == 2
     assert 'no bag is overwritten' in capsys.readouterr().err
     assert main(['bag', 'repair', str(trial), '--out', str(tmp_path / 'b'), '--json']) == 0
