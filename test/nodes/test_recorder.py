@@ -9,6 +9,7 @@ import time
 import warnings
 
 import pytest
+import yaml
 from geometry_msgs.msg import WrenchStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -217,6 +218,25 @@ def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
     said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])['/driver']
     assert (said['rate'], said['key']) == (250, [1, 255])
     assert 'serial_number' not in said
+
+
+def test_a_node_that_comes_back_is_asked_again(context, executor, record, until, tmp_path):
+    recorder = record()
+
+    def told():
+        text = (tmp_path / 'trial' / 'metadata.yaml').read_text(encoding='utf-8')
+        data = yaml.safe_load(text)['rosbag2_bagfile_information']['custom_data']
+        return json.loads(data.get(label.PARAMETERS, '{}')).get('/gait', {}).get('stride')
+
+    for stride in (0.14, 0.2):
+        gait = Node('gait', context=context, enable_rosout=False)
+        gait.declare_parameter('stride', stride)
+        executor.add_node(gait)
+        until(lambda stride=stride: told() == stride)
+        executor.remove_node(gait)
+        gait.destroy_node()
+        until(lambda: '/gait' not in recorder._askers)
+    recorder.close()
 
 
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
