@@ -416,7 +416,7 @@ def loopback(patience: float = LOOPBACK) -> Finding:
                     'loopback',
                     'problem',
                     f'a node does not start: {said}',
-                    f'{_RMW}; {_silence()}',
+                    f'{_silence()}; {_RMW}',
                 )
         limit.cancel()
         started = time.monotonic()
@@ -453,16 +453,19 @@ def _end(children: Sequence[subprocess.Popen[str]]) -> None:
             child.wait()
 
 
-def _domain() -> str:
+def _domain() -> int | None:
+    """Return the number of the domain; None where it is set to none that there is."""
     text = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if not text.isdecimal() or int(text) > 101:
-        return f'ROS_DOMAIN_ID={text}: a number from 0 to 101 is needed'
-    return 'ROS_DOMAIN_ID must be the same everywhere'
+    return int(text) if text.isdecimal() and int(text) <= 101 else None
 
 
 def _silence() -> str:
     """Return what most often keeps nodes on one machine apart, what is seen here first."""
     hints = []
+    domain = _domain()
+    if domain is None:
+        text = os.environ['ROS_DOMAIN_ID']
+        hints.append(f'ROS_DOMAIN_ID={text}: a number from 0 to 101 is needed')
     reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
     if reach.upper() == 'OFF':
         hints.append('ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps processes apart: LOCALHOST')
@@ -483,12 +486,12 @@ def _silence() -> str:
         size = int(pathlib.Path('/proc/sys/net/core/rmem_max').read_text())
         if size < BUFFER:
             hints.append(f'sudo sysctl -w net.core.rmem_max={BUFFER}: it is {size}')
-    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if domain.isdecimal():
-        port = 7400 + 250 * int(domain)  # as DDS has it
+    if domain is not None:
+        port = 7400 + 250 * domain  # as DDS has it
         hints.append(f'let the firewall pass UDP {port} to {port + 249} on the loopback')
     hints.append('fastdds shm clean, when no node runs')
-    hints.append(_domain())
+    if domain is not None:
+        hints.append('ROS_DOMAIN_ID must be the same everywhere')
     return '; '.join(hints)
 
 

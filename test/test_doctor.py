@@ -266,11 +266,14 @@ def test_nodes_that_hang_are_not_waited_for(
     assert 'shm clean' in started.advice
 
 
-def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch):
-    alone.setenv('ROS_DOMAIN_ID', 'blue')
+@pytest.mark.parametrize('number', ['blue', '400'])
+def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch, number: str):
+    alone.setenv('ROS_DOMAIN_ID', number)
     finding = doctor.loopback(1.0)
     assert finding.status == 'problem'
-    assert 'ROS_DOMAIN_ID=blue: a number from 0 to 101' in finding.advice
+    # First what is seen to be wrong, and no firewall of ports that there are not.
+    assert finding.advice.startswith(f'ROS_DOMAIN_ID={number}: a number from 0 to 101 is needed;')
+    assert 'UDP' not in finding.advice
 
 
 @pytest.mark.parametrize(

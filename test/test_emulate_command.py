@@ -86,9 +86,11 @@ def test_bad_arguments_are_told(arguments, words, capsys: pytest.CaptureFixture[
 def test_what_is_there_is_not_replaced(tmp_path, capsys: pytest.CaptureFixture[str]):
     link = tmp_path / 'regulator'
     link.write_text('mine')
-    assert cli.main(['emulate', 'alicat', '--link', str(link)]) == 1
-    assert str(link) in capsys.readouterr().err
+    assert cli.main(['emulate', 'alicat', '--link', str(link)]) == 2
+    assert f"link = '{link}' is not allowed: something is there" in capsys.readouterr().err
     assert link.read_text() == 'mine'
+    assert cli.main(['emulate', 'alicat', '--link', str(tmp_path / 'no' / 'regulator')]) == 2
+    assert 'there is no such folder' in capsys.readouterr().err
 
 
 def test_help_has_units_and_faults(capsys: pytest.CaptureFixture[str]):

@@ -7,6 +7,7 @@ import argparse
 import json
 import pathlib
 import warnings
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -14,6 +15,7 @@ from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.progress import bar
+from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.trials import label as labels
 from ros_pad.trials import repair as repairs
@@ -62,10 +64,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _repair(options: argparse.Namespace) -> int:
     source: pathlib.Path = options.bag
-    folder = options.out or source.with_name(f'{source.resolve().stem}_repaired')
     with bar('reading', 1.0, 'bag') as progress:
         found = repairs.inspect(source, progress)
-    whole = found.sound and (source / 'metadata.yaml').is_file()
+    whole = found.sound
+    folder: pathlib.Path = options.out or _beside(source)
     if not whole:
         with bar('writing', 1.0, 'bag') as progress:
             found = repairs.repair(source, folder, progress)
@@ -77,19 +79,43 @@ def _repair(options: argparse.Namespace) -> int:
         print(f'{source}: is whole, {found.messages} messages; nothing was written')
         return 0
     print(f'{folder}: {found.messages} messages recovered')
-    for count, words in (
-        (found.unread_bytes, 'bytes at the end make no sense'),
-        (found.damaged_chunks, 'damaged chunks were left out'),
-        (found.lost_messages, 'messages lost their topic with a damaged chunk'),
-    ):
-        if count:
-            print(f'{count:8d}  {words}')
+    _tell_losses(asdict(found))
+    if found.closed and not found.described:
+        print('metadata.yaml was missing, or said something else than the files')
     return 0
 
 
+def _tell_losses(found: Mapping[str, Any]) -> None:
+    for name, words in (
+        ('unread_bytes', 'bytes at the end make no sense'),
+        ('damaged_chunks', 'damaged chunks were left out'),
+        ('lost_messages', 'messages lost their topic with a damaged chunk'),
+    ):
+        if found.get(name):
+            print(f'{found[name]:8d}  {words}')
+
+
+def _beside(source: pathlib.Path) -> pathlib.Path:
+    """Return the default folder of a repaired bag."""
+    if not source.name.strip('.'):  # . and .. have names, too
+        source = source.resolve()
+    name = source.stem if source.is_file() else source.name
+    return source.with_name(f'{name}_repaired')
+
+
+def _said(reader: BagReader, key: str) -> dict[str, Any]:
+    """Return what a bag says under a key of its custom data."""
+    try:
+        return dict(json.loads(reader.custom_data.get(key, '{}')))
+    except (TypeError, ValueError) as error:
+        raise BagError(
+            f'{reader.path}: custom data {key!r} is not as ros_pad writes it: {error}'
+        ) from error
+
+
 def _tell(options: argparse.Namespace, reader: BagReader) -> int:
-    about: dict[str, Any] = json.loads(reader.custom_data.get(labels.KEY, '{}'))
-    lost: dict[str, int] = json.loads(reader.custom_data.get(labels.LOST, '{}'))
+    about, lost = _said(reader, labels.KEY), _said(reader, labels.LOST)
+    made_with, repair = _said(reader, labels.MADE_WITH), _said(reader, repairs.KEY)
     if options.json:
         print(
             json.dumps(
@@ -104,9 +130,10 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
                     },
                     'lost': lost,
                     'problem': reader.problem,
+                    'repair': repair,
                     'trial': about,
-                    'made_with': json.loads(reader.custom_data.get(labels.MADE_WITH, '{}')),
-                    'parameters': json.loads(reader.custom_data.get(labels.PARAMETERS, '{}')),
+                    'made_with': made_with,
+                    'parameters': _said(reader, labels.PARAMETERS),
                 }
             )
         )
@@ -114,10 +141,13 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
     print(f'{options.bag}: {reader.message_count} messages in', end=' ')
     print(f'{(reader.end - reader.start) * 1e-9:.2f} s')
     if about:
-        print(f'scene {about["scene"]}, policy {about["policy"]}, seed {about["seed"]}')
-    made_with = json.loads(reader.custom_data.get(labels.MADE_WITH, '{}'))
+        words = (f'{name} {about.get(name, "unknown")}' for name in ('scene', 'policy', 'seed'))
+        print(', '.join(words))
     if made_with:
         print('made with', ', '.join(f'{name} {version}' for name, version in made_with.items()))
+    if repair:
+        print('repaired from', repair.get('source', 'a broken bag'))
+        _tell_losses(repair)
     for name in sorted(reader.topics):
         missed = f'  {lost[name]} lost' if name in lost else ''
         print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')

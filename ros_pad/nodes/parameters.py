@@ -251,11 +251,17 @@ def _follow(node: Node, live: dict[str, Parameter], values: dict[str, Any]) -> N
     node.add_post_set_parameters_callback(take)
 
 
+def plain(value: Any) -> Any:
+    """Return the value of a parameter as JSON has it."""
+    if isinstance(value, array):
+        return value.tolist()
+    if isinstance(value, list) and value and isinstance(value[0], bytes):
+        return list(b''.join(value))
+    return value
+
+
 def values_of(node: Node) -> dict[str, Any]:
     """Return every parameter of a node as JSON has it, by name."""
     names = sorted(node.get_parameters_by_prefix(''))
     values = [each.value for each in node.get_parameters(names)]
-    return {
-        name: value.tolist() if isinstance(value, array) else value
-        for name, value in zip(names, values, strict=True)
-    }
+    return {name: plain(value) for name, value in zip(names, values, strict=True)}

@@ -7,7 +7,6 @@ import datetime
 import json
 import sys
 import time
-from array import array
 from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
@@ -31,6 +30,7 @@ from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import plain
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import clock_time
 from ros_pad.trials import label
@@ -102,8 +102,9 @@ class RecorderNode(Node):
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             self._record(full_name, topic, qos.recording([topic.publish]))
         self._said: dict[str, dict[str, Any]] = {}
-        self._known: set[str] = set()  # nodes of the robot
-        self._mute: dict[str, tuple[Client, Client]] = {}  # those that are not yet asked
+        # By which each node of the robot is asked; none where that is forbidden.
+        self._askers: dict[str, tuple[Client, Client] | None] = {}
+        self._answered: set[str] = set()
         # Of wall time, whatever the clock of the trial does.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._asks = custom_data is None
@@ -198,40 +199,68 @@ class RecorderNode(Node):
             raise
 
     def _ask_nodes(self) -> None:
-        """Ask every node of the robot, once its services are there, for its parameters."""
-        for name, namespace in self.get_node_names_and_namespaces():
-            node = f'{namespace.rstrip("/")}/{name}'
-            hidden = name.startswith('_')
-            if hidden or namespace != self.get_namespace() or node in self._known:
-                continue
-            self._known.add(node)
-            try:
-                lister = self.create_client(ListParameters, f'{node}/list_parameters')
-                getter = self.create_client(GetParameters, f'{node}/get_parameters')
-            except RuntimeError as error:  # SROS 2 may forbid it
-                self.get_logger().warning(f'the bag will lack the parameters of {node}: {error}')
-                continue
-            self._mute[node] = lister, getter
-        for node, (lister, getter) in list(self._mute.items()):
-            if lister.service_is_ready() and getter.service_is_ready():
-                del self._mute[node]
-                self._ask(node, lister, getter)
+        """Ask every node of the robot for its parameters, once its services are there.
+
+        One that does not answer is asked again, and so is one that went and came back.
+        """
+        here = {
+            f'{namespace.rstrip("/")}/{name}'
+            for name, namespace in self.get_node_names_and_namespaces()
+            if namespace == self.get_namespace() and not name.startswith('_')
+        }
+        for node in self._askers.keys() - here:
+            for client in self._askers.pop(node) or ():
+                self.destroy_client(client)
+            self._answered.discard(node)
+        for node in here - self._askers.keys():
+            self._askers[node] = self._asker(node)
+        for node, clients in self._askers.items():
+            if clients and node not in self._answered:
+                lister, getter = clients
+                if lister.service_is_ready() and getter.service_is_ready():
+                    self._ask(node, lister, getter)
+
+    def _asker(self, node: str) -> tuple[Client, Client] | None:
+        try:
+            lister = self.create_client(ListParameters, f'{node}/list_parameters')
+            return lister, self.create_client(GetParameters, f'{node}/get_parameters')
+        except RuntimeError as error:  # SROS 2 may forbid it
+            self.get_logger().warning(f'the bag will lack the parameters of {node}: {error}')
+            return None
 
     def _ask(self, node: str, lister: Client, getter: Client) -> None:
         def named(future: Future) -> None:
-            names = list(future.result().result.names)
-            values = getter.call_async(GetParameters.Request(names=names))
-            values.add_done_callback(lambda future: told(names, future))
-
-        def told(names: list[str], future: Future) -> None:
-            values = map(parameter_value_to_python, future.result().values)
-            self._said[node] = {
-                name: value.tolist() if isinstance(value, array) else value
-                for name, value in zip(names, values, strict=True)
-            }
-            self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
+            self._answered.add(node)
+            self._said[node] = {}
+            self._ask_for(list(future.result().result.names), node, getter)
 
         lister.call_async(ListParameters.Request()).add_done_callback(named)
+
+    def _ask_for(self, names: list[str], node: str, getter: Client) -> None:
+        """Ask a node for the values of parameters, and let the bag say them."""
+
+        def told(future: Future) -> None:
+            values = future.result().values
+            if len(values) == len(names):
+                try:
+                    said = {
+                        name: plain(parameter_value_to_python(value))
+                        for name, value in zip(names, values, strict=True)
+                    }
+                except RuntimeError as error:  # of a type that ROS does not have
+                    self.get_logger().warning(
+                        f'the bag will lack parameters of {node}: {error}', once=True
+                    )
+                    return
+                self._said[node].update(said)
+                self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
+            elif len(names) > 1:
+                # One that is declared without a value keeps a node from telling all others.
+                for name in names:
+                    self._ask_for([name], node, getter)
+
+        request = GetParameters.Request(names=names)
+        getter.call_async(request).add_done_callback(told)
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

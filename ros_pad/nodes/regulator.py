@@ -339,6 +339,10 @@ class RegulatorNode(LifecycleNode):
             self.trigger_deactivate()
         else:
             self.vent('asked to on ~/vent')
+        if not self.channels:
+            response.success = False
+            response.message = 'no device is open, and none was told: configure the node first'
+            return response
         held = [str(leg) for leg, channel in self.channels.items() if not channel.vented]
         response.success = not held
         response.message = (

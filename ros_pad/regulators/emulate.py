@@ -134,6 +134,11 @@ class Emulator:
         A name that stays when the device is unplugged and comes back, as a port of udev's
         ``/dev/serial/by-id`` does. Nothing may be there yet.
 
+    Raises
+    ------
+    InvalidInput
+        When something is where the link is to be, or there is no such folder.
+
     Attributes
     ----------
     path : str
@@ -143,6 +148,10 @@ class Emulator:
     """
 
     def __init__(self, device: Device, link: str | None = None) -> None:
+        if link and os.path.lexists(link):
+            raise InvalidInput(f'link = {link!r} is not allowed: something is there already')
+        if link and not os.path.isdir(os.path.dirname(link) or '.'):
+            raise InvalidInput(f'link = {link!r} is not allowed: there is no such folder')
         self._device = device
         self._link = link
         self._closing = threading.Event()

@@ -87,7 +87,7 @@ def data(view: View) -> dict[str, Any] | None:
         'body': {
             'x': _differences(1e3 * body[fast, 0]),
             'y': _differences(1e3 * body[fast, 1]),
-            'heading': _differences(1e3 * np.unwrap(body[fast, 2])),
+            'heading': _differences(1e3 * _unwrapped(body[fast, 2])),
         }
         if known
         else None,
@@ -156,6 +156,14 @@ def element(view: View) -> str:
 def _at(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the values of some rows; NaN for rows before the first."""
     return np.append(values, np.nan)[rows] if len(values) else np.full(len(rows), np.nan)
+
+
+def _unwrapped(angles: np.ndarray) -> np.ndarray:
+    """Return angles, rad, without leaps; `numpy.unwrap` loses all that come after a NaN."""
+    found = angles.copy()
+    known = np.isfinite(angles)
+    found[known] = np.unwrap(angles[known])
+    return found
 
 
 def _differences(values: np.ndarray) -> list[int | None]:

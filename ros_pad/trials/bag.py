@@ -361,6 +361,8 @@ class BagWriter:
         try:
             self._writer.finish()
             self._disk.shutdown()
+            if self._synced:
+                self._synced.result()  # the disk tells only once what it could not take
             os.fsync(self._stream.fileno())
             self._stream.close()
             self._stream = None
@@ -449,11 +451,16 @@ def _replace_metadata(folder: pathlib.Path, information: dict[str, Any]) -> None
         sort_keys=False,
         allow_unicode=True,
     )
-    with new.open('w', encoding='utf-8') as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())  # or the name may reach the disk before the contents
-    new.replace(folder / 'metadata.yaml')
+    try:
+        with new.open('w', encoding='utf-8') as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())  # or the name may reach the disk before the contents
+        new.replace(folder / 'metadata.yaml')
+    except OSError:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise
 
 
 class BagReader:

@@ -138,7 +138,13 @@ class Settings:
         )
         told_nodes = _told(bag)
         if told_nodes:
-            return _of_nodes(settings, *told_nodes)
+            try:
+                return _of_nodes(settings, *told_nodes)
+            except (KeyError, TypeError, ValueError) as error:
+                raise BagError(
+                    f'{bag.path}: custom data {PARAMETERS!r} lack parameters of ros_pad, or have'
+                    f' others: {error!r}'
+                ) from error
         if not said:
             return replace(
                 settings,

@@ -8,6 +8,7 @@ and strokes say the same once more, so that a grey print can be read too.
 from __future__ import annotations
 
 import base64
+import contextlib
 import html
 import io
 import os
@@ -22,6 +23,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 
 BLUE, VERMILION, GREEN, BLACK = '#0072B2', '#D55E00', '#009E73', '#222222'
@@ -206,8 +208,10 @@ def write_figures(
 
     Raises
     ------
+    InvalidInput
+        When a file exists.
     PadError
-        When a file exists or cannot be written.
+        When one cannot be written.
     """
     files = {
         pathlib.Path(folder) / f'{name}.{kind}': (each.figure, kind)
@@ -223,12 +227,12 @@ def write_figures(
 
 
 def refuse(path: str | os.PathLike[str], force: bool) -> None:
-    """Raise PadError where a file is there that must not be replaced."""
+    """Raise InvalidInput where a file is there that must not be replaced."""
     path = pathlib.Path(path)
     if path.exists() and not path.is_file():
-        raise PadError(f'{path}: is no regular file, and is never replaced')
+        raise InvalidInput(f'{path}: is no regular file, and is never replaced')
     if not force and path.exists():
-        raise PadError(f'{os.fspath(path)}: exists, and is only replaced when that is forced')
+        raise InvalidInput(f'{os.fspath(path)}: exists, and is only replaced when that is forced')
 
 
 def save(path: str | os.PathLike[str], data: bytes) -> None:
@@ -240,4 +244,6 @@ def save(path: str | os.PathLike[str], data: bytes) -> None:
         new.write_bytes(data)
         new.replace(path)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
         raise PadError(f'{path}: cannot be written: {error.strerror}') from error

@@ -100,7 +100,7 @@ _KINDS: dict[str, tuple[str, int, Callable[[Any], tuple[float, ...]]]] = {
     'doubt': ('std_msgs/msg/String', 1, _doubt),
     'morphology': ('std_msgs/msg/String', 1, _is_dome),
 }
-_BODY = 0  # in place of a leg's number, for the body's pose
+_BODY = -1  # in place of a leg's number, for the body's pose
 
 
 @dataclasses.dataclass
@@ -242,7 +242,7 @@ def message_type(kind: str) -> str:
 def wanted_topics(
     bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
 ) -> dict[str, tuple[int, str]]:
-    """Return leg (0 for the body's pose) and kind of each topic that a trial is read from.
+    """Return leg (-1 for the body's pose) and kind of each topic that a trial is read from.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from dataclasses import dataclass
 from dataclasses import field
+from typing import Any
 
 import yaml
 from mcap.records import Channel
@@ -51,6 +52,8 @@ class Repair:
         Bytes behind the last record that makes sense.
     closed : bool
         Whether every file was closed by its writer.
+    described : bool
+        Whether ``metadata.yaml`` names the files and counts their messages.
     """
 
     messages: int = 0
@@ -58,11 +61,13 @@ class Repair:
     lost_messages: int = 0
     unread_bytes: int = 0
     closed: bool = True
+    described: bool = True
 
     @property
     def sound(self) -> bool:
-        """Whether there is nothing to repair in the files."""
-        return self.closed and not self.damaged_chunks and not self.unread_bytes
+        """Whether there is nothing to repair."""
+        whole = self.closed and not self.damaged_chunks and not self.unread_bytes
+        return whole and self.described
 
 
 @dataclass
@@ -174,6 +179,7 @@ def _examine(
         total.lost_messages += counts.total() - known
         if progress:
             progress((place + 1) / len(files))
+    total.described = _described(source, files, total.messages)
     return files, total
 
 
@@ -192,14 +198,32 @@ def _topics(source: pathlib.Path, files: list[_File]) -> dict[str, tuple[Channel
     return topics
 
 
+def _information(source: pathlib.Path) -> dict[str, Any]:
+    """Return what the metadata of a bag says; nothing where it is missing or torn."""
+    try:
+        text = (source / 'metadata.yaml').read_text(encoding='utf-8')
+        return dict(yaml.safe_load(text)['rosbag2_bagfile_information'])
+    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
+        return {}
+
+
+def _described(source: pathlib.Path, files: list[_File], messages: int) -> bool:
+    """Return whether the metadata names the files and counts the messages in them."""
+    information = _information(source)
+    try:
+        names = {pathlib.PurePath(name).name for name in information['relative_file_paths']}
+    except (KeyError, TypeError):
+        return False
+    return (
+        names == {file.path.name for file in files}
+        and information.get('message_count') == messages
+    )
+
+
 def _custom_data(source: pathlib.Path) -> dict[str, str]:
     """Return what the broken bag says about its trial, if that can be read."""
-    try:
-        metadata = yaml.safe_load((source / 'metadata.yaml').read_text(encoding='utf-8'))
-        data = metadata['rosbag2_bagfile_information'].get('custom_data') or {}
-        return {str(key): str(value) for key, value in data.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, yaml.YAMLError):
-        return {}
+    data = _information(source).get('custom_data')
+    return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
 
 
 def _records(path: pathlib.Path, found: Repair) -> Iterator[McapRecord]:

@@ -9,6 +9,7 @@ import time
 import warnings
 
 import pytest
+import yaml
 from geometry_msgs.msg import WrenchStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -195,6 +196,47 @@ def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
     }
     said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
     assert set(said) <= {'/gait', '/robot', '/recorder'}
+
+
+def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
+    context, executor, record, until, tmp_path
+):
+    driver = Node('driver', context=context, enable_rosout=False)
+    # With one that has no value, rclpy and rclcpp answer a question for all with nothing.
+    driver.declare_parameter('serial_number', Parameter.Type.STRING)
+    driver.declare_parameter('rate', 250)
+    driver.declare_parameter('key', [b'\x01', b'\xff'])
+    executor.add_node(driver)
+    recorder = record()
+
+    def told():
+        text = (tmp_path / 'trial' / 'metadata.yaml').read_text(encoding='utf-8')
+        return text.count('/driver') and '255' in text and '250' in text
+
+    until(told)
+    recorder.close()
+    said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])['/driver']
+    assert (said['rate'], said['key']) == (250, [1, 255])
+    assert 'serial_number' not in said
+
+
+def test_a_node_that_comes_back_is_asked_again(context, executor, record, until, tmp_path):
+    recorder = record()
+
+    def told():
+        text = (tmp_path / 'trial' / 'metadata.yaml').read_text(encoding='utf-8')
+        data = yaml.safe_load(text)['rosbag2_bagfile_information']['custom_data']
+        return json.loads(data.get(label.PARAMETERS, '{}')).get('/gait', {}).get('stride')
+
+    for stride in (0.14, 0.2):
+        gait = Node('gait', context=context, enable_rosout=False)
+        gait.declare_parameter('stride', stride)
+        executor.add_node(gait)
+        until(lambda stride=stride: told() == stride)
+        executor.remove_node(gait)
+        gait.destroy_node()
+        until(lambda: '/gait' not in recorder._askers)
+    recorder.close()
 
 
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)

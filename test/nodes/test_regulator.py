@@ -430,6 +430,14 @@ def test_a_broken_cable_does_not_keep_the_other_pads_up(robot, devices, error):
     robot.until(lambda: first.setpoint == 0.0, what='the vent')
 
 
+def test_a_vent_that_reaches_no_device_is_no_success(robot):
+    """Whoever asked believes otherwise that the pads are flat."""
+    robot.start(autostart=False)
+    answer = robot.call(Trigger, 'regulator/vent', Trigger.Request())
+    assert not answer.success
+    assert answer.message == 'no device is open, and none was told: configure the node first'
+
+
 def test_a_command_whose_answer_is_lost_is_vented(robot, devices):
     """The device may have taken it: that nobody confirmed it does not make the pad flat."""
     node = robot.start(simulated=False, backend='device')

@@ -5,6 +5,7 @@ import base64
 import dataclasses
 import html.parser
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -190,6 +191,17 @@ def test_without_any_place_there_is_nothing_to_play():
     assert animation.data(view) is None
     assert 'nothing to play' in animation.element(view)
     assert '<script' not in animation.element(view)
+
+
+def test_a_motion_capture_system_that_comes_late_tells_the_heading_all_the_same():
+    trial = walk()
+    body = trial.body.copy()
+    body[:, 2] = (body[:, 2] + math.pi + 2.5) % (2.0 * math.pi) - math.pi  # leaps on the way
+    body[trial.time < 1.0] = np.nan
+    heading = animation.data(view_of(dataclasses.replace(trial, body=body)))['body']['heading']
+    assert heading[:20] == [None] * 20
+    # 0.1 rad/s, 25 frames a second: 4 mrad a frame, and never a turn.
+    assert set(heading[30:]) <= {3, 4, 5}
 
 
 def test_gaps_stay_gaps():

@@ -409,6 +409,23 @@ def test_a_full_disk_says_what_is_saved(tmp_path):
         assert len(list(BagReader(tmp_path / 'trial').messages())) == saved
 
 
+def test_a_full_disk_leaves_no_half_of_its_metadata(tmp_path, monkeypatch):
+    BagWriter(tmp_path / 'trial', {'a': '1'}).close()
+    before = (tmp_path / 'trial' / 'metadata.yaml').read_bytes()
+
+    def fsync(number):
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(os, 'fsync', fsync)
+    with pytest.raises(BagError, match='No space left'):
+        bag.annotate(tmp_path / 'trial', {'b': '2'})
+    assert sorted(each.name for each in (tmp_path / 'trial').iterdir()) == [
+        'metadata.yaml',
+        'trial_0.mcap',
+    ]
+    assert (tmp_path / 'trial' / 'metadata.yaml').read_bytes() == before
+
+
 def test_a_bag_cut_anywhere_gives_its_beginning_or_an_error(recorded, tmp_path):
     folder, written = recorded
     whole = (folder / 'trial_0.mcap').read_bytes()

@@ -207,6 +207,17 @@ def test_a_leg_that_only_says_one_thing_is_enough(tmp_path):
     assert trial.body.shape == (0, 3)
 
 
+def test_legs_may_be_counted_from_zero(tmp_path):
+    with Recording(tmp_path / 'bag') as bag:
+        bag.add('/body/pose', pose(1.0, 0.0, 0.0), 0, 0)
+        for leg in (0, 1):
+            bag.add(f'/leg_{leg}/wrench', wrench(0.0, 0.0, 3.0 + leg), 0, 0)
+    trial = recorded.load(tmp_path / 'bag')
+    assert trial.legs == (0, 1)
+    assert trial.force[0, :, 2].tolist() == [3.0, 4.0]
+    assert trial.body[0, 0] == 1.0
+
+
 def test_messages_out_of_order_and_without_stamp(tmp_path):
     with Recording(tmp_path / 'bag') as bag:
         for log, stamp, load in ((10, 30, 3.0), (11, 10, 1.0), (20, 0, 2.0)):

@@ -137,6 +137,22 @@ def test_a_disk_that_does_not_take_it_is_told_at_the_next_flush(tmp_path, monkey
             time.sleep(0.001)
 
 
+def test_a_disk_that_did_not_take_it_is_told_at_the_end(tmp_path, monkeypatch):
+    failed = []
+
+    def fsync(number):  # Linux tells of a write that failed once, and then no more
+        if not failed and '.mcap' in os.readlink(f'/proc/self/fd/{number}'):
+            failed.append(number)
+            raise OSError(5, 'Input/output error')
+
+    writer = BagWriter(tmp_path / 'trial')
+    writer.add_topic('/number', 'std_msgs/msg/Float64')
+    monkeypatch.setattr(os, 'fsync', fsync)
+    writer.write('/number', serialize_message(Float64()), 0)
+    with pytest.raises(BagError, match='Input/output error; 1 messages are saved'):
+        writer.close()
+
+
 @pytest.mark.parametrize('share', [0.3, 0.6, 0.99])
 def test_a_bag_cut_short_gives_what_is_before_the_cut(trial, tmp_path, share):
     file = trial / 'trial_0.mcap'
@@ -265,6 +281,46 @@ def test_any_cut_is_read_without_a_fall(trial, tmp_path):
         assert 0 <= found.messages <= 10_000
 
 
+def test_metadata_that_is_wrong_is_repaired_too(trial, tmp_path, capsys):
+    metadata = trial / 'metadata.yaml'
+    text = metadata.read_text(encoding='utf-8')
+    assert repairs.inspect(trial).sound
+    for place, wrong in enumerate(
+        (
+            text[:200],  # torn
+            text.replace('message_count: 10000', 'message_count: 0'),  # of the beginning
+            text.replace('trial_0.mcap', 'trial_1.mcap'),
+        )
+    ):
+        assert wrong != text
+        metadata.write_text(wrong, encoding='utf-8')
+        assert not repairs.inspect(trial).sound
+        out = str(tmp_path / f'whole_{place}')
+        assert main(['bag', 'repair', str(trial), '--out', out]) == 0
+        assert 'metadata.yaml was missing, or said' in capsys.readouterr().out
+        assert BagReader(out).message_count == 10_000
+        assert repairs.inspect(out).sound
+
+
+def test_a_bag_that_is_the_working_folder_is_repaired_beside_it(trial, monkeypatch, capsys):
+    (trial / 'metadata.yaml').unlink()
+    monkeypatch.chdir(trial)
+    assert main(['bag', 'repair', '.']) == 0
+    assert BagReader(f'{trial}_repaired').message_count == 10_000
+
+
+@pytest.mark.parametrize('key', ['ros_pad', 'ros_pad_lost', 'ros_pad_made_with'])
+def test_other_peoples_custom_data_are_no_crash(tmp_path, capsys, key):
+    for place, said in enumerate(('no JSON', '7', '[1]')):
+        folder = tmp_path / f'trial_{place}'
+        BagWriter(folder, {key: said}).close()
+        assert main(['bag', 'info', str(folder)]) == 2
+        assert f"custom data '{key}' is not as" in capsys.readouterr().err
+    BagWriter(tmp_path / 'trial', {'ros_pad': '{"scene": "lab"}'}).close()
+    assert main(['bag', 'info', str(tmp_path / 'trial')]) == 0
+    assert 'scene lab, policy unknown, seed unknown' in capsys.readouterr().out
+
+
 def test_the_command(trial, tmp_path, capsys):
     assert main(['bag', 'repair', str(trial)]) == 0
     assert 'is whole, 10000 messages; nothing was written' in capsys.readouterr().out
@@ -280,6 +336,9 @@ def test_the_command(trial, tmp_path, capsys):
     assert f'{trial}_repaired: ' in out
     assert 'bytes at the end make no sense' in out
     assert main(['bag', 'info', f'{trial}_repaired']) == 0
+    out = capsys.readouterr().out
+    assert 'repaired from trial\n' in out
+    assert 'bytes at the end make no sense' in out
     assert main(['bag', 'repair', str(trial)]) == 2
     assert 'no bag is overwritten' in capsys.readouterr().err
     assert main(['bag', 'repair', str(trial), '--out', str(tmp_path / 'b'), '--json']) == 0

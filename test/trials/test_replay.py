@@ -2,6 +2,7 @@
 """Replays of our own bags, and of bags of other robots, which rosbags writes here."""
 
 import dataclasses
+import json
 import math
 import pathlib
 import re
@@ -20,8 +21,10 @@ from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.bag import BagReader
+from ros_pad.trials.bag import BagWriter
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
+from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.node_settings import Settings
 from ros_pad.trials.replay import open_bag
 from ros_pad.trials.replay import replay
@@ -244,6 +247,21 @@ def test_what_does_not_go_together():
     with pytest.raises(ConfigError, match='large19'):
         settings.changed(foot='wide')
     assert settings.changed(foot='large19').foot.source == 'large19'
+
+
+@pytest.mark.parametrize('changes', [{'dome_pressure': None}, {'margin': 'much'}])
+def test_parameters_of_other_nodes_are_an_error_of_ours(tmp_path, changes):
+    # As nodes of another version have them.
+    said = json.loads(BagReader(SAMPLE).custom_data[PARAMETERS])
+    (controller,) = (each for each in said.values() if {'policy', 'margin'} <= each.keys())
+    controller.update(changes)
+    BagWriter(tmp_path / 'bag', {PARAMETERS: json.dumps(said)}).close()
+    with pytest.raises(BagError, match='lack parameters of ros_pad, or have others'):
+        Settings.of(BagReader(tmp_path / 'bag'))
+    del controller['dome_pressure']
+    BagWriter(tmp_path / 'other', {PARAMETERS: json.dumps(said)}).close()
+    with pytest.raises(BagError, match=r"KeyError.*'dome_pressure'"):
+        Settings.of(BagReader(tmp_path / 'other'))
 
 
 # --- bags of other robots -----------------------------------------------------------------------

@@ -5,6 +5,7 @@ import html.parser
 import io
 import json
 import re
+import resource
 import subprocess
 import sys
 import warnings
@@ -182,6 +183,18 @@ def test_the_same_trial_gives_the_same_file(tmp_path):
     report.write(made_up(), tmp_path / 'one.html')
     report.write(made_up(), tmp_path / 'two.html')
     assert (tmp_path / 'one.html').read_bytes() == (tmp_path / 'two.html').read_bytes()
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path):
+    path = tmp_path / 'page.html'
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(PadError, match=r'page\.html: cannot be written'):
+            page_of.save(path, bytes(2000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_is_replaced_unless_forced(tmp_path):
@@ -611,7 +624,7 @@ def test_figures_replace_nothing_unless_forced(printed, tmp_path):
     mine.write_text('mine')
     drawn = report.drawn(made_up())
     drawn = {name: drawn[name] for name in ('reserves', 'reliability')}
-    with pytest.raises(PadError, match=r'reliability\.png: exists'):
+    with pytest.raises(InvalidInput, match=r'reliability\.png: exists'):
         page_of.write_figures(drawn, tmp_path)
     assert list(tmp_path.iterdir()) == [mine]
     page_of.write_figures(drawn, tmp_path, force=True)
