@@ -76,11 +76,14 @@ setup(
         'fast': ['numba>=0.60'],
         # Sweeps on a Dask cluster, and Parquet beside their CSV.
         'sweep': ['distributed>=2024.1', 'pyarrow>=14'],
+        # Meshes of pads from STL, OBJ, PLY and MSH files.
+        'mesh': ['meshio>=5.3'],
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
         'test': [
             'colcon-common-extensions',
             'distributed>=2024.1',
             'hypothesis',
+            'meshio>=5.3',
             'mujoco>=3.2',
             'mypy==2.4.*',
             'numba>=0.60',

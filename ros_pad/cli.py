@@ -34,6 +34,7 @@ COMMANDS = {
     'contact': 'shape, ring of liquid and force limits of one pad',
     'calibrate': 'fit a foot to what was measured',
     'design': 'pads on a sole: how many, what they carry, at which pressure',
+    'wet': 'liquid round a meshed pad: rise, pressure and pull',
     'chart': 'measure time and error of every method, here and now',
     'emulate': 'a pressure regulator that is not there, on a pseudo-terminal',
     'doctor': 'check Python, ROS 2, serial ports and folders, and say what to do',

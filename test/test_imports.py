@@ -18,13 +18,14 @@ MAY_IMPORT = {
     'pace': {'errors'},
     'configuration': {'errors'},
     'contact': GROUND,
+    'capillary': GROUND | {'contact'},
     'estimation': GROUND | {'contact'},
     'control': GROUND | {'contact'},
     'simulation': GROUND | {'contact'},
     'regulators': GROUND | {'contact', 'estimation', 'control', 'simulation'},
 }
 MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
-MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials'}
+MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials', 'capillary'}
 MAY_IMPORT['figures'] = MAY_IMPORT['ladders'] | {'ladders'}
 MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
 MAY_IMPORT['doctor'] = MAY_IMPORT['trials'] | {'trials'}
@@ -32,7 +33,7 @@ MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes', 'doctor'}
 MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
 
 NUMERICS = {'numpy', 'scipy', 'yaml'}
-FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'tqdm'}
+FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'mpl_toolkits', 'tqdm'}  # the fourth is of the third
 ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
@@ -40,9 +41,16 @@ ROS = {
 }
 # What an extra brings: imported inside the functions that need it, missing where it is not asked
 # for.
-EXTRAS = {'mujoco': 'mujoco', 'numba': 'fast', 'distributed': 'sweep', 'pyarrow': 'sweep'}
+EXTRAS = {
+    'mujoco': 'mujoco',
+    'numba': 'fast',
+    'distributed': 'sweep',
+    'pyarrow': 'sweep',
+    'meshio': 'mesh',
+}
 FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'errors': set(),
+    'capillary': NUMERICS | {'meshio'},
     'simulation': NUMERICS | {'mujoco', 'numba'},
     'regulators': NUMERICS | {'serial'},
     'trials': NUMERICS | FILES | {'distributed', 'pyarrow'},
@@ -154,8 +162,14 @@ ROSDEP_KEY = {
     'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
     'mpmath': 'python3-sympy',
+    'mpl_toolkits': 'python3-matplotlib',
 }
-PIP_NAME = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support', 'serial': 'pyserial'}
+PIP_NAME = {
+    'yaml': 'pyyaml',
+    'mcap_ros2': 'mcap-ros2-support',
+    'mpl_toolkits': 'matplotlib',
+    'serial': 'pyserial',
+}
 
 
 def test_what_is_imported_is_declared():

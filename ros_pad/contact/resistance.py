@@ -60,6 +60,7 @@ _UNITS = (
     ('shear_stiffness', 'N/m', True),
     ('chamber_volume', 'm³', False),
     ('ceiling', 'Pa', True),
+    ('capillary_force', 'N', False),
 )
 
 
@@ -97,6 +98,9 @@ class Foot:
         Highest gauge pressure that may be commanded, Pa.
     limit : str
         Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
+    capillary_force : float
+        Tangential force that liquid round one dome on wet ground adds, F_cap of Eq. 3.65, N: from
+        ``pad wet``, or measured. 0 leaves it out.
     """
 
     source: str
@@ -113,6 +117,7 @@ class Foot:
     chamber_volume: float
     ceiling: float
     limit: str = 'measured'
+    capillary_force: float = 0.0
     _limit_table: tuple[float, ...] = field(init=False, repr=False, compare=False)
     _limit_cell: float = field(init=False, repr=False, compare=False)
 
@@ -171,6 +176,7 @@ class Foot:
             'chamber_volume': table.number('chamber_volume', 'm3', 0.0, 1e-3),
             'ceiling': table.number('ceiling', 'Pa', 1e3, 1e6),
             'limit': table.choice('force_limit', FORCE_LIMITS, default='measured'),
+            'capillary_force': table.number('capillary_force', 'N', 0.0, 1.0, default=0.0),
         }
         table.finish()
         try:
@@ -254,6 +260,8 @@ class Foot:
             under_domes = dome_load / max(pressure, self.conforming_pressure)
             dry = self.friction * dome_load + self.shear_strength * under_domes
             total += self._on_film(dry, dome_load, dome_film)
+            if dome_film > 0.0:
+                total += self.pads * self.capillary_force
         if sole_load > 0.0:
             area = min(self.sole_area - under_domes, sole_load / self.conforming_pressure)
             dry = self.friction * sole_load + self.shear_strength * area
@@ -301,9 +309,9 @@ def tangential_resistance(
     Returns
     -------
     float or ndarray
-        Resistance in newtons, broadcast over the inputs. The capillary force is left out: the
-        hysteresis of a contact line (:func:`ros_pad.contact.hysteresis_force`) is at most 1e-3 of
-        the friction of a loaded pad.
+        Resistance in newtons, broadcast over the inputs. The capillary force is what the foot
+        says, by default none: the hysteresis of a contact line
+        (:func:`ros_pad.contact.hysteresis_force`) is at most 1e-3 of the friction of a loaded pad.
 
     Raises
     ------

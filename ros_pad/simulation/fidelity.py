@@ -310,21 +310,24 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
         # A meniscus resists sliding by hysteresis at most: γ w (cos θ_rec - cos θ_adv) <= 2 γ w,
         # with w = 2 r0 a pad; only domes have one.
         capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
-        terms += [
-            Omission(
-                'capillary force of the pads',
-                capillary / (foot.friction * load),
-                'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0'
-                ' degrees) on every pad',
-            ),
+        if not foot.capillary_force:
+            terms.append(
+                Omission(
+                    'capillary force of the pads',
+                    capillary / (foot.friction * load),
+                    'of the friction of a loaded foot: full hysteresis of the contact angle (180'
+                    ' to 0 degrees) on every pad',
+                )
+            )
+        terms.append(
             Omission(
                 'liquid dragged under a slipping foot',
                 None,
                 'the film is taken to travel with the foot; at 10 mm/s a plane wedge drags at most'
                 f' {1e6 * _dragged_film(scene, 0.01):.2g} um under a dome, where'
                 f' {1e6 * foot.critical_film:.2g} um leave 1/e of dry contact',
-            ),
-        ]
+            )
+        )
         if scene.floor.roughness:
             terms.append(
                 Omission(

@@ -239,6 +239,7 @@ def setting(scene: Scene, floor: Floor, period: float, soles_turn: bool = False)
         shear_strength=foot.shear_strength,
         conforming_pressure=foot.conforming_pressure,
         boundary_friction=foot.boundary_friction,
+        capillary=foot.pads * foot.capillary_force,
         critical_film=foot.critical_film,
         film_exponent=foot.film_exponent,
         shear_stiffness=foot.shear_stiffness,

@@ -94,6 +94,7 @@ class Setting(NamedTuple):
     shear_strength: float
     conforming_pressure: float
     boundary_friction: float
+    capillary: float  # of the liquid round all domes, N
     critical_film: float
     film_exponent: float
     shear_stiffness: float
@@ -456,6 +457,8 @@ def resistance(
         under_domes = on_domes / (pressure if pressure > conforming else conforming)
         dry = setting.friction * on_domes + setting.shear_strength * under_domes
         total += on_film(setting, dry, on_domes, dome_film)
+        if dome_film > 0.0:
+            total += setting.capillary
     if on_sole > 0.0:
         free, touched = setting.sole_area - under_domes, on_sole / conforming
         dry = setting.friction * on_sole + setting.shear_strength * (

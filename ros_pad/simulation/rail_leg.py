@@ -213,7 +213,8 @@ def walk_many(
     (
         mass, drag, goal, stroke, stance, swing, settle, downhill,
         dome_dry, dome_wet, dome_drain, sole_dry, sole_wet, sole_drain, critical, exponent,
-    ) = np.array(rows).reshape(-1, 16).T  # fmt: skip
+        capillary,
+    ) = np.array(rows).reshape(-1, 17).T  # fmt: skip
     # A depth of zero is dry ground: no film at all, 1/h² is infinite.
     depths = [floor.film_thickness for floor in floors]
     puddle = np.array([depth**-2.0 if depth else math.inf for depth in depths])
@@ -255,7 +256,8 @@ def walk_many(
         cap = np.where(
             wet,
             resistance(dome_dry, dome_wet, fresh + dome_drain * drained)
-            + resistance(sole_dry, sole_wet, fresh + sole_drain * drained),
+            + resistance(sole_dry, sole_wet, fresh + sole_drain * drained)
+            + np.where(fresh < math.inf, capillary, 0.0),
             dome_dry + sole_dry,
         )
         cap[~stands] = 0.0
@@ -291,4 +293,5 @@ def _row(scene: Scene, pressure: float) -> tuple[float, ...]:
         both_dry - dome_dry, foot.boundary_friction * sole,
         4.0 * sole / (3.0 * viscosity * foot.sole_radius**2 * foot.sole_area),
         foot.critical_film, foot.film_exponent,
+        foot.pads * foot.capillary_force if domes else 0.0,
     )  # fmt: skip

@@ -89,6 +89,16 @@ def test_film_leaves_a_share_of_dry_contact():
     assert tangential_resistance(bare_foot(), 5.0, 0.0, THICK, 1e-6) == found
 
 
+def test_liquid_round_domes_adds_its_force_on_wet_ground_only():
+    foot = bare_foot(capillary_force=1e-3)  # 20 pads: 0.02 N
+    for films in ((THICK, THICK), (1e-6, 0.0)):
+        dry_of_it = tangential_resistance(bare_foot(), 2.0, 75e3, *films)
+        assert tangential_resistance(foot, 2.0, 75e3, *films) == pytest.approx(dry_of_it + 0.02)
+    for pressure, films in ((75e3, (0.0, 0.0)), (0.0, (THICK, THICK))):
+        found = tangential_resistance(foot, 2.0, pressure, *films)
+        assert found == tangential_resistance(bare_foot(), 2.0, pressure, *films)
+
+
 def test_no_load_no_resistance():
     assert tangential_resistance(bare_foot(), 0.0, 75e3) == 0.0
     assert tangential_resistance(bare_foot(), 0.0, 0.0, THICK, THICK) == 0.0
@@ -329,6 +339,15 @@ def test_a_foot_file_may_give_the_limit_of_its_pads(tmp_path):
     assert foot.dome_load(100.0, 70e3) == pytest.approx(19 * 0.3, rel=1e-6)
     path.write_text(path.read_text().replace('slope: 1.0e-5', 'slope: -1.0'))
     with pytest.raises(ConfigError, match=r'own\.yaml.*slope'):
+        Foot.load(path)
+
+
+def test_a_foot_file_may_give_the_force_of_its_liquid(tmp_path):
+    assert Foot.load('large37').capillary_force == 0.0
+    path = written(tmp_path, lambda values: values.update(capillary_force=2e-5))
+    assert Foot.load(path).capillary_force == 2e-5
+    path = written(tmp_path, lambda values: values.update(capillary_force=-2e-5))
+    with pytest.raises(ConfigError, match=r'capillary_force = -2e-05 is not allowed'):
         Foot.load(path)
 
 

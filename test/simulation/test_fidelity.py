@@ -244,6 +244,11 @@ def test_bound_of_the_capillary_force():
     assert bound(HEXAPOD, 'capillary') == pytest.approx(37 * 0.000438 / 2.392, rel=1e-3)
 
 
+def test_a_foot_with_a_capillary_force_leaves_none_out():
+    foot = dataclasses.replace(HEXAPOD.foot, capillary_force=1e-4)
+    assert bound(dataclasses.replace(HEXAPOD, foot=foot), 'capillary') is None
+
+
 def test_film_that_a_dome_can_drag():
     """The best plane wedge: Reynolds' equation in closed form, over all inclinations.
 

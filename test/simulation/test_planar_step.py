@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The flat step: the same physics as the objects it stands for, plain and compiled to the bit."""
 
+import dataclasses
 import itertools
 import math
 
@@ -69,7 +70,7 @@ def test_gait(time, cycle, duty, stride):
     st.floats(0.0, 1e-3),
 )
 def test_foot(load, pressure, name, dome_film, sole_film):
-    foot = Foot.load(name)
+    foot = dataclasses.replace(Foot.load(name), capillary_force=2e-4)
     own = SETTING._replace(
         **{
             each: getattr(foot, each)
@@ -80,11 +81,14 @@ def test_foot(load, pressure, name, dome_film, sole_film):
         },
         limit_cell=foot._limit_cell,
         limits=foot._limit_table,
+        capillary=foot.pads * 2e-4,
     )  # fmt: skip
     on_domes = foot.dome_load(load, pressure)
     assert planar_step.dome_load(own, load, pressure) == on_domes
     films = on_domes, load - on_domes, pressure, dome_film, sole_film
     assert planar_step.resistance(own, *films) == foot.resistance_of(*films)
+    with_it = dataclasses.replace(SCENE, foot=foot)
+    assert setting(with_it, FLOOR, 0.004).capillary == own.capillary
 
 
 @given(

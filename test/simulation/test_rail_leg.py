@@ -304,7 +304,9 @@ def mixed_legs():
     scenes = [Scene.load(f'leg_{name}') for name in ('dry_flat', 'wet_flat', 'wet_dome_60')]
     scenes.append(dataclasses.replace(scenes[1], floor=patched))
     scenes.append(on_slope(scene_of(0.7, settle=0.3, stance=0.4), 0.005))
-    pressures = [0.0, 0.0, 60e3, 75e3, 40e3]
+    wetter = dataclasses.replace(scenes[2].foot, capillary_force=5e-3)  # a tenth of its grip
+    scenes.append(dataclasses.replace(scenes[2], foot=wetter))
+    pressures = [0.0, 0.0, 60e3, 75e3, 40e3, 60e3]
     return scenes, [scene.floor.build(3) for scene in scenes], pressures
 
 

@@ -1,0 +1,481 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Closed triangle meshes of pads that stand on the floor: read, made, checked, written."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import os
+import pathlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import number
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import MeshError
+
+Indices: TypeAlias = npt.NDArray[np.int64]
+
+SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
+LARGEST = 0.5  # m: beyond this a pad was surely drawn in millimetres
+SMALLEST = 1e-5  # m
+_ON_FLOOR = 1e-5  # of the height: what files in single precision may miss the floor by
+_WELD = 1e-7  # of the extent: points that are one
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """One or more closed bodies that stand on the floor z = 0, z up, normals outward.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3)
+        Corners, m.
+    faces : array of int, shape (m, 3)
+        Corners of each triangle, anticlockwise as seen from outside.
+    source : str
+        File or generator, for messages.
+
+    Raises
+    ------
+    MeshError
+        When the mesh is empty, holds numbers that are not finite, has holes, edges of more than
+        two triangles or triangles that face the other way than their neighbours, is inside out,
+        does not reach down to z = 0 or goes below it, or has no size a pad can have in metres.
+    """
+
+    points: Array
+    faces: Indices
+    source: str = 'mesh'
+
+    def __post_init__(self) -> None:
+        points, faces = np.asarray(self.points), np.asarray(self.faces)
+        _check_arrays(points, faces, self.source)
+        points, faces = points.astype(np.float64), faces.astype(np.int64)
+        extent = float(np.ptp(points[faces.ravel()], axis=0).max())
+        _check_size(extent, self.source)
+        used, first = np.unique(faces, return_inverse=True)
+        points, faces = points[used], first.reshape(faces.shape)
+        _check_edges(points, faces, self.source)
+        _check_volumes(points, faces, self.source)
+        low, high = float(points[:, 2].min()), float(points[:, 2].max())
+        if abs(low) > _ON_FLOOR * (high - low):
+            raise MeshError(
+                f'{self.source}: the lowest point is at z = {low:.6g} m, not on the floor z = 0:'
+                f' lift = {-low:.9g} m would put it there'
+            )
+        points[:, 2] -= low
+        points.setflags(write=False)
+        faces.setflags(write=False)
+        object.__setattr__(self, 'points', points)
+        object.__setattr__(self, 'faces', faces)
+
+    @property
+    def height(self) -> float:
+        """From the floor to the highest point, m."""
+        return float(self.points[:, 2].max())
+
+    @functools.cached_property
+    def volume(self) -> float:
+        """Of all bodies, m³."""
+        return float(_tetrahedra(self.points, self.faces).sum())
+
+    # --- Files --------------------------------------------------------------------------------
+
+    @classmethod
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        scale: float = 1.0,
+        lift: float = 0.0,
+        flip: bool = False,
+    ) -> Mesh:
+        """Read an STL, OBJ, PLY or MSH (Gmsh) file.
+
+        Triangles and quadrangles are taken; of a file with tetrahedra alone, their outer faces.
+
+        Parameters
+        ----------
+        path : path
+            The ending names the format.
+        scale : float
+            What one unit of the file is in metres: 1e-3 for a file in millimetres.
+        lift : float
+            Added to every height after scaling, m.
+        flip : bool
+            Turn every triangle over, for a mesh that is inside out.
+
+        Raises
+        ------
+        MeshError
+            When the file is missing or cannot be understood, meshio is not installed, or for any
+            reason of :class:`Mesh`.
+        InvalidInput
+            When ``scale`` or ``lift`` is not finite, or the scale not above 0.
+        """
+        number('scale', scale, 'm per unit', above=True)
+        number('lift', lift, 'm', low=-math.inf)
+        path = _known(path)
+        if not path.is_file():
+            raise MeshError(f'{path}: there is no such file')
+        meshio = _meshio()
+        # meshio prints what it does not understand, and then leaves the interpreter.
+        with (
+            open(os.devnull, 'w') as nowhere,
+            contextlib.redirect_stdout(nowhere),
+            contextlib.redirect_stderr(nowhere),
+            np.errstate(all='ignore'),
+        ):
+            try:
+                found = meshio.read(path)
+            except (Exception, SystemExit) as error:
+                reason = str(error) or type(error).__name__
+                raise MeshError(
+                    f'{path}: this is no {path.suffix[1:].upper()} file that can be read'
+                    f' ({reason})'
+                ) from error
+        faces = _triangles(found.cells)
+        points = np.asarray(found.points, dtype=np.float64)
+        if faces.size and points.shape[1:] == (3,) and np.isfinite(points).all():
+            points, faces = _welded(points, faces)
+        points = points * scale
+        if points.shape[1:] == (3,):
+            points[:, 2] += lift
+        return cls(points, faces[:, ::-1] if flip else faces, os.fspath(path))
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write an STL, OBJ, PLY or MSH file in metres. An existing file is left alone.
+
+        Raises
+        ------
+        MeshError
+            When the ending is not one of these, or meshio is not installed.
+        InvalidInput
+            When the file exists.
+        """
+        path = _known(path)
+        meshio = _meshio()
+        if path.exists():
+            raise InvalidInput(f'{path} exists already: nothing is overwritten')
+        ways: dict[str, Any] = {
+            '.stl': {'binary': True},
+            '.msh': {'file_format': 'gmsh', 'binary': False},
+        }
+        faces = self.faces.astype(np.int32)  # PLY has no longer integers
+        meshio.Mesh(self.points, [('triangle', faces)]).write(
+            path, **ways.get(path.suffix.lower(), {})
+        )
+
+    # --- Generators ---------------------------------------------------------------------------
+
+    @classmethod
+    def dome(
+        cls,
+        sphere_radius: float,
+        contact_radius: float,
+        height: float | None = None,
+        rings: int = 48,
+        sectors: int = 72,
+    ) -> Mesh:
+        """Make a dome pressed flat on the floor: a sphere cut off below and above.
+
+        Parameters
+        ----------
+        sphere_radius : float
+            m.
+        contact_radius : float
+            Of the flat part on the floor, m, from 0 (it touches in a point) to below
+            ``sphere_radius``.
+        height : float, optional
+            Where the sphere is cut off above, m: by default at its widest.
+        rings, sectors : int
+            Bands of triangles from floor to top (from 1), and round the axis (from 3).
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, not in range or not a whole number.
+        """
+        radius = number('sphere_radius', sphere_radius, 'm', above=True)
+        below = math.nextafter(radius, 0.0)
+        contact = number('contact_radius', contact_radius, 'm', high=below)
+        centre = math.sqrt((radius - contact) * (radius + contact))
+        if height is None:
+            height = centre
+        top = math.nextafter(centre + radius, 0.0)
+        number('height', height, 'm', high=top, above=True)
+        turns = np.linspace(
+            math.asin(contact / radius), math.acos((centre - height) / radius), _count(rings) + 1
+        )
+        r, z = radius * np.sin(turns), centre - radius * np.cos(turns)
+        r[0], z[0], z[-1] = contact, 0.0, height
+        return _revolved(r, z, sectors, f'dome of {radius:g} m')
+
+    @classmethod
+    def cone(
+        cls,
+        contact_radius: float,
+        top_radius: float,
+        height: float,
+        rings: int = 24,
+        sectors: int = 72,
+    ) -> Mesh:
+        """Make a truncated cone.
+
+        Parameters
+        ----------
+        contact_radius, top_radius : float
+            At the floor and at the top, m, from 0, not both 0.
+        height : float
+            m, above 0.
+        rings, sectors : int
+            As for :meth:`dome`.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, not in range or not a whole number.
+        """
+        contact = number('contact_radius', contact_radius, 'm')
+        top = number('top_radius', top_radius, 'm', above=contact == 0.0)
+        z = np.linspace(0.0, number('height', height, 'm', above=True), _count(rings) + 1)
+        return _revolved(contact + (top - contact) * z / height, z, sectors, 'cone')
+
+    @classmethod
+    def cylinder(cls, radius: float, height: float, rings: int = 1, sectors: int = 72) -> Mesh:
+        """Make a cylinder that stands upright; values as for :meth:`cone`."""
+        return cls.cone(number('radius', radius, 'm', above=True), radius, height, rings, sectors)
+
+    @classmethod
+    def dome_pattern(
+        cls,
+        pads: int,
+        pitch: float,
+        sphere_radius: float,
+        contact_radius: float,
+        height: float | None = None,
+        rings: int = 24,
+        sectors: int = 48,
+    ) -> Mesh:
+        """Make many equal domes in a hexagonal layout, the first in the middle.
+
+        Parameters
+        ----------
+        pads : int
+            How many, from 1: those of the lattice that are nearest to the middle.
+        pitch : float
+            Distance of neighbours, m.
+        sphere_radius, contact_radius, height, rings, sectors
+            Of each :meth:`dome`.
+
+        Raises
+        ------
+        MeshError
+            When neighbours overlap or touch.
+        InvalidInput
+            As for :meth:`dome`.
+        """
+        one = cls.dome(sphere_radius, contact_radius, height, rings, sectors)
+        widest = 2.0 * float(np.hypot(*one.points[:, :2].T).max())
+        number('pitch', pitch, 'm', above=True)
+        if _count(pads, 'pads') > 1 and pitch <= widest:
+            raise MeshError(
+                f'pitch = {pitch:g} m: the domes are {widest:.6g} m wide and would overlap'
+            )
+        places = np.column_stack([pitch * _hexagonal(pads), np.zeros(pads)])
+        points = (places[:, None] + one.points[None]).reshape(-1, 3)
+        shifts = len(one.points) * np.arange(pads)
+        faces = (one.faces[None] + shifts[:, None, None]).reshape(-1, 3)
+        return cls(points, faces, f'{pads} domes of {sphere_radius:g} m')
+
+
+def _count(value: int, name: str = 'rings', low: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < low:
+        raise InvalidInput(f'{name} = {value!r} is not allowed: a whole number from {low}')
+    return value
+
+
+def _revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
+    """Return a body of revolution; the profile goes up from the floor."""
+    turns = 2.0 * math.pi * np.arange(_count(sectors, 'sectors', 3)) / sectors
+    ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    # The middle of floor and top stand for rings without a radius, too.
+    wide = r > 0.0
+    levels = [np.column_stack([r[k] * ring, np.full(sectors, z[k])]) for k in np.flatnonzero(wide)]
+    points = np.concatenate([*levels, [(0.0, 0.0, z[0]), (0.0, 0.0, z[-1])]])
+    here = np.arange(sectors)
+    there = np.roll(here, -1)
+    bands = [
+        sectors * k
+        + np.concatenate(
+            [
+                np.column_stack([here, there, there + sectors]),
+                np.column_stack([here, there + sectors, here + sectors]),
+            ]
+        )
+        for k in range(len(levels) - 1)
+    ]
+    low, high, last = len(points) - 2, len(points) - 1, sectors * (len(levels) - 1)
+    bands.append(np.column_stack([np.full(sectors, low), there, here]))
+    bands.append(np.column_stack([np.full(sectors, high), here + last, there + last]))
+    return Mesh(points, np.concatenate(bands), source)
+
+
+def _hexagonal(count: int) -> Array:
+    """Return the places of a hexagonal lattice that are nearest to its origin, neighbours 1."""
+    reach = int(math.sqrt(count)) + 2
+    i, j = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    places = np.column_stack([i + 0.5 * j, math.sqrt(0.75) * j])
+    turn = np.arctan2(places[:, 1], places[:, 0])
+    order = np.lexsort((np.round(turn, 9), i * i + i * j + j * j))[:count]
+    chosen: Array = places[order]
+    return chosen
+
+
+# --- Reading ----------------------------------------------------------------------------------
+
+
+def _known(path: str | os.PathLike[str]) -> pathlib.Path:
+    known = pathlib.Path(path)
+    if known.suffix.lower() not in SUFFIXES:
+        raise MeshError(f'{known}: a mesh ends in {", ".join(SUFFIXES)}')
+    return known
+
+
+def _meshio() -> Any:
+    try:
+        import meshio
+    except ImportError as error:
+        raise MeshError(
+            "files of meshes need meshio, which is not installed: pip install 'ros_pad[mesh]'"
+        ) from error
+    return meshio
+
+
+def _triangles(cells: Sequence[Any]) -> Indices:
+    """Return all triangles of a file."""
+    found = [np.empty((0, 3), dtype=np.int64)]
+    for block in cells:
+        corners = np.asarray(block.data, dtype=np.int64)
+        if block.type.startswith('triangle'):
+            found.append(corners[:, :3])
+        elif block.type.startswith('quad'):
+            found += [corners[:, :3], corners[:, [0, 2, 3]]]
+    if len(found) == 1:
+        for block in cells:
+            if block.type.startswith('tetra'):
+                t = np.asarray(block.data, dtype=np.int64)
+                found += [t[:, [0, 2, 1]], t[:, [0, 1, 3]], t[:, [1, 2, 3]], t[:, [2, 0, 3]]]
+        faces = np.concatenate(found)
+        # The faces between two tetrahedra are there twice.
+        _, which, times = np.unique(
+            np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
+        )
+        return faces[times[which.ravel()] == 1]
+    return np.concatenate(found)
+
+
+def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
+    """Merge points that are one, as an STL file has them; drop triangles without a size."""
+    points, which = np.unique(points, axis=0, return_inverse=True)
+    which = which.ravel()
+    pairs = cKDTree(points).query_pairs(
+        _WELD * float(np.ptp(points, axis=0).max()), output_type='ndarray'
+    )
+    if len(pairs):
+        graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+        count, group = connected_components(graph, directed=False)
+        first = np.full(count, len(points))
+        np.minimum.at(first, group, np.arange(len(points)))
+        points, which = points[first], group[which]
+    faces = which[faces]
+    a, b, c = faces.T
+    return points, faces[(a != b) & (b != c) & (c != a)]
+
+
+# --- Checks -----------------------------------------------------------------------------------
+
+
+def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str) -> None:
+    if points.size == 0 or faces.size == 0:
+        raise MeshError(f'{source}: the mesh is empty: it has no triangles')
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in 'iuf':
+        raise MeshError(f'{source}: points of shape {points.shape}: (n, 3) numbers are needed')
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in 'iu':
+        raise MeshError(f'{source}: faces of shape {faces.shape}: (m, 3) integers are needed')
+    if faces.min() < 0 or faces.max() >= len(points):
+        raise MeshError(
+            f'{source}: corners {faces.min()} to {faces.max()} are not all among the'
+            f' {len(points)} points'
+        )
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(f'{source}: point {bad[0]} is not finite: {points[bad[0]]}')
+
+
+def _check_size(extent: float, source: str) -> None:
+    if extent > LARGEST:
+        raise MeshError(
+            f'{source}: {extent:.6g} m across, more than {LARGEST:g} m: a pad in millimetres needs'
+            ' scale=1e-3'
+        )
+    if extent < SMALLEST:
+        raise MeshError(
+            f'{source}: {extent:.6g} m across, less than {SMALLEST:g} m: was it scaled twice?'
+        )
+
+
+def _check_edges(points: Array, faces: Indices, source: str) -> None:
+    """Refuse what is no closed surface with one outside."""
+    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    if (starts == ends).any():
+        raise MeshError(
+            f'{source}: triangle {int(np.argmax(starts == ends)) // 3} has a corner twice'
+        )
+    n = len(points)
+    edges = np.minimum(starts, ends) * n + np.maximum(starts, ends)
+    keys, which, times = np.unique(edges, return_inverse=True, return_counts=True)
+    rising = np.bincount(which, weights=starts < ends)
+    for wrong, what in (
+        (times > 2, 'edges of more than two triangles (non-manifold)'),
+        (times < 2, 'open edges (holes)'),
+        (rising != 1, 'edges whose two triangles face opposite ways (flipped normals)'),
+    ):
+        if wrong.any():
+            place = 0.5 * (points[keys[wrong][0] // n] + points[keys[wrong][0] % n])
+            raise MeshError(
+                f'{source}: {int(wrong.sum())} {what}, the first at'
+                f' ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) m'
+            )
+
+
+def _check_volumes(points: Array, faces: Indices, source: str) -> None:
+    """Refuse bodies that are inside out."""
+    edges = np.concatenate([faces[:, :2], faces[:, 1:]]).T
+    graph = coo_array((np.ones(edges.shape[1]), edges), shape=(len(points),) * 2)
+    count, group = connected_components(graph, directed=False)
+    volumes = np.bincount(group[faces[:, 0]], _tetrahedra(points, faces), count)
+    wrong = int(np.sum(volumes <= 0.0))
+    if wrong:
+        which = 'the mesh is' if wrong == count else f'{wrong} of {count} bodies are'
+        raise MeshError(
+            f'{source}: {which} inside out (flipped normals) or flat: flip=True turns a whole'
+            ' mesh over; hollows inside a pad must go'
+        )
+
+
+def _tetrahedra(points: Array, faces: Indices) -> Array:
+    """Return the signed volume that each triangle spans with a point in the middle."""
+    a, b, c = (points - points.mean(axis=0))[faces.T]
+    volumes: Array = np.einsum('ij,ij->i', a, np.cross(b, c)) / 6.0
+    return volumes

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cuts through a mesh: half planes through an axis (slices), and horizontal planes (layers)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.capillary.mesh import Indices
+from ros_pad.capillary.mesh import Mesh
+from ros_pad.contact.pad import Array
+from ros_pad.errors import MeshError
+
+CREASE = math.radians(40.0)  # facets that meet at less stand for one smooth wall
+_INSIDE = 1e-9  # of the height: lowest and highest cut, so far from floor and top
+_LINES = 96  # along which bodies are searched for overlaps
+
+
+class Walls(NamedTuple):
+    """Where half planes through the axis cut the wall.
+
+    Attributes
+    ----------
+    azimuths : array, shape (slices,), rad.
+    heights : array, shape (layers + 1,), m, from the floor to the top.
+    radii : array, shape (slices, layers + 1)
+        Distance of the wall from the axis, m.
+    inclinations : array, shape (slices, layers + 1)
+        Between floor and wall, measured through the liquid, rad: pi/2 where the wall stands
+        upright, less where it hangs over the liquid.
+    """
+
+    azimuths: Array
+    heights: Array
+    radii: Array
+    inclinations: Array
+
+
+def levels(mesh: Mesh, layers: int) -> Array:
+    """Return the heights of equal layers, m, floor and top included."""
+    return np.linspace(0.0, mesh.height, layers + 1)
+
+
+def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Walls:
+    """Cut the mesh by half planes that start at a vertical axis.
+
+    Raises
+    ------
+    MeshError
+        Where a half plane meets the wall not exactly once at some height: the axis is outside the
+        pad, bodies overlap, or the pad is no star as seen from the axis.
+    """
+    heights = levels(mesh, layers)
+    cuts = heights.copy()
+    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
+    azimuths = 2.0 * math.pi * np.arange(slices) / slices
+    outward = np.stack([np.cos(azimuths), np.sin(azimuths)])
+    flat = mesh.points[:, :2] - axis
+    offset = flat @ np.stack([-outward[1], outward[0]])  # from each point to each plane
+    beyond = offset > 0.0
+
+    z = mesh.points[:, 2][mesh.faces]
+    upright = np.flatnonzero(np.ptp(z, axis=1) > 0.0)  # no layer cuts what lies level
+    first, second, third = (beyond[mesh.faces[upright, k]] for k in range(3))
+    which, face = np.nonzero(((first != second) | (second != third)).T)
+    sides = np.stack([first[face, which], second[face, which], third[face, which]], axis=1)
+    face = upright[face]
+    ahead = sides.sum(axis=1) == 1  # one corner beyond the plane, two behind; or the reverse
+    lone = np.argmax(sides == ahead[:, None], axis=1)
+    corners = np.stack([lone, (lone + 1) % 3, (lone + 2) % 3], axis=1)
+    points = mesh.faces[face[:, None], corners]
+    normals = _smooth_normals(mesh, face, corners)
+
+    # Both ends of the cut through a triangle: radius, height, normal (three numbers).
+    ends = []
+    for other in (2, 1):
+        # From the point of lower number, so that both triangles at an edge agree to the bit.
+        low = np.minimum(points[:, 0], points[:, other])
+        high = np.maximum(points[:, 0], points[:, other])
+        share = offset[low, which] / (offset[low, which] - offset[high, which])
+        place = mesh.points[low] + share[:, None] * (mesh.points[high] - mesh.points[low])
+        radius = ((place[:, :2] - axis) * outward[:, which].T).sum(axis=1)
+        share = np.where(low == points[:, 0], share, 1.0 - share)[:, None]
+        normal = normals[:, 0] + share * (normals[:, other] - normals[:, 0])
+        ends.append(np.column_stack([radius, place[:, 2], normal]))
+    start, end = (
+        np.where(ahead[:, None], ends[0], ends[1]),
+        np.where(ahead[:, None], ends[1], ends[0]),
+    )
+
+    row, layer = _crossed(cuts, start[:, 1], end[:, 1])
+    share = (cuts[layer] - start[row, 1]) / (end[row, 1] - start[row, 1])
+    found = start[row] + share[:, None] * (end[row] - start[row])
+    leaves = np.where(end[row, 1] > start[row, 1], 1, -1)  # the solid, or enters it
+    right = found[:, 0] > 0.0
+    found, leaves, row, layer = found[right], leaves[right], row[right], layer[right]
+    cell = which[row] * len(cuts) + layer
+    count = np.bincount(cell, minlength=slices * len(cuts))
+    turns = _summed(cell, leaves, count.size)
+    _check_star(mesh, count, turns, heights, azimuths, axis)
+
+    radii, inclinations = np.empty(count.size), np.empty(count.size)
+    radii[cell] = found[:, 0]
+    radial = (found[:, 2:4] * outward[:, which[row]].T).sum(axis=1)
+    inclinations[cell] = np.arctan2(radial, -found[:, 4])
+    shape = slices, len(cuts)
+    return Walls(azimuths, heights, radii.reshape(shape), inclinations.reshape(shape))
+
+
+def _crossed(cuts: Array, start: Array, end: Array) -> tuple[Indices, Indices]:
+    """Return, for spans of height, pairs of span and cut, where the cut is inside the span."""
+    first = np.searchsorted(cuts, np.minimum(start, end), 'left')
+    last = np.searchsorted(cuts, np.maximum(start, end), 'left')
+    count = last - first
+    row = np.repeat(np.arange(count.size), count)
+    within = np.arange(row.size) - np.repeat(np.cumsum(count) - count, count)
+    return row, first[row] + within
+
+
+def _check_star(
+    mesh: Mesh,
+    count: npt.NDArray[Any],
+    turns: Array,
+    heights: Array,
+    azimuths: Array,
+    axis: tuple[float, float],
+) -> None:
+    for wrong, what in (
+        (turns > 1, 'bodies overlap round the axis'),
+        (turns < 1, 'the axis is outside the pad'),
+        (count > 1, 'the wall is met more than once: no star as seen from the axis'),
+    ):
+        if wrong.any():
+            j, k = divmod(int(np.argmax(wrong)), heights.size)
+            raise MeshError(
+                f'{mesh.source}: {what} (z = {heights[k]:.4g} m,'
+                f' {math.degrees(azimuths[j]):.3g} degrees from the x axis, axis through'
+                f' x = {axis[0]:.4g}, y = {axis[1]:.4g} m); wet_pattern takes any shape'
+            )
+
+
+def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
+    """Return unit normals of the wall at three corners of triangles, shape (n, 3, 3).
+
+    The mean of the triangles round the corner that belong to the same smooth wall, weighted by
+    their angles there; what lies on the floor or at the very top is not wall.
+    """
+    points, faces = mesh.points, mesh.faces
+    a, b, c = points[faces.T]
+    flat = np.cross(b - a, c - a)
+    size = np.linalg.norm(flat, axis=1)
+    flat /= np.where(size > 0.0, size, 1.0)[:, None]
+    edges = np.stack([b - a, c - b, a - c], axis=1)
+    edges /= np.maximum(np.linalg.norm(edges, axis=2), 1e-300)[..., None]
+    between = -np.einsum('ijk,ijk->ij', edges, edges[:, [2, 0, 1]])
+    weight = np.arccos(np.clip(between, -1.0, 1.0))
+    heights, tiny = points[:, 2][faces], 1e-6 * mesh.height
+    level = (heights < tiny).all(axis=1) | (heights > mesh.height - tiny).all(axis=1)
+    weight[level | (size == 0.0)] = 0.0
+
+    order = np.argsort(faces.ravel(), kind='stable')  # corners of all triangles, point by point
+    begin = np.searchsorted(faces.ravel()[order], np.arange(len(points) + 1))
+    wanted, back = np.unique(3 * face[:, None] + corners, return_inverse=True)
+    point = faces.ravel()[wanted]
+    count = begin[point + 1] - begin[point]
+    row = np.repeat(np.arange(wanted.size), count)
+    within = np.arange(row.size) - np.repeat(np.cumsum(count) - count, count)
+    near = order[begin[point][row] + within]
+    alike = np.einsum('ij,ij->i', flat[wanted[row] // 3], flat[near // 3]) > math.cos(CREASE)
+    alike &= weight.ravel()[near] > 0.0
+    share = np.where(alike, weight.ravel()[near], 0.0)
+    mean = _units(
+        np.stack(
+            [np.bincount(row, share * flat[near // 3, k], wanted.size) for k in range(3)], axis=1
+        )
+    )
+    inner = np.bincount(row, ~alike, wanted.size) == 0.0
+    mean, inner = mean[back.reshape(corners.shape)], inner[back.reshape(corners.shape)]
+
+    # At an edge of the wall the mean is one-sided. On an arc the normal of a chord halves the
+    # angle between those at its ends: reflect the one that is known.
+    known = _units(np.sum(mean * inner[..., None], axis=1))
+    across = flat[face]
+    mirrored = 2.0 * np.sum(known * across, axis=1)[:, None] * across - known
+    edge = ~inner & inner.any(axis=1)[:, None]
+    return np.where(edge[..., None], mirrored[:, None], mean)
+
+
+def _units(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, 1.0)
+
+
+# --- Layers -----------------------------------------------------------------------------------
+
+
+class Layers(NamedTuple):
+    """What horizontal planes cut out of a mesh; every array has shape (layers + 1,).
+
+    Attributes
+    ----------
+    heights : array, m.
+    areas : array
+        Of the solid, m².
+    wetted : array
+        Wall below each height, m².
+    pull : array
+        Sum over the outline, with contact angle θ and inclination a, of length times
+        sin(θ + a), m.
+    gain : array
+        The same of (cos a + cos θ)/sin a, m: surface energy that a rise sets free, over the
+        tension.
+    """
+
+    heights: Array
+    areas: Array
+    wetted: Array
+    pull: Array
+    gain: Array
+
+
+def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
+    """Cut the mesh by horizontal planes; the contact angle, rad, is for ``pull`` and ``gain``.
+
+    Raises
+    ------
+    MeshError
+        Where bodies overlap, as far as horizontal lines through the layers show it.
+    """
+    heights = levels(mesh, layers)
+    cuts = heights.copy()
+    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
+    corners = mesh.points[mesh.faces]
+    upright = np.flatnonzero(np.ptp(corners[:, :, 2], axis=1) > 0.0)
+    corners = corners[upright]
+    normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
+    start, end, layer = _outlines(np.concatenate([corners, normals], axis=2), cuts)
+    _check_overlaps(mesh, start, end, layer, heights)
+    nx, ny, nz = 0.5 * (start + end)[:, 2:].T
+    slope = np.arctan2(np.hypot(nx, ny), -nz)
+    length = np.hypot(*(end - start)[:, :2].T)
+    gain = (np.cos(slope) + math.cos(angle)) / np.maximum(np.sin(slope), 1e-12)
+    return Layers(
+        heights,
+        _summed(layer, 0.5 * _cross(start, end), cuts.size),
+        _area_below(corners, cuts),
+        _summed(layer, length * np.sin(angle + slope), cuts.size),
+        _summed(layer, length * gain, cuts.size),
+    )
+
+
+def centre(mesh: Mesh, height: float) -> tuple[float, float]:
+    """Return the centroid of the section at a height, m."""
+    start, end, _ = _outlines(mesh.points[mesh.faces], np.array([height]))
+    cross = _cross(start, end)
+    x, y = ((start + end)[:, :2] * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
+    return float(x), float(y)
+
+
+def _outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
+    """Return the pieces of outline in each layer, solid on their left: start, end, layer.
+
+    Corners have x, y, z and whatever else there is to know of them, shape (triangles, 3, n); z is
+    left out of what comes back.
+    """
+    z = corners[:, :, 2]
+    face, layer = _crossed(cuts, z.min(axis=1), z.max(axis=1))
+    above = z[face] > cuts[layer][:, None]
+    ahead = above.sum(axis=1, keepdims=True) == 1
+    lone = np.argmax(above == ahead, axis=1)
+    first = corners[face, lone]
+    ends = []
+    for step in (1, 2):
+        other = corners[face, (lone + step) % 3]
+        # From below to above, so that neighbours agree to the bit.
+        low, high = np.where(ahead, other, first), np.where(ahead, first, other)
+        share = (cuts[layer] - low[:, 2]) / (high[:, 2] - low[:, 2])
+        ends.append(np.delete(low + share[:, None] * (high - low), 2, axis=1))
+    return np.where(ahead, ends[0], ends[1]), np.where(ahead, ends[1], ends[0]), layer
+
+
+def _area_below(corners: Array, cuts: Array) -> Array:
+    """Return the area of the triangles below each cut, without those that lie level."""
+    sizes = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    low, middle, high = np.sort(corners[:, :, 2], axis=1).T
+    face, layer = _crossed(cuts, low, high)
+    z = cuts[layer]
+    a, b, c = low[face], middle[face], high[face]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        share = np.where(
+            z < b,
+            (z - a) ** 2 / ((b - a) * (c - a)),
+            1.0 - (c - z) ** 2 / ((c - b) * (c - a)),
+        )
+    partly = _summed(layer, sizes[face] * share, cuts.size)
+    done = np.searchsorted(cuts, high, 'left')
+    wall = (high > low) & (done < cuts.size)
+    return partly + np.cumsum(_summed(done[wall], sizes[wall], cuts.size))
+
+
+def _check_overlaps(mesh: Mesh, start: Array, end: Array, layer: Indices, heights: Array) -> None:
+    """Walk along lines through every layer, counting how many bodies one is in."""
+    low, high = float(mesh.points[:, 1].min()), float(mesh.points[:, 1].max())
+    # Off any symmetry of the mesh.
+    lines = low + (high - low) * (np.arange(_LINES) + 0.4137) / _LINES
+    row, line = _crossed(lines, start[:, 1], end[:, 1])
+    share = (lines[line] - start[row, 1]) / (end[row, 1] - start[row, 1])
+    x = start[row, 0] + share * (end[row, 0] - start[row, 0])
+    # Along x one enters a solid where its outline goes down, with the solid on the left.
+    enters = np.where(end[row, 1] < start[row, 1], 1, -1)
+    order = np.lexsort((enters, x, line, layer[row]))
+    inside = np.cumsum(enters[order])  # back to 0 at the end of every line
+    if inside.size and (inside.max() > 1 or inside.min() < 0):
+        worst = order[int(np.argmax((inside > 1) | (inside < 0)))]
+        raise MeshError(
+            f'{mesh.source}: bodies overlap, or the mesh cuts itself, at x = {x[worst]:.4g},'
+            f' y = {lines[line[worst]]:.4g}, z = {heights[layer[row[worst]]]:.4g} m'
+        )
+
+
+def _cross(start: Array, end: Array) -> Array:
+    cross: Array = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
+    return cross
+
+
+def _summed(group: Indices, values: npt.NDArray[Any], count: int) -> Array:
+    return np.bincount(group, values, count).astype(np.float64)
