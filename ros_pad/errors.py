@@ -37,6 +37,21 @@ class NoBridge(PadError):
     """A liquid bridge of this volume or filling angle does not exist: it has ruptured."""
 
 
+class NoSurface(PadError):
+    """A liquid surface, or a pad under it, has no equilibrium of the kind asked for.
+
+    Attributes
+    ----------
+    status : str
+        ``blocked`` (the surface would run through the wall), ``collapsed`` (it pinches off),
+        ``rim`` (it reaches the rim of the pad) or ``no_convergence``.
+    """
+
+    def __init__(self, message: str, status: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
 class MeshError(PadError):
     """A mesh cannot be wetted: open, flipped, non-manifold, or off the floor."""
 

@@ -93,6 +93,30 @@ def _height(radius: float, slope: float) -> float:
     """Return the height at a radius and slope angle there, in capillary lengths."""
     if slope <= 0.0:
         return -_height(radius, -slope) if slope < 0.0 else 0.0
+    return float(outer_surface(radius, slope)[2, -1])
+
+
+def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points: int = 2) -> Array:
+    """Return the surface of a wide bath outside a circle where it stands at a slope angle.
+
+    Parameters
+    ----------
+    radius : float
+        Of the circle, in capillary lengths, above 0.
+    slope : float
+        By which the surface falls outwards there, rad, above 0 and below pi. Above pi/2 it first
+        leads inwards, below what it hangs on.
+    tolerance : float
+        Relative error of the heights, about.
+    points : int
+        How many to return, from 2.
+
+    Returns
+    -------
+    array, shape (3, points)
+        Slope angle (rad), radius and height above the bath (capillary lengths) at places that
+        begin far away and end on the circle, evenly in the logarithm of the slope.
+    """
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
     from scipy.special import k0e
@@ -100,8 +124,8 @@ def _height(radius: float, slope: float) -> float:
 
     outer = 1e-6 * slope  # there the surface is linear to 1e-12
 
-    def miss(distance: float) -> tuple[float, float]:
-        """Return ln(r / radius) and z where a surface ends that is linear at this distance."""
+    def surface(distance: float) -> Array:
+        """Return ln slope, r - radius and z of a surface that is linear at this distance."""
         start = radius + distance
 
         def rates(log: float, state: Array) -> tuple[float, float]:
@@ -110,16 +134,21 @@ def _height(radius: float, slope: float) -> float:
             pull = psi / (state[1] + rise / r)
             return -math.cos(psi) * pull, rise * pull
 
-        end = solve_ivp(
+        ends = math.log(outer), math.log(slope)
+        path = solve_ivp(
             rates,
-            (math.log(outer), math.log(slope)),
+            ends,
             (distance, outer * k0e(start) / k1e(start)),
             method='DOP853',
-            rtol=1e-11,
-            atol=(1e-12 * min(radius, 1.0), 1e-12 * outer),
-        ).y[:, -1]
-        return math.log1p(end[0] / radius), end[1]
+            rtol=10.0 * tolerance,
+            atol=(tolerance * min(radius, 1.0), tolerance * outer),
+            t_eval=np.linspace(*ends, points),
+        )
+        return np.vstack([path.t, path.y])
 
     # A slope falls off at least as fast as exp(-2/3 distance).
-    distance = brentq(lambda far: miss(far)[0], 0.0, 25.0, xtol=1e-12)
-    return float(miss(distance)[1])
+    distance = brentq(
+        lambda far: math.log1p(surface(far)[1, -1] / radius), 0.0, 25.0, xtol=tolerance
+    )
+    log, beyond, height = surface(distance)
+    return np.vstack([np.exp(log), radius + beyond, height])

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An inflated pad on a wet floor: membrane and meniscus in one equilibrium.
+
+The pad is the exact membrane of :mod:`ros_pad.contact.membrane`, whose tension T follows from its
+whole area, and the liquid is the wide bath of :mod:`ros_pad.capillary.bath`. The liquid acts back
+on the membrane in three ways: its suction ``ρ g z`` adds to the pressure inside, wetting lowers
+the tension of the wet part to ``T - γ cos θ``, and its surface pulls a kink into the contact line.
+The three tensions are in balance there (Neumann's triangle), which makes the angle between wet
+wall and surface the contact angle of a rigid wall when T is large beside γ.
+
+With arc length s from the edge of the contact disc, where the membrane leaves the floor at a
+tangent, inclination φ and tension τ: ``dφ/ds = (p + ρ g z)/τ - sin φ / r`` in the wet part and
+``dφ/ds = p/T - sin φ / r`` in the dry one. Unknown are the contact radius b, T, the length of the
+wall and the place of the contact line; the equations are that the wall ends at the rim, that T is
+that of the area, that force and pull of the liquid press the disc, ``F + F_cap = p π b²``, and
+that the bath stands as high as the contact line. Adhesion is left out, as in that membrane.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.capillary.bath import Wall
+from ros_pad.capillary.bath import bath_height
+from ros_pad.capillary.bath import contact
+from ros_pad.contact.dome import press
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import number
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoSurface
+
+STEEPEST = math.pi - 0.02  # where the wet wall is no longer followed, rad
+
+
+@dataclass(frozen=True)
+class WetPad:
+    """A pad in liquid.
+
+    Attributes
+    ----------
+    gap : m, from pad base to floor.
+    contact_radius : m, of the disc on the floor.
+    tension : N/m, of the dry membrane.
+    height : m, of the contact line over the floor.
+    line_radius : m, of the contact line.
+    kink : rad, by which the membrane turns at the contact line, drawn outwards.
+    rim_angle : rad, inclination of the membrane at the rim: above pi/2 it leans inwards there.
+    pressure : Pa, of the liquid over that of the air at the contact line.
+    force : N, vertical, of the liquid on the pad, towards the floor positive.
+    radii, heights : m, shape (n,): the wall from the floor to the rim.
+    rigid : the same pad as if the liquid did not act on its shape; None in that one itself.
+    """
+
+    gap: float
+    contact_radius: float
+    tension: float
+    height: float
+    line_radius: float
+    kink: float
+    rim_angle: float
+    pressure: float
+    force: float
+    radii: Array
+    heights: Array
+    rigid: WetPad | None
+
+
+def press_wet(
+    pad: Pad, pressure: float, force: float, liquid: Liquid, gravity: float = GRAVITY
+) -> WetPad:
+    """Return a pad that is pressed on a floor with a wide bath at floor level.
+
+    Parameters
+    ----------
+    pad : Pad
+        What the pad is made of. Its adhesion energy is not used.
+    pressure : float
+        Gauge pressure in the pad, Pa, above 0.
+    force : float
+        Normal force on the pad, N, above 0; the liquid's pull comes on top of it.
+    liquid : Liquid
+        Its contact angle on the pad is ``liquid.angle``.
+    gravity : float
+        m/s², above 0.
+
+    Raises
+    ------
+    NoEquilibrium
+        Where the dry pad has no equilibrium, see :func:`ros_pad.contact.press`.
+    NoSurface
+        ``rim`` where the liquid reaches the rim of the pad; ``no_convergence`` where no common
+        equilibrium was found near that of the rigid pad.
+    InvalidInput
+        For values that are not finite or not in range.
+    """
+    if not isinstance(liquid, Liquid):
+        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    p = number('pressure', pressure, 'Pa', above=True)
+    load = number('force', force, 'N', above=True)
+    weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)
+    case = _Case(
+        pressure=p * pad.radius / pad.stiffness,
+        force=load / (pad.stiffness * pad.radius),
+        tension=liquid.surface_tension / pad.stiffness,
+        weight=weight * pad.radius**2 / pad.stiffness,
+        angle=liquid.angle,
+        length=math.sqrt(liquid.surface_tension / weight) / pad.radius,
+    )
+    pressed = press(pad, p, load, model='membrane')
+    size = pad.radius
+    dry = _dry(case, float(pressed.contact_radius) / size, float(pressed.sphere_radius) / size)
+    rigid_wall = _meridian(case, dry[0], dry[2], dry[1], 0.0)
+    place, slope, status = contact(_as_wall(rigid_wall), case.angle, case.length)
+    if status == 'dry':
+        raise InvalidInput(
+            f'contact_angle = {case.angle:g} rad is not allowed: below pi is needed'
+        )
+    _refuse_rim(place, dry[2])
+    rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall, 0.0, None)
+
+    found = _root(lambda x: _misfit(case, x), (*dry, place), 'pad and liquid')
+    _refuse_rim(found[3], found[2])
+    wet = _meridian(case, found[0], found[2], found[1] - case.grip, case.weight)
+    slope, kink = _joint(case, found[1], float(wet(found[3])[2]))
+    angle = math.pi - slope - float(wet(found[3])[2])
+    again = contact(_as_wall(wet), angle, case.length)[0]
+    if abs(again - found[3]) > 1e-5 * found[2]:
+        raise NoSurface('the liquid that rises from the floor stops lower', 'no_convergence')
+    above = _above(case, found, wet, kink)
+    return _result(pad, case, found, slope, wet, above, kink, rigid)
+
+
+class _Case(NamedTuple):
+    """What is asked, in units of the pad's radius and stiffness."""
+
+    pressure: float
+    force: float
+    tension: float  # of the liquid
+    weight: float
+    angle: float
+    length: float  # capillary length
+
+    @property
+    def grip(self) -> float:
+        """By how much the wet membrane is slacker."""
+        return self.tension * math.cos(self.angle)
+
+
+# Radius, height, inclination, area of the wall and volume inside it, over arc length.
+Meridian = Callable[[Any], Any]
+
+
+def _rates(s: float, state: Array, push: float, weight: float, tension: float) -> list[float]:
+    r, z, phi = state[:3]
+    sine = math.sin(phi)
+    return [
+        math.cos(phi),
+        sine,
+        (push + weight * z) / tension - sine / r,
+        2.0 * math.pi * r,
+        math.pi * r * r * sine,
+    ]
+
+
+def _meridian(case: _Case, b: float, length: float, tension: float, weight: float) -> Meridian:
+    """Return the wall from the edge of the contact disc upwards, as if all of it were alike."""
+    from scipy.integrate import solve_ivp
+
+    def steep(s: float, state: Array, *_: float) -> float:
+        return float(state[2]) - STEEPEST
+
+    steep.terminal = True  # type: ignore[attr-defined]
+    path = solve_ivp(
+        _rates,
+        (0.0, 2.0 * length + 1.0),
+        (b, 0.0, 0.0, math.pi * b * b, 0.0),
+        method='DOP853',
+        rtol=1e-11,
+        atol=1e-13,
+        dense_output=True,
+        events=steep,
+        args=(case.pressure, weight, tension),
+    )
+    meridian: Meridian = path.sol
+    return meridian
+
+
+def _above(case: _Case, unknowns: Any, wet: Meridian, kink: float) -> Meridian:
+    """Return the dry wall above the contact line, over arc length from the disc."""
+    from scipy.integrate import solve_ivp
+
+    _, tension, length, place = unknowns
+    state = np.array(wet(place))
+    state[2] += kink
+    path = solve_ivp(
+        _rates,
+        (place, length),
+        state,
+        method='DOP853',
+        rtol=1e-11,
+        atol=1e-13,
+        dense_output=True,
+        args=(case.pressure, 0.0, tension),
+    )
+    meridian: Meridian = path.sol
+    return meridian
+
+
+def _as_wall(meridian: Any) -> Wall:
+    def at(place: float) -> tuple[float, float, float]:
+        r, z, phi = meridian(place)[:3]
+        return float(r), float(z), float(phi)
+
+    return Wall(at, 0.0, float(meridian.t_max), 0.0)
+
+
+def _dry(case: _Case, b: float, sphere: float) -> tuple[float, float, float]:
+    """Return contact radius, tension and length of the wall without liquid."""
+
+    def misfit(x: Array) -> list[float]:
+        end = _meridian(case, b, x[1], x[0], 0.0)(x[1])
+        return [end[0] - 1.0, x[0] - _tension(end[3])]
+
+    # Near the sphere through rim and edge of the disc, which ends below or above its equator.
+    rise = math.asin(min(1.0, 1.0 / sphere))
+    for turn in (math.pi - rise, rise):
+        guess = 0.5 * case.pressure * sphere, sphere * (turn - math.asin(b / sphere))
+        with contextlib.suppress(NoSurface):
+            tension, length = _root(misfit, guess, 'the dry pad')
+            return b, tension, length
+    raise NoSurface('the dry pad has not settled', 'no_convergence')
+
+
+def _tension(area: float) -> float:
+    """Return the tension of a membrane of this whole area (thesis 3.41)."""
+    return 1.5 * math.sqrt(area / math.pi) - 1.0
+
+
+def _joint(case: _Case, tension: float, phi: float) -> tuple[float, float]:
+    """Return the slope of the surface at the contact line, and the membrane's kink there."""
+    wet, liquid = tension - case.grip, case.tension
+    cosine = (wet * wet + liquid * liquid - tension * tension) / (2.0 * wet * liquid)
+    if wet <= 0.0 or abs(cosine) > 1.0:
+        raise NoSurface('the liquid is stronger than the membrane', 'no_convergence')
+    slope = math.acos(cosine) - phi
+    # The dry membrane pulls against the other two.
+    across = liquid * math.sin(slope + phi)
+    along = wet - liquid * math.cos(slope + phi)
+    return slope, math.atan2(across, along)
+
+
+def _pull(case: _Case, state: Array, slope: float) -> float:
+    """Return the force of the liquid on the pad: pull at the line, suction on the wall below."""
+    r, z, _, _, volume = state
+    surface = 2.0 * math.pi * r * case.tension * math.sin(slope)
+    return float(surface + case.weight * (math.pi * r * r * z - volume))
+
+
+def _misfit(case: _Case, x: Array) -> list[float]:
+    """Return what is left of the four equations."""
+    b, tension, length, place = x
+    if not (0.0 < b < 1.0 and tension > case.grip and 0.0 < place < length):
+        raise NoSurface('pad and liquid have no common equilibrium here', 'no_convergence')
+    wet = _meridian(case, b, length, tension - case.grip, case.weight)
+    line = wet(place)
+    slope, kink = _joint(case, tension, float(line[2]))
+    end = _above(case, x, wet, kink)(length)
+    height = bath_height(line[0] / case.length, slope) * case.length
+    disc = math.pi * case.pressure * b * b
+    return [
+        end[0] - 1.0,
+        tension - _tension(end[3]),
+        (disc - case.force - _pull(case, line, slope)) / case.force,
+        (height - line[1]) / case.length,
+    ]
+
+
+def _root(misfit: Callable[[Array], list[float]], start: Any, what: str) -> tuple[float, ...]:
+    """Return the root near a start, by Powell's hybrid of Newton's method."""
+    from scipy.optimize import root
+
+    found = root(misfit, start, method='hybr', options={'xtol': 1e-11, 'eps': 1e-8})
+    if not np.max(np.abs(found.fun)) < 1e-7:
+        raise NoSurface(f'{what} have no common equilibrium: {found.message}', 'no_convergence')
+    return tuple(float(value) for value in found.x)
+
+
+def _refuse_rim(place: float, length: float) -> None:
+    if place >= length:
+        raise NoSurface('the liquid rises to the rim of the pad, where its base begins', 'rim')
+
+
+def _result(
+    pad: Pad,
+    case: _Case,
+    unknowns: Any,
+    slope: float,
+    wet: Meridian,
+    above: Meridian,
+    kink: float,
+    rigid: WetPad | None,
+) -> WetPad:
+    b, tension, length, place = unknowns
+    size = pad.radius
+    line = wet(place)
+    below, beyond = np.linspace(0.0, place, 100), np.linspace(place, length, 101)[1:]
+    path = np.concatenate([wet(below)[:2], above(beyond)[:2]], axis=1) * size
+    unit = pad.stiffness * size
+    return WetPad(
+        gap=float(path[1, -1]),
+        contact_radius=b * size,
+        tension=tension * pad.stiffness,
+        height=float(line[1]) * size,
+        line_radius=float(line[0]) * size,
+        kink=kink,
+        rim_angle=float(above(length)[2]),
+        pressure=-case.weight * float(line[1]) * pad.stiffness / size,
+        force=_pull(case, line, slope) * unit,
+        radii=path[0],
+        heights=path[1],
+        rigid=rigid,
+    )

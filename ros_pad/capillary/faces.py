@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Solid faces that liquid wets: pads, floors, plates, and the mirrors between equal pads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.capillary.bath import Wall
+from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import number
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import MeshError
+
+Integers: TypeAlias = npt.NDArray[np.int64]
+
+KNOTS = 129  # of a rail
+
+
+@dataclass(frozen=True)
+class Face:
+    """A solid face round a vertical axis, star-shaped in every section across it.
+
+    Parameters
+    ----------
+    rails : callable
+        From azimuths (rad, shape (n,)) to radii and heights of the face there, m, shape
+        (n, KNOTS, 2), from where wetting begins to where the face ends, evenly in arc length or
+        nearly so.
+    centre : array, shape (2,)
+        Where the axis is, m.
+    under : bool
+        The liquid stands on this face, as on a floor; else the face is beside or above it.
+    """
+
+    rails: Callable[[Array], Array]
+    centre: tuple[float, float] = (0.0, 0.0)
+    under: bool = False
+
+    @classmethod
+    def revolution(
+        cls, radii: npt.ArrayLike, heights: npt.ArrayLike, centre: tuple[float, float] = (0.0, 0.0)
+    ) -> Face:
+        """Return a face of revolution through points of its meridian, m, shape (n,)."""
+        rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
+        return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
+
+    @classmethod
+    def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return the face of a pad that is round about its axis, from the floor to its top."""
+        places = np.linspace(wall.floor, wall.top, KNOTS)
+        radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
+        return cls.revolution(radii, heights, centre)
+
+    @classmethod
+    def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return a disc of the floor, m, wetted from its middle."""
+        return replace(cls.plate(radius, 0.0, centre), under=True)
+
+    @classmethod
+    def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return the underside of a level disc, m, wetted from its middle."""
+        size = number('radius', radius, 'm', above=True)
+        return cls.revolution([0.0, size], [height, height], centre)
+
+    @classmethod
+    def cell(cls, pitch: float, sides: int, height: float) -> Face:
+        """Return the walls between equal pads: with a contact angle of pi/2 they are mirrors.
+
+        Parameters
+        ----------
+        pitch : float
+            Distance of the pads' axes, m.
+        sides : int
+            4 for a square pattern, 6 for a hexagonal one.
+        height : float
+            m.
+        """
+        size = number('pitch', pitch, 'm', above=True)
+        top = number('height', height, 'm', above=True)
+        if sides not in (4, 6):
+            raise InvalidInput(f'sides = {sides!r} is not allowed: 4 or 6 is needed')
+        sector = 2.0 * math.pi / sides
+
+        def rails(azimuths: Array) -> Array:
+            off = np.mod(azimuths + 0.5 * sector, sector) - 0.5 * sector
+            up = np.broadcast_to(np.linspace(0.0, top, KNOTS), (azimuths.size, KNOTS))
+            return np.stack([0.5 * size / np.cos(off)[:, None] + 0.0 * up, up], axis=-1)
+
+        return cls(rails)
+
+    @classmethod
+    def of_mesh(cls, mesh: Any, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
+        """Return the wall of a meshed pad.
+
+        Parameters
+        ----------
+        mesh : object with ``vertices`` (n, 3), m, and ``triangles`` (m, 3), or a pair of these
+            The wall alone or the closed pad. Its level parts (bottom and lid) are left out.
+        centre : array, shape (2,)
+            Of a vertical line inside the pad, m.
+
+        Raises
+        ------
+        MeshError
+            Where the wall does not go once round the line, or leans over itself.
+
+        Notes
+        -----
+        Radii come from the vertices, over azimuth and height, by moving least squares with
+        quadratics: contact angles are taken from slopes, which facets do not have. Edges of the
+        pad are rounded by about two triangles.
+        """
+        vertices, triangles = (
+            (mesh.vertices, mesh.triangles) if hasattr(mesh, 'vertices') else mesh
+        )
+        points = np.asarray(vertices, float) - np.append(centre, 0.0)
+        walls = np.asarray(triangles, dtype=np.int64)
+        size = float(np.ptp(points, axis=0).max())
+        walls = walls[np.ptp(points[walls][..., 2], axis=1) > 1e-9 * size]
+        azimuth, z = np.arctan2(points[:, 1], points[:, 0]), points[:, 2]
+        turn = azimuth[walls] - azimuth[walls[:, :1]]
+        turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+        rise = z[walls] - z[walls[:, :1]]
+        seen = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # area in the chart
+        around = abs(abs(seen.sum()) - 4.0 * math.pi * np.ptp(z[walls])) < 1e-6 * size
+        if not (around and ((seen > 0.0).all() or (seen < 0.0).all())):
+            raise MeshError(
+                'the wall of the mesh is not seen once, from the outside, on every half plane'
+                f' through the vertical line at {centre[0]:g}, {centre[1]:g} m: it is open, leans'
+                ' over itself, or does not go round that line'
+            )
+        low, high = float(z[walls].min()), float(z[walls].max())
+        rim = z[boundary_edges(walls)]
+        if np.minimum(rim - low, high - rim).max() > 1e-6 * size:
+            raise MeshError('the wall of the mesh ends at other heights than its foot and its top')
+        use = np.unique(walls)
+        radii = np.hypot(points[use, 0], points[use, 1])
+        scale = float(radii.mean())
+        chart = np.column_stack([azimuth[use], z[use] / scale])
+        turns = np.concatenate([chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)])
+
+        def rails(azimuths: Array) -> Array:
+            at = np.mod(azimuths + math.pi, 2.0 * math.pi) - math.pi
+            heights = np.broadcast_to(np.linspace(low, high, KNOTS), (at.size, KNOTS))
+            places = np.stack(np.broadcast_arrays(at[:, None], heights / scale), axis=-1)
+            found = _fitted(turns, np.tile(radii, 3), places.reshape(-1, 2))
+            return np.stack([found.reshape(heights.shape), heights], axis=-1)
+
+        return cls(rails, centre)
+
+
+def _fitted(places: Array, values: Array, at: Array) -> Array:
+    """Return values at other places: of quadratics through the nearest ones."""
+    from scipy.spatial import cKDTree
+
+    distance, near = cKDTree(places).query(at, k=32)
+    reach = distance[:, -1:]
+    x, y = np.moveaxis((places[near] - at[:, None]) / reach[..., None], -1, 0)
+    weight = (1.0 - np.minimum(distance / reach, 1.0) ** 2) ** 2 + 1e-12
+    basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    weighted = (basis * weight[..., None]).swapaxes(1, 2)
+    # Where all neighbours lie in two rows, this prefers the flattest of the quadratics.
+    squares = weighted @ basis + 1e-6 * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+    fit: Array = np.linalg.solve(squares, weighted @ values[near][..., None])[:, 0, 0]
+    return fit
+
+
+def _even(points: Array) -> Array:
+    """Return a curve through points at KNOTS places, evenly in arc length."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    at = np.linspace(0.0, along[-1], KNOTS)
+    if len(points) == 2:
+        return points[0] + (at / along[-1])[:, None] * (points[1] - points[0])
+    curve: Array = Akima1DInterpolator(along, points)(at)
+    return curve
+
+
+def boundary_edges(triangles: Integers) -> Integers:
+    """Return the edges that belong to one triangle alone, shape (n, 2)."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return unique[count == 1]

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.capillary.bath import Wall
+from ros_pad.capillary.bath import bath_meniscus
+from ros_pad.capillary.coupling import press_wet
+from ros_pad.contact.dome import press
+from ros_pad.contact.meniscus import WATER
+from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.pad import LARGE_PAD
+from ros_pad.contact.pad import Pad
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import NoSurface
+
+SIZE = LARGE_PAD.radius
+# So soft that the liquid bends it visibly.
+SOFT = Pad(SIZE, 0.4)
+
+
+@functools.cache
+def wet(pressure=75e3, force=0.1, stiffness=40.0, liquid=WATER):
+    return press_wet(Pad(SIZE, stiffness), pressure, force, liquid)
+
+
+@pytest.mark.parametrize(('pressure', 'force'), [(75e3, 0.1), (60e3, 0.1), (85e3, 0.3)])
+def test_the_rigid_pad_is_the_exact_membrane(pressure, force):
+    """Which elliptic integrals give, in place of shooting."""
+    rigid = wet(pressure, force).rigid
+    exact = press(LARGE_PAD, pressure, force, model='membrane')
+    assert rigid.gap == pytest.approx(exact.gap, rel=1e-9)
+    assert rigid.contact_radius == exact.contact_radius
+    assert rigid.kink == 0.0 and rigid.rigid is None
+    assert rigid.radii[-1] == pytest.approx(SIZE, rel=1e-9)
+
+
+def test_the_rigid_pad_has_the_meniscus_of_its_profile():
+    rigid = wet().rigid
+    alone = bath_meniscus(wall=Wall.through(rigid.radii, rigid.heights), liquid=WATER)
+    assert rigid.height == pytest.approx(alone.height, rel=1e-3)
+    assert rigid.force == pytest.approx(alone.force, rel=3e-3)
+    assert rigid.pressure == pytest.approx(-9810.0 * rigid.height, rel=1e-12)
+
+
+SOFT_CASE = {'pressure': 750.0, 'force': 1e-3, 'stiffness': 0.4}
+
+
+@pytest.mark.parametrize('case', [{}, SOFT_CASE], ids=['silicone', 'soft'])
+def test_the_rim_carries_the_load(case):
+    """Seen from outside, what lifts the pad's base is gas less membrane; the liquid is inside."""
+    found = wet(**case)
+    pressure, force = case.get('pressure', 75e3), case.get('force', 0.1)
+    for pad in (found, found.rigid):
+        down = 2.0 * math.pi * SIZE * pad.tension * math.sin(pad.rim_angle)
+        assert pressure * math.pi * SIZE**2 - down == pytest.approx(force, rel=1e-8)
+    disc = pressure * math.pi * found.contact_radius**2
+    assert disc == pytest.approx(force + found.force, rel=1e-9)
+
+
+def test_wet_and_dry_wall_carry_their_pressures():
+    """Finite differences of the profile: tension times mean curvature, and area to tension."""
+    found = wet(**SOFT_CASE)
+    for part, push, tension in (
+        (
+            slice(0, 100),
+            lambda z: 750.0 + 9810.0 * z,
+            found.tension - 0.073 * math.cos(WATER.angle),
+        ),
+        (slice(99, 200), lambda z: 750.0 + 0.0 * z, found.tension),
+    ):
+        r, z = found.radii[part], found.heights[part]
+        step = np.hypot(np.diff(r), np.diff(z))
+        s = np.append(0.0, np.cumsum(step))
+        phi = np.unwrap(np.arctan2(np.gradient(z, s), np.gradient(r, s)))
+        bend = np.gradient(phi, s) + np.sin(phi) / r
+        inner = slice(3, -3)
+        assert tension * bend[inner] == pytest.approx(push(z[inner]), rel=2e-3)
+    r, z = found.radii, found.heights
+    wall = np.sum(math.pi * (r[1:] + r[:-1]) * np.hypot(np.diff(r), np.diff(z)))
+    area = wall + math.pi * found.contact_radius**2
+    stretch = math.sqrt(area / math.pi) / SIZE
+    assert found.tension == pytest.approx(0.4 * (1.5 * stretch - 1.0), rel=1e-3)
+
+
+@pytest.mark.parametrize('case', [{}, SOFT_CASE], ids=['silicone', 'soft'])
+def test_three_tensions_close_at_the_contact_line(case):
+    found = wet(**case)
+    dry, liquid = found.tension, 0.073
+    slack = dry - liquid * math.cos(WATER.angle)
+    cosine = (dry**2 + slack**2 - liquid**2) / (2.0 * dry * slack)
+    assert found.kink == pytest.approx(math.acos(cosine), rel=1e-5)
+
+
+def changes(found):
+    rigid = found.rigid
+    names = ('gap', 'contact_radius', 'height', 'force')
+    return np.array([getattr(found, name) / getattr(rigid, name) - 1.0 for name in names])
+
+
+def test_coupling_vanishes_as_the_inverse_of_stiffness():
+    """At the same shape: pressure and force grow with the stiffness."""
+    twice, eight = (changes(wet(75e3 * k, 0.1 * k, 40.0 * k)) for k in (2.0, 8.0))
+    assert np.all(abs(twice) > 1e-4)
+    assert twice / eight == pytest.approx(4.0, rel=2e-2)
+
+
+def test_liquid_presses_the_pad_down_and_a_soft_one_more():
+    hard, soft = changes(wet()), changes(wet(**SOFT_CASE))
+    assert hard[1] > 0.0 and soft[1] > 0.1  # it draws the pad onto the floor
+    assert np.all(abs(soft) > 30.0 * abs(hard))
+
+
+def test_a_pad_too_soft_for_the_liquid_is_refused():
+    with pytest.raises(NoSurface) as refusal:
+        press_wet(Pad(SIZE, 0.04), 75.0, 1e-4, WATER)
+    assert refusal.value.status == 'no_convergence'
+
+
+def test_liquid_at_the_rim_is_refused():
+    with pytest.raises(NoSurface, match='rim') as refusal:
+        press_wet(LARGE_PAD, 40e3, 0.05, WATER)
+    assert refusal.value.status == 'rim'
+
+
+def test_a_dry_pad_without_equilibrium_stays_one():
+    with pytest.raises(NoEquilibrium) as refusal:
+        press_wet(LARGE_PAD, 75e3, 0.6, WATER)
+    assert refusal.value.status == 'flattened'
+
+
+@pytest.mark.parametrize(
+    ('change', 'name'),
+    [
+        ({'pressure': 0.0}, 'pressure'),
+        ({'force': 0.0}, 'force'),
+        ({'force': [0.1, 0.2]}, 'force'),
+        ({'gravity': -9.81}, 'gravity'),
+        ({'liquid': 'water'}, 'liquid'),
+    ],
+)
+def test_bad_input(change, name):
+    with pytest.raises(InvalidInput, match=name):
+        press_wet(**{'pad': LARGE_PAD, 'pressure': 75e3, 'force': 0.1, 'liquid': WATER, **change})
+
+
+def test_thin_liquid_changes_nothing():
+    thin = Liquid(1e-5, 1e-5, contact_angle=1.0)
+    assert np.all(abs(changes(wet(liquid=thin))) < 1e-5)
