@@ -87,8 +87,7 @@ def _ladder(panel: Axes, rungs: Sequence[Rung], quantity: str) -> None:
             worst = getattr(rung, f'worst_{quantity}_error')
             if y < _LOWEST:
                 panel.plot(x, 2.5 * _LOWEST, mark, color=colour, ms=9.0, mec='white', mew=0.5)
-                at = {'xy': (x, _LOWEST), 'xytext': (x, 2.0 * _LOWEST)}
-                panel.annotate('', **at, arrowprops={'arrowstyle': '->', 'lw': 0.8})
+                panel.plot(x, 1.25 * _LOWEST, 'v', color=colour, ms=3.5, clip_on=False)
                 said = f'{y:.0e} '.replace('e-0', 'e-')
                 panel.annotate(
                     said, (x, 2.5 * _LOWEST), (-4, 0), ha='right', va='center', **_BESIDE
