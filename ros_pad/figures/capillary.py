@@ -231,9 +231,9 @@ def _figure_26() -> Explained:
     found = bodies()
     for k, (name, each) in enumerate(found.items()):
         ax: Any = figure.add_axes(
-            (k / 3.0 - 0.03, -0.02, 0.39, 1.0), projection='3d', computed_zorder=False
+            (k / 3.0, 0.0, 1.0 / 3.0, 1.0), projection='3d', computed_zorder=False
         )
-        _solid(ax, each.mesh, each.layers['energy'], 1.35)
+        _solid(ax, each.mesh, each.layers['energy'], 1.27)
         heights = ', '.join(
             f'{text} {1e3 * value:.2f}'
             for text, value in (
@@ -569,11 +569,11 @@ def _figure_30() -> Explained:
 
 def _figure_31() -> Explained:
     figure = Figure(figsize=(WIDE, 2.7))
-    body: Any = figure.add_axes((-0.06, -0.10, 0.60, 1.10), projection='3d', computed_zorder=False)
+    body: Any = figure.add_axes((0.0, 0.0, 0.5, 0.95), projection='3d', computed_zorder=False)
     drawn_pitch = PITCHES[1]
     many = Mesh.dome_pattern(19, drawn_pitch, *dome(), 2.2e-3, rings=10, sectors=24)
     area = 19.0 * math.sqrt(0.75) * drawn_pitch**2
-    _solid(body, many, wet_pattern(many, WATER, area), 1.15)
+    _solid(body, many, wet_pattern(many, WATER, area), 1.2)
     figure.text(0.015, 0.94, '(a) nineteen domes, 3.8 mm apart')
     ax = figure.add_axes((0.58, 0.17, 0.40, 0.70))
     figure.text(0.52, 0.94, '(b) height of water over their distance')
@@ -675,7 +675,6 @@ def _solid(ax: Any, mesh: Mesh, found: Wet | WetPattern, zoom: float) -> None:
     ax.set_box_aspect((1.0, 1.0, 0.5 * float(high[2]) / half), zoom=zoom)
     ax.view_init(20.0, -62.0)
     ax.set_axis_off()
-    ax.set_in_layout(False)  # its box reaches out of the figure, what is in it does not
 
 
 def _handles() -> list[Line2D]:
