@@ -7,6 +7,7 @@ from far away inwards until it meets the wall, with the volume integrated on the
 
 from __future__ import annotations
 
+import importlib
 import math
 import statistics
 import time
@@ -128,13 +129,13 @@ SHAPES = (
 class Case:
     """One answer: tension (N/m), ratio of tensions, height (m), force (N), the truth, status.
 
-    Where there is no answer height and force are NaN and the status says why.
+    Where there is no answer height and force are None and the status says why.
     """
 
     tension: float
     ratio: float
-    height: float
-    force: float
+    height: float | None
+    force: float | None
     exact_height: float
     exact_force: float
     status: str
@@ -190,12 +191,12 @@ class Trap:
 
 @dataclass(frozen=True)
 class Speed:
-    """How long something takes on a mesh of so many triangles; NaN where it is not installed."""
+    """How long something takes on a mesh of so many triangles; None where it is not installed."""
 
     kind: str
     what: str
     triangles: int
-    ms: float
+    ms: float | None
 
 
 Row = Rung | Trap | Speed
@@ -305,18 +306,18 @@ def _minimised(shape: Shape, sectors: int, refinements: int) -> Callable[[Liquid
     return lambda liquid: bath_surface(face, liquid, sectors=sectors, refinements=refinements)
 
 
-def _read(shape: Shape, found: Any) -> tuple[Pair, str]:
-    """Return height, force and status of whatever a method found."""
+def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
+    """Return height and force, if there is an answer, and status of what a method found."""
     if isinstance(found, Wet):
         status = str(found.status[0])
         if status != 'ok':
-            return (math.nan, math.nan), status
+            return None, status
         return (found.mean_height, weight_lifted(found, shape.solid)), status
     if hasattr(found, 'lines'):
         line = found.vertices[found.lines[0].vertices, 2]
         return (float(line.mean()), -float(found.forces[0, 2])), 'ok'
     if found.status not in ('ok', 'several'):
-        return (math.nan, math.nan), found.status
+        return None, found.status
     return (found.height, found.force), found.status
 
 
@@ -371,23 +372,22 @@ def _rung(
     for (tension, ratio), (height, force) in zip(cases, exact, strict=True):
         liquid = Liquid(tension, ratio * tension)
         begun = time.perf_counter()
-        found, status = None, ''
+        pair: Pair | None = None
         try:
             found = solve(liquid)
         except PadError as error:
             status = str(getattr(error, 'status', type(error).__name__))
-        took = time.perf_counter() - begun
-        pair = (math.nan, math.nan)
-        if found is not None:
+        else:
+            took = time.perf_counter() - begun
             pair, status = _read(shape, found)
-        if not math.isnan(pair[0]):
-            times.append(1e3 * took)
-        answers.append(Case(tension, ratio, *pair, height, force, status))
+            if pair:
+                times.append(1e3 * took)
+        answers.append(Case(tension, ratio, *(pair or (None, None)), height, force, status))
     rising = [case for case in answers if case.exact_height > 0.0]
-    good = [case for case in rising if not math.isnan(case.height)]
     still = [case for case in answers if case.exact_height == 0.0]
-    heights = [abs(case.height / case.exact_height - 1.0) for case in good]
-    forces = [abs(case.force / case.exact_force - 1.0) for case in good]
+    good = [case for case in rising if case.height is not None]
+    heights = [_off(case.height, case.exact_height) for case in good]
+    forces = [_off(case.force, case.exact_force) for case in good]
     return Rung(
         kind='rung',
         shape=shape.name,
@@ -398,11 +398,16 @@ def _rung(
         worst_height_error=max(heights, default=math.nan),
         force_error=statistics.median(forces) if good else math.nan,
         worst_force_error=max(forces, default=math.nan),
-        dry=sum(math.isnan(case.height) for case in still),
+        dry=sum(case.height is None for case in still),
         refused=len(rising) - len(good),
-        false=sum(not math.isnan(case.height) for case in still),
+        false=sum(case.height is not None for case in still),
         cases=answers,
     )
+
+
+def _off(found: float | None, exact: float) -> float:
+    assert found is not None
+    return abs(found / exact - 1.0)
 
 
 # --- traps and speed -----------------------------------------------------------------------------
@@ -422,8 +427,8 @@ def traps() -> list[Trap]:
             found = solve()
         except PadError as error:
             return f'{type(error).__name__}: {error}'
-        (height, _), status = _read(shape, found)
-        return status if math.isnan(height) else f'{1e3 * height:.2f} mm'
+        pair, status = _read(shape, found)
+        return f'{1e3 * pair[0]:.2f} mm' if pair else status
 
     def high(shape: Shape, liquid: Liquid) -> str:
         height = truth(shape, liquid)[0]
@@ -469,7 +474,7 @@ def speeds() -> list[Speed]:
     triangles = len(mesh.faces)
 
     def row(what: str, solve: Callable[[], Any] | None) -> Speed:
-        return Speed('speed', what, triangles, math.nan if solve is None else _shortest(solve))
+        return Speed('speed', what, triangles, None if solve is None else _shortest(solve))
 
     found = [
         row(
@@ -480,7 +485,8 @@ def speeds() -> list[Speed]:
     ]
     what = f'trimesh: {layers} sections alone, one by one'
     try:
-        import trimesh
+        # No dependency and no extra: something to compare with where it happens to be.
+        trimesh = importlib.import_module('trimesh')
     except ImportError:
         return [*found, row(what, None)]
     other = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
@@ -533,6 +539,6 @@ def table(rows: Sequence[Row]) -> str:
     lines += [f'  {t.rung:14} {t.given:38} says {t.said}; true: {t.true}' for t in traps_]
     lines.append('')
     for speed in (row for row in rows if isinstance(row, Speed)):
-        took = 'not installed' if math.isnan(speed.ms) else f'{speed.ms:.0f} ms'
+        took = 'not installed' if speed.ms is None else f'{speed.ms:.0f} ms'
         lines.append(f'{speed.what}, {speed.triangles} triangles: {took}')
     return '\n'.join([*lines, ''])

@@ -107,7 +107,7 @@ def _spread(panel: Axes, rungs: Sequence[Rung]) -> None:
         for tension in dict.fromkeys(case.tension for case in rung.cases):
             cases = [c for c in rung.cases if c.tension == tension and c.exact_height > 0.0]
             x = [case.ratio for case in cases]
-            y = [case.height / case.exact_height for case in cases]
+            y = [(case.height or math.nan) / case.exact_height for case in cases]
             dashed = (0, (4, 2)) if tension < 0.01 else '-'
             panel.plot(x, y, color=colour, marker=mark, ms=3.5, lw=1.0, ls=dashed)
     panel.set(yscale='log', xlabel='tension of the solid / of the liquid', xlim=(0.25, 1.0))

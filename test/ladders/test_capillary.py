@@ -3,6 +3,7 @@ import json
 import math
 import pathlib
 import sys
+from dataclasses import asdict
 
 import pytest
 
@@ -121,6 +122,11 @@ def test_traps_are_named(rows):
     overlaps = [trap for trap in said.values() if trap.true == 'they overlap']
     assert len(overlaps) == 2
     assert all(trap.said.startswith('MeshError') for trap in overlaps)
+
+
+def test_rows_are_json(rows):
+    json.dumps([asdict(row) for row in rows], allow_nan=False)
+    assert {row.kind for row in rows} == {'rung', 'trap', 'speed'}
 
 
 def test_table_and_picture(rows, tmp_path):
