@@ -19,6 +19,7 @@ from ros_pad.trials.page import GREEN
 from ros_pad.trials.page import PALE
 from ros_pad.trials.page import PAPER_STYLE
 from ros_pad.trials.page import VERMILION
+from ros_pad.trials.page import legend
 
 if TYPE_CHECKING:
     from ros_pad.ladders.capillary import Rung
@@ -65,7 +66,7 @@ def draw(rungs: Sequence[Rung]) -> Figure:
             Line2D([], [], color=BLACK, lw=1.0, label='water, 73 mN/m'),
             Line2D([], [], color=BLACK, lw=1.0, ls=(0, (4, 2)), label='4 mN/m'),
         ]
-        figure.legend(handles=handles, loc='outside upper left', ncols=4)
+        legend(figure, handles, 4)
         figure.supxlabel(
             'a to f: median of the cases with an answer, whisker to the worst; larger marks are'
             ' finer.  g to i: finest layers; a curve ends where there is no answer.',
