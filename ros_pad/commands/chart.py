@@ -12,6 +12,7 @@ from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
+from ros_pad.ladders import capillary
 from ros_pad.ladders import contact
 from ros_pad.ladders import estimator
 from ros_pad.ladders import meniscus
@@ -21,6 +22,7 @@ from ros_pad.ladders.ladder import machine
 from ros_pad.ladders.ladder import table
 
 LADDERS = {
+    'capillary': capillary,
     'contact': contact,
     'estimator': estimator,
     'meniscus': meniscus,
@@ -28,7 +30,12 @@ LADDERS = {
     'walk': walk,
 }
 # What is no ladder of time against one error has a table of its own.
-TABLES = {'estimator': estimator.table, 'stability': stability.table, 'walk': walk.table}
+TABLES = {
+    'capillary': capillary.table,
+    'estimator': estimator.table,
+    'stability': stability.table,
+    'walk': walk.table,
+}
 
 
 def add(commands: Commands) -> None:
@@ -43,8 +50,8 @@ def add(commands: Commands) -> None:
     part.add_argument(
         'ladder',
         choices=(*LADDERS, 'all'),
-        help='contact takes about 15 s, estimator and meniscus a minute and a half each,'
-        ' stability 10 s, walk a minute',
+        help='capillary and walk take about a minute each, contact 15 s, estimator and meniscus a'
+        ' minute and a half each, stability 10 s',
     )
     part.add_argument(
         '--out',

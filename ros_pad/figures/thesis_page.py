@@ -34,8 +34,11 @@ _BENCHES = {
     'bench_press': (16, 17, 18),
     'bench_tangential': (20, 21),
 }
-_CAPILLARY = (29, 30)
-NUMBERS = (*(n for numbers in _BENCHES.values() for n in numbers), *_CAPILLARY, *walks.NUMBERS)
+NUMBERS = (
+    *(n for numbers in _BENCHES.values() for n in numbers),
+    *capillary.NUMBERS,
+    *walks.NUMBERS,
+)
 
 _COMMON_DOME = (
     'Nothing beyond the thesis: radius 1.5 mm, stiffness 40 N/m, adhesion 0.006 J/m² are its own.'
@@ -90,7 +93,7 @@ _WORDS = {
 def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -> list[Explained]:
     """Work out and draw some of the thesis' figures, in its order.
 
-    All of them take about half a minute, nearly all of it for the walks of figures 41 to 44.
+    All of them take about 45 s: 15 for figures 26 to 31, the rest for the walks of 41 to 44.
 
     Parameters
     ----------
@@ -113,8 +116,7 @@ def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -
     for name, own in _BENCHES.items():
         if set(own) & set(numbers):
             done += _of_bench(name, set(own) & set(numbers))
-    if set(_CAPILLARY) & set(numbers):
-        done += [each for each in capillary.draw() if each.number in numbers]
+    done += capillary.draw(numbers)
     first = 0.1 if done else 0.0
     if progress:
         progress(first)

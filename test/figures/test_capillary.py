@@ -1,53 +1,107 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures 29 and 30."""
+"""Figures 26 to 31."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import press
+from ros_pad.contact import WATER
 from ros_pad.figures import capillary
 
 FIGURES = {each.number: each for each in capillary.draw()}
 
 
-def test_the_surface_turns_by_what_angles_leave():
-    """A circle of radius R that rises by h from a level floor to a wall at α, at θ to it."""
-    pressed = press(LARGE_PAD, 75e3, 0.19)
-    wall = math.asin(pressed.contact_radius / pressed.sphere_radius)
-    for ratio, angle in ((0.25, 90.0), (0.5625, 60.0), (1.0, 0.0)):
-        one = capillary.ring(pressed, 0.002, 'corrected', np.array([ratio]))
-        (height,), (radius,) = one.height, one.curvature
-        # From level, the surface turns by π − θ − α over its arc.
-        turn = math.pi - math.radians(angle) - wall
-        assert radius * (1.0 - math.cos(turn)) == pytest.approx(height, rel=1e-9)
+def test_only_what_is_asked_for_is_drawn():
+    assert tuple(FIGURES) == capillary.NUMBERS
+    assert [each.number for each in capillary.draw((29, 14))] == [29]
+    assert capillary.draw((14,)) == []
+
+
+def test_exact_curvature_is_that_of_the_surface():
+    for degrees in (60.0, 30.0):
+        found = capillary.exact(0.004, degrees)
+        out, up = np.diff(found.radii[:7]), np.diff(found.heights[:7])
+        along = np.append(0.0, np.cumsum(np.hypot(out, up)))
+        middles = 0.5 * (along[1:] + along[:-1])
+        bend = -np.polyfit(middles, np.arctan2(-up, out), 3)[-2]
+        liquid = capillary.liquid_at(0.004, degrees)
+        assert math.degrees(liquid.angle) == pytest.approx(degrees)
+        assert capillary.exact_curvature(found, liquid) == pytest.approx(1.0 / bend, rel=1e-3)
+
+
+def test_pull_on_one_half_is_what_half_the_liquid_needs():
+    """Balance of half the liquid, cut along the axis: tension and suction in the cut."""
+    found, liquid = capillary.exact(0.004, 60.0), capillary.liquid_at(0.004, 60.0)
+    sphere, rest = capillary.dome()
+    r, z = found.radii, found.heights
+    longer = float(np.sum(np.hypot(np.diff(r), np.diff(z)) - np.diff(r)))
+    levels = np.linspace(0.0, found.height, 2001)[1:]
+    outer = np.interp(levels, z[::-1], r[::-1])
+    wall = np.sqrt(sphere**2 - (levels - math.sqrt(sphere**2 - rest**2)) ** 2)
+    suction = 9810.0 * float(np.mean(levels * (outer - wall))) * found.height
+    expected = 2.0 * (0.004 * (found.radius - longer) - suction)
+    assert capillary.one_sided(found, liquid) == pytest.approx(expected, rel=2e-3)
 
 
 def test_curves_run_from_90_to_0_degrees():
     ax = FIGURES[29].drawn.figure.axes[0]
     curves = [line for line in ax.lines if line.get_marker() == 'None']
-    assert len(curves) == 6
+    points = [line for line in ax.lines if line.get_marker() == 'o']
+    assert len(curves) == 6 and len(points) == 12
     for line, tension in zip(curves, (1.6, 1.6, 2.0, 2.0, 4.0, 4.0), strict=True):
         x = line.get_xdata()
         assert (x[0], x[-1]) == pytest.approx((tension / 4.0, tension))
-    # Capillary length: heights go with the root of the tension, nearly.
-    heights = [line.get_ydata()[45] for line in curves[::2]]
-    assert heights[2] / heights[0] == pytest.approx(math.sqrt(2.5), rel=0.1)
+    for balance in curves[::2]:
+        assert np.all(np.diff(balance.get_ydata()) > 0.0)
+    # Where there is a disc, the balance of energy is above it by up to 16 %.
+    x, y = points[-3].get_xydata()[0]
+    assert 1.0 < np.interp(x, *curves[4].get_xydata().T) / y < 1.16
 
 
-def test_rays_join_points_of_the_same_angle():
-    ax = FIGURES[30].drawn.figure.axes[0]
-    rays = [line for line in ax.lines if len(line.get_xdata()) == 2]
-    ends = [line for line in ax.lines if len(line.get_xdata()) > 2]
-    assert len(rays) == 4 and len(ends) == 6
-    slopes = [line.get_ydata()[1] / line.get_xdata()[1] for line in rays]
-    for line in ends:
-        x, y = line.get_xydata().T
-        assert (y[0] / x[0], y[-1] / x[-1]) == pytest.approx((slopes[0], slopes[-1]))
+def test_radius_is_in_proportion_on_a_cone_alone():
+    """R = h/(1 + cos(θ + a)), so that on a wall at 100° and at 45° it is 5.53 h."""
+    first, last, *cone = FIGURES[30].claims[0].numbers
+    assert first > 5.0 * last
+    expected = 1.0 / (1.0 + math.cos(math.radians(145.0)))
+    assert cone == pytest.approx([expected] * 3, rel=1e-3)
 
 
-def test_what_is_claimed():
-    assert [claim.holds for claim in FIGURES[29].claims] == [None, True, None]
-    assert [claim.holds for claim in FIGURES[30].claims] == [False]
+def test_water_between_domes_stays_below_its_limit():
+    lone, close, limit = FIGURES[31].claims[0].numbers
+    sphere, rest = capillary.dome()
+    assert limit == pytest.approx(math.sqrt(sphere**2 - rest**2) + sphere * math.cos(WATER.angle))
+    assert 0.9 * limit < close < limit
+    # Nearly as high as one dome alone, and higher.
+    assert 1.0 < lone / 0.789e-3 < 1.2
+    # Water between them: a hexagonal cell less a segment of the sphere.
+    (volume,) = FIGURES[31].claims[2].numbers
+    height = capillary.filled(capillary.PITCHES[0], 'energy').height
+    centre = math.sqrt(sphere**2 - rest**2)
+    inside = math.pi * (sphere**2 * height + ((centre - height) ** 3 - centre**3) / 3.0)
+    cell = math.sqrt(0.75) * capillary.PITCHES[0] ** 2
+    assert volume == pytest.approx(cell * height - inside, rel=5e-3)
+
+
+def test_general_shape_is_not_round_and_is_not_pushed_sideways():
+    general, net, printed, mended, half = FIGURES[27].claims[0].numbers
+    assert net < 0.01 * general
+    assert printed > 0.0 > mended > half
+    layers, surface = FIGURES[26].claims[1].numbers
+    assert layers > surface > 10.0  # µm
+
+
+@pytest.mark.parametrize(
+    ('number', 'holds'),
+    [
+        (26, [False, True]),
+        (27, [False, False]),
+        (28, [True, False]),
+        (29, [True, True, False]),
+        (30, [False]),
+        (31, [True, False, False]),
+    ],
+)
+def test_what_is_claimed(number, holds):
+    assert [claim.holds for claim in FIGURES[number].claims] == holds
+    assert all(math.isfinite(each) for claim in FIGURES[number].claims for each in claim.numbers)

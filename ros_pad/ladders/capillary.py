@@ -1,0 +1,544 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ladder of liquid round one pad: height and force against the exact meniscus of a wide bath.
+
+The truth is made here in another way than in :mod:`ros_pad.capillary`: by following the surface
+from far away inwards until it meets the wall, with the volume integrated on the way.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import statistics
+import time
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import k0e
+from scipy.special import k1e
+
+from ros_pad.capillary import Face
+from ros_pad.capillary import Mesh
+from ros_pad.capillary import Wall
+from ros_pad.capillary import Wet
+from ros_pad.capillary import bath_meniscus
+from ros_pad.capillary import bath_surface
+from ros_pad.capillary import wet
+from ros_pad.capillary import wet_pattern
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.meniscus import WATER
+from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.pad import Array
+from ros_pad.errors import PadError
+from ros_pad.ladders import capillary_chart
+from ros_pad.ladders.ladder import Progress
+
+Pair = tuple[float, float]  # height, m, and force, N
+
+SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
+TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
+RATIOS = (0.3, 0.5, 0.65, 0.8, 0.95)  # of the solid's tension to the liquid's
+# The minimiser is slow: these of the ten cases are enough.
+FEW = slice(1, None, 4)
+
+BALANCES = ('thesis', 'force', 'energy')
+# Layers, slices, rings and sectors of the mesh.
+SIZES = ((25, 12, 12, 48), (100, 36, 48, 72), (100, 36, 100, 100), (400, 36, 100, 100))
+# Vertices round the pad, and how often triangles are halved.
+MINIMISED = ((12, 0), (24, 0), (24, 1))
+BIG = (100, 36, 100, 100)  # about 20 000 triangles
+EXACT = 'exact meniscus'
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A round pad, as a wall, as a mesh, and as what the truth needs of it.
+
+    Attributes
+    ----------
+    name : str
+    wall : Wall
+    mesh : callable
+        From rings and sectors to the mesh.
+    outside : callable
+        From radius and height, m: above 0 outside of the pad.
+    inclination : callable
+        Of the wall, rad, at a height, m.
+    solid : callable
+        Volume of the pad, m³, up to a height, m.
+    """
+
+    name: str
+    wall: Wall
+    mesh: Callable[[int, int], Mesh]
+    outside: Callable[[float, float], float]
+    inclination: Callable[[float], float]
+    solid: Callable[[float], float]
+
+
+def dome(top: float = 2.9e-3) -> Shape:
+    """Return the dome of the reference table, cut off at a height, m."""
+    centre = math.sqrt(SPHERE**2 - REST**2)
+
+    def solid(z: float) -> float:
+        return math.pi * (SPHERE**2 * z + ((centre - z) ** 3 - centre**3) / 3.0)
+
+    return Shape(
+        'dome',
+        Wall.dome(SPHERE, REST, top),
+        lambda rings, sectors: Mesh.dome(SPHERE, REST, top, rings, sectors),
+        lambda r, z: math.hypot(r, z - centre) - SPHERE,
+        lambda z: math.acos((centre - z) / SPHERE),
+        solid,
+    )
+
+
+def cone(name: str, radius: float, degrees: float, top: float) -> Shape:
+    """Return a truncated cone whose wall is inclined by some degrees; 90 is a cylinder."""
+    phi = math.radians(degrees)
+    lean = math.cos(phi) / math.sin(phi)
+
+    def solid(z: float) -> float:
+        above = radius + lean * z
+        return math.pi * z * (radius**2 + radius * above + above**2) / 3.0
+
+    return Shape(
+        name,
+        Wall.cone(radius, phi, top),
+        lambda rings, sectors: Mesh.cone(radius, radius + lean * top, top, rings, sectors),
+        lambda r, z: r - radius - lean * z,
+        lambda z: phi,
+        solid,
+    )
+
+
+SHAPES = (
+    dome(),
+    cone('truncated cone', 1.6e-3, 110.0, 3e-3),
+    cone('cylinder', 1.2e-3, 90.0, 4e-3),
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One answer: tension (N/m), ratio of tensions, height (m), force (N), the truth, status.
+
+    Where there is no answer height and force are None and the status says why.
+    """
+
+    tension: float
+    ratio: float
+    height: float | None
+    force: float | None
+    exact_height: float
+    exact_force: float
+    status: str
+
+
+@dataclass(frozen=True)
+class Rung:
+    """What a method achieved on a shape.
+
+    Attributes
+    ----------
+    kind : str
+    shape, family, size : str
+        The family of methods, and how fine it is.
+    ms_per_solve : float
+        Median time of one case, milliseconds.
+    height_error, force_error : float
+        Median relative errors; ``worst_`` the largest.
+    dry : int
+        Cases in which liquid does not rise, and that is what the method said.
+    refused : int
+        Cases in which it rises and the method has no answer.
+    false : int
+        Cases in which it does not rise and the method has a number.
+    cases : list of Case
+    """
+
+    kind: str
+    shape: str
+    family: str
+    size: str
+    ms_per_solve: float
+    height_error: float
+    worst_height_error: float
+    force_error: float
+    worst_force_error: float
+    dry: int
+    refused: int
+    false: int
+    cases: list[Case]
+
+
+@dataclass(frozen=True)
+class Trap:
+    """An input that makes a rung fail, what it says then, and what is true."""
+
+    kind: str
+    rung: str
+    given: str
+    said: str
+    true: str
+
+
+@dataclass(frozen=True)
+class Speed:
+    """How long something takes on a mesh of so many triangles; None where it is not installed."""
+
+    kind: str
+    what: str
+    triangles: int
+    ms: float | None
+
+
+Row = Rung | Trap | Speed
+
+
+def measure(progress: Progress | None = None) -> list[Row]:
+    """Climb the ladder on every shape, look at the traps, and measure the speed."""
+    tell = progress or (lambda _: None)
+    rows: list[Row] = []
+    share = 0.9 / len(SHAPES)
+    _minimised(SHAPES[0], *MINIMISED[0])(WATER)  # what is imported once is not timed
+    for k, shape in enumerate(SHAPES):
+        begin = k * share
+        rows += climb(shape, lambda done, begin=begin: tell(begin + share * done))  # type: ignore[misc]
+    rows += traps()
+    tell(0.95)
+    rows += speeds()
+    tell(1.0)
+    return rows
+
+
+def figures(rows: list[Row], progress: Progress | None = None) -> dict[str, Figure]:
+    """Return the picture by its name."""
+    return {'capillary': capillary_chart.draw([row for row in rows if isinstance(row, Rung)])}
+
+
+# --- truth ---------------------------------------------------------------------------------------
+
+
+def truth(shape: Shape, liquid: Liquid, rtol: float = 1e-10) -> Pair:
+    """Return how high a wide bath at floor level climbs, m, and the weight it lifts, N.
+
+    For contact angles above 0; both are 0 where the liquid does not rise. In capillary lengths and
+    from far away, where it is linear, the surface follows its slope angle ψ inwards until it meets
+    the wall; how far away is sought so that it meets it at the contact angle. The force of the
+    liquid on the pad is the weight of what is lifted.
+    """
+    if math.pi - shape.inclination(0.0) - liquid.angle <= 0.0:
+        return 0.0, 0.0
+    weight = liquid.density * GRAVITY
+    length = math.sqrt(liquid.surface_tension / weight)
+    start = shape.wall.meridian(shape.wall.floor)[0] / length
+
+    def rates(log: float, state: Array) -> tuple[float, float, float]:
+        psi, (r, z, _) = math.exp(log), state.tolist()
+        pull = psi / (z + math.sin(psi) / r)
+        inward = math.cos(psi) * pull
+        return -inward, math.sin(psi) * pull, 2.0 * math.pi * r * z * inward
+
+    def touch(_: float, state: Array) -> float:
+        return shape.outside(length * state[0], length * state[1])
+
+    touch.terminal = True  # type: ignore[attr-defined]
+
+    def meet(distance: float) -> tuple[float, float, float]:
+        """Return slope angle less the one that is asked for, height, and volume lifted."""
+        first, far = 1e-6, start + distance
+        height = first * k0e(far) / k1e(far)
+        met = solve_ivp(
+            rates,
+            (math.log(first), math.log(math.pi)),
+            # What is lifted farther out: the surface's slope carries it.
+            (far, height, 2.0 * math.pi * far * first),
+            method='DOP853',
+            rtol=rtol,
+            atol=rtol * min(start, first),
+            events=touch,
+            dense_output=True,
+        )
+        if not met.t_events[0].size:
+            return math.pi, math.nan, math.nan
+        r, z, ring = met.y_events[0][0].tolist()
+        wanted = math.pi - shape.inclination(length * z) - liquid.angle
+        lifted = length**3 * (ring + math.pi * r**2 * z) - shape.solid(length * z)
+        return math.exp(met.t_events[0][0]) - wanted, length * z, lifted
+
+    # Farther than this a slope of a millionth is too steep.
+    distance = brentq(lambda far: meet(far)[0], 1e-3, 30.0, xtol=1e-13, rtol=0.1 * rtol)
+    _, height, lifted = meet(distance)
+    return height, weight * lifted
+
+
+# --- methods -------------------------------------------------------------------------------------
+
+
+def weight_lifted(found: Wet, solid: Callable[[float], float]) -> float:
+    """Return the weight of the liquid between the arcs, the floor and a round pad, N.
+
+    The balances do not know another vertical force; for the exact meniscus it is the same.
+    """
+    points = found.surface(65)
+    r = np.hypot(points[..., 0] - found.axis[0], points[..., 1] - found.axis[1])
+    z = points[..., 2]
+    around = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz  # NumPy 1.26
+    inside = math.pi * float(np.mean(around(r**2, z, axis=1)))
+    return found.liquid.density * GRAVITY * (inside - solid(found.mean_height))
+
+
+def _layers(shape: Shape, balance: str, size: tuple[int, ...]) -> Callable[[Liquid], Any]:
+    layers, slices, rings, sectors = size
+    mesh = shape.mesh(rings, sectors)
+    return lambda liquid: wet(mesh, liquid, balance, layers, slices)
+
+
+def _minimised(shape: Shape, sectors: int, refinements: int) -> Callable[[Liquid], Any]:
+    face = Face.of_wall(shape.wall)
+    return lambda liquid: bath_surface(face, liquid, sectors=sectors, refinements=refinements)
+
+
+def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
+    """Return height and force, if there is an answer, and status of what a method found."""
+    if isinstance(found, Wet):
+        status = str(found.status[0])
+        if status != 'ok':
+            return None, status
+        return (found.mean_height, weight_lifted(found, shape.solid)), status
+    if hasattr(found, 'lines'):
+        line = found.vertices[found.lines[0].vertices, 2]
+        return (float(line.mean()), -float(found.forces[0, 2])), 'ok'
+    if found.status not in ('ok', 'several'):
+        return None, found.status
+    return (found.height, found.force), found.status
+
+
+def climb(shape: Shape, progress: Progress) -> list[Rung]:
+    """Measure every method on a shape; ``progress`` from 0 to 1."""
+    cases = [(tension, ratio) for tension in TENSIONS for ratio in RATIOS]
+    exact = []
+    for tension, ratio in cases:
+        exact.append(truth(shape, Liquid(tension, ratio * tension)))
+        progress(0.2 * len(exact) / len(cases))
+    # Family, size, method, its cases, and what one of them weighs in the progress.
+    methods: list[tuple[str, str, Callable[[Liquid], Any], slice]] = [
+        (balance, _worded(size), _layers(shape, balance, size), slice(None))
+        for balance in BALANCES
+        for size in (SIZES if balance == 'energy' else SIZES[::2])
+    ]
+    methods += [
+        (
+            'minimised',
+            f'{sectors} sectors, {halved}x halved',
+            _minimised(shape, sectors, halved),
+            FEW,
+        )
+        for sectors, halved in MINIMISED
+    ]
+
+    def meniscus(liquid: Liquid) -> Any:
+        return bath_meniscus(wall=shape.wall, liquid=liquid)
+
+    methods.append((EXACT, '', meniscus, slice(None)))
+    rungs = []
+    for family, size, solve, which in methods:
+        rungs.append(_rung(shape, family, size, solve, cases[which], exact[which]))
+        progress(0.2 + 0.8 * len(rungs) / len(methods))
+    return rungs
+
+
+def _worded(size: tuple[int, ...]) -> str:
+    layers, slices, rings, sectors = size
+    return f'{layers} × {slices}, {2 * (rings + 1) * sectors} triangles'
+
+
+def _rung(
+    shape: Shape,
+    family: str,
+    size: str,
+    solve: Callable[[Liquid], Any],
+    cases: Sequence[Pair],
+    exact: Sequence[Pair],
+) -> Rung:
+    times, answers = [], []
+    for (tension, ratio), (height, force) in zip(cases, exact, strict=True):
+        liquid = Liquid(tension, ratio * tension)
+        begun = time.perf_counter()
+        pair: Pair | None = None
+        try:
+            found = solve(liquid)
+        except PadError as error:
+            status = str(getattr(error, 'status', type(error).__name__))
+        else:
+            took = time.perf_counter() - begun
+            pair, status = _read(shape, found)
+            if pair:
+                times.append(1e3 * took)
+        answers.append(Case(tension, ratio, *(pair or (None, None)), height, force, status))
+    rising = [case for case in answers if case.exact_height > 0.0]
+    still = [case for case in answers if case.exact_height == 0.0]
+    good = [case for case in rising if case.height is not None]
+    heights = [_off(case.height, case.exact_height) for case in good]
+    forces = [_off(case.force, case.exact_force) for case in good]
+    return Rung(
+        kind='rung',
+        shape=shape.name,
+        family=family,
+        size=size,
+        ms_per_solve=statistics.median(times) if times else math.nan,
+        height_error=statistics.median(heights) if good else math.nan,
+        worst_height_error=max(heights, default=math.nan),
+        force_error=statistics.median(forces) if good else math.nan,
+        worst_force_error=max(forces, default=math.nan),
+        dry=sum(case.height is None for case in still),
+        refused=len(rising) - len(good),
+        false=sum(case.height is not None for case in still),
+        cases=answers,
+    )
+
+
+def _off(found: float | None, exact: float) -> float:
+    assert found is not None
+    return abs(found / exact - 1.0)
+
+
+# --- traps and speed -----------------------------------------------------------------------------
+
+
+def traps() -> list[Trap]:
+    """Return inputs that make rungs fail, with what comes out now."""
+    round_, narrow, upright = SHAPES
+    meshes = {shape.name: shape.mesh(48, 72) for shape in SHAPES}
+    low = dome(1.1e-3)
+    hung = Liquid(0.073, 0.073, contact_angle=math.radians(100.0))
+    wetting = Liquid(0.073, 0.8 * 0.073)
+    flat = Liquid(0.073, 0.073, contact_angle=math.radians(75.0))
+
+    def asked(solve: Callable[[], Any], shape: Shape = round_) -> str:
+        try:
+            found = solve()
+        except PadError as error:
+            return f'{type(error).__name__}: {error}'
+        pair, status = _read(shape, found)
+        return f'{1e3 * pair[0]:.2f} mm' if pair else status
+
+    def high(shape: Shape, liquid: Liquid) -> str:
+        height = truth(shape, liquid)[0]
+        return f'{1e3 * height:.2f} mm' if height else 'no rise'
+
+    def trap(rung: str, given: str, said: str, true: str) -> Trap:
+        return Trap('trap', rung, given, said, true)
+
+    rows = []
+    for balance in BALANCES:
+        say = asked(lambda b=balance: wet(meshes['dome'], hung, b))  # type: ignore[misc]
+        rows.append(trap(balance, 'dome, water, θ = 100°', say, high(round_, hung)))
+    for balance in BALANCES:
+        for name, shape in (('truncated cone', narrow), ('cylinder', upright)):
+            say = asked(lambda b=balance, n=name: wet(meshes[n], wetting, b), shape)  # type: ignore[misc]
+            rows.append(trap(balance, f'{name}, water, γs/γl = 0.8', say, high(shape, wetting)))
+    for balance in BALANCES:
+        say = asked(lambda b=balance: wet(low.mesh(48, 72), wetting, b))  # type: ignore[misc]
+        rows.append(trap(balance, 'dome 1.1 mm high, water, γs/γl = 0.8', say, 'over the top'))
+    say = asked(lambda: bath_meniscus(wall=low.wall, liquid=wetting))
+    rows.append(trap(EXACT, 'dome 1.1 mm high, water, γs/γl = 0.8', say, 'over the top'))
+    say = asked(lambda: bath_surface(Face.of_wall(low.wall), wetting, sectors=12, refinements=0))
+    rows.append(trap('minimised', 'dome 1.1 mm high, water, γs/γl = 0.8', say, 'over the top'))
+    half, wide = dome(1.436e-3), Liquid(0.073, 0.7 * 0.073)
+    say = asked(lambda: wet(half.mesh(48, 72), wide, 'thesis'), half)
+    rows.append(trap('thesis', 'dome 1.44 mm high, water, γs/γl = 0.7', say, high(half, wide)))
+    say = asked(lambda: wet(meshes['truncated cone'], flat), narrow)
+    rows.append(trap('energy', 'truncated cone, water, θ = 75°', say, high(narrow, flat)))
+    thin = Liquid(0.001, 0.0003)
+    say = asked(lambda: wet(meshes['dome'], thin, layers=10))
+    rows.append(trap('energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers', say, high(round_, thin)))
+    say = asked(lambda: Mesh.dome_pattern(7, 3e-3, SPHERE, REST, 2.9e-3))
+    rows.append(trap('patterns', '7 domes 3.10 mm wide, 3 mm apart', say, 'they overlap'))
+    say = asked(lambda: wet_pattern(meshes['dome'], WATER, 5e-5, 7))
+    rows.append(trap('patterns', '7 domes in 50 mm²', say, 'they overlap'))
+    return rows
+
+
+def speeds() -> list[Speed]:
+    """Return how long a mesh of 20 000 triangles takes, here and with trimesh where it is."""
+    layers, slices, rings, sectors = BIG
+    mesh = SHAPES[0].mesh(rings, sectors)
+    triangles = len(mesh.faces)
+
+    def row(what: str, solve: Callable[[], Any] | None) -> Speed:
+        return Speed('speed', what, triangles, None if solve is None else _shortest(solve))
+
+    found = [
+        row(
+            f'wet, {balance}, {layers} layers × {slices} slices',
+            lambda b=balance: wet(mesh, WATER, b, layers, slices),  # type: ignore[misc]
+        )
+        for balance in ('energy', 'force')
+    ]
+    what = f'trimesh: {layers} sections alone, one by one'
+    try:
+        # No dependency and no extra: something to compare with where it happens to be.
+        trimesh = importlib.import_module('trimesh')
+    except ImportError:
+        return [*found, row(what, None)]
+    other = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
+    heights = (np.arange(layers) + 0.5) / layers * mesh.height
+
+    def sections() -> None:
+        for z in heights:
+            trimesh.intersections.mesh_plane(other, (0.0, 0.0, 1.0), (0.0, 0.0, z))
+
+    def together() -> None:
+        trimesh.intersections.mesh_multiplane(other, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), heights)
+
+    named = f'trimesh {trimesh.__version__}: {layers} sections alone'
+    return [*found, row(f'{named}, one by one', sections), row(f'{named}, together', together)]
+
+
+def _shortest(solve: Callable[[], Any], repeats: int = 5) -> float:
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        solve()
+        times.append(time.perf_counter() - begun)
+    return 1e3 * min(times)
+
+
+# --- what is shown -------------------------------------------------------------------------------
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as text."""
+    lines = []
+    rungs = [row for row in rows if isinstance(row, Rung)]
+    for name in dict.fromkeys(rung.shape for rung in rungs):
+        part = [rung for rung in rungs if rung.shape == name]
+        lines += [
+            f'{name}: height and force against the exact meniscus of a wide bath',
+            f'  {"method":14} {"size":30} {"ms":>7}  {"height: median":>14} {"worst":>7}'
+            f'  {"force: median":>14} {"worst":>7}  cases  dry  refused  false',
+        ]
+        lines += [
+            f'  {rung.family:14} {rung.size:30} {rung.ms_per_solve:7.3g}'
+            f'  {rung.height_error:14.1e} {rung.worst_height_error:7.1e}'
+            f'  {rung.force_error:14.1e} {rung.worst_force_error:7.1e}'
+            f'  {len(rung.cases):5d}  {rung.dry:3d}  {rung.refused:7d}  {rung.false:5d}'
+            for rung in part
+        ]
+        lines.append('')
+    lines.append('inputs that make rungs fail')
+    traps_ = [row for row in rows if isinstance(row, Trap)]
+    lines += [f'  {t.rung:14} {t.given:38} says {t.said}; true: {t.true}' for t in traps_]
+    lines.append('')
+    for speed in (row for row in rows if isinstance(row, Speed)):
+        took = 'not installed' if speed.ms is None else f'{speed.ms:.0f} ms'
+        lines.append(f'{speed.what}, {speed.triangles} triangles: {took}')
+    return '\n'.join([*lines, ''])
