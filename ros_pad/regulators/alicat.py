@@ -72,7 +72,7 @@ class AlicatRegulator(SerialRegulator):
     analogue set-point source ignores this line without a word; ``LSS`` tells of it from 10v05
     on, and for all others the echo does.
 
-    A vent is the set-point zero; a device that holds its valves (HLD) is told to let go first.
+    A vent is the set-point zero; a device that holds its valves (HLD) is then told to let go.
     The exhaust command is not used: no manual at hand says how it is left again.
 
     Source: Alicat's manuals (frame, status, ``S``, ``C``) and what two independent drivers say
@@ -121,9 +121,14 @@ class AlicatRegulator(SerialRegulator):
         return self._frame_in(self.address, ask(self.address))
 
     def _set(self, ask: Ask, setpoint: float) -> Frame | None:
-        if self._held and setpoint == 0.0:
-            self._ask(ask, f'{self.address}C')
-        value = f'{setpoint / self._unit:.{self._decimals}f}'
+        release = self._held and setpoint == 0.0
+        frame = self._send(ask, f'{setpoint / self._unit:.{self._decimals}f}')
+        if release:  # after zero is in force, or what was held would go on at the old set-point
+            command = f'{self.address}C'
+            frame = self._frame_in(command, self._ask(ask, command))
+        return frame
+
+    def _send(self, ask: Ask, value: str) -> Frame | None:
         if not self._unit_code:
             command = f'{self.address}S{value}'
             return self._frame_in(command, self._ask(ask, command))

@@ -97,9 +97,8 @@ def test_valves_that_are_held_are_let_go_to_vent(dialogue, until):
         [
             ('A', 'A +050.00 +000.00 HLD\r'),
             *GREETING[1:],
-            ('AC', 'A +050.00 +000.00\r'),
             ('ALS 0.00 10', 'A +000.00 +000.00 10 kPaG\r'),
-            ('A', 'A +049.00 +000.00\r'),
+            ('AC', 'A +049.00 +000.00\r'),
         ]
     )
     regulator = create('alicat', port=device.path, **SLOW)
@@ -108,6 +107,25 @@ def test_valves_that_are_held_are_let_go_to_vent(dialogue, until):
     regulator.vent()
     until(lambda: regulator.read().faults == ())
     regulator.close()
+
+
+def test_zero_is_sent_even_if_valves_are_not_let_go():
+    regulator = create('alicat', port='/dev/somewhere')
+    said = dict(GREETING) | {
+        'A': 'A +050.00 +060.00 HLD',
+        'ALS 0.00 10': 'A +060.00 +000.00 10 kPaG',
+        'AC': '?',
+    }
+    asked = []
+
+    def ask(command):
+        asked.append(command)
+        return said[command].strip()
+
+    regulator._meet(ask)
+    with pytest.raises(DeviceFault, match='rejected'):
+        regulator._set(ask, 0.0)
+    assert asked[-2:] == ['ALS 0.00 10', 'AC']
 
 
 def test_a_rejection_is_a_fault_and_the_old_setpoint_stays(dialogue, until):
