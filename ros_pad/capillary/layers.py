@@ -113,8 +113,9 @@ class Wet:
     def force(self, direction: float | npt.ArrayLike) -> float:
         """Return pressure times section for a direction of motion, N (thesis 4.18).
 
-        It is a bound: the pull of one side. On the other side the liquid pulls back, so that
-        nothing is left of it round a symmetric pad. Below 0 the liquid pulls.
+        The thesis' estimate of what one side of the pad feels: no bound, for the pressure is that
+        of an arc. Exact surfaces pull many times as much on one side, and by as much on the other,
+        so that nothing is left of it round a symmetric pad. Below 0 the liquid pulls.
         Directions as for :meth:`section`.
         """
         return self._projected(direction, self.pressure)
@@ -198,7 +199,7 @@ class WetPattern:
 
     @property
     def force(self) -> float:
-        """Pressure times section, N (thesis 4.18): a bound, as for :meth:`Wet.force`."""
+        """Pressure times section, N (thesis 4.18): an estimate, see :meth:`Wet.force`."""
         return self.pressure * self.section
 
 

@@ -41,7 +41,7 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--thesis',
         action='store_true',
-        help="draw the thesis' figures, without PATH; all of them take about half a minute",
+        help="draw the thesis' figures, without PATH; all of them take about 45 s",
     )
     part.add_argument(
         '--only', type=int, nargs='+', metavar='N', help='with --thesis: figures of these numbers'

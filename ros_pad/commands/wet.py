@@ -60,10 +60,11 @@ the floor at z = 0, or one of these shapes:
 With --area, or for a pattern, the liquid stands between many pads with a level surface.
 
   pressure         of the liquid over the air: below 0 it pulls
-  force            pressure times projected section, a bound: what one side of the pad feels. On \
-the other side the liquid pulls back, and nothing is left of it round a symmetric pad
+  force            pressure times projected section: the thesis' estimate of what one side of the \
+pad feels, no bound. On the other side the liquid pulls back, and nothing is left of it round a \
+symmetric pad
   capillary force  what a scene may be given: capillary_force in the file of its foot, N for each \
-pad; the size of that bound, or with --hysteresis what the pinned line holds"""
+pad; the size of that estimate, or with --hysteresis what the pinned line holds"""
 
 
 def add(commands: Commands) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import ListParameters
 from rclpy.client import Client
@@ -21,6 +22,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
+from rclpy.qos import qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
@@ -63,7 +65,7 @@ class RecorderNode(Node):
     custom_data : mapping of str to str, optional
         What the bag is to say about the trial. Without it, it says the versions of ros_pad and
         its libraries, and the parameters of all nodes in the namespace of this one, which are
-        asked as they appear.
+        asked as they appear, with their changes since.
     **kwargs
         Passed on to `rclpy.node.Node`.
 
@@ -108,6 +110,11 @@ class RecorderNode(Node):
         # Of wall time, whatever the clock of the trial does.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._asks = custom_data is None
+        self._changes: list[tuple[int, str, str, Any]] = []
+        if self._asks:
+            self.create_subscription(
+                ParameterEvent, '/parameter_events', self._on_change, qos_profile_parameter_events
+            )
         self.get_logger().info(f'recording {len(recorded)} topics into {self._bag.folder}')
 
     @property
@@ -261,6 +268,16 @@ class RecorderNode(Node):
 
         request = GetParameters.Request(names=names)
         getter.call_async(request).add_done_callback(told)
+
+    def _on_change(self, event: ParameterEvent) -> None:
+        """Note which parameters changed of nodes that told theirs."""
+        if event.node not in self._said:
+            return
+        now_ns = self._now()
+        for each in event.changed_parameters:
+            value = plain(parameter_value_to_python(each.value))
+            self._changes.append((now_ns, event.node, each.name, value))
+        self._bag.describe({label.CHANGES: json.dumps(self._changes)})
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

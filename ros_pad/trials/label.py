@@ -31,6 +31,9 @@ MADE_WITH = 'ros_pad_made_with'
 PARAMETERS = 'ros_pad_parameters'
 """Of the parameters of the nodes on the graph, by full name of the node."""
 
+CHANGES = 'ros_pad_parameter_changes'
+"""Of parameters that changed while it was recorded: log time in ns, node, name, new value."""
+
 LOST = 'ros_pad_lost'
 """Of the numbers of messages that were lost on the way to the recorder, by topic."""
 

@@ -33,6 +33,7 @@ from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
 from ros_pad.trials.label import LOST
+from ros_pad.trials.repair import KEY as REPAIR
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
@@ -225,6 +226,7 @@ def _described(bag: BagReader) -> dict[str, Any]:
             | {
                 'ambient_pressure': ambient,
                 'lost': dict(json.loads(bag.custom_data.get(LOST, '{}'))),
+                'repaired': REPAIR in bag.custom_data,
             },
             'real_time_factor': said.get('real_time_factor'),
         }

@@ -10,6 +10,7 @@ have changed in what was estimated and decided; the robot walks as it walked.
 from __future__ import annotations
 
 import bisect
+import json
 import math
 import os
 import pathlib
@@ -40,6 +41,7 @@ from ros_pad.trials.bag import BagReader
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
+from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import ESTIMATOR
 from ros_pad.trials.node_settings import POLICY
 from ros_pad.trials.node_settings import SETTABLE
@@ -699,6 +701,11 @@ def _notes(
     notes = list(settings.assumed)
     if bag.problem:
         notes.append(bag.problem)
+    for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]')):
+        notes.append(
+            f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r};'
+            ' the replay goes on with what it was'
+        )
     absent = _absent(player, there, settings)
     if absent:
         notes.append(

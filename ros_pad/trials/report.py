@@ -310,6 +310,10 @@ def _warnings(trial: Trial) -> list[str]:
     if trial.metrics is not None:
         found += [f'Meant to be a dome but stayed flat, {why}' for why in trial.metrics.refusals]
         found += told(trial.metrics.faults)
+    if trial.settings.get('repaired'):
+        found.append(
+            'The bag was repaired: its recorder was cut off, and what came at the end is missing.'
+        )
     if lost := trial.settings.get('lost'):
         words = ', '.join(f'{count} on {topic}' for topic, count in sorted(lost.items()))
         found.append(f'Messages were lost on the way to the recorder: {words}.')

@@ -190,7 +190,13 @@ def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
     until(lambda: publisher.get_subscription_count())
     publisher.publish(Float64())
     until(while_open)
+    changed = Parameter('stride', value=0.10)
+    assert nodes[0].set_parameters([changed])[0].successful
+    until(lambda: recorder._changes)
     recorder.close()
+    ((at, *change),) = json.loads(BagReader(tmp_path / 'trial').custom_data[label.CHANGES])
+    assert change == ['/gait', 'stride', 0.1]
+    assert abs(at - time.time_ns()) < 60e9
     assert told() == {'homes': [0.1, 0.2], 'stride': 0.14, 'use_sim_time': False} | {
         'start_type_description_service': True
     }

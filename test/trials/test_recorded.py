@@ -96,6 +96,7 @@ def record(trial, folder):
         'fidelity': trial.fidelity,
         'ambient_pressure': 101325.0,
         'lost': {},
+        'repaired': False,
         'metrics': trial.metrics.as_dict(),
         'real_time_factor': 4.5,
         'settings': {'expected_load': 6.8, 'omitted': []},

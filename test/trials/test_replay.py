@@ -22,8 +22,10 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.bag import BagReader
 from ros_pad.trials.bag import BagWriter
+from ros_pad.trials.bag import annotate
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
+from ros_pad.trials.label import CHANGES
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.node_settings import Settings
 from ros_pad.trials.replay import open_bag
@@ -343,6 +345,15 @@ def test_what_the_estimator_had_not_heard_yet_is_left_out(tmp_path):
     assert found.verdict in ('equal', 'rounding')
     assert found.notes[-1].startswith('leg 1: the estimator heard of it later')
     assert found.samples == {1: 250}
+
+
+def test_parameters_that_changed_meanwhile_are_told(tmp_path):
+    bag = copy(tmp_path / 'bag', end=0.5)
+    annotate(bag, {CHANGES: json.dumps([[300_000_000, '/controller', 'margin', 1.5]])})
+    assert any(
+        re.fullmatch(r'0\.30 s: parameter margin of /controller became 1\.5; .*', note)
+        for note in found_in(bag).notes
+    )
 
 
 def test_missing_legs_are_said_and_not_called_a_difference(tmp_path):

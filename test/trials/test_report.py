@@ -244,11 +244,13 @@ def test_a_walk_that_is_not_valid_says_so(tmp_path):
     trial = made_up()
     trial.metrics = metrics(0.12, verdict='it fell & lay', lateral_drift_m=-1e-6)
     trial.settings['interrupted'] = True
+    trial.settings['repaired'] = True
     trial.settings['lost'] = {'/leg_2/wrench': 7, '/leg_1/wrench': 12}
     report.write(trial, tmp_path / 'r.html')
     text = page(tmp_path / 'r.html').text
     assert 'The walk is not valid: it fell & lay.' in text
     assert 'cut short' in text
+    assert 'The bag was repaired' in text
     assert 'lost on the way to the recorder: 12 on /leg_1/wrench, 7 on /leg_2/wrench.' in text
     assert re.search(r'sideways drift *mm *0\.0', text)
 
