@@ -162,5 +162,5 @@ def test_command(folder, tmp_path, capsys):
     assert cli.main(['report', str(folder), '--figures', str(figures)]) == 0
     written = capsys.readouterr().out.split()
     assert written == [str(figures / 'sweep.pdf'), str(figures / 'sweep.png')]
-    assert cli.main(['report', str(folder), '--figures', str(figures)]) == 1
+    assert cli.main(['report', str(folder), '--figures', str(figures)]) == 2
     assert cli.main(['report', str(folder), '--figures', str(figures), '--force']) == 0
