@@ -9,6 +9,7 @@ it hands messages over in the order they were published, several times faster th
 from __future__ import annotations
 
 import copy
+import gc
 import json
 import os
 import signal
@@ -344,11 +345,15 @@ def run(
         trial.close()
     finally:
         rclpy.shutdown(context=context)
-    robot = trial.simulator.robot
-    annotate(bag, label(scene, policy, seed, rung, interrupted=trial.stopped))
+    robot, floor = trial.simulator.robot, trial.simulator.floor
+    walked, stopped = trial.walked, trial.stopped
+    # Lifecycle nodes hold themselves, and stay on the graph until they are collected.
+    del trial
+    gc.collect()
+    annotate(bag, label(scene, policy, seed, rung, interrupted=stopped))
     result = recorded.load(bag)
-    result.floor = trial.simulator.floor
-    result.metrics = summarise(scene, result, robot, trial.walked)
+    result.floor = floor
+    result.metrics = summarise(scene, result, robot, walked)
     result.real_time_factor = robot.time / wall
     annotate(
         bag,
@@ -357,7 +362,7 @@ def run(
             policy,
             seed,
             rung,
-            interrupted=trial.stopped,
+            interrupted=stopped,
             metrics=result.metrics,
             real_time_factor=result.real_time_factor,
         ),

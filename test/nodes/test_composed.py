@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import contextlib
 import dataclasses
+import gc
 import os
 import signal
 import subprocess
@@ -91,6 +92,17 @@ def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves
     assert np.max(on_nodes.pressure) > 30e3
     assert sum(on_nodes.metrics.switches) >= moves
     assert on_nodes.metrics.distance_m > 0.0
+
+
+def test_no_node_stays_behind(tmp_path):
+    """Whoever walks twice in one process would find the first regulator still on the graph."""
+    gc.collect()
+    gc.disable()  # or chance might do it
+    try:
+        composed.run(scene_of('leg_wet_dome_60', 1), 'dome', seed=2, bag=tmp_path / 'bag')
+        assert not [each for each in gc.get_objects() if isinstance(each, Node)]
+    finally:
+        gc.enable()
 
 
 def test_faults_come_to_both_alike(tmp_path):

@@ -33,6 +33,7 @@ from ros_pad.nodes.controller import position_in
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.regulator import RegulatorNode
+from ros_pad.nodes.simulator import HIGHEST
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.regulators import BACKENDS
@@ -482,8 +483,13 @@ def test_the_simulator_lives(context):
     @given(st.lists(pressures, max_size=5))
     def behave(actions):
         for action in actions:
+            before = node.robot.time
             deliver(node, topics.PRESSURE.name(leg), message_of(*action))
             node.step()
+            assert node.robot.time > before
+            assert 0.0 <= node.pressures[0] <= HIGHEST
+            foot = node.robot.feet[0]
+            assert all(map(math.isfinite, (*foot.position, *foot.force, *node.robot.body)))
 
     try:
         behave()
@@ -527,7 +533,6 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
             count = len(heard)
             until(lambda count=count: len(heard) > count, what='a pressure')  # it lives
         attacker.destroy_publisher(publisher)
-    # All of them have dealt with what came, for they still take what is sound.
     wrench, position = (topic.publisher(attacker, 1) for topic in (topics.WRENCH, topics.POSITION))
     until(lambda: wrench.get_subscription_count() == position.get_subscription_count() == 2)
     before = nodes[0].answered
@@ -544,3 +549,5 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
         return nodes[1].samples and nodes[0].answered > before
 
     until(answered, what='a set-point after a sound sample')
+    assert nodes[1].samples >= 1
+    assert nodes[0].channels[1].commands >= 1

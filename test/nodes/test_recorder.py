@@ -157,7 +157,9 @@ def test_a_last_message_reaches_the_disk_although_none_follows(robot, record, un
         publisher.publish(Float64())
         until(lambda n=number: recorder.message_count == n)
     until(lambda: on_disk(tmp_path / 'trial', '/leg_1/wetness') == 2)
+    # And it was not close() that brought it there, nor does that bring it twice.
     recorder.close()
+    assert BagReader(tmp_path / 'trial').counts['/leg_1/wetness'] == 2
 
 
 def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
@@ -243,6 +245,8 @@ def test_a_node_that_comes_back_is_asked_again(context, executor, record, until,
         gait.destroy_node()
         until(lambda: '/gait' not in recorder._askers)
     recorder.close()
+    said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
+    assert said['/gait']['stride'] == 0.2
 
 
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)

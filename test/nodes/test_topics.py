@@ -148,6 +148,7 @@ def test_the_regulator_has_it_on_diagnostics_until_set_points_come(
     name = '/leg_1/pressure_setpoint'
     foreign.create_publisher(message, name, BEST_EFFORT)
     until(lambda: any('let it offer reliability reliable' in words for words in said))
+    assert regulator.answered == 0
     setpoint = message(fluid_pressure=101325.0)
     publisher = foreign.create_publisher(message, name, topics.PRESSURE_SETPOINT.publish)
 
@@ -159,3 +160,5 @@ def test_the_regulator_has_it_on_diagnostics_until_set_points_come(
     until(accepted)
     said.clear()
     until(lambda: said and said[-1] == 'no set-points: vented')
+    assert regulator.channels[1].commands >= 1
+    assert not any('let it offer' in words for words in said[-1:])
