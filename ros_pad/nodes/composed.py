@@ -47,9 +47,9 @@ from ros_pad.trials.loop import CONTROL_PERIOD_NS
 from ros_pad.trials.loop import Progress
 from ros_pad.trials.loop import tuning_for
 from ros_pad.trials.metrics import summarise
+from ros_pad.trials.trial import DOME_PRESSURE
 from ros_pad.trials.trial import Trial
 
-VENTED = 1000.0  # Pa gauge: below this a pad is flat
 _PATIENCE = 10.0  # s of wall time for one step
 _VENTING = 5.0  # s of simulated time for the pads to empty
 
@@ -247,7 +247,7 @@ class ComposedTrial:
             simulator.tick()
             if self._pace.due(simulator.time_ns):
                 self._spin(lambda: self._reported(simulator.time_ns), 'pads to vent')
-                if all(channel.pressure < VENTED for channel in channels):
+                if all(channel.pressure < DOME_PRESSURE for channel in channels):
                     return
         if not self.scene.faults:  # which may well keep a pad from being vented
             raise PadError(f'pads still hold pressure {_VENTING:g} s after they were told to vent')

@@ -20,12 +20,10 @@ from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.trials.trial import DOME_PRESSURE
 
 FORCE_SCALE = 0.01
 """m of arrow in a newton."""
-
-DOME = 5000.0
-"""Gauge pressure, Pa, above which a pad is drawn as a dome."""
 
 TILE = 1.0
 """Edge of the square of floor in one marker, m."""
@@ -104,7 +102,7 @@ class WalkMarkers:
     def _sole(self, leg: int, foot: FootState, pressure: float) -> Marker:
         x, y, z = foot.position
         marker = _marker('soles', leg, Marker.CYLINDER)
-        height = 0.006 if pressure > DOME else 0.002
+        height = 0.006 if pressure > DOME_PRESSURE else 0.002
         ground = self._floor.height(x, y) if foot.standing else z
         marker.pose.position = Point(x=x, y=y, z=ground + 0.5 * height)
         diameter = 2.0 * self._scene.foot.sole_radius

@@ -41,12 +41,12 @@ from ros_pad.trials.page import legend
 from ros_pad.trials.page import refuse
 from ros_pad.trials.page import rendered
 from ros_pad.trials.page import save
+from ros_pad.trials.trial import DOME_PRESSURE
 from ros_pad.trials.trial import Trial
 
 Progress = Callable[[float], None]
 
 WINDOW = 8.0  # s of the trial that are drawn large
-DOME_PRESSURE = 1000.0  # Pa gauge above which a pad is no longer flat
 _ROW_GAP = 0.4  # inches between the rows of a map
 POLICY_NAMES = {
     'flat': 'always flat',

@@ -16,6 +16,8 @@ from ros_pad.simulation.terrain import Floor
 
 BOUNCE = 0.03  # s without load that end no stance
 
+DOME_PRESSURE = 1000.0  # Pa gauge above which a pad is no longer flat
+
 OFTEN = 3  # faults of one kind on one leg that are each told of
 
 
