@@ -21,6 +21,7 @@ from ros_pad.trials.page import BLACK
 from ros_pad.trials.page import BLUE
 from ros_pad.trials.page import STANCE
 from ros_pad.trials.page import VERMILION
+from ros_pad.trials.page import picture_path
 
 CLAIMED = (0.3, 0.8)  # mm, the thesis' optimum
 _STYLE: dict[Any, Any] = {
@@ -52,9 +53,7 @@ def draw(
     InvalidInput
         For another ending, or a sole that has no room for any pad.
     """
-    text = os.fspath(path)
-    if not text.endswith(('.png', '.svg', '.pdf')):
-        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    text = picture_path(path)
     if not corrected:
         raise InvalidInput('the sole is too small for a pad of any radius that is drawn')
     with matplotlib.rc_context(_STYLE):

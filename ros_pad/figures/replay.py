@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ros_pad.errors import InvalidInput
 from ros_pad.figures.design import _STYLE
 from ros_pad.trials.comparison import Track
+from ros_pad.trials.page import picture_path
 from ros_pad.trials.replay import Replay
 from ros_pad.trials.report import VERMILION
 
@@ -36,9 +36,7 @@ def draw(path: str | os.PathLike[str], replay: Replay) -> None:
     InvalidInput
         For another ending.
     """
-    text = os.fspath(path)
-    if not text.endswith(('.png', '.svg', '.pdf')):
-        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    text = picture_path(path)
     ambient = replay.settings.ambient_pressure
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(7.2, 0.9 + 0.95 * len(replay.legs)), layout='constrained')

@@ -24,6 +24,7 @@ from ros_pad.trials.page import PAPER_STYLE
 from ros_pad.trials.page import VERMILION
 from ros_pad.trials.page import WIDE
 from ros_pad.trials.page import Drawn
+from ros_pad.trials.page import picture_path
 from ros_pad.trials.page import rendered
 from ros_pad.trials.page import save
 from ros_pad.trials.sweep import Point
@@ -55,9 +56,7 @@ def draw(path: str | os.PathLike[str], points: Sequence[Point], sweep: Sweep) ->
     InvalidInput
         For another ending, or for more panels than 48.
     """
-    text = os.fspath(path)
-    if not text.endswith(('.png', '.svg', '.pdf')):
-        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    text = picture_path(path)
     with matplotlib.rc_context(PAPER_STYLE):
         save(path, rendered(figure(points, sweep).figure, text.rpartition('.')[2], dpi=200))
 

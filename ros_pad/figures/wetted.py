@@ -23,11 +23,11 @@ from ros_pad.capillary import Wet
 from ros_pad.capillary import WetPattern
 from ros_pad.capillary.sections import layered
 from ros_pad.capillary.sections import walls
-from ros_pad.errors import InvalidInput
 from ros_pad.trials.page import BLACK
 from ros_pad.trials.page import BLUE
 from ros_pad.trials.page import PAPER_STYLE
 from ros_pad.trials.page import WET
+from ros_pad.trials.page import picture_path
 
 Array = npt.NDArray[Any]
 
@@ -149,9 +149,7 @@ def draw(
     InvalidInput
         For another ending.
     """
-    text = os.fspath(path)
-    if not text.endswith(('.png', '.svg', '.pdf')):
-        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    text = picture_path(path)
     with matplotlib.rc_context(PAPER_STYLE):
         figure = Figure(figsize=(7.0, 2.2 if isinstance(found, Wet) else 2.7))
         body: Any = figure.add_axes(

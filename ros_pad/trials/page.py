@@ -235,6 +235,14 @@ def refuse(path: str | os.PathLike[str], force: bool) -> None:
         raise InvalidInput(f'{os.fspath(path)}: exists, and is only replaced when that is forced')
 
 
+def picture_path(path: str | os.PathLike[str]) -> str:
+    """Return the path of a picture as text; raise InvalidInput unless it ends as one."""
+    text = os.fspath(path)
+    if not text.endswith(('.png', '.svg', '.pdf')):
+        raise InvalidInput(f'figure = {text!r} is not allowed: .png, .svg or .pdf is needed')
+    return text
+
+
 def save(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file as a whole, so that no half of one is ever left."""
     path = pathlib.Path(path)
