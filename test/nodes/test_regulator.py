@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 import math
+from functools import partial
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -414,14 +415,14 @@ def test_every_end_vents(robot, devices, executor, end):
     assert [device.is_open for device in devices()] == [not closed] * 2
 
 
-@pytest.mark.parametrize('error', [TransportError('cable'), OSError(5, 'cable')])
+@pytest.mark.parametrize('error', [partial(TransportError, 'cable'), partial(OSError, 5, 'cable')])
 def test_a_broken_cable_does_not_keep_the_other_pads_up(robot, devices, error):
     node = robot.start(simulated=False, backend='device')
     for leg in (1, 2):
         robot.send(50e3, leg, stamp_ns=node.get_clock().now().nanoseconds)
     first, second = devices()
     real_read, first.read = first.read, second.read  # only its commands are lost
-    first.broken = error
+    first.broken = error()
     answer = robot.call(Trigger, 'regulator/vent', Trigger.Request())
     assert not answer.success
     assert answer.message == 'cannot vent leg 1'
