@@ -11,6 +11,12 @@ floor with the angle θ_f: its radius is R = h/(cos(θ + a) + cos θ_f). Three b
 - ``thesis``: Eq. 4.11 summed up from the floor, γ cos θ A_wet = 2 ρ g Σ z V. In a tube this is
   Jurin's law; elsewhere it is no equilibrium, and it has no rise at contact angles from 90
   degrees.
+
+The last two also have answers where there is no equilibrium. Energy, which is least in one, judges
+them: what is farther from its height than ``AGREEMENT`` is refused. The arc itself fails on
+straight walls, if the pad is slender (the true surface reaches farther out) or the wall is steep
+and wholly wetted: ``SLENDER`` and ``WETTING`` are where its height is a sixth off the exact one. A
+wall that bulges, as that of a dome, stops the liquid whatever the surface is like.
 """
 
 from __future__ import annotations
@@ -40,7 +46,13 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 BALANCES = ('energy', 'force', 'thesis')
-STATUSES = ('ok', 'dry', 'coarse', 'saturated', 'no_circle')
+STATUSES = ('ok', 'dry', 'coarse', 'saturated', 'no_circle', 'far_off', 'far_apart')
+AGREEMENT = 0.15  # of the height of least energy: farther off, another balance is refused
+SLENDER = 0.35  # capillary lengths: radius below which a straight pad is too thin for arcs
+WETTING = math.radians(10.0)  # contact angle below which arcs are too high on walls
+_STEEP = math.radians(70.0)  # as steep as this and straight
+_STRAIGHT = math.radians(10.0)  # from the mean inclination of a wall to that at the line
+WIDEST_GAP = 1.0  # capillary lengths: between pads farther apart the surface is not level
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _THROUGH_WALL = 0.01  # of the height: by which an arc may dip into a wall of facets
 _ROUND = 720  # pieces of a contact line, for its projections
@@ -53,7 +65,9 @@ class Wet:
     Where a slice has no answer its numbers are NaN and its status says why: ``dry`` (no rise:
     the liquid is pushed down), ``coarse`` (a rise of less than two layers, or an end of the arcs
     within one: more layers are needed), ``saturated`` (over the top of the mesh), ``no_circle``
-    (no arc of a circle fits between this wall and the floor).
+    (no arc of a circle fits between this wall and the floor), ``far_off`` (known to be more
+    than about a sixth off: the energy is least elsewhere by more than ``AGREEMENT``, or the wall
+    is straight and slender, or steep and wholly wetted).
 
     Attributes
     ----------
@@ -177,7 +191,9 @@ class WetPattern:
         Of the liquid below its surface over the air, -ρ g h: below 0 the liquid pulls.
     volume : float, m³, of the liquid.
     void_area : float, m², between the pads at that height.
-    status : str, as for :class:`Wet`.
+    status : str
+        As for :class:`Wet`, or ``far_apart``: void area over outline is more than ``WIDEST_GAP``
+        capillary lengths, so that the surface sags between the pads.
     area : float, m², of the whole pattern.
     pads : int, how often the mesh stands there.
     balance : str
@@ -211,6 +227,7 @@ def wet(
     slices: int = 36,
     axis: tuple[float, float] | None = None,
     floor_angle: float = 0.0,
+    strict: bool = True,
 ) -> Wet:
     """Return how high liquid climbs round one pad.
 
@@ -231,6 +248,9 @@ def wet(
         x and y of the axis, m: by default the centroid of the lowest layer.
     floor_angle : float
         Contact angle on the floor, rad, from 0 (the floor is wet all over) to below pi/2.
+    strict : bool
+        Refuse heights that are ``far_off``. Without it they are taken as they are, up to 3 times
+        too high or low: to compare, not to use.
 
     Raises
     ------
@@ -248,11 +268,16 @@ def wet(
     else:
         axis = _pair(axis)
     cut = walls(mesh, layers, slices, axis)
-    return _climb(cut, liquid, balance, floor_angle, axis)
+    return _climb(cut, liquid, balance, floor_angle, axis, strict)
 
 
 def _climb(
-    cut: Walls, liquid: Liquid, balance: str, floor_angle: float, axis: tuple[float, float]
+    cut: Walls,
+    liquid: Liquid,
+    balance: str,
+    floor_angle: float,
+    axis: tuple[float, float],
+    strict: bool,
 ) -> Wet:
     """Balance every slice of a wall."""
     theta, tension = liquid.angle, liquid.surface_tension
@@ -268,26 +293,27 @@ def _climb(
     wall = np.concatenate([np.zeros((len(r), 1)), np.cumsum(slant, axis=1)], axis=1)
     covered = 0.5 * (arc.floor_radius**2 - r[:, :1] ** 2)
 
+    free = arc.area - math.cos(floor_angle) * covered - math.cos(theta) * wall
+    least = _lowest(np.where(arc.open, weight * lifted + tension * free, np.inf))
     if balance == 'energy':
-        free = arc.area - math.cos(floor_angle) * covered - math.cos(theta) * wall
-        energy = np.where(arc.open, weight * lifted + tension * free, np.inf)
-        place = _lowest(energy)
+        place = least
     else:
         if balance == 'force':
             misfit = tension * np.sin(theta + a) * r - weight * volume
         else:
             misfit = tension * math.cos(theta) * wall - 2.0 * weight * lifted
         place = _first_root(np.where(arc.open, misfit, -np.inf))
+    judge = least if strict else place
     # No way up: the liquid would leave the wall downwards at once.
     no_rise = ~arc.open[:, 1]
     if balance == 'thesis' and math.cos(theta) <= 1e-12:
         no_rise[:] = True
 
     status = np.full(len(r), 'ok', dtype='<U9')
-    status[np.isnan(place)] = 'coarse'
-    status[place >= cells] = 'saturated'
+    status[np.isnan(place) | np.isnan(judge)] = 'coarse'
+    status[(place >= cells) | (judge >= cells)] = 'saturated'
     status[no_rise] = 'dry'
-    place[status != 'ok'] = np.nan
+    place = np.where(status == 'ok', place, np.nan)
 
     at = np.clip(np.nan_to_num(place), 0.0, cells - 1e-9)
     k = at.astype(int)
@@ -304,6 +330,9 @@ def _climb(
         wall_there = np.interp(top.z[j, 0], z, r[j])
         if (top.r[j, 0] < wall_there - _THROUGH_WALL * heights[j]).any() or not top.open[j, 0]:
             status[j] = 'no_circle'
+    if strict:
+        far = _disagree(place, judge) | _no_arc(place, cut, liquid)
+        status[far & (status == 'ok')] = 'far_off'
     good = status == 'ok'
     curvature = np.where(good, top.radius[:, 0], np.nan)
     with np.errstate(divide='ignore'):
@@ -357,6 +386,7 @@ def wet_pattern(
     pads: int = 1,
     balance: str = 'energy',
     layers: int = 200,
+    strict: bool = True,
 ) -> WetPattern:
     """Return how high liquid stands between many pads (thesis 4.19 to 4.23).
 
@@ -376,6 +406,9 @@ def wet_pattern(
         pitch.
     layers : int
         From floor to top, from 4.
+    strict : bool
+        Refuse what is ``far_off``, as for :func:`wet`, and what is ``far_apart``: heights of
+        pads with wide gaps, where the level surface is lower than the meniscus of each pad.
 
     Raises
     ------
@@ -397,36 +430,30 @@ def wet_pattern(
             f' z = {cut.heights[k]:.4g} m, and the pattern has only area = {area:.4g} m²:'
             ' the pads overlap'
         )
-    return _fill(cut, void, pads, liquid, area, balance)
+    return _fill(cut, void, pads, liquid, area, balance, strict)
 
 
 def _fill(
-    cut: Layers, void: Array, pads: int, liquid: Liquid, area: float, balance: str
+    cut: Layers, void: Array, pads: int, liquid: Liquid, area: float, balance: str, strict: bool
 ) -> WetPattern:
     """Balance a level surface between pads."""
-    tension, weight = liquid.surface_tension, liquid.density * GRAVITY
-    z, wall = cut.heights, pads * cut.wetted
-    volume, lifted = _cumulative(z, void), _cumulative(z, z * void)
-    if balance == 'energy':
-        # The slope of the energy; the areas of facets by themselves have one with steps.
-        misfit = tension * pads * cut.gain - weight * z * void
-        no_rise = misfit[0] <= 0.0 and misfit[1] <= 0.0
-        lowest = int(np.argmin(-_cumulative(z, misfit)))
-        first = misfit[: max(lowest - 1, 0)]
-        np.abs(first, out=first)  # hills on the way are passed
-    elif balance == 'force':
-        misfit = tension * pads * cut.pull - weight * volume
-        no_rise = cut.pull[0] <= 0.0 and cut.pull[1] <= 0.0
-    else:
-        misfit = tension * math.cos(liquid.angle) * wall - 2.0 * weight * lifted
-        no_rise = math.cos(liquid.angle) <= 1e-12
-    place = _first_root(misfit[None])[0]
+    z, cells = cut.heights, cut.heights.size - 1
+    place, no_rise = _level(cut, void, pads, liquid, balance)
+    judge = place
+    if strict:
+        judge, nowhere = _level(cut, void, pads, liquid, 'energy')
+        no_rise |= nowhere
+    gap = np.interp(place, np.arange(z.size), void / (pads * cut.outline))
     if no_rise:
         status = 'dry'
-    elif math.isnan(place):
+    elif math.isnan(place) or math.isnan(judge):
         status = 'coarse'
-    elif place >= z.size - 1:
+    elif max(place, judge) >= cells:
         status = 'saturated'
+    elif strict and gap > WIDEST_GAP * _capillary_length(liquid):
+        status = 'far_apart'
+    elif _disagree(place, judge):
+        status = 'far_off'
     else:
         status = 'ok'
     height = place * z[1] if status == 'ok' else math.nan
@@ -436,14 +463,37 @@ def _fill(
 
     return WetPattern(
         height=float(height),
-        pressure=-weight * float(height),
-        volume=here(volume),
+        pressure=-liquid.density * GRAVITY * float(height),
+        volume=here(_cumulative(z, void)),
         void_area=here(void),
         status=status,
         area=float(area),
         pads=pads,
         balance=balance,
     )
+
+
+def _level(
+    cut: Layers, void: Array, pads: int, liquid: Liquid, balance: str
+) -> tuple[float, bool]:
+    """Return where a level surface is in balance, in layers, and whether nothing rises."""
+    tension, weight = liquid.surface_tension, liquid.density * GRAVITY
+    z = cut.heights
+    if balance == 'energy':
+        # The slope of the energy; the areas of facets by themselves have one with steps.
+        misfit = tension * pads * cut.gain - weight * z * void
+        no_rise = misfit[0] <= 0.0 and misfit[1] <= 0.0
+        lowest = int(np.argmin(-_cumulative(z, misfit)))
+        first = misfit[: max(lowest - 1, 0)]
+        np.abs(first, out=first)  # hills on the way are passed
+    elif balance == 'force':
+        misfit = tension * pads * cut.pull - weight * _cumulative(z, void)
+        no_rise = cut.pull[0] <= 0.0 and cut.pull[1] <= 0.0
+    else:
+        lifted = _cumulative(z, z * void)
+        misfit = tension * math.cos(liquid.angle) * pads * cut.wetted - 2.0 * weight * lifted
+        no_rise = math.cos(liquid.angle) <= 1e-12
+    return float(_first_root(misfit[None])[0]), bool(no_rise)
 
 
 # --- Where a balance is met -------------------------------------------------------------------
@@ -455,6 +505,26 @@ def _cumulative(z: Array, values: Array) -> Array:
     total = np.zeros(values.shape)
     np.cumsum(steps, axis=-1, out=total[..., 1:])
     return total
+
+
+def _disagree(place: Floats, judge: Floats) -> npt.NDArray[np.bool_]:
+    """Tell where a balance is met too far from where another is."""
+    return np.abs(np.subtract(place, judge)) > AGREEMENT * np.asarray(judge)
+
+
+def _no_arc(place: Array, cut: Walls, liquid: Liquid) -> npt.NDArray[np.bool_]:
+    """Tell on which walls the liquid's surface is known to be no arc of a circle."""
+    z, rows = cut.heights, np.arange(len(cut.radii))
+    layer = np.nan_to_num(place).clip(0, z.size - 1).astype(int)
+    ring = cut.radii[rows, layer]
+    mean = np.arctan2(z[layer], ring - cut.radii[:, 0])
+    straight = cut.inclinations[rows, layer] - mean < _STRAIGHT
+    slender = ring < SLENDER * _capillary_length(liquid)
+    return straight & (slender | ((mean > _STEEP) & (liquid.angle < WETTING)))
+
+
+def _capillary_length(liquid: Liquid) -> float:
+    return math.sqrt(liquid.surface_tension / (liquid.density * GRAVITY))
 
 
 def _lowest(energy: Array) -> Array:

@@ -208,6 +208,8 @@ class Layers(NamedTuple):
         Of the solid, m².
     wetted : array
         Wall below each height, m².
+    outline : array
+        Length of the sections' outlines, m.
     pull : array
         Sum over the outline, with contact angle θ and inclination a, of length times
         sin(θ + a), m.
@@ -219,6 +221,7 @@ class Layers(NamedTuple):
     heights: Array
     areas: Array
     wetted: Array
+    outline: Array
     pull: Array
     gain: Array
 
@@ -248,6 +251,7 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
         heights,
         _summed(layer, 0.5 * _cross(start, end), cuts.size),
         _area_below(corners, cuts),
+        _summed(layer, length, cuts.size),
         _summed(layer, length * np.sin(angle + slope), cuts.size),
         _summed(layer, length * gain, cuts.size),
     )

@@ -47,6 +47,8 @@ _ADVICE = {
     'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
     'saturated': 'the liquid goes over the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
+    'far_off': 'this balance is no equilibrium on this wall: --balance energy, or --loose',
+    'far_apart': 'the surface is not level: ros_pad.capillary.pattern_surface, or --loose',
 }
 _DESCRIPTION = """\
 How high liquid climbs a pad that stands on a wet floor, and how it pulls.
@@ -113,6 +115,11 @@ def add(commands: Commands) -> None:
         choices=BALANCES,
         default='energy',
         help='how the height is found (%(default)s)',
+    )
+    part.add_argument(
+        '--loose',
+        action='store_true',
+        help='take heights that are known to be far off too: to compare, not to use',
     )
     part.add_argument(
         '--layers', type=int, metavar='N', help='number from floor to top (100, pattern 200)'
@@ -226,6 +233,7 @@ def _round(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet:
         options.balance,
         100 if options.layers is None else options.layers,
         36 if options.slices is None else options.slices,
+        strict=not options.loose,
     )
 
 
@@ -240,7 +248,8 @@ def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPatt
         cells = math.sqrt(0.75) * options.pitch**2 * pads
         pads, area = 1, cells if area is None else area
     layers = 200 if options.layers is None else options.layers
-    return wet_pattern(mesh, liquid, area, pads, options.balance, layers)
+    strict = not options.loose
+    return wet_pattern(mesh, liquid, area, pads, options.balance, layers, strict)
 
 
 def _option(name: str) -> str:

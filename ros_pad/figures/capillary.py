@@ -126,7 +126,7 @@ def climbed(tension: float, balance: str) -> tuple[Array, Array, Array]:
     """Return tensions of the solid (N/m), heights and radii of curvature (m) on the dome."""
     mesh = Mesh.dome(*dome(), 1.75 * dome()[0], rings=64, sectors=48)
     liquids = [liquid_at(tension, degrees) for degrees in _CURVE]
-    found = [wet(mesh, liquid, balance, slices=3) for liquid in liquids]
+    found = [wet(mesh, liquid, balance, slices=3, strict=False) for liquid in liquids]
     return (
         np.array([liquid.solid_tension for liquid in liquids]),
         np.array([each.mean_height for each in found]),
@@ -175,7 +175,10 @@ def bodies() -> dict[str, Found]:
 
 
 def _by_balance(mesh: Mesh) -> dict[str, Wet]:
-    return {name: wet(mesh, _HALF, name, slices=48, axis=(0.0, 0.0)) for name in _BALANCES}
+    return {
+        name: wet(mesh, _HALF, name, slices=48, axis=(0.0, 0.0), strict=False)
+        for name in _BALANCES
+    }
 
 
 def one_sided(found: BathMeniscus, liquid: Liquid) -> float:
@@ -203,7 +206,8 @@ def in_pattern(pitch: float) -> float:
 
 def filled(pitch: float, balance: str) -> WetPattern:
     """Return the level water between domes of a hexagonal pattern."""
-    return wet_pattern(_one_of_many(), WATER, math.sqrt(0.75) * pitch**2, balance=balance)
+    cell = math.sqrt(0.75) * pitch**2
+    return wet_pattern(_one_of_many(), WATER, cell, balance=balance, strict=False)
 
 
 @functools.cache

@@ -13,6 +13,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from ros_pad.capillary import Mesh
+from ros_pad.capillary import Wall
+from ros_pad.capillary import bath_meniscus
 from ros_pad.capillary import wet
 from ros_pad.capillary import wet_pattern
 from ros_pad.capillary.layers import BALANCES
@@ -26,9 +28,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 R, B = 1.55e-3, 0.583e-3
-REFERENCE = json.loads(
-    (pathlib.Path(__file__).parent.parent / 'reference' / 'wet_dome_layers.json').read_text()
-)['rows']
+REFERENCES = pathlib.Path(__file__).parent.parent / 'reference'
+REFERENCE = json.loads((REFERENCES / 'wet_dome_layers.json').read_text())['rows']
+FIBRES = json.loads((REFERENCES / 'fibre_meniscus.json').read_text())['rows']
 COLUMN = {'energy': 'energy', 'force': 'force', 'thesis': '411'}
 HALF = Liquid(0.004, 0.002)  # its heights on the dome are those of the check values
 
@@ -57,7 +59,9 @@ def error(found: float, exact: float) -> float:
 @pytest.mark.parametrize('row', REFERENCE, ids=lambda row: f'{row["gl"]}_{row["gs_gl"]}')
 @pytest.mark.parametrize('balance', BALANCES)
 def test_a_dome_as_another_program_has_it(dome: Mesh, balance: str, row):
-    found = wet(dome, Liquid(row['gl'], row['gl'] * row['gs_gl']), balance, layers=200)
+    found = wet(
+        dome, Liquid(row['gl'], row['gl'] * row['gs_gl']), balance, layers=200, strict=False
+    )
     column = COLUMN[balance]
     if row[f'{column}_sat']:
         expected = 'saturated'
@@ -178,7 +182,12 @@ def test_a_wide_cylinder_is_an_upright_plane(balance: str, degrees: float):
     # What the curvature of the wall adds goes with 1 / radius, and is taken off.
     near, far = (
         wet(
-            Mesh.cylinder(radius, 10e-3, sectors=360), liquid(degrees), balance, 400, 4
+            Mesh.cylinder(radius, 10e-3, sectors=360),
+            liquid(degrees),
+            balance,
+            400,
+            4,
+            strict=False,
         ).mean_height
         for radius in (0.05, 0.2)
     )
@@ -285,15 +294,16 @@ def test_where_the_mesh_stands_and_how_it_is_listed_does_not_matter(dome: Mesh):
     degrees=st.floats(0.0, 170.0),
     tension=st.floats(1e-4, 0.5),
     balance=st.sampled_from(BALANCES),
+    strict=st.booleans(),
 )
 def test_any_shape_has_a_height_within_it_or_says_why_not(
-    bottom, top, height, waves, depth, bulge, degrees, tension, balance
+    bottom, top, height, waves, depth, bulge, degrees, tension, balance, strict
 ):
     mesh = shaped(
         Mesh.cone(bottom, top, height, rings=10, sectors=40),
         lambda a, z: 1.0 + depth * np.cos(waves * a) + bulge * np.sin(math.pi * z),
     )
-    found = wet(mesh, liquid(degrees, tension), balance, 40, 12, axis=(0.0, 0.0))
+    found = wet(mesh, liquid(degrees, tension), balance, 40, 12, axis=(0.0, 0.0), strict=strict)
     assert set(found.status) <= set(STATUSES)
     good = found.status == 'ok'
     for values in (found.heights, found.ring_radii, found.curvature_radius, found.pressure):
@@ -343,8 +353,76 @@ def test_a_low_pad_is_saturated(balance: str):
 @pytest.mark.parametrize('balance', BALANCES)
 def test_a_rise_of_less_than_a_layer_is_called_coarse(balance: str):
     mesh = Mesh.cylinder(1e-3, 100e-3)
-    assert set(wet(mesh, liquid(60.0, 1e-4), balance, layers=10).status) == {'coarse'}
-    assert set(wet(mesh, liquid(60.0, 1e-4), balance, layers=4000, slices=4).status) == {'ok'}
+    thin = liquid(60.0, 1e-4)
+    assert set(wet(mesh, thin, balance, layers=10).status) == {'coarse'}
+    assert set(wet(mesh, thin, balance, layers=4000, slices=4, strict=False).status) == {'ok'}
+
+
+@pytest.mark.parametrize('balance', BALANCES)
+def test_what_is_given_on_a_dome_is_near_to_the_exact_meniscus(dome: Mesh, balance: str):
+    given = 0
+    for row in REFERENCE:
+        found = wet(dome, Liquid(row['gl'], row['gl'] * row['gs_gl']), balance, slices=4)
+        assert set(found.status) <= {'ok', 'far_off', 'saturated', 'dry'}
+        if found.status[0] == 'ok':
+            assert error(found.mean_height, row['exact_bath']) < 0.25
+            given += 1
+    # Of energy and of force almost all, of the thesis those few that happen to be right.
+    assert given >= (20 if balance != 'thesis' else 3)
+
+
+@pytest.mark.parametrize('balance', BALANCES)
+@pytest.mark.parametrize('row', FIBRES, ids=lambda row: f'{row["theta"]}_{row["r_over_lambda"]}')
+def test_what_is_given_on_a_cylinder_is_near_to_the_exact_meniscus(row, balance: str):
+    length = math.sqrt(0.073 / (1000.0 * 9.80665))
+    exact = row['h_over_lambda'] * length
+    if not exact > 0.0:
+        pytest.skip('no rise')
+    mesh = Mesh.cylinder(row['r_over_lambda'] * length, 4.0 * exact, sectors=96)
+    loose, found = (
+        wet(mesh, liquid(row['theta']), balance, 400, 3, strict=strict) for strict in (False, True)
+    )
+    if found.status[0] == 'ok':
+        assert error(found.mean_height, exact) < 0.1
+        assert found.mean_height == loose.mean_height
+    elif loose.status[0] == 'ok':
+        assert set(found.status) == {'far_off'}
+        assert error(loose.mean_height, exact) > 0.05
+    # Wide cylinders that are not wholly wetted are what least energy is good for.
+    good = balance == 'energy' and row['theta'] >= 30.0 and row['r_over_lambda'] >= 1.0
+    assert (found.status[0] == 'ok') == good
+
+
+@pytest.mark.parametrize('degrees', [0.0, 11.0, 75.0])
+@pytest.mark.parametrize('radius', [0.03, 1.5])  # capillary lengths
+def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
+    radius: float, degrees: float
+):
+    water = liquid(degrees)
+    length = math.sqrt(0.073 / (1000.0 * 9.80665))
+    base = radius * length
+    bodies = [
+        (Wall.dome(base, share * base), Mesh.dome(base, share * base, reach * base, 64, 32))
+        for share, reach in ((0.1, 1.94), (0.8, 1.55))
+    ]
+    for slope in (30.0, 68.0, 80.0, 110.0):
+        wall = Wall.cone(base, math.radians(slope), 4.0 * length)
+        height = 3.0 * bath_meniscus(wall=wall, liquid=water).height
+        lean = 1.0 / math.tan(math.radians(slope))
+        if not height > 0.0 or base + height * lean < 0.01 * base:
+            continue
+        bodies.append((wall, Mesh.cone(base, base + height * lean, height, 24, 32)))
+    given = 0
+    for wall, mesh in bodies:
+        exact = bath_meniscus(wall=wall, liquid=water).height
+        for balance in BALANCES:
+            found = wet(mesh, water, balance, 200, 3)
+            if found.status[0] != 'ok':
+                continue
+            off = found.mean_height / exact - 1.0
+            assert -0.15 < off < (0.18 if balance == 'energy' else 0.34)
+            given += 1
+    assert given
 
 
 def test_where_no_arc_fits_there_is_no_circle():
@@ -460,6 +538,24 @@ def test_narrower_gaps_hold_liquid_higher():
     assert heights == sorted(heights, reverse=True)
 
 
+@pytest.mark.parametrize('balance', BALANCES)
+def test_many_domes_never_hold_liquid_lower_than_one(dome: Mesh, balance: str):
+    # A neighbour's liquid can only help: of a level surface that is lower, nothing may be given.
+    said = set()
+    for row in REFERENCE[::5]:
+        rain = Liquid(row['gl'], row['gl'] * row['gs_gl'])
+        for pitch in (3.2e-3, 3.8e-3, 4.4e-3, 5e-3, 6e-3, 8e-3, 12e-3):
+            area = math.sqrt(0.75) * pitch**2
+            found = wet_pattern(dome, rain, area, 1, balance, layers=200)
+            said.add(found.status)
+            if found.status == 'ok':
+                assert found.height > 0.95 * row['exact_bath']
+        lowest = wet_pattern(dome, rain, area, 1, 'energy', layers=400, strict=False)
+        assert lowest.height < 0.6 * row['exact_bath']
+    assert 'far_apart' in said
+    assert 'ok' in said or balance == 'thesis'
+
+
 def test_one_mesh_of_many_domes_is_many_meshes_of_one():
     area = 7 * math.sqrt(0.75) * 4e-3**2
     shape = {'sphere_radius': 1.5e-3, 'contact_radius': 0.3e-3, 'height': 2.8e-3}
@@ -489,14 +585,16 @@ def test_pads_that_do_not_fit_are_refused():
     tension=st.floats(1e-4, 0.5),
     density=st.floats(1e-2, 1e4),
     balance=st.sampled_from(BALANCES),
+    strict=st.booleans(),
 )
 def test_any_pattern_has_a_height_within_it_or_says_why_not(
-    contact, cut, room, degrees, tension, density, balance
+    contact, cut, room, degrees, tension, density, balance, strict
 ):
     top = cut * (math.sqrt(1.5e-3**2 - contact**2) + 1.5e-3)
     mesh = Mesh.dome(1.5e-3, contact, top, rings=12, sectors=16)
     area = room * math.pi * 1.5e-3**2
-    found = wet_pattern(mesh, liquid(degrees, tension, density), area, 1, balance, layers=60)
+    rain = liquid(degrees, tension, density)
+    found = wet_pattern(mesh, rain, area, 1, balance, layers=60, strict=strict)
     assert found.status in STATUSES
     numbers = np.array([found.height, found.pressure, found.volume, found.void_area, found.force])
     if found.status == 'ok':

@@ -56,7 +56,7 @@ def test_a_cylinder_is_pulled_by_its_line_alone(ratio):
     liquid = Liquid(0.004, ratio * 0.004)
     expected = 2.0 * math.pi * 1.2e-3 * 0.004 * math.cos(liquid.angle)
     assert capillary.truth(CYLINDER, liquid)[1] == pytest.approx(expected, rel=1e-8)
-    found = wet(CYLINDER.mesh(24, 96), liquid, 'force', 200, 6)
+    found = wet(CYLINDER.mesh(24, 96), liquid, 'force', 200, 6, strict=False)
     assert capillary.weight_lifted(found, CYLINDER.solid) == pytest.approx(expected, rel=5e-3)
 
 
@@ -114,8 +114,11 @@ def test_traps_are_named(rows):
     assert said['minimised', low].said.startswith('NoSurface')
     tall = said['thesis', 'dome 1.44 mm high, water, γs/γl = 0.7']
     assert tall.said == 'saturated' and float(tall.true.removesuffix(' mm')) < 1.44
-    cone = said['thesis', 'truncated cone, water, γs/γl = 0.8']
-    assert float(cone.said.removesuffix(' mm')) > 2.4 * float(cone.true.removesuffix(' mm'))
+    for shape in ('truncated cone', 'cylinder'):
+        for balance in ('thesis', 'force'):
+            assert said[balance, f'{shape}, water, γs/γl = 0.8'].said == 'far_off'
+    wide = [trap for trap in said.values() if trap.given.endswith('9 mm apart')]
+    assert [trap.said for trap in wide] == ['far_apart'] and wide[0].true.endswith(' mm')
     slope = said['energy', 'truncated cone, water, θ = 75°']
     assert (slope.said, slope.true) == ('dry', 'no rise')
     assert said['energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers'].said == 'coarse'
