@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -170,7 +171,7 @@ def _friction(calibration: Calibration, above: Axes, below: Axes) -> None:
         part = [r for r in rows if r.setting.startswith(shape) and f', {floor},' in r.setting]
         if part:
             fill = 'none' if floor == 'dry' else 'full'
-            look = {'color': colour, 'marker': mark, 'ls': '', 'fillstyle': fill}
+            look: dict[str, Any] = {'color': colour, 'marker': mark, 'ls': '', 'fillstyle': fill}
             above.plot([r.measured for r in part], [r.modelled for r in part], **look, label=words)
             below.plot([r.measured for r in part], [100.0 * r.error for r in part], **look)
     _equal(above, 'N')

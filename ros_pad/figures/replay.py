@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -17,8 +18,8 @@ from ros_pad.trials.page import picture_path
 from ros_pad.trials.replay import Replay
 from ros_pad.trials.report import VERMILION
 
-RECORDED = {'color': '#C4C4C4', 'lw': 3.0, 'solid_capstyle': 'butt'}
-REPLAYED = {'color': VERMILION, 'lw': 1.0}
+RECORDED: dict[str, Any] = {'color': '#C4C4C4', 'lw': 3.0, 'solid_capstyle': 'butt'}
+REPLAYED: dict[str, Any] = {'color': VERMILION, 'lw': 1.0}
 
 
 def draw(path: str | os.PathLike[str], replay: Replay) -> None:
@@ -67,7 +68,12 @@ def draw(path: str | os.PathLike[str], replay: Replay) -> None:
 
 
 def _steps(
-    axes: Axes, track: Track, start_ns: int, look: dict, scale: float = 1.0, zero: float = 0.0
+    axes: Axes,
+    track: Track,
+    start_ns: int,
+    look: dict[str, Any],
+    scale: float = 1.0,
+    zero: float = 0.0,
 ) -> None:
     if not len(track):
         return

@@ -138,19 +138,21 @@ def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]
         # Side by side, so that no interval hides another.
         aside = (0.06 if words else 0.012) * reach * (number - 0.5 * (len(policies) - 1))
         own = [
-            each for each in points if each.labels['policy'] == policy and each.mean is not None
+            (each, each.mean)
+            for each in points
+            if each.labels['policy'] == policy and each.mean is not None
         ]
         # A policy that the axis means nothing to: a level line, with its interval at the end.
-        level = [each for each in own if each.labels[axis] is None]
-        for point in level:
-            axes.axhline(1e3 * point.mean, color=colour, lw=1.4)
-            _mark(axes, ends[1] + 0.08 * reach + aside, point, policy)
-        own = [each for each in own if each.labels[axis] is not None]
-        own.sort(key=lambda point: place[point.labels[axis]])
-        x = [place[point.labels[axis]] + aside for point in own]
-        axes.plot(x, [1e3 * each.mean for each in own], color=colour, lw=0 if words else 1.4)
-        for at, point in zip(x, own, strict=True):
-            _mark(axes, at, point, policy)
+        level = [(point, mean) for point, mean in own if point.labels[axis] is None]
+        for point, mean in level:
+            axes.axhline(1e3 * mean, color=colour, lw=1.4)
+            _mark(axes, ends[1] + 0.08 * reach + aside, mean, point, policy)
+        own = [(point, mean) for point, mean in own if point.labels[axis] is not None]
+        own.sort(key=lambda pair: place[pair[0].labels[axis]])
+        x = [place[point.labels[axis]] + aside for point, _ in own]
+        axes.plot(x, [1e3 * mean for _, mean in own], color=colour, lw=0 if words else 1.4)
+        for at, (point, mean) in zip(x, own, strict=True):
+            _mark(axes, at, mean, point, policy)
     if all(point.mean is None for point in points):
         axes.text(0.5, 0.5, 'no walk that counts', ha='center', transform=axes.transAxes)
     axes.set_xlim(ends[0] - 0.06 * reach, ends[1] + 0.14 * reach)
@@ -164,12 +166,12 @@ def _panel(axes: Axes, points: Sequence[Point], axis: str, values: Sequence[Any]
     axes.set_axisbelow(True)
 
 
-def _mark(axes: Axes, x: float, point: Point, policy: str) -> None:
+def _mark(axes: Axes, x: float, mean: float, point: Point, policy: str) -> None:
     colour, mark = LOOKS[policy]
-    if point.low is not None:
+    if point.low is not None and point.high is not None:
         axes.plot([x, x], [1e3 * point.low, 1e3 * point.high], color=colour, lw=1.1)
     inside = 'white' if point.left_out else colour
-    axes.plot(x, 1e3 * point.mean, mark, color=colour, mfc=inside, ms=4.5)
+    axes.plot(x, 1e3 * mean, mark, color=colour, mfc=inside, ms=4.5)
 
 
 def _legend(figure: Figure, points: Sequence[Point], columns: int) -> None:

@@ -30,8 +30,8 @@ from ros_pad.trials.page import WET
 from ros_pad.trials.page import WIDE
 from ros_pad.trials.page import Drawn
 from ros_pad.trials.page import legend
-from ros_pad.trials.pictures import view_of
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.view import view_of
 
 Progress = Callable[[float], None]
 

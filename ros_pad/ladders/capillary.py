@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 from scipy.special import k0e
 from scipy.special import k1e
@@ -291,8 +292,7 @@ def weight_lifted(found: Wet, solid: Callable[[float], float]) -> float:
     points = found.surface(65)
     r = np.hypot(points[..., 0] - found.axis[0], points[..., 1] - found.axis[1])
     z = points[..., 2]
-    around = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz  # NumPy 1.26
-    inside = math.pi * float(np.mean(around(r**2, z, axis=1)))
+    inside = math.pi * float(np.mean(trapezoid(r**2, z, axis=1)))
     return found.liquid.density * GRAVITY * (inside - solid(found.mean_height))
 
 
@@ -384,7 +384,8 @@ def _rung(
             pair, status = _read(shape, found)
             if pair:
                 times.append(1e3 * took)
-        answers.append(Case(tension, ratio, *(pair or (None, None)), height, force, status))
+        given, lifted = pair or (None, None)
+        answers.append(Case(tension, ratio, given, lifted, height, force, status))
     rising = [case for case in answers if case.exact_height > 0.0]
     still = [case for case in answers if case.exact_height == 0.0]
     good = [case for case in rising if case.height is not None]

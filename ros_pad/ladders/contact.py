@@ -237,7 +237,7 @@ def _follow(pressure: float, forces: list[float], end: float) -> list[tuple[floa
     """Return depth and height at each force, followed from the free dome with 30 digits."""
     # Steps that shrink towards the end, where the dome falls fastest.
     path = sorted({*forces, *(end * (1.0 - 0.87**n) for n in range(1, 45))})
-    reached = {}
+    reached: dict[float, tuple[float, float]] = {}
     with mpmath.workdps(30):
         # _one_unknown divides by a double.
         correction = mpmath.mpf(math.pi) / mpmath.pi
@@ -343,8 +343,7 @@ QUADRATURE = 'membrane, quadrature and brentq'
 
 def gap_problem() -> Problem:
     """Return pressed pads with the gap under the exact membrane of the same energy."""
-    pressures, shares = np.meshgrid(PRESSURES, SHARES)
-    pressures, shares = pressures.ravel(), shares.ravel()
+    pressures, shares = (each.ravel() for each in np.meshgrid(PRESSURES, SHARES))
     forces = shares * math.pi * _R * _R * pressures
     gaps = [_membrane_gap(*case) for case in zip(pressures.tolist(), forces.tolist(), strict=True)]
     return Problem(
@@ -506,7 +505,7 @@ def draw_maps(maps: list[FailureMap]) -> Figure:
     """Return the picture of where each method is right, wrong, or silent."""
     figure = Figure(figsize=(9.6, 7.0), layout='constrained')
     colours = ListedColormap([colour for _, colour in _MEANING.values()])
-    above, below = figure.subfigures(2, 1, height_ratios=[12, 1])
+    above, below = figure.subfigures(2, 1, height_ratios=[12, 1], squeeze=False)[:, 0]
     grid = above.subplots(2, len(maps) // 2, sharex=True, sharey=True)
     panels = grid.ravel()
     edge = PAD.stiffness / PAD.radius

@@ -30,6 +30,7 @@ from dataclasses import field
 from dataclasses import replace
 from typing import Any
 from typing import Protocol
+from typing import TypedDict
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -63,7 +64,18 @@ BEFORE = 0.3  # s
 STILL = 5e-4  # m
 STANCE = 0.1  # s: shorter ones are not asked whether they were wet
 
-TARGETS = {
+
+class Targets(TypedDict):
+    """What is asked of a :class:`Row`: at most; ``wet_right`` at least, ``coverage`` between."""
+
+    misses: float
+    false_per_minute: float
+    wet_right: float
+    coverage: tuple[float, float]
+    us_per_update: float
+
+
+TARGETS: Targets = {
     'misses': 0.01,
     'false_per_minute': 1.0,
     'wet_right': 0.97,
@@ -183,7 +195,7 @@ def record(scene: Scene, policy: str, seed: int, rung: str) -> Recording:
         foot=scene.foot,
         expected_load=scene.expected_load,
         told=(scene.foot, scene.expected_load, tuning_for(scene)),
-        stamps=loop.period_ns * 1e-9 * np.arange(1, len(taken) + 1),
+        stamps=loop.period_ns * 1e-9 * np.arange(1, len(taken) + 1, dtype=np.float64),
         force=taken[..., :3],
         position=taken[..., 3:6],
         noise=taken[..., 3:6] - truth[..., :3],
@@ -205,7 +217,7 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
     """
     period, load, foot = 1.0 / scene.sensors.rate, scene.expected_load, scene.foot
     generator = np.random.default_rng([seed, 5])
-    stamps = period * np.arange(1, round(duration / period) + 1)
+    stamps = period * np.arange(1, round(duration / period) + 1, dtype=np.float64)
     friction = FrictionPrior.of(foot, load).flat_dry
     amplitude, cycle = friction * np.linspace(0.2, 0.6, 6), np.linspace(1.2, 0.3, 6)
     shape = (len(stamps), 6, 3)
@@ -328,9 +340,18 @@ def replay(walk: Recording) -> Said:
         seconds += time.perf_counter() - start
         updates += sum(each[leg] for each in arrived)
         out[:, leg] = said
-    columns = [out[..., index] for index in range(8)]
-    flags = [column > 0.5 for column in columns[:3]]
-    return Said(*flags, *columns[3:], seconds, updates)
+    return Said(
+        slipping=out[..., 0] > 0.5,
+        standing=out[..., 1] > 0.5,
+        fresh=out[..., 2] > 0.5,
+        wet=out[..., 3],
+        mean=out[..., 4],
+        sd=out[..., 5],
+        margin=out[..., 6],
+        speed=out[..., 7],
+        seconds=seconds,
+        updates=updates,
+    )
 
 
 # --- the judge -----------------------------------------------------------------------------------

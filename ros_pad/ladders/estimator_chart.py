@@ -161,7 +161,8 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
         )
     for place, row in enumerate(chosen):
         look = _LOOKS[row.name, row.variant]
-        panel.plot(row.us_per_update, place, **{'ms': 7.0, **look, 'ls': ''})
+        cost = math.nan if row.us_per_update is None else row.us_per_update
+        panel.plot(cost, place, **{'ms': 7.0, **look, 'ls': ''})
         false = row.false_per_minute or 0.0
         texts = (
             f'{1e2 * (row.misses or 0.0):.1f} %',
@@ -324,6 +325,6 @@ def _cell(
         panel.set_title(title, loc='center')
     if first:
         panel.set_ylabel(label)
-        panel.figure.align_ylabels()  # type: ignore[union-attr]
+        panel.figure.align_ylabels()
     else:
         panel.set_yticklabels([])

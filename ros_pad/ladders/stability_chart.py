@@ -130,7 +130,7 @@ def _split(panel: Axes, case: Sequence[Outcome]) -> None:
         for leg, shift in zip(legs, (-0.25, 0.0, 0.25), strict=True):
             mine = [outcome for outcome in part if outcome.at == leg]
             ours = part[0].ours
-            values = [outcome.value for outcome in mine]
+            values = [np.nan if o.value is None else o.value for o in mine]
             panel.plot(
                 values,
                 [row + shift] * len(values),
@@ -203,10 +203,11 @@ def _threshold(panel: Axes, case: Sequence[Outcome]) -> None:
     methods = list(_methods(case).items())
     for (name, part), style in zip(methods, ('o', 'x'), strict=True):
         label = name.removeprefix('RailLeg, ')
-        x, y = [1e2 * (o.at - 1.0) for o in part], [o.value for o in part]
+        x = [1e2 * (o.at - 1.0) for o in part]
+        y = [np.nan if o.value is None else o.value for o in part]
         panel.plot(x, y, style, color=BLUE, ms=5, mfc='none', label=label)
-    law = [outcome for outcome in methods[0][1] if outcome.law is not None]
-    panel.plot([1e2 * (o.at - 1.0) for o in law], [o.law for o in law], **_LAW)
+    law = [(1e2 * (o.at - 1.0), o.law) for o in methods[0][1] if o.law is not None]
+    panel.plot(*zip(*law, strict=True), **_LAW)
     panel.axhline(ILL, color=PALE, lw=0.9, ls='--', zorder=1)
     panel.set_xticks([3.0, 10.0, 30.0, 100.0, 300.0], ['3', '10', '30', '100', '300'])
     panel.set_yticks([0.1, 1.0, 10.0], ['0.1', '1', '10'])

@@ -20,8 +20,8 @@ from ros_pad.trials.page import BLUE
 from ros_pad.trials.page import PALE
 from ros_pad.trials.page import VERMILION
 from ros_pad.trials.page import WET
-from ros_pad.trials.pictures import View
 from ros_pad.trials.trial import DOME_PRESSURE
+from ros_pad.trials.view import View
 
 RATE = 25.0  # frames a second
 MOST_FRAMES = 9000  # of a long trial, which then has fewer a second

@@ -38,11 +38,11 @@ from ros_pad.trials.page import rendered
 from ros_pad.trials.page import save
 from ros_pad.trials.page import table
 from ros_pad.trials.pictures import POLICY_NAMES
-from ros_pad.trials.pictures import View
 from ros_pad.trials.pictures import lead_picture
-from ros_pad.trials.pictures import view_of
 from ros_pad.trials.trial import Trial
 from ros_pad.trials.trial import told
+from ros_pad.trials.view import View
+from ros_pad.trials.view import view_of
 
 Progress = Callable[[float], None]
 

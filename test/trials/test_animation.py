@@ -16,8 +16,8 @@ import pytest
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import animation
 from ros_pad.trials import report
-from ros_pad.trials.pictures import view_of
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.view import view_of
 
 CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
 

@@ -24,11 +24,14 @@ from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import conditions
 from ros_pad.trials import page as page_of
 from ros_pad.trials import pictures
+from ros_pad.trials import reliability
 from ros_pad.trials import report
+from ros_pad.trials import reserves
 from ros_pad.trials import run
 from ros_pad.trials.label import described
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.view import view_of
 
 # Shapes of a drawing are closed where they begin.
 VOID = {'meta', 'img', 'br', 'hr', 'link', 'input'}
@@ -309,21 +312,11 @@ def test_footprints_window_and_omissions(tmp_path):
 
 
 def test_reliability_counts_what_was_wet():
-    view = pictures.view_of(made_up())
-    believed, wet = pictures.beliefs(view)
+    believed, wet = reliability.beliefs(view_of(made_up()))
     # On the floor of made_up, all stances before 10 s are dry and believed so at 0.1; later ones
     # are wet and believed so at 0.9.
     assert sorted(believed.tolist()) == [0.1] * 10 + [0.9] * 5
     np.testing.assert_array_equal(wet, believed > 0.5)
-
-
-@pytest.mark.parametrize(
-    ('hits', 'count', 'low', 'high'),
-    [(0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662)],
-)
-def test_wilson_intervals_of_the_literature(hits, count, low, high):
-    # 81 of 263: Newcombe (1998), table I, method 3.
-    assert pictures._wilson(hits, count) == pytest.approx((low, high), abs=6e-5)
 
 
 def without(names, trial=None):
@@ -549,7 +542,7 @@ def test_use_of_the_force_limit():
     trial = made_up()
     trial.settings['foot'] = 'large37'
     trial.pressure = np.where(trial.dome, 75e3, 0.0)
-    used = pictures.limit_use(pictures.view_of(trial))
+    used = reserves.limit_use(view_of(trial))
     standing = trial.slow_time % 2.0 >= 1.0
     domed = trial.slow_time > 10.0
     sure = np.abs(trial.slow_time % 1.0 - 0.5) < 0.4  # away from steps
@@ -561,7 +554,7 @@ def test_use_of_the_force_limit():
 def test_margins_are_those_of_standing_feet():
     trial = made_up()
     trial.margin = np.full_like(trial.margin, -0.1)
-    margins = pictures.standing_margins(pictures.view_of(trial))
+    margins = reserves.standing_margins(view_of(trial))
     sure = np.abs(trial.slow_time % 1.0 - 0.5) < 0.4
     assert np.isnan(margins[sure & (trial.slow_time % 2.0 >= 1.0), 0]).all()
     assert (margins[sure & (trial.slow_time % 2.0 < 1.0), 0] == -0.1).all()
