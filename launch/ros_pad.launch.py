@@ -24,7 +24,11 @@ ARGUMENTS = {
         ' itself. [path]',
     ),
     'simulate': ('true', 'Start a simulator; false where a robot takes its place. [true, false]'),
-    'scene': ('', 'Scene that the simulator walks; empty: that of params_file. [name or path]'),
+    'scene': (
+        '',
+        'Scene that the simulator walks, and whose hose and faults simulated regulators have;'
+        ' empty: those of params_file. [name or path]',
+    ),
     'record': ('true', 'Record every topic into a bag. [true, false]'),
     'folder': (
         '',
@@ -75,14 +79,15 @@ def nodes(context: LaunchContext) -> list[Node]:
             output='screen',
         )
 
-    use_sim_time = flag('use_sim_time')
+    use_sim_time, simulate = flag('use_sim_time'), flag('simulate')
+    scene = text('scene') if simulate else ''
     # The recorder first and the simulator last: a walk is recorded from its first step on.
     chosen = []
     if flag('record'):
         chosen.append(node('recorder_node', use_sim_time=use_sim_time, folder=text('folder')))
-    chosen.append(node('regulator_node', use_sim_time=use_sim_time))
+    chosen.append(node('regulator_node', use_sim_time=use_sim_time, scene=scene))
     chosen.append(node('estimator_node', use_sim_time=use_sim_time))
     chosen.append(node('controller_node', use_sim_time=use_sim_time))
-    if flag('simulate'):
-        chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=text('scene')))
+    if simulate:
+        chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=scene))
     return chosen

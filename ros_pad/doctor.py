@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be wrong with a machine on which ros_pad is to run, and what to do.
 
-Nothing but the standard library is imported before it is looked for, and ROS 2 only in
+Nothing but the standard library is imported before it is looked for, ROS 2 and extras only in
 processes of their own: whatever is broken, the doctor comes to the end of the list.
 """
 
@@ -24,6 +24,7 @@ import uuid
 from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -57,7 +58,7 @@ LOOPBACK = 10.0
 """Within which a message must come from one process to another, s."""
 
 STARTING = 30.0
-"""Given to a process to import rclpy, s: disks are slow the first time."""
+"""Given to a process to import rclpy or an extra, s: disks are slow the first time."""
 
 ROOM_NEEDED, ROOM_WANTED = 0.1e9, 1e9
 """Free bytes on the disk for bags below which there is a problem, or a warning."""
@@ -155,16 +156,42 @@ def packages(names: Sequence[str] = NEEDED) -> Iterator[Finding]:
 
 
 def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
-    """Look for the packages that only some need."""
+    """Import the packages that only some need, side by side in processes of their own."""
+    here = [name for name in names if importlib.util.find_spec(name)]
+    with ThreadPoolExecutor(max_workers=len(here) or 1) as children:
+        troubles = dict(zip(here, children.map(_import_trouble, here), strict=True))
     for name in names:
         extra, purpose = EXTRAS[name]
-        if importlib.util.find_spec(name) is None:
+        if name not in here:
             advice = f'pip install "ros_pad[{extra}]", or --editable ".[{extra}]" in its folder'
             yield Finding(name, 'warning', f'not here: {purpose}', advice)
-        else:
-            with contextlib.suppress(metadata.PackageNotFoundError):
-                purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
-            yield Finding(name, 'ok', purpose)
+            continue
+        if troubles[name]:
+            advice = f'pip install --force-reinstall {name}, or pip uninstall {name} to go without'
+            yield Finding(name, 'warning', f'{troubles[name]}; {purpose}', advice)
+            continue
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
+        yield Finding(name, 'ok', purpose)
+
+
+def _import_trouble(name: str) -> str:
+    """Import a package in a process of its own; return what is wrong, empty if nothing is."""
+    code = f'import sys; sys.path[:] = {sys.path!r}; import {name}'
+    try:
+        child = subprocess.run(
+            [sys.executable, '-c', code],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors='replace',
+            timeout=STARTING,
+        )
+    except subprocess.TimeoutExpired:
+        return f'import {name} did not end within {STARTING:g} s'
+    if child.returncode == 0:
+        return ''
+    return f'import {name} ends with status {child.returncode}: {_last_line(child.stderr)}'
 
 
 def configuration() -> Iterator[Finding]:

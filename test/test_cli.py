@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -264,6 +265,39 @@ def test_a_stop_during_imports_leaves_no_traceback(number: str):
     child = subprocess.run(
         [sys.executable, '-c', INTERRUPTED_IMPORT.format(signal=number)],
         cwd=SCENE.parent.parent.parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (child.returncode, child.stdout) == (cli.INTERRUPTED, '')
+    assert child.stderr == 'pad: stopped\n'
+
+
+INTERRUPTED_START = """
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == 'argparse':
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt())
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from {module} import {function}
+assert 'argparse' not in sys.modules
+sys.exit({function}())
+"""
+
+
+def test_ctrl_c_while_the_command_itself_is_imported_leaves_no_traceback():
+    """As its console script begins, with nothing of ours imported yet."""
+    root = SCENE.parent.parent.parent
+    module, function = re.search(
+        r"'pad = ([\w.]+):(\w+)'", (root / 'setup.py').read_text()
+    ).groups()
+    child = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED_START.format(module=module, function=function)],
+        cwd=root,
         capture_output=True,
         text=True,
         timeout=60,

@@ -111,6 +111,57 @@ def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch)
         assert f'pip install "ros_pad[{extra}]"' in pip[name]
 
 
+def test_extras_that_cannot_be_imported_say_why(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    modules = {
+        'broken_pad': 'raise OSError("libGL.so.1: cannot open")',
+        'half_pad': 'import not_there_pad',
+        'crashing_pad': 'import os; os.abort()',
+        'whole_pad': '',
+    }
+    for name, code in modules.items():
+        (tmp_path / f'{name}.py').write_text(code)
+        monkeypatch.setitem(doctor.EXTRAS, name, ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    broken, half, crashing, whole = doctor.extras(list(modules))
+    assert (broken.status, half.status, crashing.status) == ('warning',) * 3
+    assert broken.found == (
+        'import broken_pad ends with status 1: OSError: libGL.so.1: cannot open; nothing'
+    )
+    assert "ModuleNotFoundError: No module named 'not_there_pad'" in half.found
+    assert 'ends with status -6' in crashing.found
+    assert 'pip install --force-reinstall half_pad' in half.advice
+    assert (whole.status, whole.found) == ('ok', 'nothing')
+
+
+def test_an_extra_that_hangs_is_not_waited_for(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'slow_pad.py').write_text('import time; time.sleep(3600)')
+    monkeypatch.setitem(doctor.EXTRAS, 'slow_pad', ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(doctor, 'STARTING', 0.5)
+    finding = one(doctor.extras(['slow_pad']))
+    assert finding.status == 'warning'
+    assert finding.found.startswith('import slow_pad did not end within 0.5 s')
+
+
+def test_extras_are_imported_side_by_side(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    # Each ends when the other one has begun.
+    code = """
+import pathlib, time
+(pathlib.Path(__file__).parent / {own!r}).touch()
+while not (pathlib.Path(__file__).parent / {other!r}).exists():
+    time.sleep(0.005)
+"""
+    for own, other in (('left_pad', 'right_pad'), ('right_pad', 'left_pad')):
+        (tmp_path / f'{own}.py').write_text(code.format(own=own, other=other))
+        monkeypatch.setitem(doctor.EXTRAS, own, ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert [each.status for each in doctor.extras(['left_pad', 'right_pad'])] == ['ok', 'ok']
+
+
 def test_the_extras_are_those_of_setup():
     text = (ROOT / 'setup.py').read_text(encoding='utf-8')
     for name, (extra, _) in doctor.EXTRAS.items():

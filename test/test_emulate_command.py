@@ -93,6 +93,23 @@ def test_what_is_there_is_not_replaced(tmp_path, capsys: pytest.CaptureFixture[s
     assert 'there is no such folder' in capsys.readouterr().err
 
 
+def test_a_name_taken_while_the_device_was_unplugged_ends_it(emulate, tmp_path: pathlib.Path):
+    link = tmp_path / 'regulator'
+    child, _ = emulate('smc_itv', '--link', str(link), '--fault', 'unplugged:0.3:3.3')
+    end = time.monotonic() + LIMIT
+    while link.is_symlink():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    with link.open('x') as file:
+        file.write('mine')
+    assert child.wait(LIMIT) == 1
+    assert child.stderr.read() == (
+        f"pad: link = '{link}': the device cannot be plugged in:"
+        ' something else has taken this name, and keeps it\n'
+    )
+    assert link.read_text() == 'mine'
+
+
 def test_help_has_units_and_faults(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit):
         cli.main(['emulate', '--help'])

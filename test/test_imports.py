@@ -31,6 +31,7 @@ MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
 MAY_IMPORT['doctor'] = MAY_IMPORT['trials'] | {'trials'}
 MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes', 'doctor'}
 MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
+MAY_IMPORT['__main__'] = {'cli'}
 
 NUMERICS = {'numpy', 'scipy', 'yaml'}
 FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'mpl_toolkits', 'tqdm'}  # the fourth is of the third
@@ -60,6 +61,7 @@ FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
     'doctor': {'serial'},
     'commands': NUMERICS | FILES,
     'cli': {'argcomplete'},
+    '__main__': set(),
 }
 
 

@@ -48,6 +48,17 @@ def test_every_node_is_an_executable_of_the_package(tree: ast.Module):
     assert first_arguments(tree, 'node') == executables == set(NODES)
 
 
+def test_simulated_regulators_hear_of_the_scene_that_is_walked(tree: ast.Module):
+    scenes = {
+        call.args[0].value: ast.unparse(keyword.value)
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call) and getattr(call.func, 'id', '') == 'node'
+        for keyword in call.keywords
+        if keyword.arg == 'scene'
+    }
+    assert scenes == {'regulator_node': 'scene', 'simulator_node': 'scene'}
+
+
 def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree: ast.Module):
     arguments = assigned(tree, 'ARGUMENTS')
     flags = first_arguments(tree, 'flag')

@@ -115,8 +115,13 @@ def test_the_replayed_bag_is_a_bag_for_others(tmp_path: pathlib.Path):
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (['--set', 'estimator.wet_prior'], 'NAME=VALUE'),
+        # To the end of the line: no list or range is advised, which would then be refused.
+        (['--set', 'estimator.wet_prior'], 'wet_prior: NAME=VALUE is needed\n'),
+        (['--set', 'estimator.wet_prior='], 'wet_prior=: NAME=VALUE is needed\n'),
+        (['--set', '=0.2'], '=0.2: NAME=VALUE is needed\n'),
         (['--set', 'estimator.wet_prior=0.2,0.3'], 'one value is needed'),
+        (['--set', 'estimator.wet_prior=0.2:0.3'], 'one value is needed'),
+        (['--set', 'margin=1.2', '--set', 'margin=1.3'], 'margin is there twice'),
         (['--set', 'estimator.tau=0.2'], "'estimator.tau' is unknown"),
         (['--set', 'policy.dwell=3', '--policy', 'dome'], 'only adaptive'),
         (['--foot', 'wide'], 'large19'),

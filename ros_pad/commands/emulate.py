@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import inspect
-import threading
 from typing import Any
 
 from ros_pad.commands.command import Commands
@@ -41,7 +40,8 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--link',
         metavar='PATH',
-        help='name for the port that stays when it is unplugged; nothing may be there yet',
+        help='name for the port that stays when it is unplugged; nothing may be there yet, '
+        'and what takes its place meanwhile stays: then this ends with status 1',
     )
     part.add_argument(
         '--fault',
@@ -73,5 +73,5 @@ def run(options: argparse.Namespace) -> int:
     device = EMULATORS[options.device](schedule=options.fault, **given)
     with Emulator(device, options.link) as emulator:
         print(emulator.path, flush=True)
-        threading.Event().wait()
+        emulator.wait()
     return 0

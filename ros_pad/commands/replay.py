@@ -148,12 +148,13 @@ def _remaps(texts: list[str]) -> dict[str, str]:
 
 
 def _values(texts: list[str]) -> dict[str, Value]:
-    found: dict[str, Value] = {}
-    for name, values in parameters(texts).items():
-        if len(values) != 1:
-            raise InvalidInput(f'--set {name}: one value is needed, there are {len(values)}')
-        found[name] = values[0]
-    return found
+    for text in texts:  # before they are read as those of a sweep, which advises lists and ranges
+        name, _, value = text.partition('=')
+        if not name or not value:
+            raise InvalidInput(f'--set {text}: NAME=VALUE is needed')
+        if ',' in value or ':' in value:
+            raise InvalidInput(f'--set {text}: one value is needed, and no list or range')
+    return {name: values[0] for name, values in parameters(texts).items()}
 
 
 def _show(replay: replays.Replay) -> None:

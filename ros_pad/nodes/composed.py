@@ -31,13 +31,13 @@ from rclpy.signals import SignalHandlerOptions
 from ros_pad.errors import PadError
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import values_of
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.pace import Pace
 from ros_pad.simulation import fidelity as ladder
-from ros_pad.simulation.faults import SENSOR_KINDS
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.bag import annotate
@@ -98,10 +98,6 @@ class ComposedTrial:
         feet = {'legs': legs, 'foot': scene.foot.source}
         felt = feet | {'expected_load': scene.expected_load}
         ground = {'scene': scene.source, 'seed': seed}
-        options = dict(scene.regulator)
-        faults = [str(each) for each in scene.faults if each.kind not in SENSOR_KINDS]
-        if faults:
-            options['faults'] = faults
 
         def add(kind: Callable[..., Any], **parameters: Any) -> Any:
             overrides = [Parameter(key, value=value) for key, value in parameters.items()]
@@ -129,7 +125,11 @@ class ComposedTrial:
                 ceiling=scene.foot.ceiling,
                 publish_rate=rate,
                 **feet,
-                **{f'backend_options.{key}': value for key, value in options.items()},
+                # And not by its name: this scene may be another than that of its file.
+                **{
+                    f'{BACKEND_OPTIONS}.{key}': value
+                    for key, value in scene.regulator_options.items()
+                },
             )
             self.estimator = add(
                 EstimatorNode,

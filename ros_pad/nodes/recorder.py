@@ -107,6 +107,7 @@ class RecorderNode(Node):
         # By which each node of the robot is asked; none where that is forbidden.
         self._askers: dict[str, tuple[Client, Client] | None] = {}
         self._answered: set[str] = set()
+        self._lives: dict[str, set[bytes]] = {}  # of each node: who publishes its changes
         # Of wall time, whatever the clock of the trial does.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._asks = custom_data is None
@@ -208,7 +209,9 @@ class RecorderNode(Node):
     def _ask_nodes(self) -> None:
         """Ask every node of the robot for its parameters, once its services are there.
 
-        One that does not answer is asked again, and so is one that went and came back.
+        One that does not answer is asked again, and so is one that went and came back. One that
+        was killed stays on the graph for a while: when it comes back before its name is dropped,
+        only its publishers are new.
         """
         here = {
             f'{namespace.rstrip("/")}/{name}'
@@ -221,6 +224,14 @@ class RecorderNode(Node):
             self._answered.discard(node)
         for node in here - self._askers.keys():
             self._askers[node] = self._asker(node)
+        lives: dict[str, set[bytes]] = {}
+        for each in self.get_publishers_info_by_topic('/parameter_events'):
+            node = f'{each.node_namespace.rstrip("/")}/{each.node_name}'
+            lives.setdefault(node, set()).add(bytes(each.endpoint_gid))
+        self._answered -= {
+            node for node, publishers in lives.items() if publishers - self._lives.get(node, set())
+        }
+        self._lives = lives
         for node, clients in self._askers.items():
             if clients and node not in self._answered:
                 lister, getter = clients
@@ -237,16 +248,19 @@ class RecorderNode(Node):
 
     def _ask(self, node: str, lister: Client, getter: Client) -> None:
         def named(future: Future) -> None:
-            self._answered.add(node)
-            self._said[node] = {}
-            self._ask_for(list(future.result().result.names), node, getter)
+            self._said.setdefault(node, {})  # from now on its changes count
+            self._ask_for(list(future.result().result.names), node, getter, {})
 
         lister.call_async(ListParameters.Request()).add_done_callback(named)
 
-    def _ask_for(self, names: list[str], node: str, getter: Client) -> None:
-        """Ask a node for the values of parameters, and let the bag say them."""
+    def _ask_for(
+        self, names: list[str], node: str, getter: Client, answers: dict[str, Any]
+    ) -> None:
+        """Ask a node for the values of parameters, and let the bag say them with its others."""
 
         def told(future: Future) -> None:
+            # Only now: of a node that comes back, this service may be seen after the other.
+            self._answered.add(node)
             values = future.result().values
             if len(values) == len(names):
                 try:
@@ -259,12 +273,13 @@ class RecorderNode(Node):
                         f'the bag will lack parameters of {node}: {error}', once=True
                     )
                     return
-                self._said[node].update(said)
+                answers.update(said)
+                self._said[node] = answers
                 self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
             elif len(names) > 1:
                 # One that is declared without a value keeps a node from telling all others.
                 for name in names:
-                    self._ask_for([name], node, getter)
+                    self._ask_for([name], node, getter, answers)
 
         request = GetParameters.Request(names=names)
         getter.call_async(request).add_done_callback(told)

@@ -48,12 +48,18 @@ from ros_pad.regulators import create
 from ros_pad.regulators.protocol import permitted
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.faults import parsed
+from ros_pad.simulation.scene import Scene
 
 PARAMETERS = (
     LEGS,
     FOOT,
     AMBIENT_PRESSURE,
     Parameter('backend', 'simulated', 'Kind of regulator.', choices=tuple(BACKENDS)),
+    Parameter(
+        'scene', '',
+        'Scene whose hose and faults the simulated backend has where its options do not say.',
+        read=lambda name: Scene.load(name) if name else None,
+    ),
     Parameter(
         'ceiling', 90000.0, 'Highest gauge pressure; set-points above it are refused.',
         'Pa', 1000.0, 1e6,
@@ -212,6 +218,8 @@ class RegulatorNode(LifecycleNode):
             started = time.monotonic()
             clock = self._last_tick if self._simulated_time else lambda: time.monotonic() - started
             options = {'clock': clock, 'pad_volume': self._foot.air_volume}
+            if self._values['scene']:
+                options |= self._values['scene'].regulator_options
         for name in self.get_parameters_by_prefix(BACKEND_OPTIONS):
             options[name] = self.get_parameter(f'{BACKEND_OPTIONS}.{name}').value
         self._problem = None

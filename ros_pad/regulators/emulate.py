@@ -15,6 +15,7 @@ from typing import Protocol
 
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import TransportError
 from ros_pad.regulators.channel import unit
 
 LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
@@ -132,12 +133,15 @@ class Emulator:
     device : Device
     link : str, optional
         A name that stays when the device is unplugged and comes back, as a port of udev's
-        ``/dev/serial/by-id`` does. Nothing may be there yet.
+        ``/dev/serial/by-id`` does. Nothing may be there yet. What takes its place later stays as
+        it is: then the device cannot be plugged in again, and the emulator ends.
 
     Raises
     ------
     InvalidInput
         When something is where the link is to be, or there is no such folder.
+    TransportError
+        From :meth:`wait` and :meth:`close`, when the device could not be plugged in again.
 
     Attributes
     ----------
@@ -155,25 +159,40 @@ class Emulator:
         self._device = device
         self._link = link
         self._closing = threading.Event()
+        self._ended = threading.Event()
+        self._trouble: Exception | None = None
         self._ends: tuple[int, int] | None = None
         self._buffer = b''
         self.commands: list[str] = []
         self.path = link or ''
         self._plug()
-        self._thread = threading.Thread(target=self._serve, name='emulator', daemon=True)
+        self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
         self._thread.start()
 
     def __enter__(self) -> Emulator:
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind:  # which is to be heard, and nothing else
+            self._trouble = None
         self.close()
 
+    def wait(self) -> None:
+        """Wait until the emulator ends by itself, which it does when something is wrong."""
+        self._ended.wait()
+        self._tell()
+
     def close(self) -> None:
-        """Take the device and its port away."""
+        """Take the device and its port away; raise what ended it before, unless it was told."""
         self._closing.set()
         self._thread.join()
         self._unplug()
+        self._tell()
+
+    def _tell(self) -> None:
+        trouble, self._trouble = self._trouble, None
+        if trouble:
+            raise trouble
 
     def _plug(self) -> None:
         near, far = os.openpty()
@@ -182,18 +201,37 @@ class Emulator:
         tty.setraw(far)
         self._ends = near, far
         self._buffer = b''
-        if self._link:
-            os.symlink(os.ttyname(far), self._link)
-        else:
+        if not self._link:
             self.path = os.ttyname(far)
+            return
+        try:
+            os.symlink(os.ttyname(far), self._link)
+        except OSError as error:
+            self._unplug()
+            what = (
+                'something else has taken this name, and keeps it'
+                if isinstance(error, FileExistsError)
+                else str(error.strerror)
+            )
+            raise TransportError(
+                f'link = {self._link!r}: the device cannot be plugged in: {what}', self._link
+            ) from error
 
     def _unplug(self) -> None:
         if self._ends:
-            if self._link:
+            port = os.ttyname(self._ends[1])
+            if self._link and os.path.islink(self._link) and os.readlink(self._link) == port:
                 os.unlink(self._link)
             for end in self._ends:
                 os.close(end)
             self._ends = None
+
+    def _run(self) -> None:
+        try:
+            self._serve()
+        except Exception as error:  # a thread has nobody to tell: wait() and close() do
+            self._trouble = error
+        self._ended.set()
 
     def _serve(self) -> None:
         while not self._closing.is_set():

@@ -37,6 +37,7 @@ from operator import mul
 from operator import sub
 
 from ros_pad.contact.pad import choice
+from ros_pad.contact.pad import number
 from ros_pad.simulation.planar_step import Pushed
 from ros_pad.simulation.planar_step import newton
 from ros_pad.simulation.planar_step import push
@@ -100,7 +101,7 @@ def elastic(
     contacts : sequence of Contact
         Those with a cap of zero are skipped and lose their shear.
     dt : float
-        Step, s.
+        Step, s, above 0.
     start : tuple
         First guess of the twist; the last twist is a good one.
 
@@ -113,7 +114,10 @@ def elastic(
     ------
     ArithmeticError
         When Newton's method does not settle: pads of 1e8 N/m or more.
+    InvalidInput
+        When the step is not above zero.
     """
+    _check(dt)
     holding = [contact for contact in contacts if contact.cap > 0.0]
     pushed: list[Pushed] = [
         (
@@ -148,6 +152,7 @@ def creeping(
     creep: float = 1e-5,
 ) -> Twist:
     """Step with pseudo-Huber friction of creep speed ε, m/s; sets each contact's force."""
+    _check(dt)
     pushed: list[Pushed] = [
         (
             c.lever_x, c.lever_y, c.motion_x, c.motion_y, c.motion_turn,
@@ -234,7 +239,7 @@ def exact_stick(
     ArithmeticError
         When the bound is not met after all sweeps.
     InvalidInput
-        For another method.
+        For another method, or when the step is not above zero.
 
     Notes
     -----
@@ -249,6 +254,7 @@ def exact_stick(
     bounds the error: ½ mass error² <= gap.
     """
     choice('method', method, ('gradient', 'gauss_seidel'))
+    _check(dt)
     holding = [contact for contact in contacts if contact.cap > 0.0]
     limits = [contact.cap * dt for contact in holding]
     rows = [row for contact in holding for row in _directions(contact, mass, inertia)]
@@ -410,6 +416,11 @@ def _least_in_ball(pulls: Sequence[tuple[float, float]], limit: float) -> list[f
         slope = sum(p * p / (d + multiplier) for p, (_, d) in zip(found, pulls, strict=True))
         multiplier += (size / limit - 1.0) * square / slope
     return [p * limit / size for p in found]
+
+
+def _check(dt: float) -> None:
+    if not 0.0 < dt < math.inf:  # cheap, for steps are many: the words are those of `number`
+        number('dt', dt, 's', above=True)
 
 
 def _unsettled(dt: float, contacts: Sequence[object]) -> ArithmeticError:

@@ -347,6 +347,7 @@ class FullHexapod:
         self._state = self.data.qpos[:25]
         self._ctrl = self.data.ctrl
         self._places = self.data.geom_xpos[first : first + 6]
+        self._axes = self.data.geom_xmat[first : first + 6, :6]  # of the feet, along x and y
         # Scalars go through a memoryview faster than through an array.
         self._frictions: list[Any] = [
             memoryview(self.model.pair(f'foot_{leg}').friction) for leg in self.legs
@@ -389,6 +390,7 @@ class FullHexapod:
             state.wet = self._floor.wet(x, y)
         self._mujoco.mj_kinematics(self.model, data)
         self._last = self._places.tolist()
+        self._last_axes = self._axes.tolist()
         self._report([0.0] * 6)
 
     def step(self, pressures: Sequence[float]) -> None:
@@ -491,7 +493,8 @@ class FullHexapod:
         dt, foot, floor = self.period, self._foot, self._floor
         softness = 1.0 / foot.shear_stiffness
         places, last = self._places.tolist(), self._last
-        self._last = places
+        axes, last_axes = self._axes.tolist(), self._last_axes
+        self._last, self._last_axes = places, axes
         for index, state in enumerate(self.feet):
             x, y, z = places[index]
             load, (push_x, push_y) = self._loads[index], self._pushes[index]
@@ -510,7 +513,10 @@ class FullHexapod:
                 if way > SLIP_SPEED * dt:
                     state.slip_speed = way / dt
                     state.slip_path += way
-                    self.dissipation -= push_x * step_x + push_y * step_y
+                turn = _turn(last_axes[index], axes[index])
+                # As on the planar robot: sliding and turning share a foot's grip.
+                if math.hypot(way, self._lever * turn) > SLIP_SPEED * dt:
+                    self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
             pressure = pressures[index]
             if pressure > 0.0 and foot.dome_load(load, pressure) < load:
                 state.overload_time += dt
@@ -546,6 +552,16 @@ class FullHexapod:
     def _end(self, why: str) -> None:
         if self.verdict is None:
             self.verdict = f'{why}, at {self.time:.3f} s'
+
+
+def _turn(before: Sequence[float], now: Sequence[float]) -> float:
+    """Return how far a body has turned about the vertical, rad, small; both have its x and y rows.
+
+    The vertical part of the turn's axis times its sine.
+    """
+    a, b, c, d, e, f = before
+    u, v, w, x, y, z = now
+    return 0.5 * (x * a + y * b + z * c - u * d - v * e - w * f)
 
 
 def _line_step(scene: Scene) -> float:

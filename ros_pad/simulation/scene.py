@@ -15,6 +15,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.simulation.faults import SENSOR_KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import listed
 from ros_pad.simulation.gait import TripodGait
@@ -219,7 +220,7 @@ class Scene:
     tow : Tow
     sensors : SensorNoise
     regulator : dict
-        Options of the simulated regulator.
+        Line of every foot: options of the simulated regulator.
     policy : str
         Policy that the scene is made for.
     dome_pressure : float or None
@@ -269,6 +270,15 @@ class Scene:
         if isinstance(self.body, HexapodBody):
             return self.body.mass * GRAVITY / 3.0
         return self.body.load
+
+    @property
+    def regulator_options(self) -> dict[str, Any]:
+        """What the regulator node's backend ``simulated`` is told: line of all feet, and faults.
+
+        Faults are texts, as a parameter of ROS has them, without those of sensors.
+        """
+        faults = [str(each) for each in self.faults if each.kind not in SENSOR_KINDS]
+        return self.regulator | ({'faults': faults} if faults else {})
 
     @property
     def stride(self) -> float:

@@ -249,6 +249,25 @@ def test_a_node_that_comes_back_is_asked_again(context, executor, record, until,
     assert said['/gait']['stride'] == 0.2
 
 
+def test_a_node_that_comes_back_before_its_name_is_dropped_is_asked_again(
+    context, executor, record, until, tmp_path
+):
+    recorder = record()
+    killed = []
+    for stride in (0.14, 0.2):
+        gait = Node('gait', context=context, enable_rosout=False)
+        gait.declare_parameter('stride', stride)
+        executor.add_node(gait)
+        until(lambda stride=stride: recorder._said.get('/gait', {}).get('stride') == stride)
+        executor.remove_node(gait)  # it answers no more, and is still on the graph
+        killed.append(gait)
+    for gait in killed:
+        gait.destroy_node()
+    recorder.close()
+    said = json.loads(BagReader(tmp_path / 'trial').custom_data[label.PARAMETERS])
+    assert said['/gait']['stride'] == 0.2
+
+
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
 def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     driver = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
 from std_srvs.srv import Trigger
 
+from ros_pad import configuration
 from ros_pad.errors import ConfigError
 from ros_pad.errors import TransportError
 from ros_pad.nodes import regulator as module
@@ -526,6 +527,30 @@ def test_volumes_and_hoses_are_options_of_the_simulated_backend(robot):
     robot.start(**{'backend_options.hose_length': 20.0, 'backend_options.hose_diameter': 0.001})
     robot.hold(60e3, 0.1)
     assert robot.gauge() < 30e3  # a thin long hose is slow
+
+
+def test_hose_and_faults_of_a_scene_are_options_that_others_overrule(robot, tmp_path):
+    path = tmp_path / 'mine.yaml'
+    text = configuration.locate('scenes', 'hexapod_patches').read_text()
+    path.write_text(
+        text.replace('hose_length: 1.0 ', 'hose_length: 3.0 ') + '\nfaults:\n'
+        '  - {kind: leak, legs: [2], start: 1.5, conductance: 1.0e-9}\n'
+        '  - {kind: force_dead, legs: [2], start: 1.5}\n'
+    )
+    node = robot.start(legs=[1, 2], scene=str(path), **{'backend_options.hose_diameter': 0.002})
+    sound, leaking = (node.channels[leg].regulator for leg in (1, 2))
+    for each in (sound, leaking):
+        assert each._channel.hose.length == 3.0  # of the scene
+        assert each._channel.hose.inner_diameter == 0.002
+    assert sound._faults == ()
+    (fault,) = leaking._faults
+    assert (fault.kind, fault.start, fault.conductance) == ('leak', 1.5, 1e-9)
+
+
+def test_a_scene_says_nothing_to_other_backends(robot, devices):
+    """They know no hose: its options would be refused."""
+    robot.start(simulated=False, backend='device', scene='hexapod_patches')
+    assert len(devices()) == 2
 
 
 # What each fault does to leg 1, when it can be seen, and the first words of what is said of it.

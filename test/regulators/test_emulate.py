@@ -5,9 +5,11 @@ import time
 import pytest
 
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import TransportError
 from ros_pad.regulators import BACKENDS
 from ros_pad.regulators.emulate import EMULATORS
 from ros_pad.regulators.emulate import AlicatEmulator
+from ros_pad.regulators.emulate import Emulator
 from ros_pad.regulators.emulate import Faults
 from ros_pad.regulators.emulate import Pneumatics
 from ros_pad.regulators.emulate import SerialTextEmulator
@@ -60,6 +62,74 @@ def test_a_port_comes_and_goes_on_its_schedule(emulated, until, tmp_path):
     assert os.path.exists(link)
     until(lambda: not os.path.lexists(link))
     until(lambda: os.path.exists(link))
+
+
+def test_a_name_taken_meanwhile_is_left_and_told(until, tmp_path):
+    link = tmp_path / 'regulator'
+    device = SmcItvEmulator()
+    emulator = Emulator(device, str(link))
+    device.faults.add('unplugged')
+    until(lambda: not os.path.lexists(link))
+    link.write_text('mine')
+    open_before = len(os.listdir('/proc/self/fd'))
+    device.faults.clear()
+    with pytest.raises(TransportError, match='cannot be plugged in: something else has taken'):
+        emulator.wait()
+    assert len(os.listdir('/proc/self/fd')) <= open_before
+    emulator.close()  # it was told
+    assert link.read_text() == 'mine'
+
+
+def test_what_ended_the_emulator_is_told_at_the_end_of_a_block(until, tmp_path):
+    folder = tmp_path / 'ports'
+    folder.mkdir()
+    link = folder / 'regulator'
+    device = SmcItvEmulator()
+
+    def lose_the_folder():
+        device.faults.add('unplugged')
+        until(lambda: not os.path.lexists(link))
+        folder.rmdir()
+        device.faults.clear()
+        until(lambda: not emulator._thread.is_alive())
+        folder.mkdir()
+
+    with (
+        pytest.raises(TransportError, match='No such file or directory'),
+        Emulator(device, str(link)) as emulator,
+    ):
+        lose_the_folder()
+    device.faults.clear()
+    with (  # but no error of the block is hidden by it
+        pytest.raises(ZeroDivisionError),
+        Emulator(device, str(link)) as emulator,
+    ):
+        lose_the_folder()
+        1 / 0  # noqa: B018
+
+
+@pytest.mark.parametrize('other', ['file', 'link', 'nothing'])
+def test_a_link_that_another_one_replaced_is_left(other, until, tmp_path):
+    link = tmp_path / 'regulator'
+    emulator = Emulator(SmcItvEmulator(), str(link))
+    link.unlink()
+    if other == 'file':
+        link.write_text('mine')
+    elif other == 'link':
+        link.symlink_to('/dev/null')
+    emulator.close()
+    assert os.path.lexists(link) == (other != 'nothing')
+
+
+def test_a_link_that_was_lost_comes_back_with_the_device(until, tmp_path):
+    link = tmp_path / 'regulator'
+    device = SmcItvEmulator()
+    with Emulator(device, str(link)) as emulator:
+        link.unlink()
+        device.faults.add('unplugged')
+        until(lambda: emulator._ends is None)
+        device.faults.clear()
+        until(lambda: os.path.exists(link))
 
 
 def test_words_of_an_alicat():

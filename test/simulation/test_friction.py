@@ -64,6 +64,13 @@ def random_step(rng, stiffness=1e7, soles=False):
     return free, feet, rng.choice([1e-4, 1e-3, 4e-3])
 
 
+@pytest.mark.parametrize('name', STEPS)
+@pytest.mark.parametrize('dt', [0.0, -0.004, math.nan, math.inf])
+def test_a_step_of_no_time_is_refused(name, dt):
+    with pytest.raises(InvalidInput, match=r'dt = .* s is not allowed'):
+        STEPS[name](STILL, MASS, INERTIA, [contact(1.0, motion=(0.1, 0.0))], dt, STILL)
+
+
 def distance(one, other):
     """Return √(v² + ω² I/m) of the difference of two twists, m/s."""
     dx, dy, dw = (a - b for a, b in zip(one, other, strict=True))

@@ -325,6 +325,43 @@ def test_work_lost_is_friction_times_way(axis):
     assert robot.dissipation == pytest.approx(0.1 * WEIGHT * np.mean(ways), rel=0.05)
 
 
+def test_work_lost_in_turning_is_moment_times_angle():
+    """Slippery but for torsion, six soles that turn on the spot lose 2/3 R μ W times the angle."""
+    limit = 2.0 / 3.0 * 0.017 * 0.5 * WEIGHT
+    robot = standing(0.5)
+    for leg in robot.legs:
+        robot.model.pair(f'foot_{leg}').friction[:2] = 1e-5
+    push(robot, yaw=1.3 * limit)
+    before, lost = robot.body[2], robot.dissipation
+    for _ in range(200):
+        mujoco.mj_step(robot.model, robot.data, 2)  # as in a step, but with friction as it is
+        robot._read_contacts()
+        robot._report(FLAT)
+    turned = robot.body[2] - before
+    assert turned > 0.1
+    assert robot.dissipation - lost == pytest.approx(limit * turned, rel=0.05)
+
+
+def test_work_lost_is_what_the_contacts_of_mujoco_lose():
+    """On a dry walk, mostly in torsion: feet turn with their legs."""
+    robot = FullHexapod(scene_of(0.5), DRY, 0.002)  # one step of MuJoCo in each
+    slid = turned = 0.0
+
+    def note():
+        nonlocal slid, turned
+        data = robot.data
+        for geoms, row in zip(data.contact.geom, data.contact.efc_address, strict=True):
+            if robot._index.get(geoms[1]) is not None:
+                power = data.efc_force[row : row + 4] * data.efc_vel[row : row + 4]
+                slid -= power[1:3].sum() * robot.period
+                turned -= power[3] * robot.period
+
+    advance(robot, 0.5 + 2.0, note)
+    assert turned > slid > 0.05
+    # Creep and feet that have not landed do not count: see SLIP_SPEED and SLIP_LOAD.
+    assert robot.dissipation == pytest.approx(slid + turned, rel=0.005)
+
+
 def test_grip_is_the_cone_of_the_step():
     robot = FullHexapod(scene_of(tow=SHIPPED.tow), WET, 0.004)
     slipped = 0

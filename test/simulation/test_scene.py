@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
 import dataclasses
+import json
 import pathlib
 import re
 import shutil
@@ -52,6 +53,22 @@ def test_shipped_scenes(name):
     # The feet reach the floor beside the body's centre, and the gait keeps them apart.
     if isinstance(scene.gait, TripodGait):
         assert 2.0 * scene.gait.reach() < 1.3 * scene.body.homes[0][0]
+
+
+def test_options_of_the_regulator(tmp_path):
+    """Line and faults of devices, in words that ROS can carry; sensors are another's matter."""
+    assert Scene.load('hexapod_patches').regulator_options == HEXAPOD['regulator']
+    faults = [
+        {'kind': 'leak', 'legs': [2], 'start': 1.5, 'conductance': 1e-9},
+        {'kind': 'force_dead', 'legs': [2]},
+        {'kind': 'marker_frozen'},
+    ]
+    line = {'hose_diameter': 0.003, 'hose_length': 2.0, 'hose_conductance': 1e-8}
+    scene = Scene.load(written(tmp_path, HEXAPOD, ('regulator', line), ('faults', faults)))
+    options = scene.regulator_options
+    (fault,) = options.pop('faults')
+    assert json.loads(fault) == faults[0]
+    assert options == line
 
 
 def test_values_come_where_they_belong():
