@@ -47,8 +47,10 @@ _ADVICE = {
     'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
     'saturated': 'the liquid goes over the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
-    'far_off': 'this balance is no equilibrium on this wall: --balance energy, or --loose',
-    'far_apart': 'the surface is not level: ros_pad.capillary.pattern_surface, or --loose',
+    'far_off': 'known to be more than a sixth off: --balance energy, for slender or wholly wetted'
+    ' walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
+    'far_apart': 'the surface sags in gaps this wide: ros_pad.capillary.pattern_surface; --loose'
+    ' takes it as level',
 }
 _DESCRIPTION = """\
 How high liquid climbs a pad that stands on a wet floor, and how it pulls.
