@@ -114,7 +114,7 @@ def examine(progress: Callable[[float], None] | None = None) -> Iterator[Finding
             progress((number + 1) / len(rounds))
 
 
-def python(version: Sequence[int] = sys.version_info) -> Iterator[Finding]:
+def python(version: Sequence[int | str] = sys.version_info) -> Iterator[Finding]:
     """Look at the version of Python, and of ros_pad."""
     text = '.'.join(map(str, version[:3]))
     tested = f'{OLDEST[0]}.{OLDEST[1]} to {NEWEST[0]}.{NEWEST[1]}'
@@ -430,7 +430,7 @@ def loopback(patience: float = LOOPBACK) -> Finding:
         for end in ('hear', 'say')
     ]
     # One that hangs, say on a lock that a dead process left, says nothing for ever.
-    limit = threading.Timer(STARTING, lambda: [child.kill() for child in children])
+    limit = threading.Timer(STARTING, _kill, [children])
     limit.start()
     try:
         for child in children:
@@ -466,6 +466,11 @@ def loopback(patience: float = LOOPBACK) -> Finding:
         ' find one another (pad run without --live does not need it)',
         _silence(),
     )
+
+
+def _kill(children: Sequence[subprocess.Popen[str]]) -> None:
+    for child in children:
+        child.kill()
 
 
 def _end(children: Sequence[subprocess.Popen[str]]) -> None:

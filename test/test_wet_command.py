@@ -96,7 +96,7 @@ def test_pictures(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
         (['--balance', 'thesis', '--angle', '95'], 'dry', 'does not rise'),
         (['--angle', '0'], 'saturated', 'over the top'),
         (['--tension', '1e-6', '--angle', '60'], 'coarse', 'more --layers'),
-        (['--balance', 'thesis', '--angle', '60'], 'far_off', '--balance energy'),
+        (['--balance', 'thesis', '--angle', '70'], 'far_off', '--balance energy'),
         (['--area', '1e-3', '--pads', '7'], 'far_apart', 'pattern_surface'),
     ],
 )

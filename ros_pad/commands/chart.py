@@ -6,7 +6,11 @@ from __future__ import annotations
 import argparse
 import json
 import pathlib
+from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import asdict
+from types import ModuleType
+from typing import Any
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
@@ -21,7 +25,7 @@ from ros_pad.ladders import walk
 from ros_pad.ladders.ladder import machine
 from ros_pad.ladders.ladder import table
 
-LADDERS = {
+LADDERS: dict[str, ModuleType] = {
     'capillary': capillary,
     'contact': contact,
     'estimator': estimator,
@@ -30,7 +34,7 @@ LADDERS = {
     'walk': walk,
 }
 # What is no ladder of time against one error has a table of its own.
-TABLES = {
+TABLES: dict[str, Callable[[Sequence[Any]], str]] = {
     'capillary': capillary.table,
     'estimator': estimator.table,
     'stability': stability.table,

@@ -25,9 +25,9 @@ def attach(parser: argparse.ArgumentParser) -> None:
             for part in action.choices.values():
                 attach(part)
         elif action.type in (int, float):
-            action.completer = _nothing
+            action.completer = _nothing  # type: ignore[attr-defined]  # argcomplete's own
         elif action.dest in _COMPLETERS and not action.choices:
-            action.completer = _COMPLETERS[action.dest]
+            action.completer = _COMPLETERS[action.dest]  # type: ignore[attr-defined]
 
 
 def bags(prefix: str, **_: Any) -> list[str]:
