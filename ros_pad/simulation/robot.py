@@ -68,7 +68,7 @@ class Robot(Protocol):
     feet : sequence of FootState
         One for each leg, in the order of ``legs``.
     dissipation : float
-        Work lost in slipping feet, J.
+        Work lost in feet that slip or turn, J.
     verdict : str or None
         Why the walk is no longer valid, for instance a tip-over; None while it is.
     joint_names : tuple of str
