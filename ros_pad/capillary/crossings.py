@@ -58,9 +58,17 @@ def first_overlap(
         The body of each triangle, counted from 0.
     """
     slack = ROUNDING * float(np.abs(points).max())
+    third = faces[beside].sum(axis=2) - edges.sum(axis=1, keepdims=True)  # beside each edge
     for edge, face in _near(points, edges, faces, slack):
         met = _meeting(points[edges[edge]], points[faces[face]], slack)
-        one, other = beside[edge[met]].ravel(), np.repeat(face[met], 2)
+        edge, face = edge[met], face[met]
+        found = _passing(points[edges[edge]], points[third[edge]], points[faces[face]], slack)
+        if found.any():
+            k = int(np.argmax(found))
+            start, end = points[edges[edge[k]]]
+            where = _piece(start, end, points[faces[face[k]]])[1]
+            return Overlap((int(beside[edge[k], 0]), int(face[k])), where)
+        one, other = beside[edge].ravel(), np.repeat(face, 2)
         for overlapping, place in ((_crossing, _on_line), (_coinciding, _in_plane)):
             found = overlapping(points, faces[one], faces[other], slack)
             if found.any():
@@ -222,19 +230,47 @@ def _coinciding(points: Array, one: Indices, other: Indices, slack: float) -> Fl
     a, b = points[one], points[other]
     normals = _normals(a), _normals(b)
     coinciding = _dot(*normals) > 0.0
-    up = normals[0] + normals[1]
-    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
-    for inner, outer in ((a, b), (b, a)):
-        for k in range(3):
-            # They overlap if beyond no edge of one all the other lies.
-            start, end = outer[:, k, None], outer[:, (k + 1) % 3, None]
-            inward = _dot(up[:, None], np.cross(end - start, inner - start))
-            around = sum(_length(side) for side in (end - start, inner - start, inner - end))
-            coinciding &= (inward > slack * (around + 3.0 * slack)).any(axis=1)
     rest = np.flatnonzero(coinciding)
-    a, b = a[rest], b[rest]
+    a, b, up = a[rest], b[rest], _units(normals[0][rest] + normals[1][rest])
+    found = _overlaid(up, a, b, slack) & _overlaid(up, b, a, slack)
+    coinciding[rest] = found
+    rest, a, b = rest[found], a[found], b[found]
     coinciding[rest] = ~(_sides(a, b, slack).any(axis=1) | _sides(b, a, slack).any(axis=1))
     return coinciding
+
+
+def _passing(edges: Array, third: Array, triangles: Array, slack: float) -> Flags:
+    """Return which edges lie in a triangle, with their own two triangles on both sides of it."""
+    normals = _normals(triangles)
+    passing = _both_sides(_dot(normals[:, None], third - triangles[:, :1]))
+    rest = np.flatnonzero(passing)
+    edges, third, triangles, up = edges[rest], third[rest], triangles[rest], _units(normals[rest])
+    left, right = (
+        _left(up, edges[:, k], edges[:, 1 - k], triangles, slack).any(axis=1) for k in (0, 1)
+    )
+    found = left & right & _overlaid(up, edges, triangles, slack)
+    passing[rest] = found
+    edges, third, triangles = edges[found], third[found], triangles[found]
+    within = ~_sides(edges, triangles, slack).any(axis=1)
+    passing[rest[found]] = within & _both_sides(_sides(third, triangles, slack))
+    return passing
+
+
+def _overlaid(up: Array, inner: Array, outer: Array, slack: float) -> Flags:
+    """Return whether, as seen from above, beyond no side of a triangle all the corners lie."""
+    overlaid: Flags = np.ones(len(up), dtype=bool)
+    for k in range(3):
+        overlaid &= _left(up, outer[:, k], outer[:, (k + 1) % 3], inner, slack).any(axis=1)
+    return overlaid
+
+
+def _left(up: Array, start: Array, end: Array, corners: Array, slack: float) -> Flags:
+    """Return which corners are on the left of a line as seen from above, whatever the shifts."""
+    start, end = start[:, None], end[:, None]
+    area = _dot(up[:, None], np.cross(end - start, corners - start))
+    around = sum(_length(side) for side in (end - start, corners - start, corners - end))
+    left: Flags = area > slack * (around + 3.0 * slack)
+    return left
 
 
 def _sides(corners: Array, triangles: Array, slack: float) -> Indices:
@@ -272,6 +308,10 @@ def _normals(triangles: Array) -> Array:
     return np.cross(b - a, c - a)
 
 
+def _units(vectors: Array) -> Array:
+    return vectors / np.maximum(_length(vectors), 1e-300)[..., None]
+
+
 def _length(vectors: Array) -> Array:
     return np.linalg.norm(vectors, axis=-1)
 
@@ -298,25 +338,28 @@ def _on_line(a: Array, b: Array) -> Array:
 
 def _in_plane(a: Array, b: Array) -> Array:
     """Return the middle of the longest piece of edge that one triangle has in another's plane."""
-    longest, place = -1.0, a[0]
-    for each, other in ((a, b), (b, a)):
-        sides = np.roll(other, -1, axis=0) - other
-        inward = np.cross(np.cross(sides[0], sides[1]), sides)
-        height = _dot(each[:, None] - other, inward)  # of each corner over each side
-        for k in range(3):
-            first, last = 0.0, 1.0
-            for start, end in zip(height[k - 1], height[k], strict=True):
-                if start < 0.0 < end:
-                    first = max(first, start / (start - end))
-                elif end < 0.0 < start:
-                    last = min(last, start / (start - end))
-                elif start < 0.0 and end < 0.0:
-                    last = -1.0
-            edge = each[k] - each[k - 1]
-            piece = (last - first) * float(np.linalg.norm(edge))
-            if piece > longest:
-                longest, place = piece, each[k - 1] + 0.5 * (first + last) * edge
-    return place
+    pieces = [
+        _piece(each[k - 1], each[k], other) for each, other in ((a, b), (b, a)) for k in range(3)
+    ]
+    return max(pieces, key=lambda piece: piece[0])[1]
+
+
+def _piece(start: Array, end: Array, triangle: Array) -> tuple[float, Array]:
+    """Return length and middle of the piece of an edge that a triangle covers."""
+    sides = np.roll(triangle, -1, axis=0) - triangle
+    inward = np.cross(np.cross(sides[0], sides[1]), sides)
+    first, last = 0.0, 1.0
+    for here, there in zip(
+        _dot(start - triangle, inward), _dot(end - triangle, inward), strict=True
+    ):
+        if here < 0.0 and there < 0.0:
+            last = -1.0
+        elif here < 0.0 < there:
+            first = max(first, here / (here - there))
+        elif there < 0.0 < here:
+            last = min(last, here / (here - there))
+    length = (last - first) * float(np.linalg.norm(end - start))
+    return length, start + 0.5 * (first + last) * (end - start)
 
 
 # --- Bodies within bodies ---------------------------------------------------------------------

@@ -172,6 +172,41 @@ def test_prisms_whose_sides_cross_in_edges_of_both_overlap():
     overlap(one, moved(Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3))
 
 
+OCTAHEDRON = np.array(
+    [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
+)
+OCTAHEDRON_FACES = np.array(
+    [[k, (k + 1) % 4, 4] for k in range(4)] + [[(k + 1) % 4, k, 5] for k in range(4)]
+)
+
+
+@pytest.mark.parametrize('shift', [0.0, 0.25, -0.5])
+@pytest.mark.parametrize('turn', [0.0, 0.25, 0.5, 0.7])
+def test_corners_and_edges_in_a_face_that_the_body_passes_through(turn: float, shift: float):
+    # Its tips stand out on both sides of a side of the cube; some of its edges lie in that side.
+    c, s = math.cos(turn * math.pi / 2.0), math.sin(turn * math.pi / 2.0)
+    points = OCTAHEDRON @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    points = 1e-4 * np.where(np.abs(points) < 1e-12, 0.0, points) + 1e-3 * np.array([1, 0.4, 0.7])
+    points[:, 0] += 1e-4 * shift
+    faces = np.concatenate([CUBE_FACES, OCTAHEDRON_FACES + 8])
+    for kind in (float, np.float32):
+        what, place = refusal(np.concatenate([CUBE, points]).astype(kind).astype(float), faces)
+        assert what == 'bodies overlap'
+        assert place[0] == pytest.approx(1e-3, rel=1e-6)
+        assert math.dist(place, 1e-3 * np.array([1, 0.4, 0.7])) < 1.01e-4
+    points[:, 0] += 1e-3 - points[:, 0].min()  # touches from outside
+    Mesh(np.concatenate([CUBE, points]), faces)
+
+
+def test_a_ring_of_corners_in_the_top_of_a_plate():
+    plate = Mesh(CUBE * [10.0, 10.0, 1.0], CUBE_FACES, 'plate')
+    points, faces = arrays(plate, Mesh.cylinder(1e-3, 1e-3, 2, 24))
+    points[8:] += [5e-3, 5e-3, 0.5e-3]
+    place = refusal(points, faces)[1]
+    assert math.dist(place[:2], [5e-3, 5e-3]) == pytest.approx(1e-3, rel=0.01)
+    assert place[2] == pytest.approx(1e-3, rel=1e-6)
+
+
 TOUCHING = [
     ((1e-3, 0.0, 0.0), (2e-3, 1e-3, 1e-3)),  # a whole face
     ((1e-3, 0.3e-3, 0.2e-3), (2e-3, 0.7e-3, 5e-3)),  # part of one
