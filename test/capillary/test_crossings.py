@@ -2,7 +2,7 @@
 """Overlaps of bodies: what overlaps is found wherever it is, what only touches is left alone.
 
 The truth is geometry: convex bodies are apart if they are so along one direction, and overlap if
-circles that fit into them at one height do.
+circles that fit into them at one height do, or a ball into both.
 """
 
 import math
@@ -11,6 +11,8 @@ import re
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 
 from ros_pad.capillary import Mesh
 from ros_pad.capillary.mesh import _revolved
@@ -296,6 +298,54 @@ def test_no_rounding_makes_an_overlap(k: int, tmp_path: pathlib.Path):
             path = tmp_path / f'{j}{suffix}'
             there.write(path)
             assert Mesh.read(path).volume == pytest.approx(there.volume, rel=2e-3)
+
+
+def hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return corners, faces turned outward, and half spaces of a convex hull."""
+    found = ConvexHull(points)
+    a, b, c = np.moveaxis(points[found.simplices], 1, 0)
+    inward = np.sum(np.cross(b - a, c - a) * found.equations[:, :3], axis=1) < 0.0
+    faces = np.where(inward[:, None], found.simplices[:, ::-1], found.simplices)
+    used, names = np.unique(faces, return_inverse=True)
+    return points[used], names.reshape(faces.shape), found.equations
+
+
+@pytest.mark.parametrize('kind', ['grid', 'slim'])
+def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
+    rng = np.random.default_rng(7)
+    counts = {True: 0, False: 0}
+    for _ in range(400):
+        if kind == 'grid':  # corners, edges and faces of one often lie on those of the other
+            two = [rng.integers(0, 4, (rng.integers(4, 9), 3)) * 1e-3 for _ in range(2)]
+            if any(np.linalg.matrix_rank(each - each[0], 1e-9) < 3 for each in two):
+                continue
+        else:
+            two = []
+            for _ in range(2):
+                wide = rng.normal(size=(rng.integers(4, 25), 3)) * 10.0 ** rng.uniform(-3, 0, 3)
+                turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+                two.append(1e-3 * (wide @ turn + 0.1 * rng.normal(size=3)))
+        (one, first, planes), (other, second, more) = (hull(each) for each in two)
+        limits = 1e3 * np.concatenate([planes, more])
+        # The largest ball within all half spaces, mm.
+        ball = linprog(
+            [0.0, 0.0, 0.0, -1.0],
+            A_ub=np.column_stack([1e-3 * limits[:, :3], np.ones(len(limits))]),
+            b_ub=-limits[:, 3],
+            bounds=(None, None),
+        )
+        depth = -1e-3 * ball.fun
+        points = np.concatenate([one, other])
+        points[:, 2] -= points[:, 2].min()
+        if 1e-12 < depth / np.abs(points).max() < 5e-6:
+            continue  # within what rounding may do
+        faces = np.concatenate([first, second + len(one)])
+        counts[depth > 1e-14] += 1
+        if depth > 1e-14:
+            assert refusal(points, faces)[0] == 'bodies overlap'
+        else:
+            Mesh(points, faces)
+    assert min(counts.values()) > 30
 
 
 # --- Single bodies that cut themselves ----------------------------------------------------------
