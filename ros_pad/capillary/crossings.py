@@ -130,7 +130,11 @@ def _leaves(values: npt.NDArray[Any], depth: int, kind: type, rest: float) -> np
 def _near(
     points: Array, edges: Indices, faces: Indices, slack: float
 ) -> Iterator[tuple[Indices, Indices]]:
-    """Yield, batch by batch, edges and triangles whose boxes meet and that share no corner."""
+    """Yield, batch by batch, edges and triangles whose boxes meet and that share no corner.
+
+    The trees of SciPy hold points, which would need one radius for all: a large triangle would
+    make neighbours of all small ones.
+    """
     depth = (len(edges) - 1).bit_length()
     one = _Tree(points, edges, depth, slack, -1)
     other = _Tree(points, faces, depth, slack, -2)
