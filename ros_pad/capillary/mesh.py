@@ -19,6 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ros_pad.capillary.crossings import first_overlap
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
@@ -51,7 +52,8 @@ class Mesh:
     MeshError
         When the mesh is empty, holds numbers that are not finite, has holes, edges of more than
         two triangles or triangles that face the other way than their neighbours, is inside out,
-        does not reach down to z = 0 or goes below it, or has no size a pad can have in metres.
+        does not reach down to z = 0 or goes below it, has no size a pad can have in metres, or
+        where bodies overlap or one cuts itself.
     """
 
     points: Array
@@ -66,8 +68,9 @@ class Mesh:
         _check_size(extent, self.source)
         used, first = np.unique(faces, return_inverse=True)
         points, faces = points[used], first.reshape(faces.shape)
-        _check_edges(points, faces, self.source)
-        _check_volumes(points, faces, self.source)
+        edges, beside = _edges(points, faces, self.source)
+        bodies = _bodies(beside, len(faces))
+        _check_volumes(points, faces, bodies, self.source)
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
         if abs(low) > _ON_FLOOR * (high - low):
             raise MeshError(
@@ -75,6 +78,7 @@ class Mesh:
                 f' lift = {-low:.9g} m would put it there'
             )
         points[:, 2] -= low
+        _check_overlaps(points, faces, edges, beside, bodies, self.source)
         points.setflags(write=False)
         faces.setflags(write=False)
         object.__setattr__(self, 'points', points)
@@ -435,8 +439,11 @@ def _check_size(extent: float, source: str) -> None:
         )
 
 
-def _check_edges(points: Array, faces: Indices, source: str) -> None:
-    """Refuse what is no closed surface with one outside."""
+def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices]:
+    """Return both corners of each edge and both triangles there, shape (edges, 2) each.
+
+    What is no closed surface with one outside is refused.
+    """
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     if (starts == ends).any():
         raise MeshError(
@@ -457,21 +464,38 @@ def _check_edges(points: Array, faces: Indices, source: str) -> None:
                 f'{source}: {int(wrong.sum())} {what}, the first at'
                 f' ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) m'
             )
+    beside = np.argsort(which, kind='stable').reshape(-1, 2) // 3
+    return np.stack([keys // n, keys % n], axis=1), beside
 
 
-def _check_volumes(points: Array, faces: Indices, source: str) -> None:
+def _bodies(beside: Indices, count: int) -> Indices:
+    """Return which body each triangle is of; bodies with a point in common are two."""
+    graph = coo_array((np.ones(len(beside)), beside.T), shape=(count, count))
+    bodies: Indices = connected_components(graph, directed=False)[1].astype(np.int64)
+    return bodies
+
+
+def _check_volumes(points: Array, faces: Indices, bodies: Indices, source: str) -> None:
     """Refuse bodies that are inside out."""
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]]).T
-    graph = coo_array((np.ones(edges.shape[1]), edges), shape=(len(points),) * 2)
-    count, group = connected_components(graph, directed=False)
-    volumes = np.bincount(group[faces[:, 0]], _tetrahedra(points, faces), count)
+    volumes = np.bincount(bodies, _tetrahedra(points, faces))
     wrong = int(np.sum(volumes <= 0.0))
     if wrong:
-        which = 'the mesh is' if wrong == count else f'{wrong} of {count} bodies are'
+        which = 'the mesh is' if wrong == volumes.size else f'{wrong} of {volumes.size} bodies are'
         raise MeshError(
             f'{source}: {which} inside out (flipped normals) or flat: flip=True turns a whole'
             ' mesh over; hollows inside a pad must go'
         )
+
+
+def _check_overlaps(
+    points: Array, faces: Indices, edges: Indices, beside: Indices, bodies: Indices, source: str
+) -> None:
+    found = first_overlap(points, faces, edges, beside, bodies)
+    if found is not None:
+        one, other = bodies[list(found.faces)]
+        what = 'the mesh cuts itself' if one == other else 'bodies overlap'
+        x, y, z = found.place
+        raise MeshError(f'{source}: {what} at ({x:.4g}, {y:.4g}, {z:.4g}) m')
 
 
 def _tetrahedra(points: Array, faces: Indices) -> Array:

@@ -17,7 +17,6 @@ from ros_pad.errors import MeshError
 
 CREASE = math.radians(40.0)  # facets that meet at less stand for one smooth wall
 _INSIDE = 1e-9  # of the height: lowest and highest cut, so far from floor and top
-_LINES = 96  # along which bodies are searched for overlaps
 
 
 class Walls(NamedTuple):
@@ -52,7 +51,7 @@ def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Wa
     ------
     MeshError
         Where a half plane meets the wall not exactly once at some height: the axis is outside the
-        pad, bodies overlap, or the pad is no star as seen from the axis.
+        pad, or the pad is no star as seen from the axis.
     """
     heights = levels(mesh, layers)
     cuts = heights.copy()
@@ -130,7 +129,6 @@ def _check_star(
     axis: tuple[float, float],
 ) -> None:
     for wrong, what in (
-        (turns > 1, 'bodies overlap round the axis'),
         (turns < 1, 'the axis is outside the pad'),
         (count > 1, 'the wall is met more than once: no star as seen from the axis'),
     ):
@@ -227,13 +225,7 @@ class Layers(NamedTuple):
 
 
 def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
-    """Cut the mesh by horizontal planes; the contact angle, rad, is for ``pull`` and ``gain``.
-
-    Raises
-    ------
-    MeshError
-        Where bodies overlap, as far as horizontal lines through the layers show it.
-    """
+    """Cut the mesh by horizontal planes; the contact angle, rad, is for ``pull`` and ``gain``."""
     heights = levels(mesh, layers)
     cuts = heights.copy()
     cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
@@ -242,7 +234,6 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     corners = corners[upright]
     normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
     start, end, layer = _outlines(np.concatenate([corners, normals], axis=2), cuts)
-    _check_overlaps(mesh, start, end, layer, heights)
     nx, ny, nz = 0.5 * (start + end)[:, 2:].T
     slope = np.arctan2(np.hypot(nx, ny), -nz)
     length = np.hypot(*(end - start)[:, :2].T)
@@ -306,26 +297,6 @@ def _area_below(corners: Array, cuts: Array) -> Array:
     done = np.searchsorted(cuts, high, 'left')
     wall = (high > low) & (done < cuts.size)
     return partly + np.cumsum(_summed(done[wall], sizes[wall], cuts.size))
-
-
-def _check_overlaps(mesh: Mesh, start: Array, end: Array, layer: Indices, heights: Array) -> None:
-    """Walk along lines through every layer, counting how many bodies one is in."""
-    low, high = float(mesh.points[:, 1].min()), float(mesh.points[:, 1].max())
-    # Off any symmetry of the mesh.
-    lines = low + (high - low) * (np.arange(_LINES) + 0.4137) / _LINES
-    row, line = _crossed(lines, start[:, 1], end[:, 1])
-    share = (lines[line] - start[row, 1]) / (end[row, 1] - start[row, 1])
-    x = start[row, 0] + share * (end[row, 0] - start[row, 0])
-    # Along x one enters a solid where its outline goes down, with the solid on the left.
-    enters = np.where(end[row, 1] < start[row, 1], 1, -1)
-    order = np.lexsort((enters, x, line, layer[row]))
-    inside = np.cumsum(enters[order])  # back to 0 at the end of every line
-    if inside.size and (inside.max() > 1 or inside.min() < 0):
-        worst = order[int(np.argmax((inside > 1) | (inside < 0)))]
-        raise MeshError(
-            f'{mesh.source}: bodies overlap, or the mesh cuts itself, at x = {x[worst]:.4g},'
-            f' y = {lines[line[worst]]:.4g}, z = {heights[layer[row[worst]]]:.4g} m'
-        )
 
 
 def _cross(start: Array, end: Array) -> Array:

@@ -440,13 +440,6 @@ def test_slices_that_do_not_meet_the_wall_once_are_refused():
         wet(two, WATER, axis=(1.6e-3, 0.0))
     with pytest.raises(MeshError, match='more than once'):
         wet(two, WATER, axis=(0.0, 0.0))
-    one = Mesh.dome(R, B, rings=6, sectors=12)
-    points = np.concatenate([one.points, one.points + np.array([0.5e-3, 0.0, 0.0])])
-    over = Mesh(points, np.concatenate([one.faces, one.faces + len(one.points)]), 'two')
-    with pytest.raises(MeshError, match='two: bodies overlap'):
-        wet(over, WATER, axis=(0.25e-3, 0.0))
-    with pytest.raises(MeshError, match='two: bodies overlap'):
-        wet_pattern(over, WATER, area=1e-3)
 
 
 @pytest.mark.parametrize(

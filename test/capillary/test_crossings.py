@@ -1,0 +1,423 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Overlaps of bodies: what overlaps is found wherever it is, what only touches is left alone.
+
+The truth is geometry: convex bodies are apart if they are so along one direction, and overlap if
+circles that fit into them at one height do, or a ball into both.
+"""
+
+import math
+import pathlib
+import re
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from ros_pad.capillary import Mesh
+from ros_pad.capillary.mesh import _revolved
+from ros_pad.errors import MeshError
+
+R, B = 1.55e-3, 0.6e-3
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 1e-3
+CUBE_FACES = np.array(
+    [
+        *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+        *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+    ]
+)
+
+
+def box(low, high) -> Mesh:
+    return Mesh(np.where(CUBE > 0, high, low), CUBE_FACES, 'box')
+
+
+def moved(mesh: Mesh, x: float = 0.0, y: float = 0.0, turn: float = 0.0, kind=float) -> Mesh:
+    """Turn about the z axis, shift, and round as a file of that kind of number would."""
+    c, s = math.cos(turn), math.sin(turn)
+    points = mesh.points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [x, y, 0.0]
+    return Mesh(points.astype(kind).astype(float), mesh.faces, mesh.source)
+
+
+def arrays(*meshes: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    begin = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, begin, strict=False)]
+    return np.concatenate([mesh.points for mesh in meshes]), np.concatenate(faces)
+
+
+def together(*meshes: Mesh) -> Mesh:
+    return Mesh(*arrays(*meshes), 'together')
+
+
+def refusal(points: np.ndarray, faces: np.ndarray) -> tuple[str, np.ndarray]:
+    """Return what is said of a mesh that has to be refused, and the place that is named."""
+    with pytest.raises(MeshError) as refused:
+        Mesh(points, faces, 'pad.stl')
+    said = re.fullmatch(r'pad\.stl: (.*) at \((.*), (.*), (.*)\) m', str(refused.value))
+    assert said, refused.value
+    return said[1], np.array([float(each) for each in said.groups()[1:]])
+
+
+def overlap(*meshes: Mesh) -> np.ndarray:
+    what, place = refusal(*arrays(*meshes))
+    assert what == 'bodies overlap'
+    return place
+
+
+def outer(mesh: Mesh, azimuth: float) -> float:
+    """Return how far a body reaches along a direction."""
+    return float((mesh.points[:, :2] @ [math.cos(azimuth), math.sin(azimuth)]).max())
+
+
+def inner(mesh: Mesh, sectors: int, heights: np.ndarray) -> np.ndarray:
+    """Return the radius of the circles that fit into a body of revolution."""
+    r, z = np.hypot(*mesh.points[:-2, :2].T), mesh.points[:-2, 2]
+    order = np.argsort(z, kind='stable')
+    return np.interp(heights, z[order], r[order]) * math.cos(math.pi / sectors)
+
+
+# --- Bodies that overlap, and bodies that do not -----------------------------------------------
+
+
+@pytest.mark.parametrize('seed', range(60))
+def test_domes_overlap_or_not_at_any_azimuth(seed: int):
+    rng = np.random.default_rng(seed)
+    rings, sectors = rng.integers([3, 3], [32, 64], (2, 2)).T.tolist()
+    one = Mesh.dome(R, B, 2.2e-3, rings[0], sectors[0])
+    if seed % 3 == 0:  # twins, that may be each other's mirror image to the bit
+        rings[1], sectors[1] = rings[0], sectors[0]
+        other = one
+    else:
+        other = Mesh.dome(rng.uniform(0.3, 1.2) * R, 0.1e-3, None, rings[1], sectors[1])
+    turn = rng.uniform(0.0, 7.0) if seed % 2 else 0.0
+    other = moved(other, turn=turn)
+    whole = 2.0 * math.pi / sectors[0] * float(rng.integers(sectors[0]))
+    azimuth = whole if seed % 4 < 2 else rng.uniform(0.0, 7.0)
+    share = R * 10.0 ** rng.uniform(-3.0, math.log10(0.3))
+
+    def beside(distance: float) -> Mesh:
+        return moved(other, distance * math.cos(azimuth), distance * math.sin(azimuth))
+
+    apart = outer(one, azimuth) + outer(other, azimuth + math.pi)
+    together(one, beside(apart + 1e-3 * share))
+    heights = np.linspace(0.0, min(one.height, other.height), 300)
+    fit = inner(one, sectors[0], heights) + inner(other, sectors[1], heights)
+    second = beside(float(fit.max()) - share)
+    place = overlap(one, second)
+    for body, middle in ((one, [0.0, 0.0]), (second, second.points[-1, :2])):
+        widest = np.hypot(*(body.points[:, :2] - middle).T).max()
+        assert math.dist(place[:2], middle) < 1.001 * widest
+        assert -1e-9 <= place[2] <= 1.001 * body.height
+
+
+@pytest.mark.parametrize('width', [1e-6, 1e-5, 2e-4])
+@pytest.mark.parametrize('turn', [0.0, 0.3, math.pi / 4.0])
+def test_a_needle_through_a_coarse_plate(width: float, turn: float):
+    # Ten thousand times as wide as the needle; its triangles are a thousand times as long as wide.
+    plate = box([-5e-3, -5e-3, 0.0], [5e-3, 5e-3, 0.5e-3])
+    needle = moved(Mesh.cone(width, 0.5 * width, 1e-3, 3, 5), 1.234e-3, -0.77e-3, turn)
+    place = overlap(plate, needle)
+    # Either at the top of the plate, or where both stand on the floor.
+    assert np.allclose(place[:2], [1.234e-3, -0.77e-3], rtol=0.0, atol=2.0 * width)
+    assert min(abs(place[2]), abs(place[2] - 0.5e-3)) < 1e-9
+    together(plate, moved(needle, 5e-3))  # beside it
+
+
+def test_small_bodies_between_large_triangles_are_found():
+    plate = box([0.0, 0.0, 0.0], [10e-3, 10e-3, 1e-3])
+    dome = Mesh.dome(0.2e-3, 0.05e-3, None, 12, 24)
+    # They stand round the plate; one reaches into its side by a hundredth of its radius.
+    ring = [
+        moved(dome, x, y)
+        for k in range(20)
+        for x, y in [(10.3e-3, 0.5e-3 * k), (-0.3e-3, 0.5e-3 * k)]
+    ]
+    together(plate, *ring)
+    late = moved(dome, 5e-3, 10e-3 + 0.198e-3)
+    place = overlap(plate, *ring, late)
+    assert np.allclose(place, [5e-3, 10e-3, 0.2e-3], rtol=0.0, atol=0.08e-3)
+
+
+@pytest.mark.parametrize(
+    ('low', 'high'),
+    [
+        (
+            (0.5e-3, 0.0, 0.0),
+            (1.5e-3, 1e-3, 1e-3),
+        ),  # in a row: edges in faces, no edge through one
+        ((0.5e-3, 0.5e-3, 0.0), (1.5e-3, 1.5e-3, 1e-3)),
+        ((0.0, 0.0, 0.0), (1e-3, 1e-3, 1e-3)),  # the same twice
+        ((0.0, 0.0, 0.0), (0.5e-3, 0.5e-3, 0.5e-3)),  # in a corner
+        ((0.25e-3, 0.25e-3, 0.0), (0.75e-3, 0.75e-3, 1e-3)),  # within, from floor to top
+        ((0.25e-3, -1e-3, 0.25e-3), (0.75e-3, 2e-3, 0.75e-3)),  # right through
+        ((0.999e-3, 0.2e-3, 0.2e-3), (2e-3, 0.3e-3, 0.3e-3)),  # by a thousandth
+    ],
+)
+@pytest.mark.parametrize('turn', [0.0, 1.0])
+@pytest.mark.parametrize('kind', [float, np.float32])
+def test_boxes_with_faces_in_common_planes_overlap(low, high, turn: float, kind):
+    points = np.concatenate([CUBE, np.where(CUBE > 0, high, low)])
+    c, s = math.cos(turn), math.sin(turn)
+    turned = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    what, place = refusal(
+        turned.astype(kind).astype(float), np.concatenate([CUBE_FACES, CUBE_FACES + 8])
+    )
+    assert what == 'bodies overlap'
+    back = place @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    assert (back >= np.maximum(low, 0.0) - 2e-7).all()
+    assert (back <= np.minimum(high, 1e-3) + 2e-7).all()
+
+
+def test_prisms_whose_sides_cross_in_edges_of_both_overlap():
+    one = Mesh.cylinder(1e-3, 2e-3, 1, 6)
+    overlap(one, moved(one, 1e-3))
+    overlap(one, moved(Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3))
+
+
+OCTAHEDRON = np.array(
+    [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
+)
+OCTAHEDRON_FACES = np.array(
+    [[k, (k + 1) % 4, 4] for k in range(4)] + [[(k + 1) % 4, k, 5] for k in range(4)]
+)
+
+
+@pytest.mark.parametrize('shift', [0.0, 0.25, -0.5])
+@pytest.mark.parametrize('turn', [0.0, 0.25, 0.5, 0.7])
+def test_corners_and_edges_in_a_face_that_the_body_passes_through(turn: float, shift: float):
+    # Its tips stand out on both sides of a side of the cube; some of its edges lie in that side.
+    c, s = math.cos(turn * math.pi / 2.0), math.sin(turn * math.pi / 2.0)
+    points = OCTAHEDRON @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    points = 1e-4 * np.where(np.abs(points) < 1e-12, 0.0, points) + 1e-3 * np.array([1, 0.4, 0.7])
+    points[:, 0] += 1e-4 * shift
+    faces = np.concatenate([CUBE_FACES, OCTAHEDRON_FACES + 8])
+    for kind in (float, np.float32):
+        what, place = refusal(np.concatenate([CUBE, points]).astype(kind).astype(float), faces)
+        assert what == 'bodies overlap'
+        assert place[0] == pytest.approx(1e-3, rel=1e-6)
+        assert math.dist(place, 1e-3 * np.array([1, 0.4, 0.7])) < 1.01e-4
+    points[:, 0] += 1e-3 - points[:, 0].min()  # touches from outside
+    Mesh(np.concatenate([CUBE, points]), faces)
+
+
+def test_a_ring_of_corners_in_the_top_of_a_plate():
+    plate = Mesh(CUBE * [10.0, 10.0, 1.0], CUBE_FACES, 'plate')
+    points, faces = arrays(plate, Mesh.cylinder(1e-3, 1e-3, 2, 24))
+    points[8:] += [5e-3, 5e-3, 0.5e-3]
+    place = refusal(points, faces)[1]
+    assert math.dist(place[:2], [5e-3, 5e-3]) == pytest.approx(1e-3, rel=0.01)
+    assert place[2] == pytest.approx(1e-3, rel=1e-6)
+
+
+TOUCHING = [
+    ((1e-3, 0.0, 0.0), (2e-3, 1e-3, 1e-3)),  # a whole face
+    ((1e-3, 0.3e-3, 0.2e-3), (2e-3, 0.7e-3, 5e-3)),  # part of one
+    ((1e-3, 1e-3, 0.0), (2e-3, 2e-3, 1e-3)),  # an edge
+    ((0.2e-3, 0.3e-3, 1e-3), (0.5e-3, 5e-3, 2e-3)),  # on top, beyond it
+    ((1e-3, 1e-3, 1e-3), (2e-3, 2e-3, 2e-3)),  # a point
+    ((2e-3, 0.0, 0.0), (3e-3, 1e-3, 1e-3)),  # nowhere; floors in one plane
+]
+
+
+@pytest.mark.parametrize(('low', 'high'), TOUCHING)
+@pytest.mark.parametrize('kind', [float, np.float32])
+def test_boxes_that_touch_do_not_overlap(low, high, kind):
+    faces = np.concatenate([CUBE_FACES, CUBE_FACES + 8])
+    points = np.concatenate([CUBE, np.where(CUBE > 0, high, low)])
+    for turn in np.linspace(0.0, 3.0, 12):
+        for shift in (0.0, 0.013, 0.3):
+            c, s = math.cos(turn), math.sin(turn)
+            there = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            there[:, :2] += [shift, -0.7 * shift]
+            Mesh(there.astype(kind).astype(float), faces)
+
+
+def test_walls_of_slim_triangles_that_touch_do_not_overlap():
+    # Facets sixty times as long as wide, at right angles across a common plane.
+    n = 60
+    strip = np.linspace(0.0, 1e-3, n)
+    low = np.column_stack([np.zeros(n), strip, np.zeros(n)])
+    corners = 1e-3 * np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [1, 0, 1]])
+    wall = (corners[:, None] + low).reshape(-1, 3)
+    here, there = np.arange(n - 1), np.arange(1, n)
+
+    def band(p: int, q: int) -> np.ndarray:
+        p, q = p * n, q * n
+        return np.concatenate(
+            [
+                np.column_stack([p + here, q + here, q + there]),
+                np.column_stack([p + here, q + there, p + there]),
+            ]
+        )
+
+    ends = [[0, 2 * n, 3 * n], [0, 3 * n, n]]
+    ends += [[n - 1, 4 * n - 1, 3 * n - 1], [n - 1, 2 * n - 1, 4 * n - 1]]
+    faces = np.concatenate([band(0, 1), band(1, 3), band(3, 2), band(2, 0), ends])
+    upright = Mesh(wall, faces, 'upright')
+    # The same body fallen over to the other side of the plane x = 0, its facets along y.
+    lying = np.column_stack([-wall[:, 0], wall[:, 2], wall[:, 1]])
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        points, both = arrays(upright, Mesh(lying, faces, 'lying'))
+        moved(Mesh(points, both), *rng.uniform(-0.02, 0.02, 2), rng.uniform(0, 7), np.float32)
+    points[: len(wall), 0] -= 2e-6
+    assert refusal(points, both)[0] == 'bodies overlap'
+
+
+@pytest.mark.parametrize('sectors', [6, 12, 48])
+def test_domes_whose_rims_touch_do_not_overlap(sectors: int):
+    dome = Mesh.dome(R, B, None, 8, sectors)
+    for k in range(sectors):
+        azimuth = 2.0 * math.pi * k / sectors
+        d = outer(dome, azimuth) + outer(dome, azimuth + math.pi)
+        points, faces = arrays(dome, moved(dome, d * math.cos(azimuth), d * math.sin(azimuth)))
+        Mesh(points, faces)
+        Mesh(points.astype(np.float32).astype(float), faces)
+    Mesh.dome_pattern(19, 2.0 * R * (1.0 + 1e-12), R, B, rings=4, sectors=sectors)
+
+
+SHAPES = [
+    Mesh.dome(R, B, rings=24, sectors=36),
+    Mesh.dome(R, 0.0, 2.0 * R - 1e-6, rings=40, sectors=60),
+    Mesh.dome(R, 1.549e-3, 1e-5, rings=2, sectors=300),
+    Mesh.dome(R, B, 2.8e-3, rings=100, sectors=100),
+    Mesh.cone(0.0, 1e-3, 3e-3),
+    Mesh.cone(2e-3, 0.0, 1e-4, 8, sectors=240),
+    Mesh.cylinder(1e-3, 2e-3, sectors=1000),
+    Mesh.cylinder(1e-4, 0.2, rings=1, sectors=7),
+    Mesh.dome_pattern(19, 3.1001e-3, R, B, 2.8e-3, rings=10, sectors=24),
+]
+
+
+@pytest.mark.parametrize('k', range(len(SHAPES)))
+def test_no_rounding_makes_an_overlap(k: int, tmp_path: pathlib.Path):
+    pytest.importorskip('meshio')
+    for j, (shift, turn) in enumerate([(0.0, 0.0), (0.011, 0.4), (0.3, 2.0), (-2e-3, 0.785)]):
+        there = moved(SHAPES[k], shift, -0.6 * shift, turn)
+        for suffix in ('.stl', '.ply'):
+            path = tmp_path / f'{j}{suffix}'
+            there.write(path)
+            assert Mesh.read(path).volume == pytest.approx(there.volume, rel=2e-3)
+
+
+def hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return corners, faces turned outward, and half spaces of a convex hull."""
+    found = ConvexHull(points)
+    a, b, c = np.moveaxis(points[found.simplices], 1, 0)
+    inward = np.sum(np.cross(b - a, c - a) * found.equations[:, :3], axis=1) < 0.0
+    faces = np.where(inward[:, None], found.simplices[:, ::-1], found.simplices)
+    used, names = np.unique(faces, return_inverse=True)
+    return points[used], names.reshape(faces.shape), found.equations
+
+
+@pytest.mark.parametrize('kind', ['grid', 'slim'])
+def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
+    rng = np.random.default_rng(7)
+    counts = {True: 0, False: 0}
+    for _ in range(400):
+        if kind == 'grid':  # corners, edges and faces of one often lie on those of the other
+            two = [rng.integers(0, 4, (rng.integers(4, 9), 3)) * 1e-3 for _ in range(2)]
+            if any(np.linalg.matrix_rank(each - each[0], 1e-9) < 3 for each in two):
+                continue
+        else:
+            two = []
+            for _ in range(2):
+                wide = rng.normal(size=(rng.integers(4, 25), 3)) * 10.0 ** rng.uniform(-3, 0, 3)
+                turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+                two.append(1e-3 * (wide @ turn + 0.1 * rng.normal(size=3)))
+        (one, first, planes), (other, second, more) = (hull(each) for each in two)
+        limits = 1e3 * np.concatenate([planes, more])
+        # The largest ball within all half spaces, mm.
+        ball = linprog(
+            [0.0, 0.0, 0.0, -1.0],
+            A_ub=np.column_stack([1e-3 * limits[:, :3], np.ones(len(limits))]),
+            b_ub=-limits[:, 3],
+            bounds=(None, None),
+        )
+        depth = -1e-3 * ball.fun
+        points = np.concatenate([one, other])
+        points[:, 2] -= points[:, 2].min()
+        if 1e-12 < depth / np.abs(points).max() < 5e-6:
+            continue  # within what rounding may do
+        faces = np.concatenate([first, second + len(one)])
+        counts[depth > 1e-14] += 1
+        if depth > 1e-14:
+            assert refusal(points, faces)[0] == 'bodies overlap'
+        else:
+            Mesh(points, faces)
+    assert min(counts.values()) > 30
+
+
+# --- Single bodies that cut themselves ----------------------------------------------------------
+
+
+@pytest.mark.parametrize('sectors', [5, 24, 90])
+def test_a_body_of_revolution_whose_profile_crosses_itself(sectors: int):
+    r = 1e-3 * np.array([1.0, 1.0, 2.0, 2.0, 0.5, 0.5])
+    z = 1e-3 * np.array([0.0, 0.7, 0.7, 0.4, 0.4, 4.0])
+    with pytest.raises(MeshError) as refused:
+        _revolved(r, z, sectors, 'knot')
+    said = re.fullmatch(
+        r'knot: the mesh cuts itself at \((.*), (.*), (.*)\) m', str(refused.value)
+    )
+    x, y, height = (float(each) for each in said.groups())
+    assert height == pytest.approx(0.4e-3, rel=1e-3)
+    assert math.cos(math.pi / sectors) * 0.999e-3 < math.hypot(x, y) < 1.001e-3
+
+
+def test_a_body_that_cuts_itself_in_triangles_with_a_corner_in_common():
+    # Two pyramids on one triangle; the tip of the lower one is drawn up and out through a side.
+    a, b, c, top, tip = range(5)
+    faces = [[a, b, top], [b, c, top], [c, a, top], [b, a, tip], [c, b, tip], [a, c, tip]]
+    points = 1e-3 * np.array(
+        [[0, 0, 0.2], [1, 0, 0.2], [0.5, 1, 0.2], [0.5, 0.3, 1.2], [0.5, 0.3, 0.0]]
+    )
+    Mesh(points, np.array(faces))
+    points[:4, 2] -= 0.2e-3
+    points[tip] = 1e-3 * np.array([0.5, -0.5, 0.2])
+    what, place = refusal(points, np.array(faces))
+    assert what == 'the mesh cuts itself'
+    # The edge from c meets the side, y = 0.3 z, there; the cut runs from there to a and to b.
+    pierced = points[c] + (points[tip] - points[c]) / 1.56
+    assert min(math.dist(place, 0.5 * (pierced + points[k])) for k in (a, b)) < 1e-7
+    # Drawn up inside it cuts nothing.
+    points[tip] = 1e-3 * np.array([0.5, 0.3, 0.6])
+    Mesh(points, np.array(faces))
+
+
+# --- Bodies within bodies -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('z', [0.0, 0.3e-3])
+@pytest.mark.parametrize('size', [1e-5, 5e-4])
+def test_a_body_within_another_is_found(z: float, size: float):
+    big, small = Mesh.dome(R, 0.9e-3, rings=12, sectors=24), Mesh.cylinder(size, size, 1, 12)
+    points, faces = arrays(big, small)
+    for first in (True, False):
+        if not first:  # the same, listed the other way round
+            points, faces = arrays(small, big)
+        inside = slice(len(big.points), None) if first else slice(len(small.points))
+        there = points.copy()
+        there[inside] += [0.2e-3, 0.1e-3, z]
+        what, place = refusal(there, faces)
+        assert what == 'bodies overlap'
+        assert math.dist(place[:2], [0.2e-3, 0.1e-3]) <= 1.5 * size
+        assert z - 1e-9 <= place[2] <= z + size
+
+
+def test_a_pin_in_a_bore_is_in_no_body():
+    turns = 2.0 * math.pi * np.arange(60) / 60
+    ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    profile = [(1e-3, 0.0), (2e-3, 0.0), (2e-3, 3e-3), (1e-3, 3e-3)]
+    points = np.concatenate([np.column_stack([r * ring, np.full(60, z)]) for r, z in profile])
+    here, there = np.arange(60), np.roll(np.arange(60), -1)
+    faces = []
+    for k in range(4):
+        low, high = 60 * k, 60 * ((k + 1) % 4)
+        faces.append(np.column_stack([low + here, low + there, high + there]))
+        faces.append(np.column_stack([low + here, high + there, high + here]))
+    washer = Mesh(points, np.concatenate(faces), 'washer')
+    together(washer, Mesh.cylinder(0.9e-3, 2e-3))
+    together(washer, Mesh.cylinder(1e-3, 3e-3, 1, 60))  # a tight fit
+    place = overlap(washer, Mesh.cylinder(1.02e-3, 2e-3))
+    assert 0.99e-3 < math.hypot(*place[:2]) < 1.03e-3
