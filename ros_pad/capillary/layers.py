@@ -413,7 +413,7 @@ def wet_pattern(
     Raises
     ------
     MeshError
-        Where no room is left between the pads, or bodies overlap.
+        Where no room is left between the pads.
     InvalidInput
         When a value is not allowed.
     """

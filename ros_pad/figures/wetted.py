@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from ros_pad.capillary import Mesh
 from ros_pad.capillary import Wet
@@ -35,6 +36,7 @@ DRY = '#D9D4CC'  # silicone
 WETTED = '#56B4E9'
 _LIGHT = np.array([0.35, -0.65, 0.67])
 _AZIMUTH = -62.0  # degrees, from where one looks
+_TALLEST = 0.84  # of the height of the picture
 
 
 @dataclass(frozen=True)
@@ -197,9 +199,14 @@ def _body(axes: Axes3D, drawn: Picture, zoom: float) -> None:
     axes.set_xlim(middle[0] - 0.5 * span, middle[0] + 0.5 * span)
     axes.set_ylim(middle[1] - 0.5 * span, middle[1] + 0.5 * span)
     axes.set_zlim(0.0, high[2])
-    axes.set_box_aspect((1.0, 1.0, float(high[2]) / span), zoom=0.95 * zoom)
+    box = (1.0, 1.0, float(high[2]) / span)
+    axes.set_box_aspect(box, zoom=0.95 * zoom)
     axes.view_init(10.0 if len(drawn.line) else 24.0, _AZIMUTH)
     axes.set_proj_type('persp')
+    # A tall pad would be cut off.
+    seen = np.column_stack(proj_transform(*points.T, axes.get_proj())[:2])
+    tall = float(np.ptp(axes.transData.transform(seen)[:, 1])) / axes.figure.bbox.height
+    axes.set_box_aspect(box, zoom=0.95 * zoom * min(1.0, _TALLEST / tall))
     if len(drawn.line):
         # Only the half that faces the reader.
         turn = math.radians(_AZIMUTH)

@@ -49,6 +49,15 @@ def test_what_is_wet_ends_at_the_line():
     assert reach == pytest.approx(1e3 * found.floor_radii[0], rel=1e-6)
 
 
+@pytest.mark.parametrize('height', [0.5e-3, 5e-3, 50e-3])
+def test_pads_of_any_height_are_drawn_whole(height: float, tmp_path: pathlib.Path):
+    mesh = Mesh.cylinder(1.2e-3, height)
+    wetted.draw(tmp_path / 'it.png', mesh, wet(mesh, LIQUID, 'force', slices=12))
+    body = matplotlib.image.imread(tmp_path / 'it.png')[:, :1000, :3]  # left of the section
+    assert (body < 0.9).any()
+    assert (body[[0, -1]] == 1.0).all()
+
+
 @pytest.mark.parametrize('kind', ['one', 'saturated', 'many'])
 def test_figures_and_pages_are_written(kind: str, tmp_path: pathlib.Path):
     mesh, found = DOME, wet(DOME, LIQUID if kind == 'one' else Liquid(0.073, 0.073), slices=12)
