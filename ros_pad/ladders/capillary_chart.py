@@ -69,7 +69,8 @@ def draw(rungs: Sequence[Rung]) -> Figure:
         legend(figure, handles, 4)
         figure.supxlabel(
             'a to f: median of the cases with an answer, whisker to the worst; larger marks are'
-            ' finer.  g to i: finest layers; a curve ends where there is no answer.',
+            ' finer.  g to i: finest layers; a curve ends where there is no answer.\n'
+            'Heights that are refused as far off are drawn.',
             fontsize=7.0,
         )
     return figure
