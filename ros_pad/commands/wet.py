@@ -244,7 +244,7 @@ def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPatt
         raise InvalidInput('--hysteresis is for a single pad, which has one contact line')
     if options.slices is not None:
         raise InvalidInput('--slices is for a single pad: between many the surface is level')
-    pads, area = options.pads or 1, options.area
+    pads, area = 1 if options.pads is None else options.pads, options.area
     if options.mesh == 'pattern':
         # Each dome has a hexagon to itself, unless the area is given.
         cells = math.sqrt(0.75) * options.pitch**2 * pads
