@@ -443,14 +443,16 @@ def _fill(
     if strict:
         judge, nowhere = _level(cut, void, pads, liquid, 'energy')
         no_rise |= nowhere
-    gap = np.interp(place, np.arange(z.size), void / (pads * cut.outline))
+    room, shore = (
+        np.interp(place, np.arange(z.size), each) for each in (void, pads * cut.outline)
+    )
     if no_rise:
         status = 'dry'
     elif math.isnan(place) or math.isnan(judge):
         status = 'coarse'
     elif max(place, judge) >= cells:
         status = 'saturated'
-    elif strict and gap > WIDEST_GAP * _capillary_length(liquid):
+    elif strict and room > WIDEST_GAP * _capillary_length(liquid) * shore:
         status = 'far_apart'
     elif _disagree(place, judge):
         status = 'far_off'
