@@ -65,9 +65,9 @@ class Wet:
     Where a slice has no answer its numbers are NaN and its status says why: ``dry`` (no rise:
     the liquid is pushed down), ``coarse`` (a rise of less than two layers, or an end of the arcs
     within one: more layers are needed), ``saturated`` (over the top of the mesh), ``no_circle``
-    (no arc of a circle fits between this wall and the floor), ``far_off`` (known to be more
-    than about a sixth off: the energy is least elsewhere by more than ``AGREEMENT``, or the wall
-    is straight and slender, or steep and wholly wetted).
+    (no arc of a circle fits between this wall and the floor), ``far_off`` (of a kind that is
+    off by about a sixth and more: the energy is least elsewhere by more than ``AGREEMENT``, or the
+    wall is straight and slender, or steep and wholly wetted).
 
     Attributes
     ----------

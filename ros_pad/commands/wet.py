@@ -47,8 +47,8 @@ _ADVICE = {
     'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
     'saturated': 'the liquid goes over the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
-    'far_off': 'known to be more than a sixth off: --balance energy, for slender or wholly wetted'
-    ' walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
+    'far_off': 'of a kind that is off by a sixth and more: --balance energy, for slender or wholly'
+    ' wetted walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
     'far_apart': 'the surface sags in gaps this wide: ros_pad.capillary.pattern_surface; --loose'
     ' takes it as level',
 }
