@@ -412,6 +412,9 @@ def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
         if not height > 0.0 or base + height * lean < 0.01 * base:
             continue
         bodies.append((wall, Mesh.cone(base, base + height * lean, height, 24, 32)))
+    if degrees:
+        # Walls that bulge are what arcs are good for, however slender: none of these is refused.
+        assert {wet(mesh, water, 'energy', 200, 3).status[0] for _, mesh in bodies[:2]} == {'ok'}
     given = 0
     for wall, mesh in bodies:
         exact = bath_meniscus(wall=wall, liquid=water).height
@@ -423,6 +426,16 @@ def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
             assert -0.15 < off < (0.18 if balance == 'energy' else 0.34)
             given += 1
     assert given
+
+
+@pytest.mark.parametrize('degrees', [30.0, 60.0, 75.0])
+def test_cylinders_that_are_not_too_slender_are_not_refused(degrees: float):
+    water = liquid(degrees)
+    base = 0.4 * math.sqrt(0.073 / (1000.0 * 9.80665))
+    wall = Wall.cone(base, math.radians(89.9999999), 0.02)
+    exact = bath_meniscus(wall=wall, liquid=water).height
+    found = wet(Mesh.cylinder(base, 4.0 * exact, sectors=96), water, 'energy', 200, 3)
+    assert error(found.mean_height, exact) < 0.05
 
 
 def test_where_no_arc_fits_there_is_no_circle():
