@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# PYTHON_ARGCOMPLETE_OK: argcomplete, where it completes all commands, looks for this here
 """``pad`` as a shell starts it: Ctrl-C leaves no traceback, also while it is being imported."""
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -22,14 +23,24 @@ pytest.importorskip('argcomplete')
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
-def offered(line: str, folder: pathlib.Path, shell: str = 'bash') -> list[str]:
-    """Return what a shell is told, by argcomplete's protocol, with the cursor at the end."""
+def offered(
+    line: str,
+    folder: pathlib.Path,
+    shell: str = 'bash',
+    module: str = 'ros_pad.cli',
+    words: int = 1,
+) -> list[str]:
+    """Return what a shell is told, by argcomplete's protocol, with the cursor at the end.
+
+    ``words`` are those with which the line starts the command, which the shell starts as
+    ``module``.
+    """
     answer = folder / '.answer'
     answer.unlink(missing_ok=True)
     environment = {
         **os.environ,
         'PYTHONPATH': str(ROOT),
-        '_ARGCOMPLETE': '1',
+        '_ARGCOMPLETE': str(words),
         '_ARGCOMPLETE_SHELL': shell,
         '_ARGCOMPLETE_IFS': '\n',
         '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
@@ -40,7 +51,7 @@ def offered(line: str, folder: pathlib.Path, shell: str = 'bash') -> list[str]:
     }
     # Descriptor 9 is where argcomplete writes what it thinks.
     child = subprocess.run(
-        ['bash', '-c', 'exec "$0" -m ros_pad.cli 9>/dev/null', sys.executable],
+        ['bash', '-c', 'exec "$0" -m "$1" 9>/dev/null', sys.executable, module],
         cwd=folder,
         env=environment,
         capture_output=True,
@@ -149,6 +160,26 @@ def test_bash_completes_a_bag(here: pathlib.Path):
         timeout=60,
     )
     assert child.stdout.split() == ['runs/walk_2/bag'], child.stderr
+
+
+def test_argcomplete_finds_its_mark_where_the_command_begins():
+    """As it looks for it where it completes all commands: console script, and python -m."""
+    script = re.search(r"'pad = ([\w.]+):", (ROOT / 'setup.py').read_text()).group(1)
+    for module in (script, 'ros_pad'):
+        child = subprocess.run(
+            [sys.executable, '-m', 'argcomplete._check_module', module],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert child.returncode == 0, child.stderr
+
+
+def test_python_m_is_completed(tmp_path: pathlib.Path):
+    line = {'folder': tmp_path, 'module': 'ros_pad', 'words': 3}
+    assert offered('python -m ros_pad do', **line) == ['doctor']
+    assert '--json' in offered('python -m ros_pad doctor --', **line)
 
 
 def test_what_no_shell_asks_for_does_not_import_argcomplete():

@@ -126,6 +126,7 @@ def test_no_answer_is_a_failure_with_advice(
         ([*DOME, *SMALL, '--hysteresis', '60', '90'], 'advancing_angle - receding_angle'),
         ([*DOME, '--area', '1', '--slices', '4'], '--slices is for a single pad'),
         ([*DOME, '--area', '1e-6'], 'the pads overlap'),
+        ([*DOME, '--area', '1e-3', '--pads', '0'], 'pads = 0'),
         ([*DOME, '--tension', '0.05'], '--tension needs --angle'),
         ([*DOME, '--angle', '200'], 'contact_angle'),
         ([*DOME, '--layers', '1'], 'layers = 1'),

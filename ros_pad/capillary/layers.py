@@ -65,9 +65,9 @@ class Wet:
     Where a slice has no answer its numbers are NaN and its status says why: ``dry`` (no rise:
     the liquid is pushed down), ``coarse`` (a rise of less than two layers, or an end of the arcs
     within one: more layers are needed), ``saturated`` (over the top of the mesh), ``no_circle``
-    (no arc of a circle fits between this wall and the floor), ``far_off`` (known to be more
-    than about a sixth off: the energy is least elsewhere by more than ``AGREEMENT``, or the wall
-    is straight and slender, or steep and wholly wetted).
+    (no arc of a circle fits between this wall and the floor), ``far_off`` (of a kind that is
+    off by about a sixth and more: the energy is least elsewhere by more than ``AGREEMENT``, or the
+    wall is straight and slender, or steep and wholly wetted).
 
     Attributes
     ----------
@@ -443,14 +443,16 @@ def _fill(
     if strict:
         judge, nowhere = _level(cut, void, pads, liquid, 'energy')
         no_rise |= nowhere
-    gap = np.interp(place, np.arange(z.size), void / (pads * cut.outline))
+    room, shore = (
+        np.interp(place, np.arange(z.size), each) for each in (void, pads * cut.outline)
+    )
     if no_rise:
         status = 'dry'
     elif math.isnan(place) or math.isnan(judge):
         status = 'coarse'
     elif max(place, judge) >= cells:
         status = 'saturated'
-    elif strict and gap > WIDEST_GAP * _capillary_length(liquid):
+    elif strict and room > WIDEST_GAP * _capillary_length(liquid) * shore:
         status = 'far_apart'
     elif _disagree(place, judge):
         status = 'far_off'

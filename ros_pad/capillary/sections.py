@@ -213,7 +213,7 @@ class Layers(NamedTuple):
         sin(θ + a), m.
     gain : array
         The same of (cos a + cos θ)/sin a, m: surface energy that a rise sets free, over the
-        tension.
+        tension. What level faces above the floor set free, or cost, is at the layer next to them.
     """
 
     heights: Array
@@ -238,14 +238,29 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     slope = np.arctan2(np.hypot(nx, ny), -nz)
     length = np.hypot(*(end - start)[:, :2].T)
     gain = (np.cos(slope) + math.cos(angle)) / np.maximum(np.sin(slope), 1e-12)
+    free, step = _freed_by_level_faces(mesh, heights, angle), heights[1]
     return Layers(
         heights,
         _summed(layer, 0.5 * _cross(start, end), cuts.size),
         _area_below(corners, cuts),
         _summed(layer, length, cuts.size),
         _summed(layer, length * np.sin(angle + slope), cuts.size),
-        _summed(layer, length * gain, cuts.size),
+        _summed(layer, length * gain, cuts.size) + free / step,
     )
+
+
+def _freed_by_level_faces(mesh: Mesh, heights: Array, angle: float) -> Array:
+    """Return the surface energy, over the tension, that passing level faces sets free, m².
+
+    No layer cuts them: the tops of lower bodies, over which liquid has to spread, and undersides.
+    Floor and top of the mesh are no part of the wall.
+    """
+    a, b, c = mesh.points[mesh.faces].transpose(1, 0, 2)
+    z, tiny = np.stack([a, b, c])[:, :, 2], 1e-6 * mesh.height
+    level = (np.ptp(z, axis=0) < tiny) & (z.min(axis=0) > tiny) & (z.max(axis=0) < z.max() - tiny)
+    upward = 0.5 * _cross((b - a)[level], (c - a)[level])
+    nearest = np.rint(z[0, level] / heights[1]).astype(np.int64).clip(1, heights.size - 2)
+    return _summed(nearest, math.cos(angle) * np.abs(upward) - upward, heights.size)
 
 
 def centre(mesh: Mesh, height: float) -> tuple[float, float]:

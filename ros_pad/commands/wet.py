@@ -47,8 +47,8 @@ _ADVICE = {
     'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
     'saturated': 'the liquid goes over the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
-    'far_off': 'known to be more than a sixth off: --balance energy, for slender or wholly wetted'
-    ' walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
+    'far_off': 'of a kind that is off by a sixth and more: --balance energy, for slender or wholly'
+    ' wetted walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
     'far_apart': 'the surface sags in gaps this wide: ros_pad.capillary.pattern_surface; --loose'
     ' takes it as level',
 }
@@ -244,7 +244,7 @@ def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPatt
         raise InvalidInput('--hysteresis is for a single pad, which has one contact line')
     if options.slices is not None:
         raise InvalidInput('--slices is for a single pad: between many the surface is level')
-    pads, area = options.pads or 1, options.area
+    pads, area = 1 if options.pads is None else options.pads, options.area
     if options.mesh == 'pattern':
         # Each dome has a hexagon to itself, unless the area is given.
         cells = math.sqrt(0.75) * options.pitch**2 * pads

@@ -58,7 +58,8 @@ def picture(mesh: Mesh, found: Wet | WetPattern) -> Picture:
     triangles = 1e3 * mesh.points[mesh.faces]
     if isinstance(found, WetPattern):
         level = 1e3 * found.height
-        dry, wetted = split(triangles, triangles[:, :, 2] - level)
+        # Where there is no answer nothing is drawn wet, as round one pad.
+        dry, wetted = split(triangles, triangles[:, :, 2] - np.nan_to_num(level))
         return Picture(dry, wetted, _disc(mesh, found, level), np.empty((0, 3)))
     x, y, z = np.moveaxis(triangles, 2, 0)
     turn = np.arctan2(y - 1e3 * found.axis[1], x - 1e3 * found.axis[0])

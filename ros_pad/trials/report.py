@@ -74,7 +74,7 @@ _METRICS: tuple[tuple[str, str, str, Callable[[dict[str, Any]], str]], ...] = (
     ('gait cycles', '', 'Cycles walked.', lambda m: f'{m["cycles"]:.1f}'),
     ('slip path', 'm', 'Way that a foot slid under load, mean of the feet.',
      lambda m: f'{_mean(m["slip_path_m"]):.2f}'),
-    ('work lost in slip', 'J', 'Friction times way, all feet together.',
+    ('work lost in slip', 'J', 'Friction times way and moment times turn, all feet together.',
      lambda m: f'{m["dissipation_j"]:.2f}'),
     ('sideways drift', 'mm', 'Place of the body along y at the end.',
      lambda m: f'{1e3 * m["lateral_drift_m"]:z.1f}'),

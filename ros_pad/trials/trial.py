@@ -39,7 +39,7 @@ class Metrics:
     lateral_drift_m, yaw_drift_rad : float
         Of the body at the end.
     dissipation_j : float
-        Work lost in slipping feet.
+        Work lost in feet that slip or turn.
     switches : list of int
         Changes of shape.
     overload_s : list of float

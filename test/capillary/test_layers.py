@@ -412,6 +412,9 @@ def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
         if not height > 0.0 or base + height * lean < 0.01 * base:
             continue
         bodies.append((wall, Mesh.cone(base, base + height * lean, height, 24, 32)))
+    if degrees:
+        # Walls that bulge are what arcs are good for, however slender: none of these is refused.
+        assert {wet(mesh, water, 'energy', 200, 3).status[0] for _, mesh in bodies[:2]} == {'ok'}
     given = 0
     for wall, mesh in bodies:
         exact = bath_meniscus(wall=wall, liquid=water).height
@@ -423,6 +426,16 @@ def test_what_is_given_on_cones_and_domes_is_near_to_the_exact_meniscus(
             assert -0.15 < off < (0.18 if balance == 'energy' else 0.34)
             given += 1
     assert given
+
+
+@pytest.mark.parametrize('degrees', [30.0, 60.0, 75.0])
+def test_cylinders_that_are_not_too_slender_are_not_refused(degrees: float):
+    water = liquid(degrees)
+    base = 0.4 * math.sqrt(0.073 / (1000.0 * 9.80665))
+    wall = Wall.cone(base, math.radians(89.9999999), 0.02)
+    exact = bath_meniscus(wall=wall, liquid=water).height
+    found = wet(Mesh.cylinder(base, 4.0 * exact, sectors=96), water, 'energy', 200, 3)
+    assert error(found.mean_height, exact) < 0.05
 
 
 def test_where_no_arc_fits_there_is_no_circle():
@@ -547,6 +560,57 @@ def test_many_domes_never_hold_liquid_lower_than_one(dome: Mesh, balance: str):
         assert lowest.height < 0.6 * row['exact_bath']
     assert 'far_apart' in said
     assert 'ok' in said or balance != 'energy'
+
+
+def boxes(spans) -> Mesh:
+    """Return boxes of 1 mm² in a row, each from one height to another."""
+    unit = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+    faces += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    points = [
+        np.column_stack([1e-3 * (x + 2 * k), 1e-3 * y, low + (high - low) * z])
+        for k, (low, high) in enumerate(spans)
+        for x, y, z in [unit.T]
+    ]
+    return Mesh(
+        np.concatenate(points), np.concatenate([np.add(faces, 8 * k) for k in range(len(spans))])
+    )
+
+
+@pytest.mark.parametrize('area', [6e-6, 12e-6])
+@pytest.mark.parametrize('degrees', [20.0, 60.0, 85.0])
+@pytest.mark.parametrize(
+    'spans',
+    [
+        ((0.0, 5e-4), (0.0, 9e-3)),  # a lower body, over whose top liquid has to spread
+        ((0.0, 2e-3), (0.0, 3e-3), (0.0, 9e-3)),
+        ((0.0, 9e-3), (1.5e-3, 9e-3)),  # one that does not reach the floor
+        ((0.0, 9e-3), (1.5e-3, 2.2e-3), (0.0, 0.7e-3)),
+    ],
+)
+def test_level_surfaces_between_bodies_of_any_height_have_the_least_energy(spans, degrees, area):
+    water = liquid(degrees)
+    z = np.linspace(0.0, 9e-3, 9001)
+    inside, wall, level = np.zeros((3, z.size))
+    for low, high in spans:
+        inside += 1e-6 * ((z > low) & (z < high))
+        wall += 4e-3 * (np.clip(z, low, high) - low)
+        level += 1e-6 * ((z > high).astype(float) + ((z > low) & (low > 0.0)))
+    weight = 1000.0 * 9.80665 * np.cumsum(z * (area - inside)) * z[1]
+    wetting = math.cos(water.angle) * (wall + level)
+    energy = weight + water.surface_tension * (area - inside - wetting)
+    expected = z[1:-1][np.argmin(energy[1:-1])]
+    for layers in (200, 1000):
+        found = wet_pattern(boxes(spans), water, area, layers=layers, strict=False)
+        height = 9e-3 if found.status == 'saturated' else found.height
+        assert height == pytest.approx(expected, abs=2.0 * 9e-3 / layers)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('balance', BALANCES)
+def test_layers_that_cut_no_body_are_counted_without_a_warning(balance: str):
+    mesh = boxes([(0.0, 1e-3), (2e-3, 3e-3)])
+    assert wet_pattern(mesh, liquid(60.0), 1.5e-6, 1, balance).status in STATUSES
 
 
 def test_one_mesh_of_many_domes_is_many_meshes_of_one():

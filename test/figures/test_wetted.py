@@ -49,6 +49,15 @@ def test_what_is_wet_ends_at_the_line():
     assert reach == pytest.approx(1e3 * found.floor_radii[0], rel=1e-6)
 
 
+def test_nothing_is_wet_where_there_is_no_answer():
+    apart, over = wet_pattern(DOME, LIQUID, 1e-3), wet(DOME, Liquid(0.073, 0.073), slices=12)
+    assert (apart.status, over.status[0]) == ('far_apart', 'saturated')
+    for found in (apart, over):
+        drawn = wetted.picture(DOME, found)
+        assert drawn.wet[:, :, 2].max() == 0.0  # what stands on the floor
+        assert not drawn.surface.size
+
+
 @pytest.mark.parametrize('height', [0.5e-3, 5e-3, 50e-3])
 def test_pads_of_any_height_are_drawn_whole(height: float, tmp_path: pathlib.Path):
     mesh = Mesh.cylinder(1.2e-3, height)
