@@ -80,7 +80,7 @@ def nodes(context: LaunchContext) -> list[Node]:
         )
 
     use_sim_time, simulate = flag('use_sim_time'), flag('simulate')
-    scene = text('scene') if simulate else ''
+    scene = text('scene')
     # The recorder first and the simulator last: a walk is recorded from its first step on.
     chosen = []
     if flag('record'):

@@ -52,7 +52,9 @@ def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
     cone = ['wet', 'cone', '--contact-radius', '1e-3', '--top-radius', '2e-3', '--height', '4e-3']
     assert asked(cone, capsys)['height_m'] > 0.0
     cylinder = ['wet', 'cylinder', '--radius', '0.5e-3', '--height', '0.04', '--angle', '0']
-    alone = asked([*cylinder, '--loose'], capsys)  # slender: no height is given
+    assert cli.main(cylinder) == 1  # slender: no height is given
+    assert 'bath_meniscus; --loose' in capsys.readouterr().err
+    alone = asked([*cylinder, '--loose'], capsys)
     # Jurin in the void between pillars: half the area, so as in a tube of their radius.
     area = str(2.0 * math.pi * 0.5e-3**2)
     between = asked([*cylinder, '--area', area], capsys)

@@ -16,6 +16,7 @@ from ros_pad.contact.pad import Array
 from ros_pad.errors import MeshError
 
 CREASE = math.radians(40.0)  # facets that meet at less stand for one smooth wall
+_AT_ONCE = 2_000_000  # triangles times layers: bounds the memory
 _INSIDE = 1e-9  # of the height: lowest and highest cut, so far from floor and top
 
 
@@ -233,19 +234,30 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     upright = np.flatnonzero(np.ptp(corners[:, :, 2], axis=1) > 0.0)
     corners = corners[upright]
     normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
-    start, end, layer = _outlines(np.concatenate([corners, normals], axis=2), cuts)
+    wall = np.concatenate([corners, normals], axis=2)
+    pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // _AT_ONCE))
+    areas, wetted, outline, pull, gain = np.concatenate(
+        [_cut_level(wall, piece, angle) for piece in pieces], axis=1
+    )
+    gain += _freed_by_level_faces(mesh, heights, angle) / heights[1]
+    return Layers(heights, areas, wetted, outline, pull, gain)
+
+
+def _cut_level(wall: Array, cuts: Array, angle: float) -> Array:
+    """Return the rows of :class:`Layers` after the heights, for walls with their normals."""
+    start, end, layer = _outlines(wall, cuts)
     nx, ny, nz = 0.5 * (start + end)[:, 2:].T
     slope = np.arctan2(np.hypot(nx, ny), -nz)
     length = np.hypot(*(end - start)[:, :2].T)
     gain = (np.cos(slope) + math.cos(angle)) / np.maximum(np.sin(slope), 1e-12)
-    free, step = _freed_by_level_faces(mesh, heights, angle), heights[1]
-    return Layers(
-        heights,
-        _summed(layer, 0.5 * _cross(start, end), cuts.size),
-        _area_below(corners, cuts),
-        _summed(layer, length, cuts.size),
-        _summed(layer, length * np.sin(angle + slope), cuts.size),
-        _summed(layer, length * gain, cuts.size) + free / step,
+    return np.stack(
+        [
+            _summed(layer, 0.5 * _cross(start, end), cuts.size),
+            _area_below(wall[:, :, :3], cuts),
+            _summed(layer, length, cuts.size),
+            _summed(layer, length * np.sin(angle + slope), cuts.size),
+            _summed(layer, length * gain, cuts.size),
+        ]
     )
 
 

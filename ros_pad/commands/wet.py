@@ -47,8 +47,10 @@ _ADVICE = {
     'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
     'saturated': 'the liquid goes over the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
-    'far_off': 'of a kind that is off by a sixth and more: --balance energy, for slender or wholly'
-    ' wetted walls ros_pad.capillary.bath_meniscus; --loose takes it as it is',
+    'far_off': 'no equilibrium of this balance on this wall, or no arc: --balance energy; --loose'
+    ' takes it as it is',
+    'far_off energy': 'on slender or wholly wetted walls arcs are off by a sixth and more:'
+    ' ros_pad.capillary.bath_meniscus; --loose takes it as it is',
     'far_apart': 'the surface sags in gaps this wide: ros_pad.capillary.pattern_surface; --loose'
     ' takes it as level',
 }
@@ -178,7 +180,8 @@ def run(options: argparse.Namespace) -> int:
     worst = Counter(np.atleast_1d(found.status).tolist())
     worst.pop('ok', None)
     name, _ = worst.most_common(1)[0]
-    return complain(f'no height: status {values["status"]}: {_ADVICE[name]}', 1)
+    advice = _ADVICE.get(f'{name} {found.balance}', _ADVICE[name])
+    return complain(f'no height: status {values["status"]}: {advice}', 1)
 
 
 def _liquid(options: argparse.Namespace) -> Liquid:

@@ -12,9 +12,12 @@ from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from ros_pad.capillary import Face
 from ros_pad.capillary import Mesh
 from ros_pad.capillary import Wall
 from ros_pad.capillary import bath_meniscus
+from ros_pad.capillary import pattern_surface
+from ros_pad.capillary import sections
 from ros_pad.capillary import wet
 from ros_pad.capillary import wet_pattern
 from ros_pad.capillary.layers import BALANCES
@@ -560,6 +563,28 @@ def test_many_domes_never_hold_liquid_lower_than_one(dome: Mesh, balance: str):
         assert lowest.height < 0.6 * row['exact_bath']
     assert 'far_apart' in said
     assert 'ok' in said or balance != 'energy'
+
+
+def test_the_surface_between_pads_is_level_as_long_as_a_height_is_given():
+    tall = Mesh.dome(R, B, 2.9e-3, rings=48, sectors=72)
+    seen = []
+    for pitch in (4.4e-3, 6e-3, 7e-3):
+        drawn = pattern_surface(
+            Face.of_wall(Wall.dome(R, B, 2.9e-3)), WATER, pitch, pressure=0.0, sectors=24
+        )
+        exact = drawn.vertices[drawn.lines[0].vertices, 2].mean()
+        found = wet_pattern(tall, WATER, math.sqrt(0.75) * pitch**2)
+        seen.append(found.status)
+        if found.status == 'ok':
+            assert error(found.height, exact) < 0.08
+    assert seen == ['ok', 'ok', 'far_apart']
+
+
+def test_large_patterns_are_cut_piece_by_piece(dome: Mesh, monkeypatch: pytest.MonkeyPatch):
+    whole = sections.layered(dome, 200, 1.0)
+    monkeypatch.setattr(sections, '_AT_ONCE', 20_000)
+    for values, pieces in zip(whole, sections.layered(dome, 200, 1.0), strict=True):
+        assert pieces == pytest.approx(values, rel=1e-12, abs=1e-15)
 
 
 def boxes(spans) -> Mesh:
