@@ -11,7 +11,6 @@ import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,13 +18,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ros_pad.capillary.crossings import Indices
 from ros_pad.capillary.crossings import first_overlap
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
-
-Indices: TypeAlias = npt.NDArray[np.int64]
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
 LARGEST = 0.5  # m: beyond this a pad was surely drawn in millimetres

@@ -170,8 +170,11 @@ def test_boxes_with_faces_in_common_planes_overlap(low, high, turn: float, kind)
 
 def test_prisms_whose_sides_cross_in_edges_of_both_overlap():
     one = Mesh.cylinder(1e-3, 2e-3, 1, 6)
-    overlap(one, moved(one, 1e-3))
-    overlap(one, moved(Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3))
+    for other, top in ((one, 2e-3), (Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3)):
+        x, y, z = overlap(one, moved(other, 1e-3))
+        assert 0.0 <= x <= 1e-3  # between both axes
+        assert abs(y) < 0.9e-3
+        assert 0.0 <= z <= top
 
 
 OCTAHEDRON = np.array(
@@ -229,7 +232,8 @@ def test_boxes_that_touch_do_not_overlap(low, high, kind):
             c, s = math.cos(turn), math.sin(turn)
             there = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
             there[:, :2] += [shift, -0.7 * shift]
-            Mesh(there.astype(kind).astype(float), faces)
+            both = Mesh(there.astype(kind).astype(float), faces)
+            assert both.volume == pytest.approx(1e-9 + np.prod(np.subtract(high, low)), rel=1e-3)
 
 
 def test_walls_of_slim_triangles_that_touch_do_not_overlap():
@@ -271,9 +275,12 @@ def test_domes_whose_rims_touch_do_not_overlap(sectors: int):
         azimuth = 2.0 * math.pi * k / sectors
         d = outer(dome, azimuth) + outer(dome, azimuth + math.pi)
         points, faces = arrays(dome, moved(dome, d * math.cos(azimuth), d * math.sin(azimuth)))
-        Mesh(points, faces)
-        Mesh(points.astype(np.float32).astype(float), faces)
-    Mesh.dome_pattern(19, 2.0 * R * (1.0 + 1e-12), R, B, rings=4, sectors=sectors)
+        for kind in (float, np.float32):
+            both = Mesh(points.astype(kind).astype(float), faces)
+            assert both.volume == pytest.approx(2.0 * dome.volume, rel=1e-4)
+    few = Mesh.dome(R, B, rings=4, sectors=sectors)
+    many = Mesh.dome_pattern(19, 2.0 * R * (1.0 + 1e-12), R, B, rings=4, sectors=sectors)
+    assert many.volume == pytest.approx(19.0 * few.volume, rel=1e-9)
 
 
 SHAPES = [

@@ -130,6 +130,8 @@ def test_a_link_that_was_lost_comes_back_with_the_device(until, tmp_path):
         until(lambda: emulator._ends is None)
         device.faults.clear()
         until(lambda: os.path.exists(link))
+        assert os.readlink(link).startswith('/dev/')
+    assert not os.path.lexists(link)
 
 
 def test_words_of_an_alicat():
