@@ -14,24 +14,42 @@ unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help run test test-matrix clean FORCE
+.PHONY: help run test test-all lint studies test-matrix clean FORCE
 
 help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
-	@echo 'make test   ruff, mypy and every test'
+	@echo 'make test   the core, the nodes, one trial of each kind: a few minutes'
+	@echo 'make test-all  ruff, mypy, every test, one row of the matrix; what CI runs'
 	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
+	@echo 'make studies  the evidence: charts and tables, written to runs'
 	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
-	@echo 'run and test make .venv if need be; PYTHON=python3.12 chooses its Python.'
+	@echo 'All make .venv if need be; PYTHON=python3.12 chooses its Python.'
 
 run: .venv/ros.stamp
 	@$(BIN)/pad run hexapod_patches $(ARGS)
 
 test: .venv/test.stamp
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime and not slow' \
+	  --ignore test/studies $(ARGS)
+
+test-all: .venv/test.stamp lint
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime' $(ARGS) || $(NONE_CHOSEN)
+	$(BIN)/python -m pytest -m realtime $(ARGS) || $(NONE_CHOSEN)
+	@$(MAKE) --no-print-directory test-matrix MATRIX=$(CI_ROW) \
+	  MARKS='not realtime and not slow' CORE_TESTS='$(CI_ROW_TESTS)'
+
+lint: .venv/test.stamp
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
 	$(BIN)/python -m mypy
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime' $(ARGS) || $(NONE_CHOSEN)
-	$(BIN)/python -m pytest -m realtime $(ARGS) || $(NONE_CHOSEN)
+
+STUDIES := contact meniscus capillary walk stability estimator hose
+
+# What takes minutes at most; `python -m studies` lists the longer ones.
+studies: .venv/test.stamp
+	@for study in $(STUDIES); do \
+	  $(BIN)/python -m studies $$study --out runs/studies || exit; done
+	@$(BIN)/python -m studies thesis --out runs/studies/thesis.html --force
 
 # pytest's status when ARGS chose tests of one of the two runs only. What is measured against the
 # clock has the processors to itself.
@@ -40,9 +58,14 @@ NONE_CHOSEN := [ $$? -eq 5 ]
 # A row is a version of Python, alone or with what it is to run on. Rows without ROS test the core,
 # and so that it needs none; `oldest` is the NumPy and SciPy of Ubuntu 24.04; `jazzy` and `kilted`
 # test the nodes. `make test-matrix MATRIX=3.12-kilted` runs one row.
+# `test-all` runs CI_ROW on physics, estimation, control and drivers: what Ubuntu 24.04 has, the home
+# of ROS 2 Jazzy. Where its Python is missing, the summary says so.
+CI_ROW := 3.12-oldest
+CI_ROW_TESTS := test/contact test/estimation test/control test/regulators test/simulation
+MARKS := not realtime
 MATRIX ?= 3.11 3.12 3.13 3.12-oldest 3.12-jazzy 3.13-jazzy 3.12-kilted
 CORE_TESTS := test --ignore test/nodes
-NODE_TESTS := test/nodes test/trials/test_bag.py test/trials/test_recorded.py test/test_cli.py
+NODE_TESTS := test/nodes test/bags test/trials/test_recorded.py test/test_cli.py
 
 test-matrix:
 	@mkdir -p .matrix && : > .matrix/summary
@@ -66,7 +89,7 @@ define MATRIX_ROW
   echo "$$row: installing $$packages into .matrix/$$row ..."; \
   if PYENV_VERSION=$$version python$$version -m venv .matrix/$$row && \
      $$python -m pip install --quiet --editable $$packages && \
-     $$python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime' $$tests $(ARGS); \
+     $$python -m pytest -n $(JOBS) --dist loadfile -m '$(MARKS)' $$tests $(ARGS); \
   then verdict=passed; else verdict=FAILED; fi; \
   echo "$$row: $$verdict, with $$($$python -m pip freeze | grep -iE '^(numpy|scipy|rclpy)==' \
     | xargs)" >> .matrix/summary
@@ -82,7 +105,7 @@ STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python
 	@echo 'Installing ros_pad[$(EXTRAS)] with ROS 2 Jazzy into .venv:' \
 	  'about 600 MB, one minute on a fast line ...'
 	@$(BIN)/python -m pip install --quiet --editable '.[$(EXTRAS)]' || { \
-	  echo 'ros_pad was not installed: pip says why above. Can this machine reach pypi.org?'; \
+	  echo 'ros_pad was not installed: pip says why above. Can this machine reach the Python package index?'; \
 	  exit 1; }
 	@pwd > .venv/ros.stamp
 	@pwd > $@

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start the nodes of ros_pad, each in a process of its own, in real time.
+"""Start the nodes of ros_pad, each in a separate process, in real time.
 
-``ros2 launch ros_pad ros_pad.launch.py --show-args`` lists the arguments. What is not among them
-is set in ``params_file``: backend and ceiling of the regulators, foot, load, policy.
+``ros2 launch ros_pad ros_pad.launch.py --show-args`` lists the arguments. Everything else is set
+in ``params_file``: backend and ceiling of the regulators, foot, load, policy.
 """
 
 from launch import LaunchContext
@@ -20,32 +20,32 @@ ARGUMENTS = {
     'namespace': ('', 'Namespace of every node and topic, such as robot_1; empty: none. [text]'),
     'params_file': (
         '',
-        'Parameters of the nodes in SI units, a copy of config/params.yaml; empty: that file'
-        ' itself. [path]',
+        'File with the parameters of the nodes in SI units, a copy of config/params.yaml; empty:'
+        ' config/params.yaml itself. [path]',
     ),
-    'simulate': ('true', 'Start a simulator; false where a robot takes its place. [true, false]'),
+    'simulate': ('true', 'Start a simulator; false for a real robot. [true, false]'),
     'scene': (
         '',
-        'Scene that the simulator walks, and whose hose and faults simulated regulators have;'
-        ' empty: those of params_file. [name or path]',
+        'Scene of the simulator, whose hose and faults simulated regulators have too; empty: the'
+        ' scenes in params_file. [name or path]',
     ),
     'record': ('true', 'Record every topic into a bag. [true, false]'),
     'folder': (
         '',
-        'Folder of the bag, which must not exist; empty: that of params_file, or named after the'
-        ' time, where launch was called. [path]',
+        'Folder of the bag, which must not exist; empty: the folder in params_file or, if that is'
+        ' empty too, a new one where launch was called, named after the time. [path]',
     ),
     'use_sim_time': (
         'false',
-        'Take the time from /clock, which the simulator publishes then. Regulators other than'
-        ' simulated ones refuse it. [true, false]',
+        'Use the time of /clock, which the simulator then publishes. With other backends than'
+        ' simulated, the regulator node refuses it. [true, false]',
     ),
 }
 """Default and description of each launch argument."""
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return what ``ros2 launch`` carries out."""
+    """Return the launch description."""
     arguments = [
         DeclareLaunchArgument(name, default_value=default, description=description)
         for name, (default, description) in ARGUMENTS.items()
@@ -54,7 +54,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes that the arguments ask for."""
+    """Return the nodes that the arguments select."""
 
     def text(name: str) -> str:
         return LaunchConfiguration(name).perform(context)
@@ -67,11 +67,11 @@ def nodes(context: LaunchContext) -> list[Node]:
             package='ros_pad',
             executable=executable,
             namespace=text('namespace'),
-            # What is empty is left to the file; of two values the later one counts.
+            # Later values replace earlier ones; an empty argument keeps the value of the file.
             parameters=[
                 text('params_file') or str(shared_folder() / 'params.yaml'),
                 {
-                    name: ParameterValue(value, value_type=type(value))  # '1' is a name here
+                    name: ParameterValue(value, value_type=type(value))  # '1' stays text
                     for name, value in parameters.items()
                     if value != ''
                 },

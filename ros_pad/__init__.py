@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Feet that change shape: contact model, estimation, control, simulation and ROS 2 nodes."""
+"""Adaptive feet with inflatable pads: contact model, estimation, control, simulation, ROS 2."""
 
 __version__ = '0.1.0'

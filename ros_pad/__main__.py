@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# PYTHON_ARGCOMPLETE_OK: argcomplete, where it completes all commands, looks for this here
-"""``pad`` as a shell starts it: Ctrl-C leaves no traceback, also while it is being imported."""
+# PYTHON_ARGCOMPLETE_OK: argcomplete searches for this marker if it completes all commands
+"""Start ``pad`` from a shell, so that Ctrl-C leaves no traceback even during the imports."""
 
 from __future__ import annotations
 
 import sys
 
-INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
+INTERRUPTED = 130  # exit status after Ctrl-C, the same as in shells
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ``pad`` command.
+"""Parse and run the ``pad`` command.
 
-Its commands import much, which takes a second: only the one that is asked for is imported.
+Importing all commands takes about a second, so only the module of the given command is imported.
 """
 
 from __future__ import annotations
@@ -16,47 +16,43 @@ from collections.abc import Sequence
 from typing import Any
 
 import ros_pad
-from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import Help
-from ros_pad.commands.command import complain
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.commands.command import exit_status
 
 COMMANDS = {
     'run': 'walk a scene in closed loop: bag, report, comparison of policies',
     'scenes': 'list the scenes',
-    'sweep': 'walk scenes x policies x seeds x parameters on all cores or a cluster',
+    'sweep': 'run scenes x policies x seeds x parameters on all cores or a cluster',
     'report': "write the page of a bag, of a sweep, or of the thesis' figures",
-    'replay': 'feed a bag through estimators and controller once more, and compare',
-    'bag': 'say what is in a bag, or repair one',
-    'contact': 'shape, ring of liquid and force limits of one pad',
-    'calibrate': 'fit a foot to what was measured',
-    'design': 'pads on a sole: how many, what they carry, at which pressure',
-    'wet': 'liquid round a meshed pad: rise, pressure and pull',
-    'chart': 'measure time and error of every method, here and now',
-    'emulate': 'a pressure regulator that is not there, on a pseudo-terminal',
-    'doctor': 'check Python, ROS 2, serial ports and folders, and say what to do',
+    'replay': 'run estimators and controller again on a bag, and compare',
+    'bag': 'list the content of a bag, or repair one',
+    'contact': 'compute shape, ring of liquid and force limits of one pad',
+    'calibrate': 'fit a foot to measurements',
+    'design': 'compute number, pressure and load of the pads on a sole',
+    'wet': 'compute rise, pressure and force of the liquid round a meshed pad',
+    'chart': 'measure time and error of every method on this machine',
+    'emulate': 'emulate a pressure regulator on a pseudo-terminal',
+    'doctor': 'check Python, ROS 2, serial ports and folders, and advise',
 }
-"""The modules of ``ros_pad.commands``, with what ``pad --help`` says of them, in its order."""
+"""Summary of each command, by the name of its module in ``ros_pad.commands``, in the order of
+``pad --help``."""
 
 _DESCRIPTION = (
-    'Shape-changing feet for legged robots: simulate, record, look. '
+    'Feet with inflatable pads for legged robots: simulate, record, analyse. '
     'All values are in SI units; pressures are gauge.'
 )
 _EPILOG = """\
 exit status:
   0    done
-  1    a failure at run time, or a difference: no such shape, a silent device, a full disk;
-       a replay that differs, trials that failed, a problem that pad doctor found
-  2    bad usage or input: an option, scene, foot, table or bag that is not there, or is none
+  1    a failure at run time (such as no equilibrium, a device that does not answer, a full
+       disk), a replay that differs, failed trials, or a problem that pad doctor found
+  2    bad usage or input: an option, scene, foot, table or bag that is missing or not valid
   130  stopped by Ctrl-C or SIGTERM
 
 example:
   pad run hexapod_patches --seed 3
 
-pad COMMAND --help says more, with examples."""
+pad COMMAND --help shows details and examples."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,31 +61,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 a failure at run time or a difference, 2 bad usage or input, 130 stopped by
-        Ctrl-C.
+        0 done; 1 a failure at run time, or a replay that differs; 2 bad usage or input; 130
+        stopped by Ctrl-C or SIGTERM.
     """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _stop)
-    try:
-        if '_ARGCOMPLETE' in os.environ:
-            return _complete()
-        words = sys.argv[1:] if arguments is None else arguments
-        options = parser(_command_in(words)).parse_args(words)
-        return int(options.command(options))
-    except BrokenPipeError:
-        # Whoever read the output has seen enough; Python must not complain of it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (ConfigError, InvalidInput) as error:
-        return complain(error, 2)
-    except BagError as error:
-        # A bag that cannot be read is bad input; one that the system refuses to write or to open
-        # is a failure.
-        return complain(error, 1 if isinstance(error.__cause__, OSError) else 2)
-    except (PadError, OSError) as error:
-        return complain(error, 1)
-    except KeyboardInterrupt:
-        return complain('stopped', INTERRUPTED)
+    return exit_status(lambda: _run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    if '_ARGCOMPLETE' in os.environ:
+        return _complete()
+    words = sys.argv[1:] if arguments is None else arguments
+    options = parser(_command_in(words)).parse_args(words)
+    return int(options.command(options))
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -98,7 +83,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     Parameters
     ----------
     command : str, optional
-        The only one whose arguments are wanted; of the others the names are there.
+        Command whose arguments are added; the others get only name and summary.
     """
     top = argparse.ArgumentParser(
         prog='pad', description=_DESCRIPTION, epilog=_EPILOG, formatter_class=Help
@@ -118,7 +103,7 @@ def _command_in(words: Sequence[str]) -> str | None:
 
 
 def _complete() -> int:
-    """Answer a shell that asks how the line may go on."""
+    """Print the completions of the command line that a shell passes to argcomplete."""
     import argcomplete
 
     from ros_pad.commands import completion

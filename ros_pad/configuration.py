@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strict reading of the YAML files under ``config/``.
+"""Check values, and read the YAML files under ``config/`` strictly.
 
-A :class:`Table` is one mapping of such a file. Each value is taken by name with its unit and
-range; what was not taken by the end is an unknown key. Nothing is guessed and nothing is clamped.
+Every value from outside (argument, YAML key, ROS parameter) is checked by :func:`quantity`,
+:func:`number`, :func:`integer`, :func:`text` or :func:`choice`. A :class:`Setting` describes one
+named value. A :class:`Table` is one mapping of a YAML file; keys that are never read are an error.
 """
 
 from __future__ import annotations
@@ -17,20 +18,221 @@ from collections.abc import Iterator
 from collections.abc import Sequence
 from contextlib import contextmanager
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import yaml
 
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 
 _REQUIRED: Any = object()
+
+_REPR = reprlib.Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
+_REPR.maxlist = _REPR.maxtuple = 12
+_REPR.maxlevel = 2
+
+
+def shown(value: Any) -> str:
+    """Return a value for an error message, shortened where YAML aliases make it very long."""
+    return _REPR.repr(value)
+
+
+def _not_allowed(name: str, value: Any, allowed: str) -> InvalidInput:
+    return InvalidInput(f'{name} = {shown(value)} is not allowed: {allowed} is needed')
+
+
+def _range(what: str, low: float, high: float, unit: str, above: bool = False) -> str:
+    """Return an allowed range in words, for example ``a number from 1 to 5 N``."""
+    start, end = f'{low:.10g}', f'{high:.10g}'
+    if low > -math.inf and high < math.inf:
+        words = (
+            f'{what} above {start} and up to {end}' if above else f'{what} from {start} to {end}'
+        )
+    else:
+        words = what.replace('a number', 'a finite number')
+        if low > -math.inf:
+            words += f' above {start}' if above else f' of at least {start}'
+        elif high < math.inf:
+            words += f' of at most {end}'
+    return f'{words} {unit}'.rstrip()
+
+
+def quantity(
+    name: str,
+    value: npt.ArrayLike,
+    unit: str,
+    low: float = 0.0,
+    high: float = math.inf,
+    above: bool = False,
+) -> npt.NDArray[np.float64]:
+    """Check that a physical quantity is finite and in range.
+
+    Parameters
+    ----------
+    name, unit : str
+        Name and unit for the error message.
+    value : number or array of numbers
+        Numbers of any shape.
+    low, high : float
+        Allowed range, both ends included.
+    above : bool
+        Exclude the lower end.
+
+    Returns
+    -------
+    array
+        The value as float64; for a scalar a NumPy scalar, which is much faster than a 0-d array.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not allowed; the message has the first such value, its unit and the range.
+    """
+    if type(value) is float and low < value <= high and value != math.inf:
+        return np.float64(value)
+    bad: Any = value
+    with suppress(TypeError, ValueError):  # raised for lists with rows of different lengths
+        numbers = np.asarray(value)
+        if numbers.dtype.kind in 'iuf':
+            floats = numbers.astype(np.float64)
+            good = np.isfinite(floats) & (floats <= high)
+            good &= floats > low if above else floats >= low
+            if good.all():
+                return floats[()]
+            bad = numbers[~good].flat[0].item()
+    raise _not_allowed(name, bad, _range('a number', low, high, unit, above))
+
+
+def number(
+    name: str,
+    value: float,
+    unit: str,
+    low: float = 0.0,
+    high: float = math.inf,
+    above: bool = False,
+) -> float:
+    """Check one number as :func:`quantity` does; refuse lists and arrays, except of shape ()."""
+    # A list is refused unconverted, because one with YAML aliases can have millions of elements.
+    if isinstance(value, (int, float, np.number, np.ndarray)):
+        checked = quantity(name, value, unit, low, high, above)
+        if not np.ndim(checked):
+            return float(checked)
+    raise _not_allowed(name, value, _range('a number', low, high, unit, above))
+
+
+def integer(name: str, value: int, low: float = 0, high: float = math.inf, unit: str = '') -> int:
+    """Check that a value is a whole number in [low, high]; raise `InvalidInput` if not."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not low <= value <= high:
+        raise _not_allowed(name, value, _range('a whole number', low, high, unit))
+    return int(value)
+
+
+def text(name: str, value: str) -> str:
+    """Check that a value is a string; raise `InvalidInput` if not."""
+    if not isinstance(value, str):
+        raise _not_allowed(name, value, 'text')
+    return value
+
+
+def choice(name: str, value: str, allowed: Sequence[str]) -> str:
+    """Check that a value is one of the allowed words; raise `InvalidInput` if not."""
+    if not isinstance(value, str) or value not in allowed:
+        raise _not_allowed(name, value, f'one of {", ".join(allowed)}')
+    return value
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Description of one setting, from which checks, ROS descriptors and documentation are made.
+
+    Attributes
+    ----------
+    name : str
+        Name of the parameter or YAML key.
+    default : bool, int, float, str, list of int, or one of the types bool, int, float, str, list
+        Default value, whose type is the type of the setting. If it is itself a type, there is no
+        default: the setting is required.
+    description : str
+        One sentence.
+    unit : str
+        Empty for text, counts and ratios.
+    low, high : float
+        Allowed range of a number, both ends included.
+    choices : tuple of str
+        Allowed words of a text; empty for any text.
+    """
+
+    name: str
+    default: Any
+    description: str
+    unit: str = ''
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+
+    @property
+    def value_type(self) -> type:
+        """Type of the values: bool, int, float, str or list."""
+        return self.default if isinstance(self.default, type) else type(self.default)
+
+    @property
+    def allowed(self) -> str:
+        """The allowed values in words, for example ``a number from 1 to 5 N``."""
+        if self.choices:
+            return f'one of {", ".join(self.choices)}'
+        if self.value_type is list:
+            return _range('a list of different whole numbers', self.low, self.high, self.unit)
+        if self.value_type is int:
+            return _range('a whole number', self.low, self.high, self.unit)
+        if self.value_type is float:
+            return _range('a number', self.low, self.high, self.unit)
+        return 'true or false' if self.value_type is bool else 'text'
+
+    def accept(self, value: Any) -> Any:
+        """Return a value as the type of this setting; a whole number is accepted as a float.
+
+        Raises
+        ------
+        InvalidInput
+            When the value has another type or is outside the allowed values.
+        """
+        if self.value_type is float:
+            return number(self.name, value, self.unit, self.low, self.high)
+        if self.value_type is int:
+            return integer(self.name, value, self.low, self.high, self.unit)
+        if self.choices:
+            return choice(self.name, value, self.choices)
+        if self.value_type is str:
+            return text(self.name, value)
+        if self.value_type is bool:
+            good = isinstance(value, bool)
+        else:
+            good = isinstance(value, list) and all(map(self._holds, value))
+            good = good and len(set(value)) == len(value) > 0
+        if not good:
+            raise _not_allowed(self.name, value, self.allowed)
+        return value
+
+    def _holds(self, element: Any) -> bool:
+        return type(element) is int and self.low <= element <= self.high
 
 
 def shared_folder() -> pathlib.Path:
     """Return the folder with ``feet/``, ``scenes/`` and ``params.yaml``.
 
-    In a source tree (also an editable install) that is ``config/`` beside the package; in an
-    installed workspace it is ``share/ros_pad/config`` of the first ament prefix that has it.
+    In a source tree (also an editable install) this is ``config/`` beside the package. Otherwise
+    it is ``share/ros_pad/config`` in the first folder of ``AMENT_PREFIX_PATH`` that has it, or
+    else in ``sys.prefix``.
+
+    Raises
+    ------
+    ConfigError
+        When no such folder is found.
     """
     source = pathlib.Path(__file__).resolve().parent.parent / 'config'
     prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
@@ -39,21 +241,30 @@ def shared_folder() -> pathlib.Path:
         if (folder / 'scenes').is_dir():
             return folder
     looked = ', '.join(str(f) for f in [source, *installed])
-    raise ConfigError(f'no config folder of ros_pad found; looked in {looked}')
+    raise ConfigError(
+        f'no config folder of ros_pad found; looked in {looked}: source setup.bash of the'
+        ' workspace in which ros_pad is installed'
+    )
 
 
 def names(kind: str) -> list[str]:
-    """Return the sorted names of the shipped files of a kind (``feet`` or ``scenes``)."""
-    return sorted(path.stem for path in (shared_folder() / kind).glob('*.yaml'))
-
-
-def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
-    """Return the file for a shipped name, or for a path that ends in ``.yaml``.
+    """Return the sorted names of the shipped files of a kind (``feet`` or ``scenes``).
 
     Raises
     ------
     ConfigError
-        When there is no such file; lists the shipped names and the nearest one.
+        When the folder of the shipped files is not found.
+    """
+    return sorted(path.stem for path in (shared_folder() / kind).glob('*.yaml'))
+
+
+def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
+    """Return the file for a shipped name, or for a path that ends in ``.yaml`` or ``.yml``.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such file; for a name, the message lists the shipped ones.
     """
     text = os.fspath(name_or_path)
     if text.endswith(('.yaml', '.yml')):
@@ -73,7 +284,7 @@ def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
 
 
 class _Loader(yaml.SafeLoader):
-    """The safe loader, but a key that is there twice is an error, not the last one's win."""
+    """The safe loader of PyYAML, which raises an error for a key that occurs twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -82,20 +293,10 @@ class _Loader(yaml.SafeLoader):
                 continue
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f'key {key.value!r} is there twice', key.start_mark
+                    None, None, f'key {key.value!r} occurs twice', key.start_mark
                 )
             seen.add(key.value)
         return super().construct_mapping(node, deep)
-
-
-_REPR = reprlib.Repr()
-_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
-_REPR.maxlevel = 3
-
-
-def shown(value: Any) -> str:
-    """Return a value as an error is to show it: in short where aliases of YAML make it vast."""
-    return _REPR.repr(value)
 
 
 class Table:
@@ -106,7 +307,12 @@ class Table:
     values : mapping
         The parsed mapping.
     origin : str
-        Where it came from, used at the head of every message (file, then key path).
+        File, and keys that lead to the mapping: the start of every error message.
+
+    Raises
+    ------
+    ConfigError
+        When ``values`` is not a mapping.
     """
 
     def __init__(self, values: Any, origin: str) -> None:
@@ -118,7 +324,7 @@ class Table:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Table:
-        """Read a YAML file; a syntax error names file, line and column."""
+        """Read a YAML file; raise `ConfigError`, with line and column, if it is not valid."""
         try:
             text = pathlib.Path(path).read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
@@ -127,7 +333,7 @@ class Table:
 
     @classmethod
     def parse(cls, text: str, origin: str) -> Table:
-        """Read YAML in a text; a syntax error names origin, line and column."""
+        """Read YAML from a text; raise `ConfigError`, with line and column, if it is not valid."""
         try:
             values = yaml.load(text, Loader=_Loader)
         except yaml.YAMLError as error:
@@ -136,8 +342,8 @@ class Table:
             problem = getattr(error, 'problem', None) or str(error)
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
         except Exception as error:
-            # PyYAML has no word for what only looks like a date or a number (2026-99-99,
-            # !!int ''), nor for what is nested too deeply: each fails in a way of its own.
+            # PyYAML raises other errors for text that only looks like a date or number
+            # (2026-99-99, !!int ''), and where nesting is too deep.
             problem = str(error) or type(error).__name__
             raise ConfigError(f'{origin}: not valid YAML: {problem}') from error
         return cls(values, origin)
@@ -152,9 +358,33 @@ class Table:
         if default is _REQUIRED:
             others = [str(each) for each in self._values if each not in self._taken]
             near = difflib.get_close_matches(key, others, n=1)
-            hint = f'; is {near[0]!r} meant to be it?' if near else ''
+            hint = f'; is {near[0]!r} a misspelling of it?' if near else ''
             raise ConfigError(f'{self.origin}: key {key!r} is missing{hint}')
         return default
+
+    def value(self, setting: Setting, default: Any = _REQUIRED) -> Any:
+        """Read the value of a setting, or the default where the key is absent.
+
+        Raises
+        ------
+        ConfigError
+            When a required key is missing, or the value is not allowed.
+        """
+        if default is _REQUIRED and not isinstance(setting.default, type):
+            default = setting.default
+        value = self._take(setting.name, default)
+        if setting.value_type is float and isinstance(value, str):
+            # PyYAML reads 90e3 as text (YAML 1.1 requires 90.0e+3).
+            with suppress(ValueError):
+                value = float(value)
+        try:
+            return setting.accept(value)
+        except InvalidInput as error:
+            raise ConfigError(f'{self.origin}: {error}') from None
+
+    def values(self, settings: Sequence[Setting]) -> dict[str, Any]:
+        """Read several settings with :meth:`value`; return their values by name."""
+        return {setting.name: self.value(setting) for setting in settings}
 
     def number(
         self,
@@ -164,60 +394,30 @@ class Table:
         high: float = math.inf,
         default: Any = _REQUIRED,
     ) -> float:
-        """Take a finite number in [low, high]."""
-        value = self._take(key, default)
-        if isinstance(value, str):
-            # PyYAML reads 90e3 as text (YAML 1.1 wants 90.0e+3); to everyone else it is a number.
-            with suppress(ValueError):
-                value = float(value)
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        # The largest float rather than infinity: a whole number of YAML can be larger than it.
-        largest = sys.float_info.max
-        if not number or not max(low, -largest) <= value <= min(high, largest):
-            raise ConfigError(
-                f'{self.origin}: {key} = {shown(value)} is not allowed: '
-                f'a number from {low:g} to {high:g} {unit} is needed'
-            )
-        return float(value)
+        """Read a finite number in [low, high]."""
+        return self.value(Setting(key, float, '', unit, low, high), default)
 
     def integer(self, key: str, low: int, high: int, default: Any = _REQUIRED) -> int:
-        """Take a whole number in [low, high]."""
-        value = self._take(key, default)
-        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-            raise ConfigError(
-                f'{self.origin}: {key} = {shown(value)} is not allowed: '
-                f'a whole number from {low} to {high} is needed'
-            )
-        return value
+        """Read a whole number in [low, high]."""
+        return self.value(Setting(key, int, '', '', low, high), default)
 
     def choice(self, key: str, allowed: Sequence[str], default: Any = _REQUIRED) -> str:
-        """Take one of the allowed words."""
-        value = self._take(key, default)
-        if value not in allowed:
-            raise ConfigError(
-                f'{self.origin}: {key} = {shown(value)} is not allowed: '
-                f'one of {", ".join(allowed)} is needed'
-            )
-        return str(value)
+        """Read one of the allowed words."""
+        return self.value(Setting(key, str, '', choices=tuple(allowed)), default)
 
     def text(self, key: str, default: Any = _REQUIRED) -> str:
-        """Take a string."""
-        value = self._take(key, default)
-        if not isinstance(value, str):
-            raise ConfigError(
-                f'{self.origin}: {key} = {shown(value)} is not allowed: text is needed'
-            )
-        return value
+        """Read a string."""
+        return self.value(Setting(key, str, ''), default)
 
     @contextmanager
     def table(self, key: str, default: Any = _REQUIRED) -> Iterator[Table]:
-        """Take a nested table; on leaving the block its unknown keys are refused."""
+        """Read a nested table; at the end of the block, unknown keys raise `ConfigError`."""
         nested = Table(self._take(key, default), f'{self.origin}: {key}')
         yield nested
         nested.finish()
 
     def finish(self) -> None:
-        """Refuse keys that nobody asked for."""
+        """Raise `ConfigError` for keys that were not read."""
         unknown = [key for key in self._values if key not in self._taken]
         if unknown:
             near = difflib.get_close_matches(str(unknown[0]), sorted(self._taken), n=1)

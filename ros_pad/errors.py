@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors of ros_pad, named after what is wrong.
 
-Every message says the value, its unit, the allowed range and where the value came from.
+Every message names the value, its unit, the allowed range and the source of the value.
 """
 
 from __future__ import annotations
 
 
 class PadError(Exception):
-    """Base of every error that ros_pad raises on purpose."""
+    """Base class of all errors that ros_pad raises."""
 
 
 class InvalidInput(PadError, ValueError):
@@ -16,16 +16,18 @@ class InvalidInput(PadError, ValueError):
 
 
 class ConfigError(PadError):
-    """A YAML file or parameter has an unknown key, or a value that is not allowed."""
+    """A YAML file, key or optional package is missing, or a key or value is not allowed."""
 
 
 class NoEquilibrium(PadError):
-    """The pad has no shape in equilibrium at this pressure and force.
+    """The model of a pad has no result for these values.
 
     Attributes
     ----------
     status : str
-        Which end of the model was reached: ``no_inflation``, ``flattened`` or ``fold_zone``.
+        ``no_inflation`` (the dome would grow without limit), ``flattened`` (the contact would
+        cover the pad), ``fold_zone`` (the shape depends on the history of the load) or
+        ``no_rise`` (the equation printed in the thesis has no rise height).
     """
 
     def __init__(self, message: str, status: str) -> None:
@@ -34,17 +36,17 @@ class NoEquilibrium(PadError):
 
 
 class NoBridge(PadError):
-    """A liquid bridge of this volume or filling angle does not exist: it has ruptured."""
+    """A liquid bridge of this volume or filling angle does not exist."""
 
 
 class NoSurface(PadError):
-    """A liquid surface, or a pad under it, has no equilibrium of the kind asked for.
+    """A liquid surface, or a pad under it, has no equilibrium of the required kind.
 
     Attributes
     ----------
     status : str
-        ``blocked`` (the surface would run through the wall), ``collapsed`` (it pinches off),
-        ``rim`` (it reaches the rim of the pad) or ``no_convergence``.
+        ``blocked`` (the surface would run through the wall), ``collapsed`` (the surface pinches
+        off), ``rim`` (the surface reaches the rim of the pad) or ``no_convergence``.
     """
 
     def __init__(self, message: str, status: str) -> None:
@@ -53,20 +55,20 @@ class NoSurface(PadError):
 
 
 class MeshError(PadError):
-    """A mesh cannot be wetted: open, flipped, non-manifold, or off the floor."""
+    """A mesh cannot be wetted: it is open, inside out or non-manifold, or not on the floor."""
 
 
 class DeviceError(PadError):
-    """Something went wrong between here and a device.
+    """Communication with a device failed, or the device reports a fault.
 
     Attributes
     ----------
     port : str
-        The line, such as ``/dev/ttyUSB0``; empty where there is none.
+        Port, such as ``/dev/ttyUSB0``; empty if there is none.
     command : str
-        What was sent.
+        Command that was sent; empty if there was none.
     reply : str or bytes
-        What came back.
+        Reply that was received; empty if there was none.
     """
 
     def __init__(
@@ -77,19 +79,19 @@ class DeviceError(PadError):
 
 
 class TransportError(DeviceError):
-    """The line to a device is closed, silent or broken."""
+    """The connection to a device is closed, silent or broken."""
 
 
 class ProtocolError(DeviceError):
-    """A device answered something that its protocol does not allow."""
+    """A device sent a reply that its protocol does not allow."""
 
 
 class DeviceFault(DeviceError):
-    """A device reports a fault of its own."""
+    """A device reports that it has a fault itself."""
 
 
 class LimitError(PadError):
-    """A command would take a pad past a limit, for instance its pressure ceiling."""
+    """A command would exceed a limit of a pad, for instance its pressure ceiling."""
 
 
 class BagError(PadError):

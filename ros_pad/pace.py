@@ -1,15 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When something that runs slower than its input is due."""
+"""Pace of tasks that run more slowly than their input, and progress of long tasks."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 from ros_pad.errors import InvalidInput
+
+CONTROL_PERIOD_NS = 20_000_000
+"""Period of estimates, decisions and regulator readings, ns; serial lines are fast enough for it.
+"""
+
+TICK_PERIOD_NS = 100_000_000
+"""Period at which the stages check whether messages are missing, ns."""
+
+Progress: TypeAlias = Callable[[float], None]
+"""Callback of a long task, called with the share that is done, 0 to 1, or with the simulated
+time, s.
+"""
 
 
 class Pace:
-    """Tells at which time stamps a slower task is due: the first stamp in each of its periods.
+    """Decide at which time stamps a slower task is due: at the first stamp in each of its periods.
 
-    Depends on the stamps alone, so that nodes and the loop without ROS agree on it.
+    The result depends on the stamps alone, so that nodes and the loop without ROS agree.
 
     Parameters
     ----------
@@ -31,7 +46,7 @@ class Pace:
         self._last: int | None = None
 
     def due(self, stamp_ns: int) -> bool:
-        """Whether the task is due at this stamp, ns; True once in each period."""
+        """Return whether the task is due at this stamp, ns; True once in each period."""
         index = stamp_ns // self._period
         if index == self._last:
             return False

@@ -2,11 +2,19 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from ros_pad import configuration
+from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
+from ros_pad.configuration import choice
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
+from ros_pad.configuration import text
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 
 
 def table(text, tmp_path):
@@ -15,13 +23,120 @@ def table(text, tmp_path):
     return Table.load(path)
 
 
+# --- single values ----------------------------------------------------------------------------
+
+
+def test_a_quantity_is_float64():
+    assert type(quantity('height', 1, 'm')) is np.float64
+    assert type(quantity('height', 0.5, 'm')) is np.float64
+    found = quantity('height', [[1, 2]], 'm')
+    assert found.dtype == np.float64 and found.tolist() == [[1.0, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ('value', 'bad'),
+    [
+        ([1.0, 0.5, math.nan], '0.5'),
+        (np.array([2, 7]), '7'),
+        (math.nan, 'nan'),
+        (np.float64(6.0), '6.0'),
+        (True, 'True'),
+        ('2', "'2'"),
+        ([1.0, [2.0]], '[1.0, [2.0]]'),
+        (None, 'None'),
+    ],
+)
+def test_the_first_bad_value_is_named_with_unit_and_range(value, bad):
+    message = f'force = {bad} is not allowed: a number from 1 to 5 N is needed'
+    with pytest.raises(InvalidInput, match=re.escape(message)):
+        quantity('force', value, 'N', 1.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ('ends', 'words'),
+    [
+        ({}, 'a finite number of at least 0 N '),
+        ({'above': True}, 'a finite number above 0 N '),
+        ({'high': 2.0, 'above': True}, 'a number above 0 and up to 2 N '),
+        ({'low': -math.inf}, 'a finite number N '),
+        ({'low': -math.inf, 'high': 2e6}, 'a finite number of at most 2000000 N '),
+    ],
+)
+def test_ranges_in_words(ends, words):
+    for bad in (math.nan, math.inf):
+        with pytest.raises(InvalidInput, match=words):
+            number('force', bad, 'N', **ends)
+
+
+def test_one_number_and_no_array():
+    assert number('force', np.float32(2.0), 'N') == 2.0
+    assert type(number('force', 2, 'N')) is float
+    for bad in ([2.0], (2.0,), np.array([2.0]), '2'):
+        with pytest.raises(InvalidInput, match=r'force = .* N is needed'):
+            number('force', bad, 'N')
+
+
+def test_other_single_values():
+    assert integer('count', np.int64(3), 1, 9) == 3
+    assert text('name', 'any') == 'any'
+    assert choice('kind', 'dry', ('dry', 'wet')) == 'dry'
+    for bad in (True, 1.0, 10, '3', None):
+        with pytest.raises(InvalidInput, match=r'count = .* a whole number from 1 to 9 is needed'):
+            integer('count', bad, 1, 9)
+    for bad in ('damp', 1, ['dry']):
+        with pytest.raises(InvalidInput, match=r'kind = .* one of dry, wet is needed'):
+            choice('kind', bad, ('dry', 'wet'))
+
+
+# --- settings ---------------------------------------------------------------------------------
+
+LEGS = Setting('legs', [1, 2, 3], 'Legs.', '', 1, 6)
+MASS = Setting('mass', float, 'Mass of the body.', 'kg', 0.1, 10.0)
+COUNT = Setting('count', 3, 'How many.', '', 0, 9)
+
+
+def test_settings_accept_values_of_their_type():
+    assert MASS.value_type is float and COUNT.value_type is int
+    assert type(MASS.accept(2)) is float
+    assert COUNT.accept(9) == 9
+    assert LEGS.accept([6, 2]) == [6, 2]
+    assert Setting('live', True, 'Whether.').accept(False) is False
+    assert Setting('kind', 'dry', 'Which.', choices=('dry', 'wet')).accept('wet') == 'wet'
+    assert Setting('name', '', 'Name.').accept('any') == 'any'
+
+
+@pytest.mark.parametrize(
+    ('setting', 'bad'),
+    [
+        (MASS, '2'), (MASS, 11), (MASS, [1.0]), (COUNT, 1.0), (COUNT, 10), (LEGS, []),
+        (LEGS, [7]), (LEGS, [2, 2]), (LEGS, [1.0]), (LEGS, [True]), (LEGS, 1), (LEGS, [[1]]),
+        (Setting('live', True, 'Whether.'), 1), (Setting('name', '', 'Name.'), 3),
+    ],
+)  # fmt: skip
+def test_settings_name_what_is_allowed(setting, bad):
+    message = f'{setting.name} = {bad!r} is not allowed: {setting.allowed} is needed'
+    with pytest.raises(InvalidInput, match=re.escape(message)):
+        setting.accept(bad)
+
+
+def test_settings_from_a_file(tmp_path):
+    values = table('mass: 5e-1', tmp_path)
+    assert values.value(MASS) == 0.5
+    assert values.value(COUNT) == 3
+    assert values.value(COUNT, default=4) == 4
+    with pytest.raises(ConfigError, match=r"some\.yaml: key 'mass' is missing"):
+        table('count: 1', tmp_path).value(MASS)
+    with pytest.raises(ConfigError, match=r'some\.yaml: mass = 20\.0 is .* from 0\.1 to 10 kg'):
+        table('mass: 20.0', tmp_path).value(MASS)
+
+
 # --- numbers ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     'written, value',
     [
-        ('90e3', 90000.0),  # text for PyYAML
+        ('90e3', 90000.0),  # PyYAML reads this as text
         ('90e+3', 90000.0),
         ('90.0e+3', 90000.0),
         ('1e-6', 1e-6),
@@ -45,7 +160,9 @@ def test_numbers(tmp_path, written, value):
     ],
 )  # fmt: skip
 def test_what_is_no_finite_number(tmp_path, written):
-    with pytest.raises(ConfigError, match=r'some\.yaml: key = .* is not allowed: a number') as e:
+    with pytest.raises(
+        ConfigError, match=r'some\.yaml: key = .* is not allowed: a finite number'
+    ) as e:
         table(f'key: {written}', tmp_path).number('key', 'Pa')
     assert 'Pa is needed' in str(e.value)
 
@@ -145,14 +262,14 @@ def test_unknown_key_in_a_nested_table(tmp_path):
     [
         ('a: [1, 2', 'not valid YAML'),
         ('a: 1\n b: 2', 'line 2, column 3: not valid YAML'),
-        ('a: 1\na: 2', r"line 2, column 1: not valid YAML: key 'a' is there twice"),
-        ('a:\n  b: 1\n  b: 2', r"line 3, column 3.*'b' is there twice"),
+        ('a: 1\na: 2', r"line 2, column 1: not valid YAML: key 'a' occurs twice"),
+        ('a:\n  b: 1\n  b: 2', r"line 3, column 3.*'b' occurs twice"),
         ('a: !!python/object/apply:os.system [ls]', 'not valid YAML'),
         ('{[1]: 2}', 'not valid YAML'),
         ('a: \x01', 'not valid YAML'),
         ('a: 2026-99-99', 'not valid YAML: month must be in 1..12'),
         ('a: 0x_', 'not valid YAML: invalid literal'),
-        # PyYAML has other errors of its own for these.
+        # PyYAML raises other kinds of errors for these.
         ("a: !!int ''", 'not valid YAML: string index out of range'),
         ('a: !!bool maybe', "not valid YAML: 'maybe'"),
         ('a: !!timestamp soon', 'not valid YAML: '),
@@ -222,6 +339,6 @@ def test_shared_folder_of_an_installed_package(tmp_path, monkeypatch):
 
 
 def test_nothing_is_infinite_by_default(tmp_path):
-    """Without a range any finite number is allowed, and no other."""
+    """Without a range even the largest finite numbers are allowed."""
     assert table('key: -1.0e+308', tmp_path).number('key', '') == -1e308
     assert not math.isinf(table('key: 1.7e+308', tmp_path).number('key', ''))

@@ -1,47 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The floors of docs/architecture.md: every import runs down, and only the nodes need ROS."""
+"""Parts import only what the table in docs/imports.yaml allows, and only the nodes need ROS.
+
+``python test/test_imports.py`` writes the table into docs/architecture.md.
+"""
 
 import ast
+import functools
 import pathlib
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 
 import pytest
+import yaml
 
-SOURCE = pathlib.Path(__file__).resolve().parent.parent / 'ros_pad'
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SOURCE = ROOT / 'ros_pad'
+ARCHITECTURE = ROOT / 'docs' / 'architecture.md'
+TABLE = yaml.safe_load((ROOT / 'docs' / 'imports.yaml').read_text(encoding='utf-8'))
+BEGIN, END = '<!-- imports:begin -->\n', '<!-- imports:end -->'
 
-# The table of docs/architecture.md: what each part of ros_pad may import of the others.
-GROUND = {'errors', 'configuration', 'pace'}
-MAY_IMPORT = {
-    'errors': set(),
-    'pace': {'errors'},
-    'configuration': {'errors'},
-    'contact': GROUND,
-    'capillary': GROUND | {'contact'},
-    'estimation': GROUND | {'contact'},
-    'control': GROUND | {'contact'},
-    'simulation': GROUND | {'contact'},
-    'regulators': GROUND | {'contact', 'estimation', 'control', 'simulation'},
-}
-MAY_IMPORT['trials'] = MAY_IMPORT['regulators'] | {'regulators'}
-MAY_IMPORT['ladders'] = MAY_IMPORT['trials'] | {'trials', 'capillary'}
-MAY_IMPORT['figures'] = MAY_IMPORT['ladders'] | {'ladders'}
-MAY_IMPORT['nodes'] = MAY_IMPORT['trials'] | {'trials'}
-MAY_IMPORT['doctor'] = MAY_IMPORT['trials'] | {'trials'}
-MAY_IMPORT['commands'] = MAY_IMPORT['figures'] | {'figures', 'nodes', 'doctor'}
-MAY_IMPORT['cli'] = MAY_IMPORT['commands'] | {'commands'}
-MAY_IMPORT['__main__'] = {'cli'}
-
-NUMERICS = {'numpy', 'scipy', 'yaml'}
-FILES = {'mcap', 'mcap_ros2', 'matplotlib', 'mpl_toolkits', 'tqdm'}  # the fourth is of the third
 ROS = {
     *('rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
     'visualization_msgs',
 }
-# What an extra brings: imported inside the functions that need it, missing where it is not asked
-# for.
+# Packages of extras: functions that need them import them inside, as they may be missing.
 EXTRAS = {
     'mujoco': 'mujoco',
     'numba': 'fast',
@@ -49,20 +34,45 @@ EXTRAS = {
     'pyarrow': 'sweep',
     'meshio': 'mesh',
 }
-FOREIGN = dict.fromkeys(MAY_IMPORT, NUMERICS) | {
-    'errors': set(),
-    'capillary': NUMERICS | {'meshio'},
-    'simulation': NUMERICS | {'mujoco', 'numba'},
-    'regulators': NUMERICS | {'serial'},
-    'trials': NUMERICS | FILES | {'distributed', 'pyarrow'},
-    'ladders': NUMERICS | FILES | {'mpmath', 'mujoco'},
-    'figures': NUMERICS | FILES,
-    'nodes': NUMERICS | FILES | ROS,
-    'doctor': {'serial'},
-    'commands': NUMERICS | FILES,
-    'cli': {'argcomplete'},
-    '__main__': set(),
-}
+WORDS = {'rclpy and the messages': ROS, 'matplotlib': {'matplotlib', 'mpl_toolkits'}}
+
+
+@functools.cache
+def allowed(part: str) -> frozenset[str]:
+    """Return the parts that a part may import: those of its row, and all that these may import."""
+    direct = TABLE[part].get('imports', [])
+    return frozenset({*direct, *(each for other in direct for each in allowed(other))})
+
+
+def libraries(part: str, key: str) -> set[str]:
+    """Return the packages of other projects in one column of a part's row."""
+    return {name for word in TABLE[part].get(key, []) for name in WORDS.get(word, {word})}
+
+
+def rendered() -> str:
+    """Return the table as docs/architecture.md has it."""
+
+    def names(words: Iterable[str]) -> str:
+        return ', '.join(word if ' ' in word else f'`{word}`' for word in words)
+
+    lines = ['| part | holds | may import | libraries |', '|---|---|---|---|']
+    for part, row in TABLE.items():
+        inside = row.get('inside', [])
+        foreign = [
+            names(row.get('libraries', [])),
+            f'inside functions {names(inside)}' * bool(inside),
+        ]
+        below = f'{names(row["imports"])} and what they may' if 'imports' in row else ''
+        lines.append(
+            f'| `ros_pad.{part}` | {row["holds"]} | {below} | {"; ".join(filter(None, foreign))} |'
+        )
+    return '\n'.join(lines) + '\n'
+
+
+def written(page: str) -> str:
+    """Return a page with the table between its marks."""
+    before, _, rest = page.partition(BEGIN)
+    return before + BEGIN + rendered() + END + rest.partition(END)[2]
 
 
 def files(part: str) -> list[pathlib.Path]:
@@ -70,41 +80,56 @@ def files(part: str) -> list[pathlib.Path]:
     return [*SOURCE.glob(f'{part}.py'), *SOURCE.glob(f'{part}/**/*.py')]
 
 
-def imports(path: pathlib.Path) -> set[str]:
-    """Return the absolute dotted names that a file imports, at its top or inside functions."""
+def imports(path: pathlib.Path) -> set[tuple[str, bool]]:
+    """Return (dotted name, inside a function) of all imports in a file."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+
+    def visit(node: ast.AST, inside: bool) -> None:
+        inside |= isinstance(node, ast.FunctionDef)
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            found.update((alias.name, inside) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f'{path}: write imports out in full'
-            found |= {f'{node.module}.{alias.name}' for alias in node.names}
+            assert node.level == 0, f'{path} has a relative import: write the full name'
+            found.update((f'{node.module}.{alias.name}', inside) for alias in node.names)
+        for child in ast.iter_child_nodes(node):
+            visit(child, inside)
+
+    visit(ast.parse(path.read_text(encoding='utf-8')), False)
     return found
 
 
-def test_every_part_has_its_floor():
-    parts = {
-        path.stem for path in SOURCE.glob('*') if path.name not in ('__init__.py', 'py.typed')
-    }
-    assert parts - {'__pycache__'} == set(MAY_IMPORT)
-    table = (SOURCE.parent / 'docs' / 'architecture.md').read_text(encoding='utf-8')
-    for part in parts & set(MAY_IMPORT):
-        assert f'`ros_pad.{part}`' in table
+def test_the_table_has_every_part_and_every_part_imports_what_is_below_it():
+    parts = {path.stem for path in SOURCE.glob('*') if path.stem not in ('__init__', 'py')}
+    assert parts - {'__pycache__'} == set(TABLE)
+    order = list(TABLE)
+    for place, part in enumerate(order):
+        assert allowed(part) <= set(order[place + 1 :])
 
 
-@pytest.mark.parametrize('part', MAY_IMPORT)
+def test_the_page_has_the_table():
+    page = ARCHITECTURE.read_text(encoding='utf-8')
+    assert page == written(page), 'run python test/test_imports.py'
+
+
+@pytest.mark.parametrize('part', TABLE)
 def test_imports_run_down(part: str):
     paths = files(part)
     assert paths
+    used = set()
     for path in paths:
-        for name in imports(path):
+        for name, inside in imports(path):
             top, _, rest = name.partition('.')
             if top == 'ros_pad':
                 other = rest.split('.')[0]
-                # The package itself has only the version.
-                assert other in {'', '__version__', part} | MAY_IMPORT[part], f'{path}: {name}'
+                # From the package itself only the version may be imported.
+                assert other in {'', '__version__', part} | allowed(part), f'{path}: {name}'
             elif top not in sys.stdlib_module_names:
-                assert top in FOREIGN[part], f'{path} imports {name}'
+                used.add(top)
+                known = libraries(part, 'libraries')
+                known |= libraries(part, 'inside') if inside else set()
+                assert top in known, f'{path} imports {name}'
+    stated = libraries(part, 'libraries') | libraries(part, 'inside')
+    assert stated - used <= ROS, 'the table has libraries that are not imported'
 
 
 def test_the_reader_of_imports_sees_them_all(tmp_path: pathlib.Path):
@@ -112,7 +137,7 @@ def test_the_reader_of_imports_sees_them_all(tmp_path: pathlib.Path):
     path.write_text(
         'import a.b\nfrom c import d as e\ndef f():\n    if 1:\n        from g.h import i\n'
     )
-    assert imports(path) == {'a.b', 'c.d', 'g.h.i'}
+    assert imports(path) == {('a.b', False), ('c.d', False), ('g.h.i', True)}
 
 
 WITHOUT = """
@@ -152,7 +177,7 @@ def test_everything_but_the_nodes_imports_without_ros_and_extras():
     assert 'no rclpy' in imported
     expected = {
         '.'.join(path.relative_to(SOURCE.parent).with_suffix('').parts).removesuffix('.__init__')
-        for part in MAY_IMPORT
+        for part in TABLE
         if part != 'nodes'
         for path in files(part)
     }
@@ -162,13 +187,11 @@ def test_everything_but_the_nodes_imports_without_ros_and_extras():
 ROSDEP_KEY = {
     'yaml': 'python3-yaml',
     'mcap': 'mcap-ros2-support',
-    'mcap_ros2': 'mcap-ros2-support',
-    'mpmath': 'python3-sympy',
+    'rosbags': 'python3-rosbags-pip',
     'mpl_toolkits': 'python3-matplotlib',
 }
 PIP_NAME = {
     'yaml': 'pyyaml',
-    'mcap_ros2': 'mcap-ros2-support',
     'mpl_toolkits': 'matplotlib',
     'serial': 'pyserial',
 }
@@ -178,7 +201,7 @@ def test_what_is_imported_is_declared():
     package_xml = (SOURCE.parent / 'package.xml').read_text(encoding='utf-8')
     setup_py = (SOURCE.parent / 'setup.py').read_text(encoding='utf-8')
     names = {
-        name.split('.')[0] for part in MAY_IMPORT for path in files(part) for name in imports(path)
+        name.split('.')[0] for part in TABLE for path in files(part) for name, _ in imports(path)
     }
     foreign = names - sys.stdlib_module_names - {'ros_pad'}
     assert {'numpy', 'rclpy', *EXTRAS} <= foreign
@@ -187,6 +210,10 @@ def test_what_is_imported_is_declared():
     for name in foreign - set(EXTRAS):
         key = name if name in ROS else ROSDEP_KEY.get(name, f'python3-{name}')
         assert f'<exec_depend>{key}</exec_depend>' in package_xml
-        # The wheels of ROS have the distribution before their name.
+        # Names of ROS wheels begin with the distribution.
         pip_name = name.replace('_', '-') if name in ROS else PIP_NAME.get(name, name)
         assert re.search(rf"'{pip_name}['>\[]", setup_py), f'{pip_name} is not in setup.py'
+
+
+if __name__ == '__main__':
+    ARCHITECTURE.write_text(written(ARCHITECTURE.read_text(encoding='utf-8')), encoding='utf-8')

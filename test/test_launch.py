@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launch file starts what is there, and says what each argument is.
+"""The launch file starts nodes that exist, and describes each argument.
 
-What it says of itself is read off its source, for launch is not on PyPI; where launch is
-installed, it is also carried out.
+Most tests parse its source, because launch is not on PyPI; if launch is installed, the file is
+also executed.
 """
 
 import ast
@@ -32,7 +32,7 @@ def tree() -> ast.Module:
 
 
 def first_arguments(tree: ast.Module, function: str) -> set[str]:
-    """Return the first argument of each call of a function, where it is spelt out."""
+    """Return the first argument of each call of a function if it is a literal."""
     return {
         call.args[0].value
         for call in ast.walk(tree)

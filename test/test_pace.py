@@ -31,7 +31,7 @@ def test_once_in_each_period_whatever_the_start(period, gaps, data):
 def test_depends_on_the_stamps_alone():
     one, other = Pace(7), Pace(7)
     assert one.due(15)
-    # Two that start at different stamps of a period fall in step at the next one.
+    # Two paces that start at different stamps of a period agree from the next period on.
     assert other.due(20)
     for stamp in range(21, 100):
         assert one.due(stamp) == other.due(stamp)

@@ -13,13 +13,16 @@ import pytest
 pytest.importorskip('colcon_core', reason='colcon is not installed: pip install ros_pad[test]')
 packages = pytest.importorskip('ament_index_python.packages')
 
+# colcon builds the package several times.
+pytestmark = pytest.mark.slow
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
     f'{node}_node' for node in ('controller', 'estimator', 'recorder', 'regulator', 'simulator')
 }
 EXECUTABLES = NODES | {'pad'}
 
-# Read off ros/rosdistro: packages of jazzy/distribution.yaml, keys of rosdep/python.yaml.
+# From ros/rosdistro: packages of jazzy/distribution.yaml and keys of rosdep/python.yaml.
 ROSDEP_KEYS = {
     *('ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
     *('launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs'),
@@ -27,7 +30,7 @@ ROSDEP_KEYS = {
     *('mcap-ros2-support', 'python3-argcomplete', 'python3-hypothesis', 'python3-matplotlib'),
     'python3-numpy',
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),
-    *('python3-serial', 'python3-sympy', 'python3-tqdm', 'python3-yaml'),
+    *('python3-serial', 'python3-tqdm', 'python3-yaml'),
 }
 
 TWO_TESTS = """
@@ -41,7 +44,7 @@ def test_nothing():
 
 @pytest.fixture(scope='module', params=[[], ['--symlink-install']], ids=['copied', 'linked'])
 def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
-    """Return a colcon workspace in which ros_pad has just been built."""
+    """Return a colcon workspace in which ros_pad is built."""
     folder = tmp_path_factory.mktemp('workspace')
     source = folder / 'src' / 'ros_pad'
     source.mkdir(parents=True)
@@ -56,7 +59,7 @@ def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
 
 
 def colcon(workspace: pathlib.Path, *arguments: str) -> str:
-    """Return what a command of colcon prints in a workspace; it must succeed."""
+    """Run a command of colcon in a workspace, which must succeed; return what it prints."""
     child = subprocess.run(
         [sys.executable, '-m', 'colcon', *arguments],
         cwd=workspace,
@@ -70,7 +73,8 @@ def colcon(workspace: pathlib.Path, *arguments: str) -> str:
 
 
 def in_workspace(workspace: pathlib.Path, *command: str) -> str:
-    """Return what a command prints in a shell that has sourced the workspace."""
+    """Run a command, which must succeed, in a shell that has sourced the workspace; return what
+    it prints."""
     child = subprocess.run(
         ['bash', '-c', '. install/setup.bash && exec "$@"', 'bash', *command],
         cwd=workspace,
@@ -88,7 +92,7 @@ def test_the_ament_index_lists_package_and_executables(
     prefix = workspace / 'install' / 'ros_pad'
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
     assert packages.get_packages_with_prefixes() == {'ros_pad': str(prefix)}
-    # This is how `ros2 run` looks for executables.
+    # `ros2 run` searches for executables like this.
     folder = prefix / 'lib' / 'ros_pad'
     found = {path.name for path in folder.iterdir() if os.access(path, os.X_OK)}
     assert found == EXECUTABLES
@@ -111,7 +115,7 @@ def test_the_command_runs_and_finds_its_scenes(workspace: pathlib.Path):
 
 
 def test_the_nodes_find_their_files_through_the_ament_index(workspace: pathlib.Path):
-    """As `ros2 run` starts them: there is no source tree beside the package."""
+    """They do so without a source tree beside the package, as started by `ros2 run`."""
     folder = in_workspace(workspace, sys.executable, '-c', SHARED_FOLDER).strip()
     assert (pathlib.Path(folder) / 'params.yaml').is_file()
     assert pathlib.Path(folder).resolve().is_relative_to(workspace.resolve())

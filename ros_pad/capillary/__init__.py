@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid on pads of any shape (thesis chapter 4)."""
+"""Liquid on pads of any shape, given as meshes or meridians (thesis chapter 4)."""
 
 from ros_pad.capillary.bath import BathMeniscus
 from ros_pad.capillary.bath import Wall

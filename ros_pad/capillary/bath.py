@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid that rises round a pad from a wide bath at floor level: the exact axisymmetric meniscus.
+"""Exact axisymmetric meniscus around a pad in a wide bath at floor level.
 
-Far away the surface is flat, at the level of the floor, and its pressure is that of the air; at
-height z above the floor it is ``-ρ g z``. The surface of such a bath outside a circle is one
-curve for each radius and slope (:func:`ros_pad.contact.fibre.outer_surface`), so that the only
-unknown is where on the wall it stands as high as the wall, at the contact angle.
+Far away the surface is flat, at floor level, where the liquid has the pressure of the air; at
+height z above the floor its pressure relative to the air is ``-ρ g z``. The surface outside a
+circle is one curve for each radius and slope (:func:`ros_pad.contact.fibre.outer_surface`). So the
+only unknown is the place on the wall at which a surface with the contact angle has the height of
+this place.
 
 With wall inclination φ (from the floor, through the air, π/2 for a cylinder) the surface falls
-outwards from the contact line at ``ψ = π - φ - θ``. Two integrals need no quadrature of the
-surface: by Young and Laplace ``∫ z 2π r dr = 2π ℓ² r sin ψ`` under it, with capillary length ℓ,
-and by Archimedes the pull on the pad is the weight of the liquid that it raises.
+outwards from the contact line at ``ψ = π - φ - θ``. Two integrals are known in closed form: by
+Young and Laplace ``∫ z 2π r dr = 2π ℓ² r sin ψ`` under the surface, with capillary length ℓ; by
+Archimedes the force on the pad is the weight of the raised liquid.
 """
 
 from __future__ import annotations
@@ -22,39 +23,40 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.fibre import outer_surface
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
-# No surface of a bath is higher than this, in capillary lengths.
+# Upper bound of the height of a bath's surface, in capillary lengths.
 HIGHEST = 2.0
-# Relative errors of heights while searching, and at the end.
+# Relative errors of heights during the search, and of the result.
 COARSE, FINE = 1e-6, 1e-11
-POINTS = 400  # of a surface
+POINTS = 400  # number of points of a surface
 
 
 @dataclass(frozen=True)
 class Wall:
-    """The wall of a pad that is round about a vertical axis and stands on the floor.
+    """The wall of an axisymmetric pad that stands on the floor.
 
     Parameters
     ----------
     meridian : callable
-        From a place to radius (m), height over the floor (m) and inclination (rad, above 0 and
-        below pi; below pi/2 the wall leans outwards). The height grows with the place.
+        Function of a place (a parameter along the wall): returns radius (m), height above the
+        floor (m) and inclination (rad, above 0 and below pi; below pi/2 the wall leans outwards).
+        The height grows with the place.
     floor : float
-        The place at floor level.
+        Place at floor level.
     top : float
-        The place where the wall ends above, over ``floor``.
+        Place of the upper end of the wall, above ``floor``.
     bottom : float
-        The place where it ends below: below ``floor`` if the pad dips into the bath.
+        Place of the lower end: ``floor``, or below it if the pad dips into the bath.
     steps : int
-        In how many steps the wall is searched for where the liquid stands.
+        Number of steps in which the wall is searched for the contact line.
     """
 
     meridian: Callable[[float], tuple[float, float, float]]
@@ -65,24 +67,29 @@ class Wall:
 
     @classmethod
     def dome(cls, sphere_radius: float, contact_radius: float, height: float = math.inf) -> Wall:
-        """Return a spherical dome that rests on a disc.
+        """Return the wall of a spherical dome with a flat contact on the floor.
 
         Parameters
         ----------
         sphere_radius : float
-            m, above 0.
+            Radius of the sphere, m, above 0.
         contact_radius : float
-            Of the disc, m, above 0, below that of the sphere.
+            Radius of the contact, m, above 0 and below that of the sphere.
         height : float
-            At which the dome ends, m; by default where the sphere ends.
+            Height of the upper end, m, above 0; by default the top of the sphere.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range.
         """
         size = number('sphere_radius', sphere_radius, 'm', above=True)
         rest = number('contact_radius', contact_radius, 'm', high=size, above=True)
         start = math.asin(rest / size)
         if start > 0.5 * math.pi - 1e-9:
             raise InvalidInput(
-                f'contact_radius = {rest:g} m is not allowed: above 0 and below the sphere_radius,'
-                f' {size:g} m, is needed'
+                f'contact_radius = {rest:g} m is not allowed: above 0 and below sphere_radius ='
+                f' {size:g} m is needed'
             )
         end = math.pi - 1e-6
         if height != math.inf:
@@ -105,16 +112,22 @@ class Wall:
         height: float = math.inf,
         depth: float = 0.0,
     ) -> Wall:
-        """Return a truncated cone; with an inclination of pi/2 a cylinder.
+        """Return the wall of a truncated cone; a cylinder for an inclination of pi/2.
 
         Parameters
         ----------
         contact_radius : float
-            At floor level, m, above 0.
+            Radius at floor level, m, above 0.
         inclination : float
-            Of the wall to the floor, through the air, rad, from 0.01 to pi - 0.01.
+            Angle from floor to wall, through the air, rad, from 0.01 to pi - 0.01.
         height, depth : float
-            How far the wall reaches above and below floor level, m.
+            Extent of the wall above floor level, m, above 0, and below floor level, m, from 0.
+            Both may be infinite; the wall ends at the tip of the cone at the latest.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is out of range.
         """
         rest = number('contact_radius', contact_radius, 'm', above=True)
         phi = number('inclination', inclination, 'rad', 0.01, math.pi - 0.01)
@@ -130,29 +143,39 @@ class Wall:
 
     @classmethod
     def cylinder(cls, radius: float, height: float = math.inf, depth: float = math.inf) -> Wall:
-        """Return a cylinder, which by default dips into the bath as a fibre does."""
+        """Return the wall of a cylinder, lengths in m as for :meth:`cone`.
+
+        By default the cylinder dips into the bath like a long fibre.
+        """
         return cls.cone(radius, 0.5 * math.pi, height, depth)
 
     @classmethod
     def through(cls, radii: npt.ArrayLike, heights: npt.ArrayLike) -> Wall:
-        """Return a wall through points.
+        """Return a wall through points, with Akima's spline between them (little overshoot).
 
         Parameters
         ----------
         radii : array, shape (n,)
-            m, above 0; n from 2.
+            Radii, m, above 0; n from 2.
         heights : array, shape (n,)
-            m, growing, from 0 or below to above 0. Between the points the radius follows
-            Akima's spline, which does not overshoot.
+            Rising heights, m; the first at most 0, the last above 0.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range, heights do not rise, or shapes differ.
         """
         r, z = quantity('radii', radii, 'm', above=True), np.asarray(heights, dtype=float)
         if r.ndim != 1 or r.shape != z.shape or r.size < 2:
             raise InvalidInput(
-                f'radii of shape {np.shape(r)} and heights of shape {z.shape} are not allowed: two'
-                ' rows of the same length, at least 2, are needed'
+                f'radii of shape {np.shape(r)} and heights of shape {z.shape} are not allowed:'
+                ' one-dimensional arrays of the same length, at least 2, are needed'
             )
         if not (np.isfinite(z).all() and (np.diff(z) > 0.0).all() and z[0] <= 0.0 < z[-1]):
-            raise InvalidInput('heights are not allowed: from 0 or below they must grow, m')
+            raise InvalidInput(
+                f'heights = {z} m are not allowed: finite rising values are needed, the first at'
+                ' most 0, the last above 0'
+            )
         from scipy.interpolate import Akima1DInterpolator
 
         curve = Akima1DInterpolator(z, r)
@@ -166,23 +189,32 @@ class Wall:
 
 @dataclass(frozen=True)
 class BathMeniscus:
-    """Liquid round a pad, and what it does to the pad.
+    """The meniscus around a pad and its force on the pad.
 
     Attributes
     ----------
-    height : m, of the contact line over the floor; negative where the liquid is pushed down.
-    radius : m, of the contact line.
-    slope : rad, by which the surface falls outwards there; above pi/2 it leads inwards first.
-    pressure : Pa, of the liquid over that of the air at the contact line: ``-ρ g height``.
-    force : N, vertical, of the liquid on the pad, towards the floor positive: the pull of the
-        surface and the suction on the wall. It is the weight of the raised liquid.
-    volume : m³ of liquid above floor level, less what is missing below it.
-    radii, heights : m, shape (n,): the surface from the contact line outwards, to where its slope
-        is a millionth of that here.
-    status : ``ok``; ``several`` where the wall has other equilibria higher up (returned is the
-        one reached by rising from the floor); ``rim`` where the liquid reaches the end of the
-        wall and is held by its edge; ``dry`` where it is pushed below a wall that ends at the
-        floor: all numbers are then 0, and the radius that of the floor.
+    height : float
+        Height of the contact line above the floor, m; negative where the liquid is pushed down.
+    radius : float
+        Radius of the contact line, m.
+    slope : float
+        Angle by which the surface falls outwards at the contact line, rad; above pi/2 the surface
+        first goes inwards.
+    pressure : float
+        Pressure of the liquid minus that of the air at the contact line, Pa: ``-ρ g height``.
+    force : float
+        Vertical force of the liquid on the pad, N, positive towards the floor: surface tension
+        and suction. It equals the weight of the raised liquid.
+    volume : float
+        Volume of liquid above floor level minus the missing volume below it, m³.
+    radii, heights : array, shape (n,)
+        The surface from the contact line outwards, m, to where the slope is a millionth of
+        ``slope``.
+    status : str
+        ``ok``; ``several`` where the wall has other equilibria higher up (the lowest is returned);
+        ``rim`` where the liquid reaches the end of the wall and is pinned at its edge; ``dry``
+        where the liquid is pushed below a wall that ends at the floor: then all numbers are 0,
+        except the radius, which is that of the wall at the floor.
     """
 
     height: float
@@ -204,23 +236,24 @@ def bath_meniscus(
     wall: Wall | None = None,
     gravity: float = GRAVITY,
 ) -> BathMeniscus:
-    """Return the meniscus of a wide bath at floor level round a pad.
+    """Compute the meniscus of a wide bath at floor level around a pad.
 
     Parameters
     ----------
     sphere_radius, contact_radius : float
-        Of a dome and of the disc on which it rests, m.
+        Radius of a dome and of its contact with the floor, m, above 0.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
     wall : Wall
-        Of any other pad, in place of the two radii.
+        Wall of any other axisymmetric pad, instead of the two radii.
     gravity : float
-        m/s², above 0: without it no bath is flat far away.
+        Gravity, m/s², above 0.
 
     Raises
     ------
     InvalidInput
-        For values that are not finite or not in range, or both a dome and a wall.
+        When a value is not finite, out of range or of the wrong type, or both or none of a dome
+        and a wall are given.
     NoSurface
         With status ``blocked``, where the surface would run through the wall.
 
@@ -233,7 +266,11 @@ def bath_meniscus(
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
     if (wall is None) != (sphere_radius is not None and contact_radius is not None):
-        raise InvalidInput('either sphere_radius and contact_radius or a wall is needed')
+        raise InvalidInput(
+            f'sphere_radius = {sphere_radius!r} and contact_radius = {contact_radius!r}'
+            f' {"without" if wall is None else "with"} a wall are not allowed: either both radii'
+            ' or a wall is needed'
+        )
     if wall is None:
         assert sphere_radius is not None and contact_radius is not None
         wall = Wall.dome(sphere_radius, contact_radius)
@@ -265,21 +302,27 @@ def bath_meniscus(
 
 
 def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]:
-    """Return where the surface meets a wall: place, slope there, and status.
+    """Find the contact line on a wall.
 
     Parameters
     ----------
     wall : Wall
-        Of the pad.
+        Wall of the pad.
     angle : float
         Contact angle, rad.
     length : float
         Capillary length, m.
 
+    Returns
+    -------
+    tuple
+        Place on the wall, slope of the surface there (rad), and status as in `BathMeniscus`.
+
     Notes
     -----
-    On the way from the floor the surface that would meet the wall here at the contact angle is
-    first higher than here; the equilibrium is where this ends.
+    For each place, its height is compared with that of the surface which meets it at the contact
+    angle. The first place, seen from the floor, at which the two agree is the equilibrium. If
+    there is none, the liquid is held at the end of the wall (``rim``).
     """
 
     def slope(place: float) -> float:
@@ -288,7 +331,7 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
     start = slope(wall.floor)
 
     def excess(place: float, tolerance: float) -> float:
-        if place == wall.floor:  # the sign is that of the slope, which may be near pi here
+        if place == wall.floor:  # the excess has the sign of the slope, but may be infinite
             return start
         radius, height, _ = wall.meridian(place)
         return bath_height(radius / length, slope(place), tolerance) - height / length
@@ -299,7 +342,7 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
     if end == wall.floor:
         return wall.floor, 0.0, 'dry'
     end = _reach(wall, end, length)
-    # Closer near the floor, where a wedge holds its liquid.
+    # Smaller steps near the floor, where liquid can stand in a narrow wedge.
     places = wall.floor + (end - wall.floor) * (np.arange(1, wall.steps + 1) / wall.steps) ** 2
     signs = [math.copysign(1.0, start)]
     signs += [math.copysign(1.0, excess(float(place), COARSE)) for place in places]
@@ -318,7 +361,7 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
 
 
 def solid_volume(wall: Wall, place: float) -> float:
-    """Return the volume of the pad between floor level and a place, m³; negative below."""
+    """Return the volume of the pad between floor level and a place, m³; negative below floor."""
     legendre = np.polynomial.legendre
     nodes, weights = legendre.leggauss(16)
     edges = np.linspace(wall.floor, place, 17)
@@ -337,14 +380,17 @@ def bath_height(radius: float, slope: float, tolerance: float = FINE) -> float:
 
 
 def _surface(radius: float, slope: float, tolerance: float, points: int = 2) -> Array:
-    """Return slope, radius and height of the surface, inwards; below the bath it is mirrored."""
+    """Return slope, radius and height of the surface, from far away inwards.
+
+    A negative slope is the mirror image below the bath.
+    """
     if slope > 0.0:
         return outer_surface(radius, slope, tolerance, points)
     return outer_surface(radius, -slope, tolerance, points) * np.array([[-1.0], [1.0], [-1.0]])
 
 
 def _reach(wall: Wall, end: float, length: float) -> float:
-    """Return the end of a wall, or the place higher than any surface."""
+    """Return the end of a wall, or the place at ``HIGHEST`` if it is nearer to the floor."""
     sign = math.copysign(1.0, end - wall.floor)
     if math.isinf(end):
         end = wall.floor + sign * HIGHEST * length
@@ -356,7 +402,7 @@ def _reach(wall: Wall, end: float, length: float) -> float:
 
 
 def _held(wall: Wall, end: float, length: float, most: float) -> float:
-    """Return the slope at which an edge holds the surface."""
+    """Return the slope of a surface that is pinned at the end of the wall."""
     from scipy.optimize import brentq
 
     radius, height, _ = wall.meridian(end)
@@ -371,14 +417,15 @@ def _held(wall: Wall, end: float, length: float, most: float) -> float:
 
 
 def _clear_of(wall: Wall, place: float, radii: Array, heights: Array) -> None:
-    """Refuse a surface that runs through the wall."""
+    """Raise `NoSurface` where a surface runs through the wall."""
     places = np.linspace(wall.floor, place, POINTS)
     wall_radii, wall_heights, _ = np.transpose([wall.meridian(float(p)) for p in places])
     side = -math.copysign(1.0, heights[0])
     inside = wall_radii - np.interp(side * wall_heights, side * heights, radii)
     if np.max(inside) > 1e-3 * radii[0]:
         raise NoSurface(
-            f'the surface that reaches {heights[0]:g} m at the contact angle would run through the'
-            ' wall below: something there juts out that is thinner than the steps of the search',
+            f'the surface that meets the wall at height = {heights[0]:g} m would run through the'
+            ' wall between this height and the floor: a ledge there is thinner than a step of the'
+            f' search, so more than steps = {wall.steps} of the Wall are needed',
             'blocked',
         )

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An inflated pad on a wet floor: membrane and meniscus in one equilibrium.
+"""Equilibrium of an inflated pad and the meniscus around it on a wet floor.
 
 The pad is the exact membrane of :mod:`ros_pad.contact.membrane`, whose tension T follows from its
-whole area, and the liquid is the wide bath of :mod:`ros_pad.capillary.bath`. The liquid acts back
-on the membrane in three ways: its suction ``ρ g z`` adds to the pressure inside, wetting lowers
-the tension of the wet part to ``T - γ cos θ``, and its surface pulls a kink into the contact line.
-The three tensions are in balance there (Neumann's triangle), which makes the angle between wet
-wall and surface the contact angle of a rigid wall when T is large beside γ.
+whole area. The liquid is the wide bath of :mod:`ros_pad.capillary.bath`. It acts on the membrane
+in three ways: its suction ``ρ g z`` adds to the pressure inside, wetting lowers the tension of the
+wet part to ``T - γ cos θ``, and its surface bends the membrane at the contact line. There the
+three tensions are in balance (Neumann's triangle). For T much larger than γ, the angle between wet
+wall and surface is the contact angle on a rigid wall.
 
 With arc length s from the edge of the contact disc, where the membrane leaves the floor at a
 tangent, inclination φ and tension τ: ``dφ/ds = (p + ρ g z)/τ - sin φ / r`` in the wet part and
-``dφ/ds = p/T - sin φ / r`` in the dry one. Unknown are the contact radius b, T, the length of the
-wall and the place of the contact line; the equations are that the wall ends at the rim, that T is
-that of the area, that force and pull of the liquid press the disc, ``F + F_cap = p π b²``, and
-that the bath stands as high as the contact line. Adhesion is left out, as in that membrane.
+``dφ/ds = p/T - sin φ / r`` in the dry part. The unknowns are the contact radius b, T, the length
+of the wall and the place of the contact line. The equations: the wall ends at the rim; T belongs
+to the area; load and capillary force press the disc, ``F + F_cap = p π b²``; the surface of the
+bath has the height of the contact line. As without liquid, the membrane has no adhesion.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ import numpy as np
 from ros_pad.capillary.bath import Wall
 from ros_pad.capillary.bath import bath_height
 from ros_pad.capillary.bath import contact
+from ros_pad.configuration import number
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
-STEEPEST = math.pi - 0.02  # where the wet wall is no longer followed, rad
+STEEPEST = math.pi - 0.02  # inclination at which the integration of the wet wall stops, rad
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,26 @@ class WetPad:
 
     Attributes
     ----------
-    gap : m, from pad base to floor.
-    contact_radius : m, of the disc on the floor.
-    tension : N/m, of the dry membrane.
-    height : m, of the contact line over the floor.
-    line_radius : m, of the contact line.
-    kink : rad, by which the membrane turns at the contact line, drawn outwards.
-    rim_angle : rad, inclination of the membrane at the rim: above pi/2 it leans inwards there.
-    pressure : Pa, of the liquid over that of the air at the contact line.
-    force : N, vertical, of the liquid on the pad, towards the floor positive.
-    radii, heights : m, shape (n,): the wall from the floor to the rim.
-    rigid : the same pad as if the liquid did not act on its shape; None in that one itself.
+    gap : float
+        Distance from pad base to floor, m.
+    contact_radius : float
+        Radius of the contact with the floor, m.
+    tension : float
+        Tension of the dry part of the membrane, N/m.
+    height, line_radius : float
+        Height above the floor and radius of the contact line, m.
+    kink : float
+        Angle by which the membrane bends outwards at the contact line, rad.
+    rim_angle : float
+        Inclination of the membrane at the rim, rad; above pi/2 it leans inwards.
+    pressure : float
+        Pressure of the liquid minus that of the air at the contact line, Pa.
+    force : float
+        Vertical force of the liquid on the pad, N, positive towards the floor.
+    radii, heights : array, shape (n,)
+        The wall from the floor to the rim, m.
+    rigid : WetPad or None
+        The same pad without the effect of the liquid on its shape; None in that pad itself.
     """
 
     gap: float
@@ -78,20 +87,20 @@ class WetPad:
 def press_wet(
     pad: Pad, pressure: float, force: float, liquid: Liquid, gravity: float = GRAVITY
 ) -> WetPad:
-    """Return a pad that is pressed on a floor with a wide bath at floor level.
+    """Compute a pad that is pressed on a floor with a wide bath at floor level.
 
     Parameters
     ----------
     pad : Pad
-        What the pad is made of. Its adhesion energy is not used.
+        Size and material. Its adhesion energy is not used.
     pressure : float
         Gauge pressure in the pad, Pa, above 0.
     force : float
-        Normal force on the pad, N, above 0; the liquid's pull comes on top of it.
+        Normal force on the pad, N, above 0, without the force of the liquid.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
     gravity : float
-        m/s², above 0.
+        Gravity, m/s², above 0.
 
     Raises
     ------
@@ -101,7 +110,7 @@ def press_wet(
         ``rim`` where the liquid reaches the rim of the pad; ``no_convergence`` where no common
         equilibrium was found near that of the rigid pad.
     InvalidInput
-        For values that are not finite or not in range.
+        When a value is not finite or out of range.
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
@@ -123,7 +132,7 @@ def press_wet(
     place, slope, status = contact(_as_wall(rigid_wall), case.angle, case.length)
     if status == 'dry':
         raise InvalidInput(
-            f'contact_angle = {case.angle:g} rad is not allowed: below pi is needed'
+            f'contact_angle = {case.angle:g} rad is not allowed: below pi rad is needed'
         )
     _refuse_rim(place, dry[2])
     rigid = _result(pad, case, (*dry, place), slope, rigid_wall, rigid_wall, 0.0, None)
@@ -135,13 +144,17 @@ def press_wet(
     angle = math.pi - slope - float(wet(found[3])[2])
     again = contact(_as_wall(wet), angle, case.length)[0]
     if abs(again - found[3]) > 1e-5 * found[2]:
-        raise NoSurface('the liquid that rises from the floor stops lower', 'no_convergence')
+        raise NoSurface(
+            'the equilibrium that was found is not the first one that liquid meets when it rises'
+            ' from the floor',
+            'no_convergence',
+        )
     above = _above(case, found, wet, kink)
     return _result(pad, case, found, slope, wet, above, kink, rigid)
 
 
 class _Case(NamedTuple):
-    """What is asked, in units of the pad's radius and stiffness."""
+    """Input in units of the pad's radius and stiffness."""
 
     pressure: float
     force: float
@@ -152,12 +165,12 @@ class _Case(NamedTuple):
 
     @property
     def grip(self) -> float:
-        """By how much the wet membrane is slacker."""
+        """Reduction of the membrane's tension by wetting."""
         return self.tension * math.cos(self.angle)
 
 
-# SciPy's OdeSolution: radius, height, inclination, area of the wall and volume inside it, over
-# arc length.
+# SciPy's OdeSolution over arc length: radius, height, inclination, area of disc and wall, and
+# volume inside the wall.
 Meridian: TypeAlias = Any
 
 
@@ -174,7 +187,7 @@ def _rates(s: float, state: Array, push: float, weight: float, tension: float) -
 
 
 def _meridian(case: _Case, b: float, length: float, tension: float, weight: float) -> Meridian:
-    """Return the wall from the edge of the contact disc upwards, as if all of it were alike."""
+    """Integrate the wall from the contact disc upwards, with the same tension everywhere."""
     from scipy.integrate import solve_ivp
 
     def steep(s: float, state: Array, *_: float) -> float:
@@ -234,7 +247,7 @@ def _dry(case: _Case, b: float, gap: float) -> tuple[float, float, float]:
         end = path(min(length, path.t_max))
         return [end[0] - 1.0 + length - min(length, path.t_max), tension - _tension(end[3])]
 
-    # Near the arc that leaves the floor at a tangent.
+    # Start from the circular arc that leaves the floor at a tangent.
     turn = 2.0 * math.atan2(gap, 1.0 - b)
     length = turn / math.sin(turn) * (1.0 - b)
     tension = case.pressure * (1.0 - b * b) / (2.0 * math.sin(turn))
@@ -252,26 +265,35 @@ def _joint(case: _Case, tension: float, phi: float) -> tuple[float, float]:
     wet, liquid = tension - case.grip, case.tension
     cosine = (wet * wet + liquid * liquid - tension * tension) / (2.0 * wet * liquid)
     if wet <= 0.0 or abs(cosine) > 1.0:
-        raise NoSurface('the liquid is stronger than the membrane', 'no_convergence')
+        raise NoSurface(
+            f'a surface tension of {liquid:.3g} times the stiffness is too large for a membrane'
+            f' tension of {tension:.3g} times the stiffness: the tensions at the contact line'
+            ' cannot balance',
+            'no_convergence',
+        )
     slope = math.acos(cosine) - phi
-    # The dry membrane pulls against the other two.
+    # The tension of the dry membrane balances the other two.
     across = liquid * math.sin(slope + phi)
     along = wet - liquid * math.cos(slope + phi)
     return slope, math.atan2(across, along)
 
 
 def _pull(case: _Case, state: Array, slope: float) -> float:
-    """Return the force of the liquid on the pad: pull at the line, suction on the wall below."""
+    """Return the force of the liquid on the pad: tension at the line and suction below it."""
     r, z, _, _, volume = state
     surface = 2.0 * math.pi * r * case.tension * math.sin(slope)
     return float(surface + case.weight * (math.pi * r * r * z - volume))
 
 
 def _misfit(case: _Case, x: Array) -> list[float]:
-    """Return what is left of the four equations."""
+    """Return the residuals of the four equations."""
     b, tension, length, place = x
     if not (0.0 < b < 1.0 and tension > case.grip and 0.0 < place < length):
-        raise NoSurface('pad and liquid have no common equilibrium here', 'no_convergence')
+        raise NoSurface(
+            'no equilibrium of pad and liquid was found: the solver left the possible range of'
+            ' contact radius, tension or contact line',
+            'no_convergence',
+        )
     wet = _meridian(case, b, length, tension - case.grip, case.weight)
     line = wet(place)
     slope, kink = _joint(case, tension, float(line[2]))
@@ -292,13 +314,15 @@ def _root(misfit: Callable[[Array], list[float]], start: Any, what: str) -> tupl
 
     found = root(misfit, start, method='hybr', options={'xtol': 1e-11, 'eps': 1e-8})
     if not np.max(np.abs(found.fun)) < 1e-7:
-        raise NoSurface(f'{what} have no common equilibrium: {found.message}', 'no_convergence')
+        raise NoSurface(f'no equilibrium of {what} was found: {found.message}', 'no_convergence')
     return tuple(float(value) for value in found.x)
 
 
 def _refuse_rim(place: float, length: float) -> None:
     if place >= length:
-        raise NoSurface('the liquid rises to the rim of the pad, where its base begins', 'rim')
+        raise NoSurface(
+            'the liquid reaches the rim of the pad, which this model does not include', 'rim'
+        )
 
 
 def _result(

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where closed triangle meshes overlap: surfaces that cross, and bodies within bodies.
+"""Detection of overlaps in closed triangle meshes: surfaces that cross, and bodies inside bodies.
 
-Wherever two triangles cross, the piece that they share ends where an edge of one passes through
-the other. So edges are looked for that come near a triangle with which they share no corner, and
-then both triangles at such an edge are judged together with it.
+Where two triangles cross, their common segment ends where an edge of one passes through the other.
+So the search is for edges close to a triangle with which they share no corner; then both triangles
+at such an edge are tested against this triangle.
 
-Corners in files are rounded, by which bodies that touch come to overlap. An overlap is told of
-only if no shift of corners by up to ``ROUNDING`` undoes it: every sign that decides has to be
-larger than what such shifts change. So what only touches is never told of, however slim its
-triangles are, and what overlaps by many times as much is.
+Corners in files are rounded, so bodies that only touch can overlap slightly. An overlap is
+reported only if no shift of corners by up to ``ROUNDING`` removes it: every deciding quantity must
+be larger than the change that such shifts can cause. So contact alone is never reported, even with
+very thin triangles, and an overlap of many times ``ROUNDING`` is always reported.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ Indices: TypeAlias = npt.NDArray[np.int64]
 Flags: TypeAlias = npt.NDArray[np.bool_]
 
 ROUNDING = 5e-7  # of the largest coordinate: more than single precision and welding shift corners
-_AT_ONCE = 1 << 18  # pairs of nodes looked at together: bounds the memory
+_AT_ONCE = 1 << 18  # pairs of nodes tested together: limits the memory
 
 
 class Overlap(NamedTuple):
-    """A place that is inside twice: a triangle of each of both surfaces, and where, m."""
+    """An overlap: a triangle of each of the two surfaces, and a point of the overlap, m."""
 
     faces: tuple[int, int]
     place: Array
@@ -41,10 +41,9 @@ class Overlap(NamedTuple):
 def first_overlap(
     points: Array, faces: Indices, edges: Indices, beside: Indices, bodies: Indices
 ) -> Overlap | None:
-    """Return a place where closed bodies overlap or one cuts itself; None where there is none.
+    """Return one place where closed bodies overlap or a body cuts itself; None if there is none.
 
-    Surfaces that meet along edges of both and nowhere else, to the bit, are not told apart from
-    bodies that touch.
+    Surfaces that cross exactly along edges of both count as touching, and are not reported.
 
     Parameters
     ----------
@@ -53,12 +52,12 @@ def first_overlap(
     faces : array of int, shape (m, 3)
         Corners of each triangle, anticlockwise as seen from outside.
     edges, beside : array of int, shape (3 m/2, 2)
-        Both corners of each edge, and both triangles there.
+        Both corners and both triangles of each edge.
     bodies : array of int, shape (m,)
-        The body of each triangle, counted from 0.
+        Number of the body of each triangle, from 0.
     """
     slack = ROUNDING * float(np.abs(points).max())
-    third = faces[beside].sum(axis=2) - edges.sum(axis=1, keepdims=True)  # beside each edge
+    third = faces[beside].sum(axis=2) - edges.sum(axis=1, keepdims=True)  # opposite corners
     for edge, face in _near(points, edges, faces, slack):
         met = _meeting(points[edges[edge]], points[faces[face]], slack)
         edge, face = edge[met], face[met]
@@ -82,17 +81,17 @@ def first_overlap(
 
 
 class _Tree:
-    """Boxes round edges or triangles as a binary tree: a node k has the children 2k and 2k + 1.
+    """Boxes around edges or triangles in a binary tree: node k has the children 2k and 2k + 1.
 
     Each level, from the two children of the root, has ``low`` and ``high`` of the boxes, shape
-    (3, nodes), and ``shared``: corners that all members of a node have, or ``none``.
+    (3, nodes), and ``shared``: corners common to all members of a node, or ``none``.
     """
 
     def __init__(self, points: Array, members: Indices, depth: int, slack: float, none: int):
         corners = points[members]
         low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
         self.order = _along_curve(0.5 * (low + high))
-        # The boxes are larger than needed by more than single precision can lose.
+        # Single precision is enough: the boxes are enlarged by more than its rounding.
         level = (
             _leaves(low[self.order], depth, np.float32, np.inf),
             _leaves(high[self.order], depth, np.float32, -np.inf),
@@ -113,11 +112,11 @@ class _Tree:
 
 
 def _along_curve(places: Array) -> Indices:
-    """Return the order of places along Morton's curve, which keeps neighbours together."""
+    """Return the order of places along Morton's curve, in which neighbours stay close."""
     low, size = places.min(axis=0), float(np.ptp(places, axis=0).max())
     cell = (1023.0 / size * (places - low)).astype(np.int64)
     for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
-        cell = (cell | cell << shift) & mask  # ends with two zeros between the bits
+        cell = (cell | cell << shift) & mask  # leaves two zeros between bits
     return np.argsort(cell @ np.array([1, 2, 4]), kind='stable')
 
 
@@ -130,10 +129,10 @@ def _leaves(values: npt.NDArray[Any], depth: int, kind: type, rest: float) -> np
 def _near(
     points: Array, edges: Indices, faces: Indices, slack: float
 ) -> Iterator[tuple[Indices, Indices]]:
-    """Yield, batch by batch, edges and triangles whose boxes meet and that share no corner.
+    """Yield batches of edges and triangles whose boxes intersect and that share no corner.
 
-    The trees of SciPy hold points, which would need one radius for all: a large triangle would
-    make neighbours of all small ones.
+    SciPy's trees are not used, because they search points with one radius for all: a single large
+    triangle would make all small ones neighbours.
     """
     depth = (len(edges) - 1).bit_length()
     one = _Tree(points, edges, depth, slack, -1)
@@ -157,7 +156,8 @@ def _near(
                 meet = low[axis].take(a) <= highest[axis].take(b)
                 meet &= lowest[axis].take(b) <= high[axis].take(a)
                 a, b = a[meet], b[meet]
-            # Fans of many slim triangles would else be compared with all their own edges.
+            # Drop pairs that share a corner; otherwise fans of many thin triangles would be
+            # compared with all their own edges.
             apart = np.ones(a.size, dtype=bool)
             for mine in corners:
                 for its in others:
@@ -166,7 +166,7 @@ def _near(
 
 
 def _meeting(segments: Array, triangles: Array, slack: float) -> Indices:
-    """Return which segments may meet their triangle: all that do, and some that pass near it."""
+    """Return the indices of segments that may meet their triangle, including some that do not."""
     a, b, c = (triangles[:, k] - segments[:, 0] for k in range(3))
     along = segments[:, 1] - segments[:, 0]
     normal = np.cross(b - a, c - a)
@@ -186,10 +186,10 @@ def _meeting(segments: Array, triangles: Array, slack: float) -> Indices:
 
 
 def _crossing(points: Array, one: Indices, other: Indices, slack: float) -> Flags:
-    """Return which triangles, given by corners, cross one another, whatever shifts they have."""
+    """Return which pairs of triangles, given by their corners, cross for every allowed shift."""
     same = one[:, :, None] == other[:, None]
     shared = same.sum(axis=(1, 2))
-    # A shared corner comes first; with two, triangles only lie side by side.
+    # Put a shared corner first; triangles with two shared corners are neighbours and do not cross.
     first, second = same.any(axis=2).argmax(axis=1), same.any(axis=1).argmax(axis=1)
     a, b = points[_turned(one, first)], points[_turned(other, second)]
     crossing = np.zeros(len(one), dtype=bool)
@@ -199,12 +199,14 @@ def _crossing(points: Array, one: Indices, other: Indices, slack: float) -> Flag
     rest, over = rest[_both_sides(over)], over[_both_sides(over)]
     under = _sides(b[rest], a[rest], slack)
     rest, over, under = (each[_both_sides(under)] for each in (rest, over, under))
-    # From a shared corner both pieces of the common line go the same way or opposite ways.
+    # From a shared corner each triangle covers a segment of the common line of both planes: the
+    # triangles cross if the two segments have the same direction.
     crossing[rest] = over[:, 1] * under[:, 1] < 0
     alone = shared[rest] == 0
     rest, over, under = rest[alone], over[alone], under[alone]
     crossing[rest] = True
-    # A corner that may be on either side of the other's plane: both have to cross.
+    # Where a shift can move a corner to the other side of a plane, try both sides: the triangles
+    # must cross in every case.
     for here in (-1, 1):
         for there in (-1, 1):
             sides = np.where(over == 0, here, over), np.where(under == 0, there, under)
@@ -213,11 +215,12 @@ def _crossing(points: Array, one: Indices, other: Indices, slack: float) -> Flag
 
 
 def _interlaced(a: Array, b: Array, over: Indices, under: Indices, slack: float) -> Flags:
-    """Return which triangles share a piece of the line that their planes have in common.
+    """Return which triangles share a segment of the line in which their planes intersect.
 
-    Both are turned until p is alone on the upper side of the other's plane. Then the pieces end
-    on the edges pq and pr, in an order that volumes between these edges tell (P. Guigue and
-    O. Devillers, Journal of Graphics Tools 8, 2003).
+    The corners p, q, r of each triangle are permuted until p is alone on the upper side of the
+    other plane. Then the segments end on the edges pq and pr; the signs of volumes between these
+    edges give the order of the ends (P. Guigue and O. Devillers, Journal of Graphics Tools 8,
+    2003).
     """
     up, down = -over.sum(axis=1, keepdims=True), -under.sum(axis=1, keepdims=True)
     a = _turned(a, np.argmax(over == up, axis=1))
@@ -230,7 +233,7 @@ def _interlaced(a: Array, b: Array, over: Indices, under: Indices, slack: float)
 
 
 def _coinciding(points: Array, one: Indices, other: Indices, slack: float) -> Flags:
-    """Return which triangles lie on one another and face the same way, as two floors would."""
+    """Return which triangles lie in one plane, overlap, and face the same way."""
     a, b = points[one], points[other]
     normals = _normals(a), _normals(b)
     coinciding = _dot(*normals) > 0.0
@@ -244,7 +247,7 @@ def _coinciding(points: Array, one: Indices, other: Indices, slack: float) -> Fl
 
 
 def _passing(edges: Array, third: Array, triangles: Array, slack: float) -> Flags:
-    """Return which edges lie in a triangle, with their own two triangles on both sides of it."""
+    """Return which edges lie in a triangle and have their own two triangles on its two sides."""
     normals = _normals(triangles)
     passing = _both_sides(_dot(normals[:, None], third - triangles[:, :1]))
     rest = np.flatnonzero(passing)
@@ -261,7 +264,10 @@ def _passing(edges: Array, third: Array, triangles: Array, slack: float) -> Flag
 
 
 def _overlaid(up: Array, inner: Array, outer: Array, slack: float) -> Flags:
-    """Return whether, as seen from above, beyond no side of a triangle all the corners lie."""
+    """Return where an edge or triangle (``inner``) may overlap a triangle, as seen from above.
+
+    True unless all corners of ``inner`` are beyond one side of the triangle.
+    """
     overlaid: Flags = np.ones(len(up), dtype=bool)
     for k in range(3):
         overlaid &= _left(up, outer[:, k], outer[:, (k + 1) % 3], inner, slack).any(axis=1)
@@ -269,7 +275,7 @@ def _overlaid(up: Array, inner: Array, outer: Array, slack: float) -> Flags:
 
 
 def _left(up: Array, start: Array, end: Array, corners: Array, slack: float) -> Flags:
-    """Return which corners are on the left of a line as seen from above, whatever the shifts."""
+    """Return which corners are left of a line, as seen from above, for every allowed shift."""
     start, end = start[:, None], end[:, None]
     area = _dot(up[:, None], np.cross(end - start, corners - start))
     around = sum(_length(side) for side in (end - start, corners - start, corners - end))
@@ -278,20 +284,21 @@ def _left(up: Array, start: Array, end: Array, corners: Array, slack: float) -> 
 
 
 def _sides(corners: Array, triangles: Array, slack: float) -> Indices:
-    """Return on which side of a triangle's plane each corner is, 0 where a shift may change it."""
+    """Return the side of a triangle's plane for each corner, 0 if a shift can change it."""
     a, b, c = (triangles[:, k, None] for k in range(3))
     return _side(a, b, c, corners, slack)
 
 
 def _side(a: Array, b: Array, c: Array, d: Array, slack: float) -> Indices:
-    """Return the sign of the volume (b - a, c - a, d - a), 0 where a shift may change it."""
+    """Return the sign of the volume (b - a, c - a, d - a), 0 if a shift can change it."""
     u, v, w = np.broadcast_arrays(b - a, c - a, d - a)
     volume = _dot(np.cross(u, v), w)
-    # A shift of one corner changes it by the face across, of two by the edge across.
+    # A shift of one corner changes the volume in proportion to the opposite face, a shift of two
+    # corners in proportion to the opposite edge.
     faces = sum(_length(np.cross(*two)) for two in ((u, v), (v, w), (w, u), (v - u, w - u)))
     edges = sum(_length(edge) for edge in (u, v, w, v - u, w - v, u - w))
-    doubt = slack * (faces + slack * (edges + 4.0 * slack))
-    return np.where(np.abs(volume) > doubt, np.sign(volume), 0.0).astype(np.int64)
+    change = slack * (faces + slack * (edges + 4.0 * slack))
+    return np.where(np.abs(volume) > change, np.sign(volume), 0.0).astype(np.int64)
 
 
 def _both_sides(signs: npt.NDArray[Any]) -> Flags:
@@ -300,7 +307,7 @@ def _both_sides(signs: npt.NDArray[Any]) -> Flags:
 
 
 def _turned(corners: npt.NDArray[Any], first: Indices) -> npt.NDArray[Any]:
-    """Return triangles whose corners begin with another one, in the same sense."""
+    """Return triangles with their corners rotated so that the given one is first."""
     turned: npt.NDArray[Any] = corners[
         np.arange(len(corners))[:, None], (first[:, None] + [0, 1, 2]) % 3
     ]
@@ -326,7 +333,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _on_line(a: Array, b: Array) -> Array:
-    """Return the middle of the piece of a line that two triangles which cross have in common."""
+    """Return the middle of the common segment of two triangles that cross."""
     normals = np.cross(a[1] - a[0], a[2] - a[0]), np.cross(b[1] - b[0], b[2] - b[0])
     ends = []
     for each, height in ((a, (a - b[0]) @ normals[1]), (b, (b - a[0]) @ normals[0])):
@@ -341,7 +348,7 @@ def _on_line(a: Array, b: Array) -> Array:
 
 
 def _in_plane(a: Array, b: Array) -> Array:
-    """Return the middle of the longest piece of edge that one triangle has in another's plane."""
+    """Return the middle of the longest piece of an edge of one triangle inside the other."""
     pieces = [
         _piece(each[k - 1], each[k], other) for each, other in ((a, b), (b, a)) for k in range(3)
     ]
@@ -349,7 +356,7 @@ def _in_plane(a: Array, b: Array) -> Array:
 
 
 def _piece(start: Array, end: Array, triangle: Array) -> tuple[float, Array]:
-    """Return length and middle of the piece of an edge that a triangle covers."""
+    """Return length and middle of the part of an edge that a triangle covers."""
     sides = np.roll(triangle, -1, axis=0) - triangle
     inward = np.cross(np.cross(sides[0], sides[1]), sides)
     first, last = 0.0, 1.0
@@ -366,11 +373,11 @@ def _piece(start: Array, end: Array, triangle: Array) -> tuple[float, Array]:
     return length, start + 0.5 * (first + last) * (end - start)
 
 
-# --- Bodies within bodies ---------------------------------------------------------------------
+# --- Bodies inside bodies ---------------------------------------------------------------------
 
 
 def _nested(corners: Array, bodies: Indices, slack: float) -> Overlap | None:
-    """Return a place where a body is wholly within another, for bodies that do not cross."""
+    """Return a place where a body is completely inside another, for bodies that do not cross."""
     order = np.argsort(bodies, kind='stable')
     begin = np.searchsorted(bodies[order], np.arange(int(bodies.max()) + 1))
     low = np.minimum.reduceat(corners.min(axis=1)[order], begin)
@@ -380,7 +387,7 @@ def _nested(corners: Array, bodies: Indices, slack: float) -> Overlap | None:
         around = ((low <= low[body] + slack) & (high >= high[body] - slack)).all(axis=1)
         around[body] = False
         if around.any():
-            # Behind the middle of its largest triangle one is surely inside of it.
+            # A point behind the centre of the body's largest triangle is inside the body.
             a, b, c = np.moveaxis(corners[mine], 1, 0)
             normals = np.cross(b - a, c - a)
             areas = np.linalg.norm(normals, axis=1)
@@ -393,10 +400,10 @@ def _nested(corners: Array, bodies: Indices, slack: float) -> Overlap | None:
 
 
 def _turns(corners: Array) -> float:
-    """Return how often a surface goes round the origin: 1 inside a body, 0 outside.
+    """Return the winding number of a surface around the origin: 1 inside a body, 0 outside.
 
-    The sum of the solid angles of its triangles (A. van Oosterom and J. Strackee, IEEE
-    Transactions on Biomedical Engineering 30, 1983).
+    This is the sum of the solid angles of its triangles over 4 pi (A. van Oosterom and J.
+    Strackee, IEEE Transactions on Biomedical Engineering 30, 1983).
     """
     a, b, c = np.moveaxis(corners, 1, 0)
     p, q, r = np.linalg.norm(corners, axis=2).T

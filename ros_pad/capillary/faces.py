@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solid faces that liquid wets: pads, floors, plates, and the mirrors between equal pads."""
+"""Solid faces that liquid wets: pads, floors, plates, and symmetry planes between equal pads."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.capillary.bath import Wall
+from ros_pad.configuration import number
 from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 Integers: TypeAlias = npt.NDArray[np.int64]
 
-KNOTS = 129  # of a rail
+KNOTS = 129  # number of points of a rail
 
 
 @dataclass(frozen=True)
 class Face:
-    """A solid face round a vertical axis, star-shaped in every section across it.
+    """A solid face around a vertical axis, star-shaped in every horizontal section.
 
     Parameters
     ----------
     rails : callable
-        From azimuths (rad, shape (n,)) to radii and heights of the face there, m, shape
-        (n, KNOTS, 2), from where wetting begins to where the face ends, evenly in arc length or
-        nearly so.
+        Function of azimuths (rad, shape (n,)): returns radii and heights of the face, m, shape
+        (n, KNOTS, 2), from the start of wetting to the end of the face, at nearly equal steps of
+        arc length.
     centre : array, shape (2,)
-        Where the axis is, m.
+        x and y of the axis, m.
     under : bool
-        The liquid stands on this face, as on a floor; else the face is beside or above it.
+        True if the liquid stands on this face, as on a floor; False if the face is beside or
+        above the liquid.
     """
 
     rails: Callable[[Array], Array]
@@ -54,34 +55,39 @@ class Face:
 
     @classmethod
     def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the face of a pad that is round about its axis, from the floor to its top."""
+        """Return the face of an axisymmetric pad, from the floor to its top."""
         places = np.linspace(wall.floor, wall.top, KNOTS)
         radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
         return cls.revolution(radii, heights, centre)
 
     @classmethod
     def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return a disc of the floor, m, wetted from its middle."""
+        """Return a disc of the floor, radius in m, wetted from its centre."""
         return replace(cls.plate(radius, 0.0, centre), under=True)
 
     @classmethod
     def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the underside of a level disc, m, wetted from its middle."""
+        """Return the underside of a horizontal disc, lengths in m, wetted from its centre."""
         size = number('radius', radius, 'm', above=True)
         return cls.revolution([0.0, size], [height, height], centre)
 
     @classmethod
     def cell(cls, pitch: float, sides: int, height: float) -> Face:
-        """Return the walls between equal pads: with a contact angle of pi/2 they are mirrors.
+        """Return the symmetry planes between equal pads; liquid meets them at a right angle.
 
         Parameters
         ----------
         pitch : float
-            Distance of the pads' axes, m.
+            Distance between the axes of neighbouring pads, m, above 0.
         sides : int
             4 for a square pattern, 6 for a hexagonal one.
         height : float
-            m.
+            Height of the planes, m, above 0.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or not allowed.
         """
         size = number('pitch', pitch, 'm', above=True)
         top = number('height', height, 'm', above=True)
@@ -103,22 +109,23 @@ class Face:
         Parameters
         ----------
         mesh : Mesh, or pair of arrays
-            Points (n, 3), m, and triangles (m, 3); an object may call them ``points`` and
-            ``faces``, or ``vertices`` and ``triangles``. The wall alone or the closed pad: level
-            parts (bottom and lid) are left out.
+            Points (n, 3), m, and triangles (m, 3), or an object with ``points`` and ``faces`` or
+            with ``vertices`` and ``triangles``. The mesh is only the wall, or the closed pad:
+            horizontal parts (bottom and top) are ignored.
         centre : array, shape (2,)
-            Of a vertical line inside the pad, m.
+            x and y of a vertical line inside the pad, m.
 
         Raises
         ------
         MeshError
-            Where the wall does not go once round the line, or leans over itself.
+            When the wall does not surround the line exactly once, leans over itself, is open
+            between its lower and upper end, or has fewer than 12 vertices.
 
         Notes
         -----
-        Radii come from the vertices, over azimuth and height, by moving least squares with
-        quadratics: contact angles are taken from slopes, which facets do not have. Edges of the
-        pad are rounded by about two triangles.
+        Radii are fitted to the vertices, over azimuth and height, by moving least squares with
+        quadratics, because contact angles need smooth slopes. Edges of the pad are rounded over
+        about two triangles.
         """
         if hasattr(mesh, 'points'):
             vertices, triangles = mesh.points, mesh.faces
@@ -134,23 +141,27 @@ class Face:
         turn = azimuth[walls] - azimuth[walls[:, :1]]
         turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
         rise = z[walls] - z[walls[:, :1]]
-        seen = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # area in the chart
-        around = abs(abs(seen.sum()) - 4.0 * math.pi * np.ptp(z[walls])) < 1e-6 * size
-        if not (around and ((seen > 0.0).all() or (seen < 0.0).all())):
+        area = turn[:, 1] * rise[:, 2] - turn[:, 2] * rise[:, 1]  # over azimuth and height
+        around = abs(abs(area.sum()) - 4.0 * math.pi * np.ptp(z[walls])) < 1e-6 * size
+        if not (around and ((area > 0.0).all() or (area < 0.0).all())):
             raise MeshError(
-                'the wall of the mesh is not seen once, from the outside, on every half plane'
-                f' through the vertical line at {centre[0]:g}, {centre[1]:g} m: it is open, leans'
-                ' over itself, or does not go round that line'
+                'the wall of the mesh is open, leans over itself, or does not surround the'
+                f' vertical line through centre = {centre[0]:g}, {centre[1]:g} m exactly once'
             )
         low, high = float(z[walls].min()), float(z[walls].max())
         rim = z[boundary_edges(walls)]
         if np.minimum(rim - low, high - rim).max() > 1e-6 * size:
-            raise MeshError('the wall of the mesh ends at other heights than its foot and its top')
+            raise MeshError(
+                f'the wall of the mesh is open between its lowest and highest point, z = {low:g}'
+                f' and {high:g} m: only its lower and upper end may be open'
+            )
         use = np.unique(walls)
         if use.size < 12:
-            raise MeshError(f'the wall of the mesh has {use.size} vertices: from 12 are needed')
+            raise MeshError(
+                f'the wall of the mesh has {use.size} vertices: at least 12 are needed'
+            )
         radii = np.hypot(points[use, 0], points[use, 1])
-        # Rows and columns of vertices are equally near, however long the triangles are.
+        # Scale heights so that rows and columns of vertices are equally far apart.
         scale = float(np.mean(abs(rise)) / np.mean(abs(turn)))
         chart = np.column_stack([azimuth[use], z[use] / scale])
         turns = np.concatenate([chart + np.array([2.0 * math.pi * k, 0.0]) for k in (-1, 0, 1)])
@@ -166,7 +177,7 @@ class Face:
 
 
 def _fitted(places: Array, values: Array, at: Array) -> Array:
-    """Return values at other places: of quadratics through the nearest ones."""
+    """Return values at other places (``at``), by quadratics fitted to the nearest 32 values."""
     from scipy.spatial import cKDTree
 
     distance, near = cKDTree(places).query(at, k=32)
@@ -175,14 +186,14 @@ def _fitted(places: Array, values: Array, at: Array) -> Array:
     weight = (1.0 - np.minimum(distance / reach, 1.0) ** 2) ** 2 + 1e-12
     basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
     weighted = (basis * weight[..., None]).swapaxes(1, 2)
-    # Where all neighbours lie in two rows, this prefers the flattest of the quadratics.
+    # Regularisation: where all neighbours lie in two rows, choose the flattest quadratic.
     squares = weighted @ basis + 1e-6 * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
     fit: Array = np.linalg.solve(squares, weighted @ values[near][..., None])[:, 0, 0]
     return fit
 
 
 def _even(points: Array) -> Array:
-    """Return a curve through points at KNOTS places, evenly in arc length."""
+    """Return a curve through points at KNOTS places, at equal steps of arc length."""
     from scipy.interpolate import Akima1DInterpolator
 
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
@@ -194,7 +205,7 @@ def _even(points: Array) -> Array:
 
 
 def boundary_edges(triangles: Integers) -> Integers:
-    """Return the edges that belong to one triangle alone, shape (n, 2)."""
+    """Return the edges that belong to only one triangle, shape (n, 2)."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     unique, count = np.unique(edges, axis=0, return_counts=True)
     return unique[count == 1]

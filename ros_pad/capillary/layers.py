@@ -1,28 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How high liquid climbs a pad: balances of weight and tension, layer by layer (thesis chapter 4).
+"""Height to which liquid climbs a pad, from balances in slices or layers (thesis chapter 4).
 
-The floor round the pad is wet, and the liquid there stands at height 0. In a slice of azimuth the
-wall is a curve r(z), inclined by a(z) against the floor, and the surface of the liquid is taken as
-the arc of a circle that meets the wall at height h with the contact angle θ and runs out on the
-floor with the angle θ_f: its radius is R = h/(cos(θ + a) + cos θ_f). Three balances find h:
+The floor around the pad is wet; far away the liquid has height 0. In a slice of azimuth the wall
+is a curve r(z) with inclination a(z) to the floor. The surface of the liquid is approximated by a
+circular arc that meets the wall at height h with the contact angle θ and ends on the floor with
+the angle θ_f: its radius is R = h/(cos(θ + a) + cos θ_f). One of three balances gives h:
 
-- ``energy``: h has the least energy of weight, surface and wetted wall;
-- ``force``: the tension lifts the weight, γ sin(θ + a) r = ρ g V;
-- ``thesis``: Eq. 4.11 summed up from the floor, γ cos θ A_wet = 2 ρ g Σ z V. In a tube this is
-  Jurin's law; elsewhere it is no equilibrium, and it has no rise at contact angles from 90
-  degrees.
+- ``energy``: h minimises the energy of weight, surface and wetted wall;
+- ``force``: the surface tension carries the weight, γ sin(θ + a) r = ρ g V;
+- ``thesis``: Eq. 4.11 summed from the floor, γ cos θ A_wet = 2 ρ g Σ z V. In a tube this is
+  Jurin's law; elsewhere it is not an equilibrium, and it gives no rise for contact angles of 90
+  degrees and more.
 
-The last two also have answers where there is no equilibrium. Energy, which is least in one, judges
-them: what is farther from its height than ``AGREEMENT`` is refused. The arc itself fails on
-straight walls, if the pad is slender (the true surface reaches farther out) or the wall is steep
-and wholly wetted: ``SLENDER`` and ``WETTING`` are where its height is a sixth off the exact one. A
-wall that bulges, as that of a dome, stops the liquid whatever the surface is like.
+The last two also have solutions where there is no equilibrium. They are compared with ``energy``:
+a relative difference in height above ``AGREEMENT`` is refused. The arc is a bad approximation on
+straight walls if the pad is slender (the true surface extends farther out) or the wall is steep
+and completely wetted: at ``SLENDER`` and ``WETTING`` the error of the height is about a sixth. On
+walls that bulge, like those of domes, the wall limits the rise, whatever the surface is like.
 """
 
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,55 +34,67 @@ from ros_pad.capillary.sections import Walls
 from ros_pad.capillary.sections import centre
 from ros_pad.capillary.sections import layered
 from ros_pad.capillary.sections import walls
+from ros_pad.configuration import choice
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 BALANCES = ('energy', 'force', 'thesis')
-STATUSES = ('ok', 'dry', 'coarse', 'saturated', 'no_circle', 'far_off', 'far_apart')
-AGREEMENT = 0.15  # of the height of least energy: farther off, another balance is refused
-SLENDER = 0.35  # capillary lengths: radius below which a straight pad is too thin for arcs
-WETTING = math.radians(10.0)  # contact angle below which arcs are too high on walls
-_STEEP = math.radians(70.0)  # as steep as this and straight
-_STRAIGHT = math.radians(10.0)  # from the mean inclination of a wall to that at the line
-WIDEST_GAP = 1.0  # capillary lengths: between pads farther apart the surface is not level
+AGREEMENT = 0.15  # allowed relative difference between the heights of a balance and of ``energy``
+SLENDER = 0.35  # radius in capillary lengths below which arcs fail on a straight pad
+WETTING = math.radians(10.0)  # contact angle below which arcs are too high on steep straight walls
+_STEEP = math.radians(70.0)  # inclination from which a wall is steep
+_STRAIGHT = math.radians(10.0)  # a straight wall changes its inclination by less than this
+WIDEST_GAP = 1.0  # capillary lengths; between pads farther apart the surface is not level
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_THROUGH_WALL = 0.01  # of the height: by which an arc may dip into a wall of facets
-_ROUND = 720  # pieces of a contact line, for its projections
+_THROUGH_WALL = 0.01  # of the height: allowed depth of an arc inside a faceted wall
+_ROUND = 720  # pieces of a contact line, for projections
 
 
 @dataclass(frozen=True)
 class Wet:
-    """Liquid round one pad, slice by slice.
+    """Liquid around one pad, in slices of azimuth.
 
-    Where a slice has no answer its numbers are NaN and its status says why: ``dry`` (no rise:
-    the liquid is pushed down), ``coarse`` (a rise of less than two layers, or an end of the arcs
-    within one: more layers are needed), ``saturated`` (over the top of the mesh), ``no_circle``
-    (no arc of a circle fits between this wall and the floor), ``far_off`` (of a kind that is
-    off by about a sixth and more: the energy is least elsewhere by more than ``AGREEMENT``, or the
-    wall is straight and slender, or steep and wholly wetted).
+    Where a slice has no result, its numbers are NaN and its status gives the reason: ``dry`` (no
+    rise: the liquid is pushed down), ``coarse`` (the rise is less than two layers, or within a
+    layer of the height above which no arc exists: more layers are needed), ``saturated`` (the
+    liquid rises above the top of the mesh), ``no_circle`` (no circular arc fits between wall and
+    floor), ``far_off`` (an error of a sixth or more: the height differs from that of lowest energy
+    by more than ``AGREEMENT``, or the wall is straight, and slender or steep and completely
+    wetted).
 
     Attributes
     ----------
-    azimuths : array, shape (slices,), rad from the x axis.
-    heights : array, shape (slices,), m, of the line where liquid, wall and air meet.
-    ring_radii : array, shape (slices,), m, of that line from the axis.
-    floor_radii : array, shape (slices,), m, where the liquid's surface runs out on the floor.
-    curvature_radius : array, shape (slices,), m, of the surface in the plane of the slice.
-    pressure : array, shape (slices,), Pa
-        Of the liquid over the air, γ(1/r - 1/R): below 0 the liquid pulls.
+    azimuths : array, shape (slices,)
+        Azimuth of each slice, rad from the x axis.
+    heights : array, shape (slices,)
+        Height of the contact line, where liquid, wall and air meet, m.
+    ring_radii : array, shape (slices,)
+        Distance of the contact line from the axis, m.
+    floor_radii : array, shape (slices,)
+        Distance from the axis at which the surface ends on the floor, m.
+    curvature_radius : array, shape (slices,)
+        Radius R of the surface in the plane of the slice, m.
+    pressure : array, shape (slices,)
+        Pressure of the liquid minus that of the air, γ(1/r - 1/R), Pa: suction below 0.
     status : array of str, shape (slices,)
-    axis : tuple of float, x and y of the axis, m.
-    top : float, height of the mesh, m.
-    floor_angle : float, rad, between floor and liquid.
+        ``ok`` or the reason why there is no result.
+    axis : tuple of float
+        x and y of the axis, m.
+    top : float
+        Height of the mesh, m.
+    floor_angle : float
+        Contact angle on the floor, rad.
     balance : str
+        One of ``BALANCES``.
     liquid : Liquid
+        The liquid.
     """
 
     azimuths: Array
@@ -101,46 +112,50 @@ class Wet:
 
     @property
     def mean_height(self) -> float:
-        """Mean over the slices, m; NaN when one of them has no answer."""
+        """Mean height over the slices, m; NaN if one of them has no result."""
         return float(np.mean(self.heights))
 
     @property
     def height_spread(self) -> float:
-        """Highest less lowest slice, m; NaN when one has no answer."""
+        """Difference between the highest and the lowest slice, m; NaN if one has no result."""
         return float(np.ptp(self.heights))
 
     def section(self, direction: float | npt.ArrayLike) -> float:
         """Return the liquid's area projected along a direction of motion, m².
 
+        NaN if a slice has no result.
+
         Parameters
         ----------
         direction : float or array of 2 or 3 numbers
-            Azimuth, rad from the x axis, or a vector, whose vertical part does not count.
+            Azimuth, rad from the x axis, or a vector, whose vertical part is ignored.
 
         Raises
         ------
         InvalidInput
-            When it is not finite, or a vector that does not point anywhere on the floor.
+            When the direction is not finite, has another shape, or is a vector without horizontal
+            part.
         """
         return self._projected(direction, np.ones_like(self.heights))
 
     def force(self, direction: float | npt.ArrayLike) -> float:
         """Return pressure times section for a direction of motion, N (thesis 4.18).
 
-        The thesis' estimate of what one side of the pad feels: no bound, for the pressure is that
-        of an arc. Exact surfaces pull many times as much on one side, and by as much on the other,
-        so that nothing is left of it round a symmetric pad. Below 0 the liquid pulls.
-        Directions as for :meth:`section`.
+        This is the thesis' estimate of the force on one side of the pad; below 0 the liquid pulls.
+        It is not a bound, because the pressure is that of an arc. Exact surfaces pull many times
+        as much on each of the two sides, and around a symmetric pad these forces cancel. Direction
+        and errors are as for :meth:`section`.
         """
         return self._projected(direction, self.pressure)
 
     def hysteresis_force(
         self, direction: float | npt.ArrayLike, advancing_angle: float, receding_angle: float
     ) -> float:
-        """Return the most that pinning of the contact line resists, N.
+        """Return the largest force of the pinned contact line against a motion, N.
 
-        Its width across the direction, times tension, times cos θ_receding - cos θ_advancing; see
-        :func:`ros_pad.contact.hysteresis_force`. Directions as for :meth:`section`.
+        This is the width of the line across the direction, times tension, times cos θ_receding -
+        cos θ_advancing; see :func:`ros_pad.contact.hysteresis_force`. NaN if a slice has no
+        result. Angles are in rad, directions as for :meth:`section`.
         """
         across = self._across(direction)
         width = float(np.ptp(across)) if np.isfinite(self.heights).all() else math.nan
@@ -150,11 +165,11 @@ class Wet:
         return float(hysteresis_force(0.5 * width, tension, advancing_angle, receding_angle))
 
     def surface(self, count: int = 17) -> Array:
-        """Return points of the liquid's surface, shape (slices, count, 3), m, from floor to wall.
+        """Return points of the surface from floor to wall, m, shape (slices, count, 3).
 
-        Slices without an answer are NaN.
+        Slices without a result are NaN; count is from 2 to 1000.
         """
-        _whole('count', count, 2, 1000)
+        integer('count', count, 2, 1000)
         start = math.cos(self.floor_angle)
         last = np.arccos(np.clip(start - self.heights / self.curvature_radius, -1.0, 1.0))
         turn = self.floor_angle + np.linspace(0.0, 1.0, count) * (last - self.floor_angle)[:, None]
@@ -166,7 +181,7 @@ class Wet:
         return np.stack([x, y, z], axis=2)
 
     def _across(self, direction: float | npt.ArrayLike) -> Array:
-        """Return the contact line's points measured across a direction, closed, m."""
+        """Return the coordinate across a direction along the closed contact line, m."""
         forward = _azimuth(direction)
         turns = np.linspace(0.0, 2.0 * math.pi, _ROUND + 1)
         radii = np.interp(turns, self.azimuths, self.ring_radii, period=2.0 * math.pi)
@@ -176,27 +191,33 @@ class Wet:
         across = self._across(direction)
         middle = 2.0 * math.pi * (np.arange(_ROUND) + 0.5) / _ROUND
         load = np.interp(middle, self.azimuths, factor * self.heights, period=2.0 * math.pi)
-        # Front and rear each cover the whole section.
+        # The sum covers front and rear, each with the whole section.
         return 0.5 * float(np.sum(load * np.abs(np.diff(across))))
 
 
 @dataclass(frozen=True)
 class WetPattern:
-    """Liquid between many pads, with a level surface. NaN where there is no answer.
+    """Liquid between many pads, with a level surface. Numbers are NaN if there is no result.
 
     Attributes
     ----------
-    height : float, m.
-    pressure : float, Pa
-        Of the liquid below its surface over the air, -ρ g h: below 0 the liquid pulls.
-    volume : float, m³, of the liquid.
-    void_area : float, m², between the pads at that height.
+    height : float
+        Height of the surface above the floor, m.
+    pressure : float
+        Pressure of the liquid just below the surface minus that of the air, -ρ g h, Pa: suction.
+    volume : float
+        Volume of the liquid, m³.
+    void_area : float
+        Area between the pads at this height, m².
     status : str
         As for :class:`Wet`, or ``far_apart``: void area over outline is more than ``WIDEST_GAP``
         capillary lengths, so that the surface sags between the pads.
-    area : float, m², of the whole pattern.
-    pads : int, how often the mesh stands there.
+    area : float
+        Area of the whole pattern, m².
+    pads : int
+        Number of copies of the mesh in the pattern.
     balance : str
+        One of ``BALANCES``.
     """
 
     height: float
@@ -210,7 +231,7 @@ class WetPattern:
 
     @property
     def section(self) -> float:
-        """Area projected along any direction, m², of a pattern that is round."""
+        """Projected area of a circular pattern, along any direction, m²."""
         return self.height * 2.0 * math.sqrt(self.area / math.pi)
 
     @property
@@ -229,39 +250,40 @@ def wet(
     floor_angle: float = 0.0,
     strict: bool = True,
 ) -> Wet:
-    """Return how high liquid climbs round one pad.
+    """Compute the height to which liquid climbs around one pad.
 
     Parameters
     ----------
     mesh : Mesh
-        A single pad, a star as seen from its axis.
+        A single pad; each horizontal section is star-shaped as seen from the axis.
     liquid : Liquid
         Its contact angle is ``liquid.angle``.
     balance : {'energy', 'force', 'thesis'}
-        What holds the liquid up. ``energy`` is within 4 to 9 % of the exact meniscus of a dome
-        where the solid has up to 0.7 of the liquid's tension, 6 to 15 % above that.
+        Balance that gives the height. With ``energy`` the error against the exact meniscus of a
+        dome is 4 to 9 % if the tension of the solid is up to 0.7 of that of the liquid, 6 to 15 %
+        above.
     layers : int
-        From floor to top, from 4. The error falls with their square.
+        Number of layers from floor to top, from 4. The error falls with their square.
     slices : int
-        Round the axis, from 3. Each is in balance by itself.
+        Number of slices around the axis, from 3. Each slice has its own balance.
     axis : tuple of float, optional
-        x and y of the axis, m: by default the centroid of the lowest layer.
+        x and y of the axis, m; by default the centroid of the lowest layer.
     floor_angle : float
-        Contact angle on the floor, rad, from 0 (the floor is wet all over) to below pi/2.
+        Contact angle on the floor, rad, from 0 (the floor is completely wet) to below pi/2.
     strict : bool
-        Refuse heights that are ``far_off``. Without it they are taken as they are, up to 3 times
-        too high or low: to compare, not to use.
+        Refuse heights that are ``far_off``. If False they are returned, up to 3 times too high or
+        low; use them only for comparison.
 
     Raises
     ------
     InvalidInput
-        When a value is not allowed.
+        When a value is out of range or of the wrong type.
     MeshError
-        Where a slice does not meet the wall just once in every layer.
+        Where a slice does not meet the wall exactly once in every layer.
     """
     _check(mesh, liquid, balance)
-    _whole('layers', layers, 4, 100000)
-    _whole('slices', slices, 3, 3600)
+    integer('layers', layers, 4, 100000)
+    integer('slices', slices, 3, 3600)
     number('floor_angle', floor_angle, 'rad', high=math.nextafter(0.5 * math.pi, 0.0))
     if axis is None:
         axis = centre(mesh, 0.5 * mesh.height / layers)
@@ -279,40 +301,12 @@ def _climb(
     axis: tuple[float, float],
     strict: bool,
 ) -> Wet:
-    """Balance every slice of a wall."""
-    theta, tension = liquid.angle, liquid.surface_tension
-    weight = liquid.density * GRAVITY
+    """Solve the balance of every slice of a wall."""
     z, r, a = cut.heights, cut.radii, cut.inclinations
     cells, rows = z.size - 1, np.arange(len(r))
-    arc = _Arc(z, r, a, theta, floor_angle)
-
-    # Per radian of azimuth: moments of the liquid's section, and the wall below.
-    inner = _cumulative(z, r**2), _cumulative(z, z * r**2)
-    volume, lifted = 0.5 * (arc.volume - inner[0]), 0.5 * (arc.moment - inner[1])
-    slant = 0.5 * (r[:, 1:] + r[:, :-1]) * np.hypot(np.diff(z), np.diff(r))
-    wall = np.concatenate([np.zeros((len(r), 1)), np.cumsum(slant, axis=1)], axis=1)
-    covered = 0.5 * (arc.floor_radius**2 - r[:, :1] ** 2)
-
-    free = arc.area - math.cos(floor_angle) * covered - math.cos(theta) * wall
-    least = _lowest(np.where(arc.open, weight * lifted + tension * free, np.inf))
-    if balance == 'energy':
-        place = least
-    else:
-        if balance == 'force':
-            misfit = tension * np.sin(theta + a) * r - weight * volume
-        else:
-            misfit = tension * math.cos(theta) * wall - 2.0 * weight * lifted
-        place = _first_root(np.where(arc.open, misfit, -np.inf))
+    place, least, no_rise = _places(cut, liquid, balance, floor_angle)
     judge = least if strict else place
-    # No way up: the liquid would leave the wall downwards at once.
-    no_rise = ~arc.open[:, 1]
-    if balance == 'thesis' and math.cos(theta) <= 1e-12:
-        no_rise[:] = True
-
-    status = np.full(len(r), 'ok', dtype='<U9')
-    status[np.isnan(place) | np.isnan(judge)] = 'coarse'
-    status[(place >= cells) | (judge >= cells)] = 'saturated'
-    status[no_rise] = 'dry'
+    status = _first_statuses(place, judge, no_rise, cells)
     place = np.where(status == 'ok', place, np.nan)
 
     at = np.clip(np.nan_to_num(place), 0.0, cells - 1e-9)
@@ -324,11 +318,11 @@ def _climb(
 
     heights = np.where(status == 'ok', z[-1] / cells * place, np.nan)
     radii, angles = here(r), here(a)
-    top = _Arc(heights[:, None], radii[:, None], angles[:, None], theta, floor_angle)
-    # The arc must stay clear of the wall below it.
+    top = _Arc(heights[:, None], radii[:, None], angles[:, None], liquid.angle, floor_angle)
     for j in np.flatnonzero(status == 'ok'):
-        wall_there = np.interp(top.z[j, 0], z, r[j])
-        if (top.r[j, 0] < wall_there - _THROUGH_WALL * heights[j]).any() or not top.open[j, 0]:
+        wall = np.interp(top.z[j, 0], z, r[j])
+        through = (top.r[j, 0] < wall - _THROUGH_WALL * heights[j]).any()
+        if through or not top.open[j, 0]:
             status[j] = 'no_circle'
     if strict:
         far = _disagree(place, judge) | _no_arc(place, cut, liquid)
@@ -336,7 +330,7 @@ def _climb(
     good = status == 'ok'
     curvature = np.where(good, top.radius[:, 0], np.nan)
     with np.errstate(divide='ignore'):
-        pressure = tension * (1.0 / radii - 1.0 / curvature)
+        pressure = liquid.surface_tension * (1.0 / radii - 1.0 / curvature)
     return Wet(
         azimuths=cut.azimuths,
         heights=np.where(good, heights, np.nan),
@@ -353,15 +347,58 @@ def _climb(
     )
 
 
-class _Arc:
-    """Arcs of circles from the wall down to the floor, one for each height they could end at.
+def _first_statuses(
+    place: Array, judge: Array, no_rise: npt.NDArray[np.bool_], cells: int
+) -> npt.NDArray[np.str_]:
+    """Return the status of each slice as far as its heights, in layers, determine it."""
+    status = np.full(len(place), 'ok', dtype='<U9')
+    status[np.isnan(place) | np.isnan(judge)] = 'coarse'
+    status[(place >= cells) | (judge >= cells)] = 'saturated'
+    status[no_rise] = 'dry'
+    return status
 
-    ``volume`` and ``moment`` are the integrals of r² and z r² over the height, ``area`` that of r
-    over the arc's length; ``open`` says where there is an arc.
+
+def _places(
+    cut: Walls, liquid: Liquid, balance: str, floor_angle: float
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Find the heights of the balance and of the lowest energy of each slice, in layers.
+
+    Also returns the slices in which the liquid does not rise.
+    """
+    theta, tension = liquid.angle, liquid.surface_tension
+    weight = liquid.density * GRAVITY
+    z, r, a = cut.heights, cut.radii, cut.inclinations
+    arc = _Arc(z, r, a, theta, floor_angle)
+
+    # Per radian of azimuth: moments of the liquid's section, and the area of the wall below.
+    inner = _cumulative(z, r**2), _cumulative(z, z * r**2)
+    volume, lifted = 0.5 * (arc.volume - inner[0]), 0.5 * (arc.moment - inner[1])
+    slant = 0.5 * (r[:, 1:] + r[:, :-1]) * np.hypot(np.diff(z), np.diff(r))
+    wall = np.concatenate([np.zeros((len(r), 1)), np.cumsum(slant, axis=1)], axis=1)
+    covered = 0.5 * (arc.floor_radius**2 - r[:, :1] ** 2)
+
+    free = arc.area - math.cos(floor_angle) * covered - math.cos(theta) * wall
+    least = _lowest(np.where(arc.open, weight * lifted + tension * free, np.inf))
+    no_rise = ~arc.open[:, 1]
+    if balance == 'energy':
+        return least, least, no_rise
+    if balance == 'force':
+        misfit = tension * np.sin(theta + a) * r - weight * volume
+    else:
+        misfit = tension * math.cos(theta) * wall - 2.0 * weight * lifted
+        no_rise |= math.cos(theta) <= 1e-12
+    return _first_root(np.where(arc.open, misfit, -np.inf)), least, no_rise
+
+
+class _Arc:
+    """Circular arcs from the wall down to the floor, one for each height of the contact line.
+
+    ``volume`` and ``moment`` are the integrals of r² and z r² over the height, ``area`` is that of
+    r over the arc length; ``open`` is true where an arc exists. ``r`` and ``z`` are its points.
     """
 
     def __init__(self, height: Array, wall: Array, slope: Array, theta: float, floor: float):
-        last = math.pi - theta - slope  # inclination where the arc meets the wall
+        last = math.pi - theta - slope  # inclination of the arc at the wall
         self.open = last > floor + 1e-9
         last = np.where(self.open, last, floor + 1.0)
         self.radius = height / (math.cos(floor) - np.cos(last))
@@ -388,47 +425,46 @@ def wet_pattern(
     layers: int = 200,
     strict: bool = True,
 ) -> WetPattern:
-    """Return how high liquid stands between many pads (thesis 4.19 to 4.23).
+    """Compute the height of liquid between many pads (thesis 4.19 to 4.23).
 
     Parameters
     ----------
     mesh : Mesh
         One pad of many, or all of them: any shape.
     liquid : Liquid
-        What is between them.
+        The liquid between them.
     area : float
-        Of the whole pattern, m²: ``pads`` times what ``mesh`` stands for.
+        Area of the whole pattern, m², above 0: ``pads`` times the area for one ``mesh``.
     pads : int
-        How often the mesh stands there, from 1.
+        Number of copies of the mesh in the pattern, from 1.
     balance : {'energy', 'force', 'thesis'}
-        As for :func:`wet`. In narrow gaps ``energy`` and ``force`` meet the wall of a dome where
-        its slope is the contact angle, h = R(1 + cos θ) above a floor it touches, whatever the
-        pitch.
+        As for :func:`wet`. In narrow gaps ``energy`` and ``force`` give the height at which the
+        slope of a dome is the contact angle: h = R(1 + cos θ) for a sphere that touches the floor,
+        for every pitch.
     layers : int
-        From floor to top, from 4.
+        Number of layers from floor to top, from 4.
     strict : bool
-        Refuse what is ``far_off``, as for :func:`wet`, and what is ``far_apart``: heights of
-        pads with wide gaps, where the level surface is lower than the meniscus of each pad.
+        Refuse heights that are ``far_off``, as for :func:`wet`, or ``far_apart``: in wide gaps the
+        level surface is lower than the meniscus of each pad.
 
     Raises
     ------
     MeshError
-        Where no room is left between the pads.
+        Where the pads fill the whole area.
     InvalidInput
-        When a value is not allowed.
+        When a value is out of range or of the wrong type.
     """
     _check(mesh, liquid, balance)
     number('area', area, 'm²', above=True)
-    _whole('pads', pads, 1, 10**6)
-    _whole('layers', layers, 4, 100000)
+    integer('pads', pads, 1, 10**6)
+    integer('layers', layers, 4, 100000)
     cut = layered(mesh, layers, liquid.angle)
     void = area - pads * cut.areas
     if void.min() <= 0.0:
         k = int(np.argmax(void <= 0.0))
         raise MeshError(
-            f'{mesh.source}: {pads} of these fill {pads * cut.areas[k]:.4g} m² at'
-            f' z = {cut.heights[k]:.4g} m, and the pattern has only area = {area:.4g} m²:'
-            ' the pads overlap'
+            f'{mesh.source}: {pads} copies of the mesh need {pads * cut.areas[k]:.4g} m² at'
+            f' z = {cut.heights[k]:.4g} m, but area = {area:.4g} m²: the pads overlap'
         )
     return _fill(cut, void, pads, liquid, area, balance, strict)
 
@@ -436,7 +472,7 @@ def wet_pattern(
 def _fill(
     cut: Layers, void: Array, pads: int, liquid: Liquid, area: float, balance: str, strict: bool
 ) -> WetPattern:
-    """Balance a level surface between pads."""
+    """Solve the balance of a level surface between pads."""
     z, cells = cut.heights, cut.heights.size - 1
     place, no_rise = _level(cut, void, pads, liquid, balance)
     judge = place
@@ -478,16 +514,16 @@ def _fill(
 def _level(
     cut: Layers, void: Array, pads: int, liquid: Liquid, balance: str
 ) -> tuple[float, bool]:
-    """Return where a level surface is in balance, in layers, and whether nothing rises."""
+    """Return where a level surface is in balance, in layers, and whether there is no rise."""
     tension, weight = liquid.surface_tension, liquid.density * GRAVITY
     z = cut.heights
     if balance == 'energy':
-        # The slope of the energy; the areas of facets by themselves have one with steps.
+        # Minus the derivative of the energy, from smooth normals; facet areas would have steps.
         misfit = tension * pads * cut.gain - weight * z * void
         no_rise = misfit[0] <= 0.0 and misfit[1] <= 0.0
         lowest = int(np.argmin(-_cumulative(z, misfit)))
         first = misfit[: max(lowest - 1, 0)]
-        np.abs(first, out=first)  # hills on the way are passed
+        np.abs(first, out=first)  # ignore local minima of the energy at lower heights
     elif balance == 'force':
         misfit = tension * pads * cut.pull - weight * _cumulative(z, void)
         no_rise = cut.pull[0] <= 0.0 and cut.pull[1] <= 0.0
@@ -498,11 +534,11 @@ def _level(
     return float(_first_root(misfit[None])[0]), bool(no_rise)
 
 
-# --- Where a balance is met -------------------------------------------------------------------
+# --- Roots and minima over layers -------------------------------------------------------------
 
 
 def _cumulative(z: Array, values: Array) -> Array:
-    """Return the integral over height from the floor up to every layer, by trapezia."""
+    """Return the integral over height from the floor to every layer, by the trapezoidal rule."""
     steps = 0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(z)
     total = np.zeros(values.shape)
     np.cumsum(steps, axis=-1, out=total[..., 1:])
@@ -510,12 +546,12 @@ def _cumulative(z: Array, values: Array) -> Array:
 
 
 def _disagree(place: Floats, judge: Floats) -> npt.NDArray[np.bool_]:
-    """Tell where a balance is met too far from where another is."""
+    """Return where two heights, in layers, differ by more than ``AGREEMENT``."""
     return np.abs(np.subtract(place, judge)) > AGREEMENT * np.asarray(judge)
 
 
 def _no_arc(place: Array, cut: Walls, liquid: Liquid) -> npt.NDArray[np.bool_]:
-    """Tell on which walls the liquid's surface is known to be no arc of a circle."""
+    """Return the walls on which the surface is known to be far from a circular arc."""
     z, rows = cut.heights, np.arange(len(cut.radii))
     layer = np.nan_to_num(place).clip(0, z.size - 1).astype(int)
     ring = cut.radii[rows, layer]
@@ -530,9 +566,9 @@ def _capillary_length(liquid: Liquid) -> float:
 
 
 def _lowest(energy: Array) -> Array:
-    """Return where each row is least, in layers: NaN below the second, the last for the end.
+    """Return the minimum of each row, in layers, or the last layer if the energy falls to there.
 
-    Next to where arcs end the place is known to a layer only, and NaN, too.
+    NaN below the second layer, and next to the end of the arcs, where the minimum is not resolved.
     """
     last = energy.shape[1] - 1
     k = np.argmin(energy, axis=1)
@@ -546,9 +582,9 @@ def _lowest(energy: Array) -> Array:
 
 
 def _first_root(misfit: Array) -> Array:
-    """Return where each row falls to 0 for the first time, in layers: NaN below the second.
+    """Return where each row falls to 0 for the first time, in layers, or the last layer.
 
-    Rows that never do give the last layer; NaN, too, is what falls next to where arcs end.
+    NaN below the second layer, and next to the end of the arcs.
     """
     last = misfit.shape[1] - 1
     fallen = misfit[:, 1:] <= 0.0
@@ -560,9 +596,9 @@ def _first_root(misfit: Array) -> Array:
 
 
 def _between(values: Array, rows: Indices, k: Indices) -> Array:
-    """Return where rows of values, above 0 at k, pass 0 before k + 1.
+    """Return where rows of values, above 0 at k and not at k + 1, cross 0.
 
-    On the parabola through both and the value before them, so that the error falls smoothly.
+    The parabola through both values and the value before them gives a smooth error.
     """
     before, here, after = values[rows, np.maximum(k - 1, 0)], values[rows, k], values[rows, k + 1]
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -571,7 +607,7 @@ def _between(values: Array, rows: Indices, k: Indices) -> Array:
         return k + 2.0 * here / (np.sqrt(slope**2 - 4.0 * bend * here) - slope)
 
 
-# --- What is asked ----------------------------------------------------------------------------
+# --- Checks of arguments ----------------------------------------------------------------------
 
 
 def _check(mesh: Mesh, liquid: Liquid, balance: str) -> None:
@@ -582,16 +618,11 @@ def _check(mesh: Mesh, liquid: Liquid, balance: str) -> None:
     choice('balance', balance, BALANCES)
 
 
-def _whole(name: str, value: int, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise InvalidInput(
-            f'{name} = {value!r} is not allowed: a whole number from {low} to {high}'
-        )
-
-
 def _pair(axis: tuple[float, float]) -> tuple[float, float]:
     if np.shape(axis) != (2,):
-        raise InvalidInput(f'axis = {axis!r} is not allowed: x and y, m, are needed')
+        raise InvalidInput(
+            f'axis = {axis!r} is not allowed: two numbers, x and y in m, are needed'
+        )
     x, y = (number('axis', value, 'm', low=-math.inf) for value in axis)
     return x, y
 
@@ -603,21 +634,12 @@ def _azimuth(direction: Floats) -> float:
     vector = np.asarray(direction)
     if vector.shape not in ((2,), (3,)) or vector.dtype.kind not in 'iuf':
         raise InvalidInput(
-            f'direction = {direction!r} is not allowed: an azimuth in rad, or 2 or 3 numbers'
+            f'direction = {direction!r} is not allowed: an azimuth in rad, or a vector of 2 or 3'
+            ' numbers, is needed'
         )
     if not np.isfinite(vector).all() or not np.hypot(*vector[:2]) > 0.0:
-        raise InvalidInput(f'direction = {direction!r} is not allowed: it points nowhere')
+        raise InvalidInput(
+            f'direction = {direction!r} is not allowed: a finite vector with a horizontal part'
+            ' other than 0 is needed'
+        )
     return math.atan2(vector[1], vector[0])
-
-
-# --- Time -------------------------------------------------------------------------------------
-
-
-def timed(mesh: Mesh, liquid: Liquid, repeats: int = 5, **options: int | str) -> float:
-    """Return the shortest time that :func:`wet` takes of several, s."""
-    shortest = math.inf
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        wet(mesh, liquid, **options)  # type: ignore[arg-type]
-        shortest = min(shortest, time.perf_counter() - begun)
-    return shortest

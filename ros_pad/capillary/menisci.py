@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid surfaces round pads of any shape: in a wide bath, in a pattern of pads, as a bridge."""
+"""Liquid surfaces around pads of any shape: in a wide bath, in a pattern of pads, as a bridge."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.surface import Line
 from ros_pad.capillary.surface import LiquidSurface
 from ros_pad.capillary.surface import minimise
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
@@ -34,24 +35,33 @@ def spanned(
     rows: int = 8,
     growth: float = 1.0,
 ) -> tuple[Array, Integers, tuple[Line, Line]]:
-    """Return a straight surface between two faces, for :func:`minimise` to begin with.
+    """Return a straight surface between two faces, from which :func:`minimise` can start.
 
     Parameters
     ----------
     first, last : Face
-        The upper and the lower face of a bridge; the inner and the outer one of a meniscus.
+        Upper and lower face of a bridge; inner and outer face of a meniscus.
     places : pair of float
-        Where on the rails of each the surface begins, from 0 to 1.
+        Place of the contact line on the rails of each face, from 0 to 1.
     angles : pair of float
-        Contact angle on each, rad; None pins the line there.
+        Contact angle on each face, rad; None pins the line.
     sectors, rows : int
-        Vertices round the surface and rows of triangles across it: from 6, and from 1.
+        Number of vertices around the surface, from 6, and of rows of triangles, from 1.
     growth : float
-        How much longer each row is than the one before it, above 0.
+        Ratio of the lengths of consecutive rows, above 0.
+
+    Returns
+    -------
+    tuple
+        Vertices, m, triangles and lines, the first arguments of :func:`minimise`.
+
+    Raises
+    ------
+    InvalidInput
+        When a place, an angle or a number is out of range.
     """
-    for name, value, least in (('sectors', sectors, 6), ('rows', rows, 1)):
-        if not isinstance(value, int) or value < least:
-            raise InvalidInput(f'{name} = {value!r} is not allowed: an integer from {least}')
+    integer('sectors', sectors, 6)
+    integer('rows', rows, 1)
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
     outwards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
     rings = []
@@ -65,7 +75,7 @@ def spanned(
     i, j = np.divmod(np.arange(rows * sectors), sectors)
     a, b = i * sectors + j, i * sectors + (j + 1) % sectors
     c, d = a + sectors, b + sectors
-    flip = (i + j) % 2 == 0  # alternate diagonals favour no direction
+    flip = (i + j) % 2 == 0  # alternating diagonals prefer no direction
     one = np.where(flip, [a, c, d], [a, c, b]).T
     two = np.where(flip, [a, d, b], [b, c, d]).T
     ring = np.arange(sectors)
@@ -84,7 +94,7 @@ def bath_surface(
     refinements: int = 1,
     reach: float = 8.0,
 ) -> LiquidSurface:
-    """Return the surface of a wide bath at floor level round a pad of any shape.
+    """Compute the surface of a wide bath at floor level around a pad of any shape.
 
     Parameters
     ----------
@@ -93,25 +103,27 @@ def bath_surface(
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
     gravity : float
-        m/s², above 0.
+        Gravity, m/s², above 0.
     sectors : int
-        Vertices round the pad before refinement, from 6.
+        Number of vertices around the pad before refinement, from 6.
     refinements : int
-        Each halves the triangles.
+        Number of refinements; each halves the size of the triangles.
     reach : float
-        In capillary lengths, above 0: at this distance from the pad the surface is held level.
-        The error is ``exp(-2 reach)``.
+        Distance from the pad at which the surface is fixed at floor level, in capillary lengths,
+        above 0. The error is ``exp(-2 reach)``.
 
     Raises
     ------
     NoSurface
-        ``rim`` where the liquid stays below the floor or reaches the top of the face, and as
-        :func:`minimise` does.
+        ``rim`` where the liquid is pushed below the floor or reaches the end of the face; other
+        statuses as in :func:`bath_meniscus` and :func:`minimise`.
+    InvalidInput
+        When a value is not finite or out of range.
 
     Notes
     -----
-    The search begins with the exact meniscus of the pad with the same radius, on average, at each
-    height.
+    The minimisation starts from the exact meniscus of the axisymmetric pad with the same mean
+    radius at each height.
     """
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
     rails = face.rails(azimuths)
@@ -122,7 +134,7 @@ def bath_surface(
     length = math.sqrt(liquid.surface_tension / heavy)
     span = number('reach', reach, '(capillary lengths)', above=True) * length
     far = float(rails[..., 0].max()) + span
-    # Triangles are as long as wide, or as the surface's curvature needs, and grow outwards.
+    # Triangles are as long as wide, or shorter where the surface is curved, and grow outwards.
     step = 2.0 * math.pi / sectors
     first = step * min(bath.radius, length)
     rows = math.ceil(math.log1p(step * span / first) / math.log1p(step))
@@ -135,18 +147,7 @@ def bath_surface(
         rows,
         1.0 + step,
     )
-    along = np.append(0.0, np.cumsum(np.hypot(np.diff(bath.radii), np.diff(bath.heights))))
-    share = np.linalg.norm(
-        (vertices - vertices[:sectors].mean(axis=0)).reshape(-1, sectors, 3), axis=2
-    )
-    share = (share - share[0]).mean(axis=1)
-    radii = np.interp(share, along, bath.radii) - bath.radius
-    heights = np.interp(share, along, bath.heights)
-    line = np.hypot(*(vertices[:sectors, :2] - face.centre).T)
-    outwards = (vertices[:sectors, :2] - face.centre) / line[:, None]
-    grid = (line + radii[:, None])[..., None] * outwards + face.centre
-    vertices[:, :2] = grid.reshape(-1, 2)
-    vertices[:, 2] = np.repeat(heights, sectors)
+    _bend(vertices, bath, sectors, face.centre)
     return minimise(
         vertices,
         triangles,
@@ -156,6 +157,22 @@ def bath_surface(
         pressure=0.0,
         refinements=refinements,
     )
+
+
+def _bend(vertices: Array, bath: BathMeniscus, sectors: int, centre: tuple[float, float]) -> None:
+    """Move the vertices of a straight surface onto the meniscus of a wide bath."""
+    along = np.append(0.0, np.cumsum(np.hypot(np.diff(bath.radii), np.diff(bath.heights))))
+    distance = np.linalg.norm(
+        (vertices - vertices[:sectors].mean(axis=0)).reshape(-1, sectors, 3), axis=2
+    )
+    distance = (distance - distance[0]).mean(axis=1)
+    radii = np.interp(distance, along, bath.radii) - bath.radius
+    heights = np.interp(distance, along, bath.heights)
+    line = np.hypot(*(vertices[:sectors, :2] - centre).T)
+    outwards = (vertices[:sectors, :2] - centre) / line[:, None]
+    grid = (line + radii[:, None])[..., None] * outwards + centre
+    vertices[:, :2] = grid.reshape(-1, 2)
+    vertices[:, 2] = np.repeat(heights, sectors)
 
 
 def pattern_surface(
@@ -169,47 +186,51 @@ def pattern_surface(
     sectors: int = 24,
     refinements: int = 1,
 ) -> LiquidSurface:
-    """Return the surface of the liquid round one of many equal pads.
+    """Compute the surface of the liquid around one of many equal pads.
 
     Parameters
     ----------
     face : Face
-        The wall of the pad, its axis through 0, 0.
+        The wall of the pad, with its axis through 0, 0.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
     pitch : float
-        Distance of the pads' axes, m.
+        Distance between the axes of neighbouring pads, m.
     sides : int
         4 for a square pattern, 6 for a hexagonal one.
     pressure : float
-        Pa, of the liquid over that of the air, at the floor: 0 where the liquid is joined to a
-        wide bath at floor level.
+        Pressure of the liquid minus that of the air at the floor, Pa: 0 where the liquid is
+        connected to a wide bath at floor level.
     volume : float
-        m³ of liquid per pad, in place of the pressure. The floor is wet all over.
+        Volume of liquid per pad, m³, instead of the pressure. The whole floor is wet.
     gravity : float
-        m/s², from 0.
+        Gravity, m/s², from 0.
     sectors : int
-        Vertices round the pad before refinement, a multiple of twice the sides.
+        Number of vertices around the pad before refinement, a multiple of twice ``sides``.
     refinements : int
-        Each halves the triangles.
+        Number of refinements; each halves the size of the triangles.
 
     Raises
     ------
     NoSurface
-        As :func:`minimise` does.
+        As :func:`bath_surface` does.
+    InvalidInput
+        When a value is out of range, pads of this pitch touch, or both or none of pressure and
+        volume are given.
     """
     heavy = liquid.density * number('gravity', gravity, 'm/s²')
     cell = Face.cell(pitch, sides, 1.0)
     if sectors % (2 * sides):
         raise InvalidInput(
-            f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} has vertices in the'
-            ' corners of the cell'
+            f'sectors = {sectors!r} is not allowed: a multiple of {2 * sides} is needed, for'
+            ' vertices in the corners of the cell'
         )
     rails = face.rails(np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False))
     widest = 2.0 * float(rails[..., 0].max())
     if widest >= pitch:
         raise InvalidInput(
-            f'pitch = {pitch:g} m is not allowed: above {widest:g} m, where the pads do not touch'
+            f'pitch = {pitch:g} m is not allowed: above {widest:g} m, the width of the pads, is'
+            ' needed'
         )
     mean = rails.mean(axis=0)
     place = _film_place(mean, liquid, cell, volume, gravity)
@@ -238,14 +259,15 @@ def pattern_surface(
 
 
 def _round_bath(mean: Array, liquid: Liquid, gravity: float) -> BathMeniscus:
-    """Return the meniscus round the pad with this meridian."""
-    wall = dataclasses.replace(Wall.through(*mean.T), steps=12)  # a start need not be sure
+    """Return the meniscus around the axisymmetric pad with this meridian."""
+    wall = dataclasses.replace(Wall.through(*mean.T), steps=12)  # coarse: only a start is needed
     found = bath_meniscus(wall=wall, liquid=liquid, gravity=gravity)
     if found.status in ('dry', 'rim'):
         raise NoSurface(
-            'the liquid stays below the floor'
+            'the liquid is pushed below the floor, where the face ends'
             if found.status == 'dry'
-            else 'the liquid reaches the top of the face',
+            else f'the liquid reaches the end of the face at height = {found.height:g} m: a'
+            ' contact line between bottom and top of the face is needed',
             'rim',
         )
     return found
@@ -254,7 +276,7 @@ def _round_bath(mean: Array, liquid: Liquid, gravity: float) -> BathMeniscus:
 def _film_place(
     mean: Array, liquid: Liquid, cell: Face, volume: float | None, gravity: float
 ) -> float:
-    """Return about where on the rail the liquid of a pattern stands, from 0 to 1."""
+    """Return an estimate of the contact line's place on the rail in a pattern, from 0 to 1."""
     places = np.linspace(0.0, 1.0, KNOTS)
     radii, heights = mean.T
     if volume is not None:
@@ -262,7 +284,7 @@ def _film_place(
         free = math.pi * (np.mean(corners**2) - radii**2)
         filled = np.cumsum(0.5 * (free[1:] + free[:-1]) * np.diff(heights))
         return float(np.clip(np.interp(volume, np.append(0.0, filled), places), 0.02, 0.98))
-    # Between the level film of pads close by and the meniscus of one alone.
+    # Take the mean height of the level film between close pads and the meniscus of a single pad.
     lean = np.arctan2(np.gradient(heights), np.gradient(radii))
     level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
     if gravity > 0.0:

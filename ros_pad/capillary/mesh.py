@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed triangle meshes of pads that stand on the floor: read, made, checked, written."""
+"""Closed triangle meshes of pads that stand on the floor: read, generate, check, write."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ from scipy.spatial import cKDTree
 
 from ros_pad.capillary.crossings import Indices
 from ros_pad.capillary.crossings import first_overlap
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
-LARGEST = 0.5  # m: beyond this a pad was surely drawn in millimetres
+LARGEST = 0.5  # m: a larger pad is probably given in millimetres
 SMALLEST = 1e-5  # m
-_ON_FLOOR = 1e-5  # of the height: what files in single precision may miss the floor by
-_WELD = 1e-7  # of the extent: points that are one
+_ON_FLOOR = 1e-5  # of the height: allowed distance from the floor, for files in single precision
+_WELD = 1e-7  # of the extent: points closer than this are merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +44,15 @@ class Mesh:
     faces : array of int, shape (m, 3)
         Corners of each triangle, anticlockwise as seen from outside.
     source : str
-        File or generator, for messages.
+        File or generator, for error messages.
 
     Raises
     ------
     MeshError
-        When the mesh is empty, holds numbers that are not finite, has holes, edges of more than
-        two triangles or triangles that face the other way than their neighbours, is inside out,
-        does not reach down to z = 0 or goes below it, has no size a pad can have in metres, or
-        where bodies overlap or one cuts itself.
+        When the mesh is empty, has numbers that are not finite, holes, edges of more than two
+        triangles, or triangles that face opposite to their neighbours; when it is inside out, its
+        lowest point is not at z = 0, its size is not plausible for a pad in metres, bodies
+        overlap, or a body cuts itself.
     """
 
     points: Array
@@ -72,8 +73,8 @@ class Mesh:
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
         if abs(low) > _ON_FLOOR * (high - low):
             raise MeshError(
-                f'{self.source}: the lowest point is at z = {low:.6g} m, not on the floor z = 0:'
-                f' lift = {-low:.9g} m would put it there'
+                f'{self.source}: the lowest point is at z = {low:.6g} m, but z = 0 is needed:'
+                f' use lift = {-low:.9g} m'
             )
         points[:, 2] -= low
         _check_overlaps(points, faces, edges, beside, bodies, self.source)
@@ -84,12 +85,12 @@ class Mesh:
 
     @property
     def height(self) -> float:
-        """From the floor to the highest point, m."""
+        """Height of the highest point above the floor, m."""
         return float(self.points[:, 2].max())
 
     @functools.cached_property
     def volume(self) -> float:
-        """Of all bodies, m³."""
+        """Volume of all bodies, m³."""
         return float(_tetrahedra(self.points, self.faces).sum())
 
     # --- Files --------------------------------------------------------------------------------
@@ -104,34 +105,35 @@ class Mesh:
     ) -> Mesh:
         """Read an STL, OBJ, PLY or MSH (Gmsh) file.
 
-        Triangles and quadrangles are taken; of a file with tetrahedra alone, their outer faces.
+        Triangles and quadrangles are read. From a file that has only tetrahedra, their outer faces
+        are read.
 
         Parameters
         ----------
         path : path
-            The ending names the format.
+            The file; its suffix gives the format.
         scale : float
-            What one unit of the file is in metres: 1e-3 for a file in millimetres.
+            Length of one unit of the file, m, above 0: 1e-3 for a file in millimetres.
         lift : float
             Added to every height after scaling, m.
         flip : bool
-            Turn every triangle over, for a mesh that is inside out.
+            Reverse every triangle, for a mesh that is inside out.
 
         Raises
         ------
         MeshError
-            When the file is missing or cannot be understood, meshio is not installed, or for any
-            reason of :class:`Mesh`.
+            When the suffix is unknown, the file is missing or cannot be read, meshio is not
+            installed, or for any reason of :class:`Mesh`.
         InvalidInput
-            When ``scale`` or ``lift`` is not finite, or the scale not above 0.
+            When ``scale`` or ``lift`` is not finite or out of range.
         """
         number('scale', scale, 'm per unit', above=True)
         number('lift', lift, 'm', low=-math.inf)
         path = _known(path)
         if not path.is_file():
-            raise MeshError(f'{path}: there is no such file')
+            raise MeshError(f'{path}: no such file')
         meshio = _meshio()
-        # meshio prints what it does not understand, and then leaves the interpreter.
+        # For some broken files meshio prints a message and exits the interpreter.
         with (
             open(os.devnull, 'w') as nowhere,
             contextlib.redirect_stdout(nowhere),
@@ -143,8 +145,7 @@ class Mesh:
             except (Exception, SystemExit) as error:
                 reason = str(error) or type(error).__name__
                 raise MeshError(
-                    f'{path}: this is no {path.suffix[1:].upper()} file that can be read'
-                    f' ({reason})'
+                    f'{path}: cannot be read as {path.suffix[1:].upper()} file: {reason}'
                 ) from error
         faces = _triangles(found.cells)
         points = np.asarray(found.points, dtype=np.float64)
@@ -156,26 +157,26 @@ class Mesh:
         return cls(points, faces[:, ::-1] if flip else faces, os.fspath(path))
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write an STL, OBJ, PLY or MSH file in metres. An existing file is left alone.
+        """Write an STL, OBJ, PLY or MSH file in metres. Existing files are not overwritten.
 
         Raises
         ------
         MeshError
-            When the ending is not one of these, or meshio is not installed.
+            When the suffix is unknown, or meshio is not installed.
         InvalidInput
             When the file exists.
         """
         path = _known(path)
         meshio = _meshio()
         if path.exists():
-            raise InvalidInput(f'{path} exists already: nothing is overwritten')
-        ways: dict[str, Any] = {
+            raise InvalidInput(f'{path}: the file exists already and is not overwritten')
+        options: dict[str, Any] = {
             '.stl': {'binary': True},
             '.msh': {'file_format': 'gmsh', 'binary': False},
         }
-        faces = self.faces.astype(np.int32)  # PLY has no longer integers
+        faces = self.faces.astype(np.int32)  # PLY has no 64-bit integers
         meshio.Mesh(self.points, [('triangle', faces)]).write(
-            path, **ways.get(path.suffix.lower(), {})
+            path, **options.get(path.suffix.lower(), {})
         )
 
     # --- Generators ---------------------------------------------------------------------------
@@ -189,19 +190,20 @@ class Mesh:
         rings: int = 48,
         sectors: int = 72,
     ) -> Mesh:
-        """Make a dome pressed flat on the floor: a sphere cut off below and above.
+        """Make a dome pressed on the floor: a sphere cut by the floor and by a plane above.
 
         Parameters
         ----------
         sphere_radius : float
-            m.
+            Radius of the sphere, m, above 0.
         contact_radius : float
-            Of the flat part on the floor, m, from 0 (it touches in a point) to below
+            Radius of the contact with the floor, m, from 0 (one point) to below
             ``sphere_radius``.
         height : float, optional
-            Where the sphere is cut off above, m: by default at its widest.
+            Height of the upper plane, m, above 0; by default at the widest section.
         rings, sectors : int
-            Bands of triangles from floor to top (from 1), and round the axis (from 3).
+            Number of bands of triangles from floor to top, from 1, and of sectors around the axis,
+            from 3.
 
         Raises
         ------
@@ -217,11 +219,13 @@ class Mesh:
         top = math.nextafter(centre + radius, 0.0)
         number('height', height, 'm', high=top, above=True)
         turns = np.linspace(
-            math.asin(contact / radius), math.acos((centre - height) / radius), _count(rings) + 1
+            math.asin(contact / radius),
+            math.acos((centre - height) / radius),
+            integer('rings', rings, 1) + 1,
         )
         r, z = radius * np.sin(turns), centre - radius * np.cos(turns)
         r[0], z[0], z[-1] = contact, 0.0, height
-        return _revolved(r, z, sectors, f'dome of {radius:g} m')
+        return revolved(r, z, sectors, f'dome of {radius:g} m')
 
     @classmethod
     def cone(
@@ -237,9 +241,9 @@ class Mesh:
         Parameters
         ----------
         contact_radius, top_radius : float
-            At the floor and at the top, m, from 0, not both 0.
+            Radius at the floor and at the top, m, from 0, not both 0.
         height : float
-            m, above 0.
+            Height, m, above 0.
         rings, sectors : int
             As for :meth:`dome`.
 
@@ -250,12 +254,14 @@ class Mesh:
         """
         contact = number('contact_radius', contact_radius, 'm')
         top = number('top_radius', top_radius, 'm', above=contact == 0.0)
-        z = np.linspace(0.0, number('height', height, 'm', above=True), _count(rings) + 1)
-        return _revolved(contact + (top - contact) * z / height, z, sectors, 'cone')
+        z = np.linspace(
+            0.0, number('height', height, 'm', above=True), integer('rings', rings, 1) + 1
+        )
+        return revolved(contact + (top - contact) * z / height, z, sectors, 'cone')
 
     @classmethod
     def cylinder(cls, radius: float, height: float, rings: int = 1, sectors: int = 72) -> Mesh:
-        """Make a cylinder that stands upright; values as for :meth:`cone`."""
+        """Make a vertical cylinder; parameters as for :meth:`cone`."""
         return cls.cone(number('radius', radius, 'm', above=True), radius, height, rings, sectors)
 
     @classmethod
@@ -269,16 +275,16 @@ class Mesh:
         rings: int = 24,
         sectors: int = 48,
     ) -> Mesh:
-        """Make many equal domes in a hexagonal layout, the first in the middle.
+        """Make many equal domes in a hexagonal pattern, the first in the centre.
 
         Parameters
         ----------
         pads : int
-            How many, from 1: those of the lattice that are nearest to the middle.
+            Number of domes, from 1, at the places of the lattice nearest to the centre.
         pitch : float
-            Distance of neighbours, m.
+            Distance between neighbours, m, above 0.
         sphere_radius, contact_radius, height, rings, sectors
-            Of each :meth:`dome`.
+            Parameters of each :meth:`dome`.
 
         Raises
         ------
@@ -290,9 +296,10 @@ class Mesh:
         one = cls.dome(sphere_radius, contact_radius, height, rings, sectors)
         widest = 2.0 * float(np.hypot(*one.points[:, :2].T).max())
         number('pitch', pitch, 'm', above=True)
-        if _count(pads, 'pads') > 1 and pitch <= widest:
+        if integer('pads', pads, 1) > 1 and pitch <= widest:
             raise MeshError(
-                f'pitch = {pitch:g} m: the domes are {widest:.6g} m wide and would overlap'
+                f'pitch = {pitch:g} m is not allowed: above {widest:.6g} m, the width of the'
+                ' domes, is needed'
             )
         places = np.column_stack([pitch * _hexagonal(pads), np.zeros(pads)])
         points = (places[:, None] + one.points[None]).reshape(-1, 3)
@@ -301,17 +308,21 @@ class Mesh:
         return cls(points, faces, f'{pads} domes of {sphere_radius:g} m')
 
 
-def _count(value: int, name: str = 'rings', low: int = 1) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < low:
-        raise InvalidInput(f'{name} = {value!r} is not allowed: a whole number from {low}')
-    return value
+def revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
+    """Return a body of revolution.
 
-
-def _revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
-    """Return a body of revolution; the profile goes up from the floor."""
-    turns = 2.0 * math.pi * np.arange(_count(sectors, 'sectors', 3)) / sectors
+    Parameters
+    ----------
+    r, z : array, shape (n,)
+        Radii and heights of the profile, m, from the floor upwards.
+    sectors : int
+        Number of sectors around the axis, from 3.
+    source : str
+        Name for error messages.
+    """
+    turns = 2.0 * math.pi * np.arange(integer('sectors', sectors, 3)) / sectors
     ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    # The middle of floor and top stand for rings without a radius, too.
+    # The centres of floor and top also replace rings of radius 0.
     wide = r > 0.0
     levels = [np.column_stack([r[k] * ring, np.full(sectors, z[k])]) for k in np.flatnonzero(wide)]
     points = np.concatenate([*levels, [(0.0, 0.0, z[0]), (0.0, 0.0, z[-1])]])
@@ -334,7 +345,7 @@ def _revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
 
 
 def _hexagonal(count: int) -> Array:
-    """Return the places of a hexagonal lattice that are nearest to its origin, neighbours 1."""
+    """Return the places of a hexagonal lattice of distance 1 that are nearest to its origin."""
     reach = int(math.sqrt(count)) + 2
     i, j = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
     places = np.column_stack([i + 0.5 * j, math.sqrt(0.75) * j])
@@ -350,7 +361,7 @@ def _hexagonal(count: int) -> Array:
 def _known(path: str | os.PathLike[str]) -> pathlib.Path:
     known = pathlib.Path(path)
     if known.suffix.lower() not in SUFFIXES:
-        raise MeshError(f'{known}: a mesh ends in {", ".join(SUFFIXES)}')
+        raise MeshError(f'{known}: unknown suffix; one of {", ".join(SUFFIXES)} is needed')
     return known
 
 
@@ -359,13 +370,13 @@ def _meshio() -> Any:
         import meshio
     except ImportError as error:
         raise MeshError(
-            "files of meshes need meshio, which is not installed: pip install 'ros_pad[mesh]'"
+            "mesh files need meshio, which is not installed: pip install 'ros_pad[mesh]'"
         ) from error
     return meshio
 
 
 def _triangles(cells: Sequence[Any]) -> Indices:
-    """Return all triangles of a file."""
+    """Return the triangles of a file, with quadrangles split, or else the faces of tetrahedra."""
     found = [np.empty((0, 3), dtype=np.int64)]
     for block in cells:
         corners = np.asarray(block.data, dtype=np.int64)
@@ -379,7 +390,7 @@ def _triangles(cells: Sequence[Any]) -> Indices:
                 t = np.asarray(block.data, dtype=np.int64)
                 found += [t[:, [0, 2, 1]], t[:, [0, 1, 3]], t[:, [1, 2, 3]], t[:, [2, 0, 3]]]
         faces = np.concatenate(found)
-        # The faces between two tetrahedra are there twice.
+        # Faces between two tetrahedra occur twice.
         _, which, times = np.unique(
             np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
         )
@@ -388,7 +399,7 @@ def _triangles(cells: Sequence[Any]) -> Indices:
 
 
 def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
-    """Merge points that are one, as an STL file has them; drop triangles without a size."""
+    """Merge points that coincide, as in STL files; drop triangles with two equal corners."""
     points, which = np.unique(points, axis=0, return_inverse=True)
     which = which.ravel()
     pairs = cKDTree(points).query_pairs(
@@ -410,15 +421,15 @@ def _welded(points: Array, faces: Indices) -> tuple[Array, Indices]:
 
 def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str) -> None:
     if points.size == 0 or faces.size == 0:
-        raise MeshError(f'{source}: the mesh is empty: it has no triangles')
+        raise MeshError(f'{source}: the mesh has no points or no triangles')
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in 'iuf':
         raise MeshError(f'{source}: points of shape {points.shape}: (n, 3) numbers are needed')
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in 'iu':
         raise MeshError(f'{source}: faces of shape {faces.shape}: (m, 3) integers are needed')
     if faces.min() < 0 or faces.max() >= len(points):
         raise MeshError(
-            f'{source}: corners {faces.min()} to {faces.max()} are not all among the'
-            f' {len(points)} points'
+            f'{source}: faces with corners {faces.min()} to {faces.max()} are not allowed:'
+            f' numbers of points from 0 to {len(points) - 1} are needed'
         )
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
@@ -428,24 +439,25 @@ def _check_arrays(points: npt.NDArray[Any], faces: npt.NDArray[Any], source: str
 def _check_size(extent: float, source: str) -> None:
     if extent > LARGEST:
         raise MeshError(
-            f'{source}: {extent:.6g} m across, more than {LARGEST:g} m: a pad in millimetres needs'
-            ' scale=1e-3'
+            f'{source}: the extent is {extent:.6g} m: at most {LARGEST:g} m is needed; a file in'
+            ' millimetres needs scale=1e-3'
         )
     if extent < SMALLEST:
         raise MeshError(
-            f'{source}: {extent:.6g} m across, less than {SMALLEST:g} m: was it scaled twice?'
+            f'{source}: the extent is {extent:.6g} m: at least {SMALLEST:g} m is needed; check the'
+            ' scale'
         )
 
 
 def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices]:
-    """Return both corners of each edge and both triangles there, shape (edges, 2) each.
+    """Return both corners and both triangles of each edge, shape (edges, 2) each.
 
-    What is no closed surface with one outside is refused.
+    Raises `MeshError` where the surface is not closed or not consistently oriented.
     """
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     if (starts == ends).any():
         raise MeshError(
-            f'{source}: triangle {int(np.argmax(starts == ends)) // 3} has a corner twice'
+            f'{source}: triangle {int(np.argmax(starts == ends)) // 3} has two equal corners'
         )
     n = len(points)
     edges = np.minimum(starts, ends) * n + np.maximum(starts, ends)
@@ -454,7 +466,7 @@ def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices
     for wrong, what in (
         (times > 2, 'edges of more than two triangles (non-manifold)'),
         (times < 2, 'open edges (holes)'),
-        (rising != 1, 'edges whose two triangles face opposite ways (flipped normals)'),
+        (rising != 1, 'edges between triangles of opposite orientation (flipped normals)'),
     ):
         if wrong.any():
             place = 0.5 * (points[keys[wrong][0] // n] + points[keys[wrong][0] % n])
@@ -467,21 +479,21 @@ def _edges(points: Array, faces: Indices, source: str) -> tuple[Indices, Indices
 
 
 def _bodies(beside: Indices, count: int) -> Indices:
-    """Return which body each triangle is of; bodies with a point in common are two."""
+    """Return the body number of each triangle; bodies that share only a point count as two."""
     graph = coo_array((np.ones(len(beside)), beside.T), shape=(count, count))
     bodies: Indices = connected_components(graph, directed=False)[1].astype(np.int64)
     return bodies
 
 
 def _check_volumes(points: Array, faces: Indices, bodies: Indices, source: str) -> None:
-    """Refuse bodies that are inside out."""
+    """Raise `MeshError` where bodies are inside out."""
     volumes = np.bincount(bodies, _tetrahedra(points, faces))
     wrong = int(np.sum(volumes <= 0.0))
     if wrong:
         which = 'the mesh is' if wrong == volumes.size else f'{wrong} of {volumes.size} bodies are'
         raise MeshError(
-            f'{source}: {which} inside out (flipped normals) or flat: flip=True turns a whole'
-            ' mesh over; hollows inside a pad must go'
+            f'{source}: {which} inside out (flipped normals) or flat: use flip=True to reverse the'
+            ' whole mesh; cavities inside a pad are not allowed'
         )
 
 
@@ -497,7 +509,7 @@ def _check_overlaps(
 
 
 def _tetrahedra(points: Array, faces: Indices) -> Array:
-    """Return the signed volume that each triangle spans with a point in the middle."""
+    """Return the signed volume of the tetrahedron of each triangle with the mean of the points."""
     a, b, c = (points - points.mean(axis=0))[faces.T]
     volumes: Array = np.einsum('ij,ij->i', a, np.cross(b, c)) / 6.0
     return volumes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cuts through a mesh: half planes through an axis (slices), and horizontal planes (layers)."""
+"""Sections of a mesh: by half planes from an axis (slices), and by horizontal planes (layers)."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from ros_pad.capillary.mesh import Mesh
 from ros_pad.contact.pad import Array
 from ros_pad.errors import MeshError
 
-CREASE = math.radians(40.0)  # facets that meet at less stand for one smooth wall
-_AT_ONCE = 2_000_000  # triangles times layers: bounds the memory
-_INSIDE = 1e-9  # of the height: lowest and highest cut, so far from floor and top
+CREASE = math.radians(40.0)  # facets with a smaller angle between them belong to one smooth wall
+AT_ONCE = 2_000_000  # triangles times layers processed together: limits the memory
+_INSIDE = 1e-9  # of the height: distance of the lowest and highest cut from floor and top
 
 
 class Walls(NamedTuple):
-    """Where half planes through the axis cut the wall.
+    """Sections of the wall by half planes that start at the axis.
 
     Attributes
     ----------
-    azimuths : array, shape (slices,), rad.
-    heights : array, shape (layers + 1,), m, from the floor to the top.
+    azimuths : array, shape (slices,)
+        Azimuths of the half planes, rad.
+    heights : array, shape (layers + 1,)
+        Heights from the floor to the top, m.
     radii : array, shape (slices, layers + 1)
         Distance of the wall from the axis, m.
     inclinations : array, shape (slices, layers + 1)
-        Between floor and wall, measured through the liquid, rad: pi/2 where the wall stands
-        upright, less where it hangs over the liquid.
+        Angle between floor and wall, measured through the liquid, rad: pi/2 for a vertical wall,
+        less where the wall overhangs the liquid.
     """
 
     azimuths: Array
@@ -41,61 +43,45 @@ class Walls(NamedTuple):
 
 
 def levels(mesh: Mesh, layers: int) -> Array:
-    """Return the heights of equal layers, m, floor and top included."""
+    """Return the heights of equal layers, from floor to top, m, shape (layers + 1,)."""
     return np.linspace(0.0, mesh.height, layers + 1)
+
+
+def _cuts(heights: Array) -> Array:
+    """Return the heights at which to cut: floor and top are replaced by heights just inside."""
+    cuts = heights.copy()
+    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
+    return cuts
 
 
 def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Walls:
     """Cut the mesh by half planes that start at a vertical axis.
 
+    Parameters
+    ----------
+    mesh : Mesh
+        One pad.
+    layers, slices : int
+        Number of layers and of half planes, from 1.
+    axis : tuple of float
+        x and y of the axis, m.
+
     Raises
     ------
     MeshError
-        Where a half plane meets the wall not exactly once at some height: the axis is outside the
-        pad, or the pad is no star as seen from the axis.
+        Where a half plane does not meet the wall exactly once at some height: the axis is outside
+        the pad, or the section is not star-shaped as seen from the axis.
     """
     heights = levels(mesh, layers)
-    cuts = heights.copy()
-    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
+    cuts = _cuts(heights)
     azimuths = 2.0 * math.pi * np.arange(slices) / slices
     outward = np.stack([np.cos(azimuths), np.sin(azimuths)])
-    flat = mesh.points[:, :2] - axis
-    offset = flat @ np.stack([-outward[1], outward[0]])  # from each point to each plane
-    beyond = offset > 0.0
-
-    z = mesh.points[:, 2][mesh.faces]
-    upright = np.flatnonzero(np.ptp(z, axis=1) > 0.0)  # no layer cuts what lies level
-    first, second, third = (beyond[mesh.faces[upright, k]] for k in range(3))
-    which, face = np.nonzero(((first != second) | (second != third)).T)
-    sides = np.stack([first[face, which], second[face, which], third[face, which]], axis=1)
-    face = upright[face]
-    ahead = sides.sum(axis=1) == 1  # one corner beyond the plane, two behind; or the reverse
-    lone = np.argmax(sides == ahead[:, None], axis=1)
-    corners = np.stack([lone, (lone + 1) % 3, (lone + 2) % 3], axis=1)
-    points = mesh.faces[face[:, None], corners]
-    normals = _smooth_normals(mesh, face, corners)
-
-    # Both ends of the cut through a triangle: radius, height, normal (three numbers).
-    ends = []
-    for other in (2, 1):
-        # From the point of lower number, so that both triangles at an edge agree to the bit.
-        low = np.minimum(points[:, 0], points[:, other])
-        high = np.maximum(points[:, 0], points[:, other])
-        share = offset[low, which] / (offset[low, which] - offset[high, which])
-        place = mesh.points[low] + share[:, None] * (mesh.points[high] - mesh.points[low])
-        radius = ((place[:, :2] - axis) * outward[:, which].T).sum(axis=1)
-        share = np.where(low == points[:, 0], share, 1.0 - share)[:, None]
-        normal = normals[:, 0] + share * (normals[:, other] - normals[:, 0])
-        ends.append(np.column_stack([radius, place[:, 2], normal]))
-    start, end = (
-        np.where(ahead[:, None], ends[0], ends[1]),
-        np.where(ahead[:, None], ends[1], ends[0]),
-    )
+    which, start, end = _profiles(mesh, outward, axis)
 
     row, layer = _crossed(cuts, start[:, 1], end[:, 1])
     share = (cuts[layer] - start[row, 1]) / (end[row, 1] - start[row, 1])
     found = start[row] + share[:, None] * (end[row] - start[row])
-    leaves = np.where(end[row, 1] > start[row, 1], 1, -1)  # the solid, or enters it
+    leaves = np.where(end[row, 1] > start[row, 1], 1, -1)  # 1: leaves the solid, -1: enters it
     right = found[:, 0] > 0.0
     found, leaves, row, layer = found[right], leaves[right], row[right], layer[right]
     cell = which[row] * len(cuts) + layer
@@ -111,8 +97,52 @@ def walls(mesh: Mesh, layers: int, slices: int, axis: tuple[float, float]) -> Wa
     return Walls(azimuths, heights, radii.reshape(shape), inclinations.reshape(shape))
 
 
+def _profiles(
+    mesh: Mesh, outward: Array, axis: tuple[float, float]
+) -> tuple[Indices, Array, Array]:
+    """Cut triangles by planes through the axis with the directions ``outward``, shape (2, planes).
+
+    Returns
+    -------
+    tuple
+        For each cut the number of its plane, and its start and end: radius, height and the three
+        components of the normal.
+    """
+    flat = mesh.points[:, :2] - axis
+    offset = flat @ np.stack([-outward[1], outward[0]])  # from each point to each plane
+    beyond = offset > 0.0
+    z = mesh.points[:, 2][mesh.faces]
+    upright = np.flatnonzero(np.ptp(z, axis=1) > 0.0)  # layers do not cut horizontal triangles
+    first, second, third = (beyond[mesh.faces[upright, k]] for k in range(3))
+    which, face = np.nonzero(((first != second) | (second != third)).T)
+    sides = np.stack([first[face, which], second[face, which], third[face, which]], axis=1)
+    face = upright[face]
+    ahead = sides.sum(axis=1) == 1  # True: one corner beyond the plane; False: two
+    lone = np.argmax(sides == ahead[:, None], axis=1)
+    corners = np.stack([lone, (lone + 1) % 3, (lone + 2) % 3], axis=1)
+    points = mesh.faces[face[:, None], corners]
+    normals = _smooth_normals(mesh, face, corners)
+
+    ends = []
+    for other in (2, 1):
+        # Start from the point with the lower number, so that both triangles at an edge get exactly
+        # the same place.
+        low = np.minimum(points[:, 0], points[:, other])
+        high = np.maximum(points[:, 0], points[:, other])
+        share = offset[low, which] / (offset[low, which] - offset[high, which])
+        place = mesh.points[low] + share[:, None] * (mesh.points[high] - mesh.points[low])
+        radius = ((place[:, :2] - axis) * outward[:, which].T).sum(axis=1)
+        share = np.where(low == points[:, 0], share, 1.0 - share)[:, None]
+        normal = normals[:, 0] + share * (normals[:, other] - normals[:, 0])
+        ends.append(np.column_stack([radius, place[:, 2], normal]))
+    first_end, second_end = ends
+    ahead = ahead[:, None]
+    start = np.where(ahead, first_end, second_end)
+    return which, start, np.where(ahead, second_end, first_end)
+
+
 def _crossed(cuts: Array, start: Array, end: Array) -> tuple[Indices, Indices]:
-    """Return, for spans of height, pairs of span and cut, where the cut is inside the span."""
+    """Return all pairs (span of height, cut) with the cut inside the span."""
     first = np.searchsorted(cuts, np.minimum(start, end), 'left')
     last = np.searchsorted(cuts, np.maximum(start, end), 'left')
     count = last - first
@@ -131,22 +161,23 @@ def _check_star(
 ) -> None:
     for wrong, what in (
         (turns < 1, 'the axis is outside the pad'),
-        (count > 1, 'the wall is met more than once: no star as seen from the axis'),
+        (count > 1, 'a slice meets the wall more than once, so the section is not star-shaped'),
     ):
         if wrong.any():
             j, k = divmod(int(np.argmax(wrong)), heights.size)
             raise MeshError(
                 f'{mesh.source}: {what} (z = {heights[k]:.4g} m,'
                 f' {math.degrees(azimuths[j]):.3g} degrees from the x axis, axis through'
-                f' x = {axis[0]:.4g}, y = {axis[1]:.4g} m); wet_pattern takes any shape'
+                f' x = {axis[0]:.4g}, y = {axis[1]:.4g} m); wet_pattern accepts any shape'
             )
 
 
 def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
     """Return unit normals of the wall at three corners of triangles, shape (n, 3, 3).
 
-    The mean of the triangles round the corner that belong to the same smooth wall, weighted by
-    their angles there; what lies on the floor or at the very top is not wall.
+    Each is the mean normal of the triangles around the corner that belong to the same smooth wall,
+    weighted by their angles at this corner. Triangles on the floor or at the top are not part of
+    the wall.
     """
     points, faces = mesh.points, mesh.faces
     a, b, c = points[faces.T]
@@ -161,7 +192,7 @@ def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
     level = (heights < tiny).all(axis=1) | (heights > mesh.height - tiny).all(axis=1)
     weight[level | (size == 0.0)] = 0.0
 
-    order = np.argsort(faces.ravel(), kind='stable')  # corners of all triangles, point by point
+    order = np.argsort(faces.ravel(), kind='stable')  # corners of all triangles, sorted by point
     begin = np.searchsorted(faces.ravel()[order], np.arange(len(points) + 1))
     wanted, back = np.unique(3 * face[:, None] + corners, return_inverse=True)
     point = faces.ravel()[wanted]
@@ -180,8 +211,8 @@ def _smooth_normals(mesh: Mesh, face: Indices, corners: Indices) -> Array:
     inner = np.bincount(row, ~alike, wanted.size) == 0.0
     mean, inner = mean[back.reshape(corners.shape)], inner[back.reshape(corners.shape)]
 
-    # At an edge of the wall the mean is one-sided. On an arc the normal of a chord halves the
-    # angle between those at its ends: reflect the one that is known.
+    # At an edge of the wall the mean is one-sided. On an arc, the normal of a chord bisects the
+    # normals at both ends of the chord: mirror the normal at the inner end.
     known = _units(np.sum(mean * inner[..., None], axis=1))
     across = flat[face]
     mirrored = 2.0 * np.sum(known * across, axis=1)[:, None] * across - known
@@ -198,23 +229,24 @@ def _units(vectors: Array) -> Array:
 
 
 class Layers(NamedTuple):
-    """What horizontal planes cut out of a mesh; every array has shape (layers + 1,).
+    """Horizontal sections of a mesh; every array has shape (layers + 1,).
 
     Attributes
     ----------
-    heights : array, m.
+    heights : array
+        Heights of the sections, m.
     areas : array
-        Of the solid, m².
+        Area of the solid, m².
     wetted : array
-        Wall below each height, m².
+        Area of the wall below each height, m².
     outline : array
-        Length of the sections' outlines, m.
+        Length of the outline, m.
     pull : array
-        Sum over the outline, with contact angle θ and inclination a, of length times
-        sin(θ + a), m.
+        Integral of sin(θ + a) along the outline, m, with contact angle θ and inclination a.
     gain : array
-        The same of (cos a + cos θ)/sin a, m: surface energy that a rise sets free, over the
-        tension. What level faces above the floor set free, or cost, is at the layer next to them.
+        Integral of (cos a + cos θ)/sin a along the outline, m: surface energy released per rise,
+        over the tension. The energy released by horizontal faces above the floor is added at the
+        nearest layer.
     """
 
     heights: Array
@@ -228,14 +260,13 @@ class Layers(NamedTuple):
 def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
     """Cut the mesh by horizontal planes; the contact angle, rad, is for ``pull`` and ``gain``."""
     heights = levels(mesh, layers)
-    cuts = heights.copy()
-    cuts[0], cuts[-1] = _INSIDE * cuts[-1], (1.0 - _INSIDE) * cuts[-1]
+    cuts = _cuts(heights)
     corners = mesh.points[mesh.faces]
     upright = np.flatnonzero(np.ptp(corners[:, :, 2], axis=1) > 0.0)
     corners = corners[upright]
     normals = _smooth_normals(mesh, upright, np.tile([0, 1, 2], (upright.size, 1)))
     wall = np.concatenate([corners, normals], axis=2)
-    pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // _AT_ONCE))
+    pieces = np.array_split(cuts, min(cuts.size, 1 + len(wall) * cuts.size // AT_ONCE))
     areas, wetted, outline, pull, gain = np.concatenate(
         [_cut_level(wall, piece, angle) for piece in pieces], axis=1
     )
@@ -244,7 +275,7 @@ def layered(mesh: Mesh, layers: int, angle: float) -> Layers:
 
 
 def _cut_level(wall: Array, cuts: Array, angle: float) -> Array:
-    """Return the rows of :class:`Layers` after the heights, for walls with their normals."""
+    """Return all arrays of :class:`Layers` but ``heights``, for triangles with normals."""
     start, end, layer = _outlines(wall, cuts)
     nx, ny, nz = 0.5 * (start + end)[:, 2:].T
     slope = np.arctan2(np.hypot(nx, ny), -nz)
@@ -262,10 +293,10 @@ def _cut_level(wall: Array, cuts: Array, angle: float) -> Array:
 
 
 def _freed_by_level_faces(mesh: Mesh, heights: Array, angle: float) -> Array:
-    """Return the surface energy, over the tension, that passing level faces sets free, m².
+    """Return the surface energy released at horizontal faces, over the tension, m².
 
-    No layer cuts them: the tops of lower bodies, over which liquid has to spread, and undersides.
-    Floor and top of the mesh are no part of the wall.
+    No layer cuts these faces: tops of lower bodies, over which the liquid spreads, and undersides.
+    Floor and top of the mesh are excluded.
     """
     a, b, c = mesh.points[mesh.faces].transpose(1, 0, 2)
     z, tiny = np.stack([a, b, c])[:, :, 2], 1e-6 * mesh.height
@@ -276,7 +307,7 @@ def _freed_by_level_faces(mesh: Mesh, heights: Array, angle: float) -> Array:
 
 
 def centre(mesh: Mesh, height: float) -> tuple[float, float]:
-    """Return the centroid of the section at a height, m."""
+    """Return the centroid (x, y) of the section at a height, m."""
     start, end, _ = _outlines(mesh.points[mesh.faces], np.array([height]))
     cross = _cross(start, end)
     x, y = ((start + end)[:, :2] * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
@@ -284,10 +315,10 @@ def centre(mesh: Mesh, height: float) -> tuple[float, float]:
 
 
 def _outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
-    """Return the pieces of outline in each layer, solid on their left: start, end, layer.
+    """Return the segments of the outlines: start, end and layer; the solid is on the left.
 
-    Corners have x, y, z and whatever else there is to know of them, shape (triangles, 3, n); z is
-    left out of what comes back.
+    Corners have x, y, z and further values to interpolate, shape (triangles, 3, n). Start and end
+    have the same values without z.
     """
     z = corners[:, :, 2]
     face, layer = _crossed(cuts, z.min(axis=1), z.max(axis=1))
@@ -298,7 +329,8 @@ def _outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
     ends = []
     for step in (1, 2):
         other = corners[face, (lone + step) % 3]
-        # From below to above, so that neighbours agree to the bit.
+        # Always start from the lower point, so that both triangles at an edge get exactly the same
+        # place.
         low, high = np.where(ahead, other, first), np.where(ahead, first, other)
         share = (cuts[layer] - low[:, 2]) / (high[:, 2] - low[:, 2])
         ends.append(np.delete(low + share[:, None] * (high - low), 2, axis=1))
@@ -306,7 +338,7 @@ def _outlines(corners: Array, cuts: Array) -> tuple[Array, Array, Indices]:
 
 
 def _area_below(corners: Array, cuts: Array) -> Array:
-    """Return the area of the triangles below each cut, without those that lie level."""
+    """Return the area of triangles below each cut, without horizontal ones, m²."""
     sizes = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid surfaces of any shape: the least energy of a triangulated surface between solid faces.
+"""Liquid surfaces of any shape: minimum energy of a triangulated surface between solid faces.
 
-The energy is that of the liquid's free surface, of its weight and of what it wets: ``γ A + ρ g ∫ z
-dV - γ cos θ A_wet`` for each face, less ``p V`` where the pressure p at z = 0 is given. Volume and
-weight are integrals of z and z²/2 over the projected boundary, so that vertical walls and the
-floor at z = 0 contribute nothing, and no tetrahedra are needed.
+The energy is that of the free surface, the weight and the wetted faces: ``γ A + ρ g ∫ z dV - γ cos
+θ A_wet`` for each face, minus ``p V`` where the pressure p at z = 0 is given. Volume and weight
+are integrals of z and z²/2 over the projected boundary. Vertical walls and the floor at z = 0 do
+not contribute, and no tetrahedra are needed.
 
-Each vertex moves on a rail and is one unknown: inside the surface the rail is the normal, and on
-a solid face the curve in which the face cuts the half plane of the vertex' azimuth. Vertices thus
-cannot slide along the surface, which would not change its energy, and wetted areas are integrals
-along rails. After each minimum the vertices are averaged within the surface and put on new rails.
+Each vertex moves on a rail, so it has one unknown. Inside the surface the rail is the normal; on a
+solid face it is the intersection of the face with the half plane of the vertex' azimuth. So
+vertices cannot move along the surface, which would not change the energy, and wetted areas are
+integrals along rails. After each minimisation the vertices are averaged within the surface and get
+new rails.
 
-Gradient and Hessian are exact. SciPy's trust-region Newton-CG finds the minimum, and an augmented
-Lagrangian holds the volume, whose multiplier is the pressure.
+Gradient and Hessian are exact. The minimum is found by the trust-region Newton-CG method of SciPy.
+An augmented Lagrangian keeps the volume; its multiplier is the pressure.
 """
 
 from __future__ import annotations
@@ -30,29 +31,30 @@ from ros_pad.capillary.faces import KNOTS
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.faces import boundary_edges
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
-# A triangle this far from equilateral (1 is equilateral) is one that a neck has swallowed.
+# Quality (1: equilateral) below which a triangle means that a neck has pinched off.
 THINNEST = 0.01
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line in which the surface ends on a face, once round the axis of the face.
+    """A closed line on a face, around the axis of the face, along which the surface ends.
 
     Parameters
     ----------
     face : Face
-        On which it lies.
+        The face.
     vertices : array of int, shape (n,)
-        Of the surface; n from 3.
+        Vertices of the surface on the line; n from 3.
     azimuths : array, shape (n,)
-        Of the vertices about the axis, rad, in any order.
+        Azimuths of these vertices about the axis, rad, in any order.
     places : array, shape (n,)
-        Where they are on their rails, from 0 to 1.
+        Places of these vertices on their rails, from 0 to 1.
     angle : float, optional
         Contact angle, rad, from 0 to pi. Without it the line is pinned.
     """
@@ -67,7 +69,7 @@ class Line:
     def ring(
         cls, face: Face, vertices: npt.ArrayLike, place: float, angle: float | None = None
     ) -> Line:
-        """Return a line at one place all round, its vertices evenly spaced."""
+        """Return a line with the same place (0 to 1) at all vertices, at equal azimuth steps."""
         if angle is not None:
             number('angle', angle, 'rad', high=math.pi)
         number('place', place, '(share of the rail)', high=1.0)
@@ -82,18 +84,29 @@ class LiquidSurface:
 
     Attributes
     ----------
-    vertices : m, shape (n, 3).
-    triangles : shape (m, 3), seen counterclockwise from the gas.
-    lines : where it ends on solid faces.
-    area : m², of the surface against the gas.
-    energy : J, of surface, weight and wetting.
-    volume : m³ of liquid.
-    pressure : Pa, of the liquid over that of the gas, at z = 0.
-    forces : N, shape (lines, 3), of the liquid on each face, z up.
-    residual : greatest energy, relative to that of the surface, that any one vertex could still
-        gain by moving.
-    change : relative change of the area by the last averaging of the vertices.
-    history : area (m²) after each refinement; its differences show the error.
+    vertices : array, shape (n, 3)
+        Positions, m.
+    triangles : array of int, shape (m, 3)
+        Corners, anticlockwise as seen from the gas.
+    lines : tuple of Line
+        Lines along which the surface ends on solid faces.
+    area : float
+        Area between liquid and gas, m².
+    energy : float
+        Energy of surface, weight and wetting, J.
+    volume : float
+        Volume of the liquid, m³.
+    pressure : float
+        Pressure of the liquid minus that of the gas at z = 0, Pa.
+    forces : array, shape (lines, 3)
+        Force of the liquid on each face, N, z up.
+    residual : float
+        Largest energy decrease still possible by moving one vertex, relative to the energy of the
+        surface.
+    change : float
+        Relative change of the area by the last averaging of vertices.
+    history : tuple of float
+        Area after each refinement, m²; the differences show the error.
     """
 
     vertices: Array
@@ -119,54 +132,48 @@ def minimise(
     volume: float | None = None,
     refinements: int = 0,
 ) -> LiquidSurface:
-    """Return the surface of least energy near a given one.
+    """Compute the surface of minimum energy near a given one.
 
     Parameters
     ----------
     vertices : array, shape (n, 3)
-        m, z up. Those on lines are put there, wherever they are given.
+        Start positions, m, z up. Vertices on lines are moved to their lines.
     triangles : array of int, shape (m, 3)
-        Seen counterclockwise from the gas.
+        Corners, anticlockwise as seen from the gas.
     lines : sequence of Line
-        All edges of the surface lie on these.
+        Lines that contain all boundary edges of the surface.
     surface_tension : float
-        N/m, above 0.
+        Surface tension, N/m, above 0.
     weight : float
         Density times gravity, N/m³, from 0.
     pressure, volume : float
-        Pa of the liquid over that of the gas at z = 0, or m³ of liquid: exactly one of them.
+        Pressure of the liquid minus that of the gas at z = 0, Pa, or volume of the liquid, m³,
+        above 0. Exactly one of them is required.
     refinements : int
-        How often each triangle is split into four and the surface relaxed again.
+        How often each triangle is split into four and the surface minimised again, from 0.
 
     Raises
     ------
     NoSurface
-        ``collapsed`` where the surface pinches off, ``no_convergence`` where it has not settled.
+        ``collapsed`` where the surface pinches off or turns over, or a contact line reaches an end
+        of its face; ``no_convergence`` where the minimisation does not converge.
     InvalidInput
-        For values not in range, or edges on no line.
+        When a value or shape is not allowed, both or none of pressure and volume are given, or a
+        boundary edge is on no line.
     """
     tension = number('surface_tension', surface_tension, 'N/m', above=True)
     heavy = number('weight', weight, 'N/m³')
     if (pressure is None) == (volume is None):
-        raise InvalidInput('exactly one of pressure and volume is needed')
-    push = 0.0 if pressure is None else number('pressure', pressure, 'Pa', low=-math.inf)
-    if not isinstance(refinements, int) or refinements < 0:
-        raise InvalidInput(f'refinements = {refinements!r} is not allowed: an integer from 0')
-    points, corners = np.array(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InvalidInput(f'vertices of shape {points.shape} are not allowed: finite (n, 3), m')
-    if corners.ndim != 2 or corners.shape[1] != 3 or not np.all(corners < len(points)):
-        raise InvalidInput(f'triangles of shape {corners.shape} are not allowed: (m, 3) vertices')
-    if not lines:
-        raise InvalidInput('lines are not allowed to be none: the surface ends on at least one')
-    on_lines = np.concatenate([line.vertices for line in lines])
-    loose = np.setdiff1d(boundary_edges(corners), on_lines)
-    if loose.size:
         raise InvalidInput(
-            f'vertex {loose[0]} is not allowed: it is at an edge of the surface, on no line'
+            'exactly one of pressure and volume is needed, but'
+            f' {"none" if volume is None else "both"} is given'
         )
+    push = 0.0 if pressure is None else number('pressure', pressure, 'Pa', low=-math.inf)
+    integer('refinements', refinements)
+    points, corners = np.array(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    _check_surface(points, corners, lines)
     size = float(np.ptp(points[np.unique(corners)], axis=0).max())
-    system = _System(
+    system = System(
         tension=tension,
         weight=heavy * size**2 / tension,
         size=size,
@@ -187,9 +194,50 @@ def minimise(
     return system.result(system.area() / before - 1.0, history)
 
 
+def _check_surface(points: Array, corners: Integers, lines: Sequence[Line]) -> None:
+    """Raise `InvalidInput` for vertices or triangles of wrong shape, or edges on no line."""
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InvalidInput(
+            f'vertices of shape {points.shape} are not allowed: finite numbers of shape (n, 3), m,'
+            ' are needed'
+        )
+    if corners.ndim != 2 or corners.shape[1] != 3 or not np.all(corners < len(points)):
+        raise InvalidInput(
+            f'triangles of shape {corners.shape} are not allowed: indices of the {len(points)}'
+            ' vertices, shape (m, 3), are needed'
+        )
+    if not lines:
+        raise InvalidInput('lines = () is not allowed: at least one line is needed')
+    loose = np.setdiff1d(
+        boundary_edges(corners), np.concatenate([line.vertices for line in lines])
+    )
+    if loose.size:
+        raise InvalidInput(
+            f'vertex {loose[0]} is at an edge of the surface, but on no line: every edge of the'
+            ' surface must be on a line'
+        )
+
+
 @dataclass(frozen=True)
-class _System:
-    """A surface on its way; lengths and tension are 1 inside."""
+class System:
+    """A surface during minimisation.
+
+    Attributes
+    ----------
+    tension, size : float
+        Units: surface tension, N/m, and extent of the surface, m. The other lengths are divided by
+        ``size`` and energies by ``tension size²``.
+    weight : float
+        Density gravity size² / tension.
+    volume : float or None
+        Given volume, m³.
+    points, triangles, lines
+        The surface.
+    multiplier : float
+        Pressure of the liquid minus that of the gas at z = 0, over tension / size.
+    residual : float
+        As for `LiquidSurface`.
+    """
 
     tension: float
     weight: float
@@ -202,18 +250,17 @@ class _System:
     residual: float = math.nan
 
     def area(self) -> float:
+        """Return the area of the surface."""
         corners = self.points[self.triangles]
         sides = corners[:, 1:] - corners[:, :1]
         return 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1).sum())
 
-    # --- relaxing -------------------------------------------------------------------------
-
     @np.errstate(over='ignore', invalid='ignore')
-    def relaxed(self) -> _System:
-        """Return the minimum on the present rails."""
+    def relaxed(self) -> System:
+        """Return the surface of minimum energy on the present rails."""
         from scipy.optimize import minimize
 
-        rails = _Rails(self)
+        rails = Rails(self)
         target = None if self.volume is None else self.volume / self.size**3
         goal = _Goal(rails, self.multiplier, target)
         for _ in range(40):
@@ -227,7 +274,9 @@ class _System:
                     options={'gtol': 1e-8, 'maxiter': 300, 'initial_trust_radius': 0.1},
                 )
             except ValueError as error:  # triangles without area have no finite Hessian
-                raise NoSurface(f'the surface collapses: {error}', 'collapsed') from error
+                raise NoSurface(
+                    f'the surface collapses: a triangle has lost its area ({error})', 'collapsed'
+                ) from error
             rails.check(goal.scale * found.x)
             goal.y = found.x
             if goal.improve() < 1e-9:
@@ -235,8 +284,8 @@ class _System:
         residual, miss = float(np.max(abs(found.jac))) ** 2, goal.miss
         if miss > 1e-6 or residual > 1e-12:
             raise NoSurface(
-                f'the surface has not settled: a vertex could still gain {residual:.2g} of its'
-                f' energy, and the volume is off by {miss:.2g}',
+                f'the minimisation does not converge: residual = {residual:.2g} of the energy (at'
+                f' most 1e-12 is needed), relative volume error = {miss:.2g} (at most 1e-6)',
                 'no_convergence',
             )
         q = goal.scale * goal.y
@@ -248,8 +297,8 @@ class _System:
             self, points=points, lines=lines, multiplier=goal.multiplier, residual=residual
         )
 
-    def averaged(self) -> _System:
-        """Return the surface with inner vertices moved within it, towards their neighbours."""
+    def averaged(self) -> System:
+        """Return the surface with inner vertices moved along it, towards their neighbours."""
         points, edges = self.points, _edges(self.triangles)
         total, count = np.zeros_like(points), np.zeros(len(points))
         for a, b in (edges.T, edges.T[::-1]):
@@ -261,7 +310,7 @@ class _System:
         shift[np.concatenate([line.vertices for line in self.lines])] = 0.0
         return replace(self, points=points + 0.3 * shift)
 
-    def refined(self) -> _System:
+    def refined(self) -> System:
         """Return the surface with each triangle split into four."""
         edges = _edges(self.triangles)
         first = len(self.points)
@@ -300,7 +349,7 @@ class _System:
 
     def result(self, change: float, history: list[float]) -> LiquidSurface:
         """Return the surface in SI units, with the forces on its faces."""
-        rails = _Rails(self)
+        rails = Rails(self)
         energy, volume, _, _ = rails.energy(rails.start)
         unit = self.tension * self.size
         return LiquidSurface(
@@ -319,18 +368,18 @@ class _System:
 
 
 class _Goal:
-    """What is minimised: the energy, with an augmented Lagrangian where the volume is given.
+    """Function to be minimised: the energy, with an augmented Lagrangian for a given volume.
 
     The unknowns ``y`` are the places on the rails, scaled so that the Hessian's diagonal is 1.
     """
 
-    def __init__(self, rails: _Rails, multiplier: float, target: float | None) -> None:
+    def __init__(self, rails: Rails, multiplier: float, target: float | None) -> None:
         self.rails, self.multiplier, self.target = rails, multiplier, target
         self.stiffness = 0.0 if target is None else 30.0 * rails.area / target**2
         self.miss = 0.0
         diagonal = abs(rails.matrix(rails.start, multiplier).diagonal())
         self.scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-6 * diagonal.max()))
-        # A surface in unstable equilibrium, a long cylinder say, has to be pushed off it.
+        # Random shifts make the search leave unstable equilibria, such as a long cylinder.
         push = np.random.default_rng(0).normal(size=rails.start.size)
         self.y = (rails.start + 1e-2 * rails.shortest * push) / self.scale
         self._at: Array | None = None
@@ -339,7 +388,7 @@ class _Goal:
         return 0.0 if self.target is None else volume - self.target
 
     def value(self, y: Array) -> tuple[float, Array]:
-        """Return the value and its gradient."""
+        """Return the function to be minimised and its gradient."""
         energy, volume, slope, volume_slope = self.rails.energy(self.scale * y)
         over = self._over(volume)
         value = energy - self.multiplier * volume + 0.5 * self.stiffness * over**2
@@ -347,7 +396,7 @@ class _Goal:
         return value, self.scale * (slope - push * volume_slope)
 
     def product(self, y: Array, direction: Array) -> Array:
-        """Return the Hessian times a direction; Newton-CG asks often at one place."""
+        """Return the Hessian times a direction; the Hessian is kept while y stays the same."""
         if self._at is None or not np.array_equal(self._at, y):
             q = self.scale * y
             _, volume, _, self._volume_slope = self.rails.energy(q)
@@ -359,7 +408,7 @@ class _Goal:
         return result
 
     def improve(self) -> float:
-        """Improve the multiplier; return by how much the volume is off, relative."""
+        """Update the multiplier; return the relative error of the volume."""
         over = self._over(self.rails.energy(self.scale * self.y)[1])
         self.multiplier -= self.stiffness * over
         self._at = None
@@ -367,10 +416,14 @@ class _Goal:
         return self.miss
 
 
-class _Rails:
-    """Energy, volume and their derivatives in the places of the vertices on their rails."""
+class Rails:
+    """Energy and volume as functions of the places of vertices on their rails, with derivatives.
 
-    def __init__(self, system: _System) -> None:
+    The unknowns ``q`` are distances along rails: of inner vertices from the start, of vertices on
+    lines from the beginning of the rail. ``start`` has the values of the given surface.
+    """
+
+    def __init__(self, system: System) -> None:
         self.triangles, self.weight = system.triangles, system.weight
         self.base = system.points.copy()
         count = len(system.points)
@@ -441,7 +494,7 @@ class _Rails:
         z = corners[..., 2]
         total = z.sum(axis=1)
         mean = total / 6.0
-        square = ((z**2).sum(axis=1) + total**2) / 48.0  # Σ z² + Σ z z' over pairs, by 24
+        square = ((z**2).sum(axis=1) + total**2) / 48.0  # (Σ z² + Σ z z' over pairs) / 24
         up = normal[:, 2]
         opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)
         # d(n·N)/dx = opposite × n, for any fixed n.
@@ -461,13 +514,13 @@ class _Rails:
         )
 
     def _gathered(self, on: Array) -> Array:
-        """Return what corners of triangles have, (t, 3, 3), summed at vertices."""
+        """Return values at the corners of triangles, (t, 3, 3), summed at each vertex."""
         where, count = self.triangles.ravel(), len(self.base)
         columns = [np.bincount(where, on[..., k].ravel(), minlength=count) for k in range(3)]
         return np.stack(columns, axis=1)
 
     def matrix(self, q: Array, pressure: float) -> Any:
-        """Return the Hessian of energy less pressure times volume, sparse."""
+        """Return the Hessian of energy minus pressure times volume, sparse."""
         from scipy.sparse import coo_matrix
 
         x, d, dd = self.place(q)
@@ -514,7 +567,7 @@ class _Rails:
         return coo_matrix((data, (i, j)), shape=(q.size, q.size)).tocsr()
 
     def forces(self, pressure: float) -> Array:
-        """Return the force of the liquid on each face, which moves with its line."""
+        """Return the force of the liquid on each face: minus dE/dx if face and line move by x."""
         _, _, _, on, on_volume = self._on_vertices(self.place(self.start)[0])
         cost_of_vertices = on - pressure * on_volume
         forces = []
@@ -526,11 +579,11 @@ class _Rails:
         return np.array(forces)
 
     def _shares(self) -> list[Array]:
-        """Return how far each vertex goes with each line: harmonic on the graph of the edges.
+        """Return, for each line, the share of its displacement with which each vertex moves.
 
-        Of a surface in equilibrium any way to go along costs the same. One that is spread over
-        the surface averages what meshes leave unbalanced along it, and the forces on all faces
-        add up to the weight.
+        In equilibrium the force does not depend on these shares. They are harmonic on the graph of
+        edges: shares spread over the surface average the errors of the mesh, and the forces on all
+        faces add up to the weight.
         """
         from scipy.sparse import coo_matrix
         from scipy.sparse import diags
@@ -549,7 +602,7 @@ class _Rails:
         return shares
 
     def check(self, q: Array) -> None:
-        """Refuse a surface that has pinched off, turned over, or left a face."""
+        """Raise `NoSurface` for a surface that has pinched off, turned over, or left a face."""
         x = self.place(q)[0]
         corners = x[self.triangles]
         sides = np.roll(corners, -1, axis=1) - corners
@@ -559,14 +612,18 @@ class _Rails:
         turned = np.sum(_unit(normals) * self.first_normals, axis=1) < -0.5
         if quality.min() < THINNEST or turned.any():
             raise NoSurface(
-                'the surface collapses: a neck pinches off, or there is no minimum between these'
+                'the surface collapses: a neck pinches off, or no minimum exists between these'
                 ' lines',
                 'collapsed',
             )
         for rail in self.on_lines:
             place = rail.of(q) / rail.length
             if place.min() < 0.0 or place.max() > 1.0:
-                raise NoSurface('a contact line runs off the end of its face', 'collapsed')
+                raise NoSurface(
+                    'a contact line reaches an end of its face: a larger face, or another volume'
+                    ' or pressure, is needed',
+                    'collapsed',
+                )
 
 
 class _LineRails:
@@ -584,8 +641,8 @@ class _LineRails:
         width = np.empty_like(gaps)
         width[order] = 0.5 * (gaps + np.roll(gaps, 1))
         side = -1.0 if line.face.under else 1.0
-        # Between its vertices the line is straight; the face has the same corners, so that its
-        # areas fit those of the surface. Else, near complete wetting, films would spread for ever.
+        # Between vertices the line is straight. Areas of the face use the same polygon as the
+        # surface; otherwise films would spread without limit near complete wetting.
         chord, apothem = np.sinc(0.5 * width / math.pi), np.cos(0.5 * width)
         curves = line.face.rails(line.azimuths) / size
         steps = np.hypot(*np.moveaxis(np.diff(curves, axis=1), -1, 0))
@@ -601,7 +658,7 @@ class _LineRails:
         inner = (knots[:-1, None] + 0.5 * (nodes + 1.0) * np.diff(knots)[:, None]).ravel()
 
         def rates(t: Array) -> Array:
-            """Wet area, volume, moment and covered floor per rail and unit of t: (t, rail, 4)."""
+            """Return derivatives over t of the integrals of :meth:`integrals`: (t, rail, 4)."""
             (r, z), (rt, zt) = (np.moveaxis(along(t, k), -1, 0) for k in (0, 1))
             ra, za = (_around(value, angles, order) for value in (r, z))
             skew = chord * np.hypot(r * np.hypot(apothem * rt, zt), rt * za - zt * ra)
@@ -616,11 +673,11 @@ class _LineRails:
         self.pieces = np.concatenate([along.c, integrals.c], axis=-1)  # (power, cell, rail, 6)
 
     def of(self, q: Array) -> Array:
-        """Return the arc lengths of this line's vertices."""
+        """Return the arc lengths of this line's vertices along their rails."""
         return q[self.unknowns] if self.unknowns.size else self.start
 
     def _fields(self, s: Array) -> Array:
-        """Return value, first and second derivative by arc length, shape (3, rail, 6)."""
+        """Return value, first and second derivative over arc length, shape (3, rail, 6)."""
         t = s / self.length * (KNOTS - 1)
         cell = np.clip(t.astype(np.int64), 0, KNOTS - 2)
         u = ((t - cell) / (KNOTS - 1))[:, None]
@@ -647,7 +704,7 @@ class _LineRails:
 
 
 def _around(values: Array, angles: Array, order: Integers) -> Array:
-    """Return derivatives by azimuth of values (t, rail), by differences round the axis."""
+    """Return derivatives over azimuth of values (t, rail), by differences around the axis."""
     sorted_ = values[:, order]
     ahead, behind = np.roll(sorted_, -1, axis=1), np.roll(sorted_, 1, axis=1)
     gap = np.diff(angles, append=angles[0] + 2.0 * math.pi)

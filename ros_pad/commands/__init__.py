@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands of ``pad``, one module each: its arguments, and what it does."""
+"""The commands of ``pad``: one module for each, with its arguments and its action."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad bag``: what is in a bag, and a whole one of what a kill or a full disk left."""
+"""``pad bag``: list the content of a bag, or repair an incomplete one."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from ros_pad.bags import BagReader
+from ros_pad.bags import recovery
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
@@ -18,8 +20,6 @@ from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.trials import label as labels
-from ros_pad.trials import repair as repairs
-from ros_pad.trials.bag import BagReader
 
 
 def add(commands: Commands) -> None:
@@ -28,15 +28,15 @@ def add(commands: Commands) -> None:
         commands,
         'bag',
         run,
-        'Say what is in a bag, or repair one.',
+        'List the content of a bag, or repair one.',
         'pad bag info runs/hexapod_patches_adaptive_seed0/bag\n'
         '  pad bag repair my_trial --out my_trial_repaired',
     )
     part.add_argument(
         'action',
         choices=('info', 'repair'),
-        help='info: topics, types, numbers of messages, what was lost; repair: write what can be'
-        ' read of a bag whose recorder was killed, or whose disk was full, into a new bag',
+        help='info: list topics, types, numbers of messages and losses; repair: copy the messages'
+        ' that can be read from an incomplete bag (recorder killed, disk full) into a new bag',
     )
     part.add_argument(
         'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'
@@ -45,51 +45,51 @@ def add(commands: Commands) -> None:
         '--out',
         type=pathlib.Path,
         metavar='FOLDER',
-        help='of the repaired bag; default: BAG_repaired beside the broken one, which stays',
+        help='folder for the repaired bag (default: BAG_repaired beside BAG); BAG is not changed',
     )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do what was asked; return the exit status."""
+    """List the content of the bag, or repair it; return the exit status."""
     if options.action == 'repair':
         return _repair(options)
     if options.out:
-        raise InvalidInput('--out is for pad bag repair: pad bag info writes nothing')
+        raise InvalidInput('--out is only for pad bag repair: pad bag info writes nothing')
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # the problem is told below
+        warnings.simplefilter('ignore')  # the problem is reported below
         reader = BagReader(options.bag)
-    return _tell(options, reader)
+    return _show(options, reader)
 
 
 def _repair(options: argparse.Namespace) -> int:
     source: pathlib.Path = options.bag
     with bar('reading', 1.0, 'bag') as progress:
-        found = repairs.inspect(source, progress)
+        found = recovery.inspect(source, progress)
     whole = found.sound
     folder: pathlib.Path = options.out or _beside(source)
     if not whole:
         with bar('writing', 1.0, 'bag') as progress:
-            found = repairs.repair(source, folder, progress)
+            found = recovery.repair(source, folder, progress)
     if options.json:
         written = None if whole else str(folder)
         print(json.dumps({'bag': str(source), 'repaired': written} | asdict(found)))
         return 0
     if whole:
-        print(f'{source}: is whole, {found.messages} messages; nothing was written')
+        print(f'{source} is complete, {found.messages} messages; nothing was written')
         return 0
     print(f'{folder}: {found.messages} messages recovered')
-    _tell_losses(asdict(found))
+    _show_losses(asdict(found))
     if found.closed and not found.described:
-        print('metadata.yaml was missing, or said something else than the files')
+        print('metadata.yaml was missing, or did not match the files')
     return 0
 
 
-def _tell_losses(found: Mapping[str, Any]) -> None:
+def _show_losses(found: Mapping[str, Any]) -> None:
     for name, words in (
-        ('unread_bytes', 'bytes at the end make no sense'),
+        ('unread_bytes', 'bytes at the end cannot be read'),
         ('damaged_chunks', 'damaged chunks were left out'),
-        ('lost_messages', 'messages lost their topic with a damaged chunk'),
+        ('lost_messages', 'messages were left out: their topic was defined in a damaged chunk'),
     ):
         if found.get(name):
             print(f'{found[name]:8d}  {words}')
@@ -97,25 +97,25 @@ def _tell_losses(found: Mapping[str, Any]) -> None:
 
 def _beside(source: pathlib.Path) -> pathlib.Path:
     """Return the default folder of a repaired bag."""
-    if not source.name.strip('.'):  # . and .. have names, too
+    if not source.name.strip('.'):  # . and .. are no names for a folder
         source = source.resolve()
     name = source.stem if source.is_file() else source.name
     return source.with_name(f'{name}_repaired')
 
 
-def _said(reader: BagReader, key: str) -> dict[str, Any]:
-    """Return what a bag says under a key of its custom data."""
+def _custom(reader: BagReader, key: str) -> dict[str, Any]:
+    """Return the custom data of a bag under a key."""
     try:
         return dict(json.loads(reader.custom_data.get(key, '{}')))
     except (TypeError, ValueError) as error:
         raise BagError(
-            f'{reader.path}: custom data {key!r} is not as ros_pad writes it: {error}'
+            f'{reader.path}: custom data {key!r} is not as ros_pad writes them: {error}'
         ) from error
 
 
-def _tell(options: argparse.Namespace, reader: BagReader) -> int:
-    about, lost = _said(reader, labels.KEY), _said(reader, labels.LOST)
-    made_with, repair = _said(reader, labels.MADE_WITH), _said(reader, repairs.KEY)
+def _show(options: argparse.Namespace, reader: BagReader) -> int:
+    about, lost = _custom(reader, labels.KEY), _custom(reader, labels.LOST)
+    made_with, repair = _custom(reader, labels.MADE_WITH), _custom(reader, recovery.KEY)
     if options.json:
         print(
             json.dumps(
@@ -133,7 +133,7 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
                     'repair': repair,
                     'trial': about,
                     'made_with': made_with,
-                    'parameters': _said(reader, labels.PARAMETERS),
+                    'parameters': _custom(reader, labels.PARAMETERS),
                 }
             )
         )
@@ -147,10 +147,10 @@ def _tell(options: argparse.Namespace, reader: BagReader) -> int:
         print('made with', ', '.join(f'{name} {version}' for name, version in made_with.items()))
     if repair:
         print('repaired from', repair.get('source', 'a broken bag'))
-        _tell_losses(repair)
+        _show_losses(repair)
     for name in sorted(reader.topics):
         missed = f'  {lost[name]} lost' if name in lost else ''
         print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')
     if reader.problem:
-        return complain(f'{reader.problem}: pad bag repair makes a whole bag of it', 1)
+        return complain(f'{reader.problem}: repair it with pad bag repair', 1)
     return 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad calibrate``: a foot of one's own from one's own measurements."""
+"""``pad calibrate``: fit a foot to measurements."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from ros_pad.contact.calibrate import calibrate
 from ros_pad.contact.calibrate import foot_file
 from ros_pad.contact.measurements import Measurements
 from ros_pad.errors import InvalidInput
-from ros_pad.figures.calibration import draw
+from ros_pad.reports.calibration import draw
+from ros_pad.reports.files import refuse
 
 
 def add(commands: Commands) -> None:
@@ -29,62 +30,64 @@ def add(commands: Commands) -> None:
         'calibrate',
         run,
         'Fit a foot to measured shapes and forces; write its YAML file and a picture of the fit '
-        'and what it leaves.',
+        'and its residuals.',
         'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml',
     )
     part.add_argument(
         'csv',
         metavar='CSV',
         type=pathlib.Path,
-        help='measurements, units in the header: see docs/calibrate.md and '
-        'config/measurements/thesis.csv',
+        help='measurements, with units in the header: docs/calibrate.md describes them, '
+        'config/measurements/thesis.csv is an example',
     )
     part.add_argument(
         '--foot',
         default='large37',
-        help='where to start, and what is kept of what was not measured (default large37)',
+        help='foot whose values the fit starts from, and keeps where nothing was measured: a name '
+        'in config/feet or a YAML file (default large37)',
     )
     part.add_argument(
         '--film-thickness',
         type=float,
         default=3.0e-4,
         metavar='M',
-        help='liquid on the wet floor before a foot stands in it, m (default 3e-4)',
+        help='thickness of the liquid on the wet floor before a foot lands, m (default 3e-4)',
     )
     part.add_argument(
         '--viscosity',
         type=float,
         default=1.0e-3,
         metavar='PA_S',
-        help='of that liquid, Pa s (default 1e-3, water)',
+        help='viscosity of that liquid, Pa s (default 1e-3, water)',
     )
     part.add_argument(
         '--out',
         type=pathlib.Path,
         metavar='FILE',
-        help='foot to write (default: <name of the CSV>_foot.yaml, here)',
+        help='foot to write (default: <name of the CSV>_foot.yaml in this folder)',
     )
     part.add_argument(
         '--figure',
         type=pathlib.Path,
         metavar='FILE',
-        help='picture to write, .png, .pdf or .svg (default: beside the foot, .png)',
+        help='picture to write, .png, .pdf or .svg (default: a .png beside the foot)',
     )
-    part.add_argument('--force', action='store_true', help='replace files that are there')
+    part.add_argument('--force', action='store_true', help='replace existing files')
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit, write, print; return the exit status."""
+    """Fit the foot, write it with its picture and print the fit; return the exit status."""
     foot_path = options.out or pathlib.Path(f'{options.csv.stem}_foot.yaml')
     if foot_path.suffix not in ('.yaml', '.yml'):
         raise InvalidInput(f'--out {foot_path}: a name that ends in .yaml is needed')
     figure_path = options.figure or foot_path.with_suffix('.png')
     if figure_path.suffix not in ('.png', '.pdf', '.svg'):
-        raise InvalidInput(f'--figure {figure_path}: .png, .pdf or .svg is needed')
+        raise InvalidInput(
+            f'--figure {figure_path}: a name that ends in .png, .pdf or .svg is needed'
+        )
     for path in (foot_path, figure_path):
-        if path.exists() and not options.force:
-            raise InvalidInput(f'{path}: exists already; --force replaces it')
+        refuse(path, options.force)
     found = calibrate(
         Measurements.read(options.csv),
         Foot.load(options.foot),
@@ -103,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write(contents: dict[pathlib.Path, bytes]) -> None:
-    """Write all of the files, or none: a foot without its picture would have to be removed."""
+    """Write all files or none, so that no foot is left without its picture."""
     written = {path: path.with_name(f'.{path.name}.part') for path in contents}
     try:
         for path, part in written.items():
@@ -119,7 +122,7 @@ def _values(
     found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path
 ) -> dict[str, Any]:
     def plain(values: dict[str, Any]) -> dict[str, Any]:
-        """JSON knows no NaN."""
+        """Replace NaN, which JSON does not have, by None."""
         return {
             key: None if isinstance(value, float) and math.isnan(value) else value
             for key, value in values.items()

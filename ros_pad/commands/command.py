@@ -1,27 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all commands of ``pad`` have: how they are added, and how a complaint is printed."""
+"""Shared by all commands of ``pad``: help, errors, exit status and tables."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable
+from collections.abc import Sequence
 from typing import TypeAlias
 
-INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
-WIDEST = 98  # columns of help, however wide the terminal
+from ros_pad.errors import BagError
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
+
+INTERRUPTED = 130  # exit status after Ctrl-C, the same as in shells
+WIDEST = 98  # largest width of the help in columns, also on a wider terminal
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
 
 class Help(argparse.HelpFormatter):
-    """Help whose descriptions keep their lines and columns, but are never wider than the page.
+    """Format help: descriptions keep their lines and columns, but not beyond the page width.
 
-    A line that is too long goes on below its last column; one that is a command goes on after a
-    backslash, so that it can be pasted into a shell.
+    A line of a list that is too long continues below its second column; a command continues after
+    a backslash, so that it can be pasted into a shell.
     """
 
     def __init__(self, prog: str) -> None:
@@ -29,10 +36,11 @@ class Help(argparse.HelpFormatter):
         super().__init__(prog, max_help_position=30, width=width)
 
     def add_argument(self, action: argparse.Action) -> None:
-        """Add an argument to what the columns are measured by."""
+        """Add an argument, which may make the column of names wider."""
         super().add_argument(action)
         if isinstance(action, argparse._SubParsersAction):
-            # argparse forgets that commands are indented, and breaks the line of the longest.
+            # argparse forgets that commands are indented: without this, the line of the command
+            # with the longest name would break.
             self._action_max_length += self._indent_increment
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
@@ -44,7 +52,7 @@ def _folded(line: str, width: int) -> str:
     if len(line) <= width:
         return line
     if not line[len(margin) :].startswith('pad '):
-        # Below the second column of a list, if this is one.
+        # Continue below the second column if this is a list.
         column = re.match(r'\s*(\S+(?: \S+)*\s{2,})?', line)
         hanging = ' ' * len(column[0]) if column else margin
         return textwrap.fill(line, width, subsequent_indent=hanging, drop_whitespace=True)
@@ -64,7 +72,7 @@ def add_command(
     text: str,
     example: str,
 ) -> argparse.ArgumentParser:
-    """Add a command with its help and an example in each line; return its parser."""
+    """Add a command with its description and examples, one in each line; return its parser."""
     lines = [line.strip() for line in example.splitlines()]
     parser = commands.add_parser(
         name,
@@ -76,7 +84,45 @@ def add_command(
     return parser
 
 
-def complain(error: object, status: int) -> int:
-    """Print an error for the user on stderr; return the exit status."""
-    print(f'pad: {error}', file=sys.stderr)
+def exit_status(run: Callable[[], int], program: str = 'pad') -> int:
+    """Run a command and return its exit status; print an error that it raises.
+
+    Returns
+    -------
+    int
+        Status that the command returns, or 1 after a failure at run time, 2 after bad usage or
+        input, 130 after Ctrl-C or SIGTERM, 0 after the reader of the output has closed it.
+    """
+    try:
+        return run()
+    except BrokenPipeError:
+        # The reader of the output, for example head, has ended. Without a new file for the output,
+        # Python would report an error at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (ConfigError, InvalidInput) as error:
+        return complain(error, 2, program)
+    except BagError as error:
+        # A bag that is not valid is bad input; an error of the operating system is a failure.
+        return complain(error, 1 if isinstance(error.__cause__, OSError) else 2, program)
+    except (PadError, OSError) as error:
+        return complain(error, 1, program)
+    except KeyboardInterrupt:
+        return complain('stopped', INTERRUPTED, program)
+
+
+def complain(error: object, status: int, program: str = 'pad') -> int:
+    """Print an error on stderr; return the given exit status."""
+    print(f'{program}: {error}', file=sys.stderr)
     return status
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> None:
+    """Print a table; the first ``texts`` columns are aligned left, the others right."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    for row in (head, *rows):
+        cells = [
+            cell.ljust(width) if column < texts else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        print('  '.join(cells).rstrip())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a shell offers where the parser alone does not know: scenes, feet, bags."""
+"""Completion of scenes, feet and bags in a shell."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 from ros_pad import configuration
 
 DEEPEST = 4
-"""Folders below the one that was typed in which bags are looked for."""
+"""Number of folder levels below the typed folder that are searched for bags."""
 
 MOST = 2000
-"""Folders looked at: a shell does not wait for a whole disk."""
+"""Largest number of folders to search: searching a whole disk would take too long."""
 
 
 def attach(parser: argparse.ArgumentParser) -> None:
-    """Tell argcomplete how to complete the arguments of a parser and of its commands."""
+    """Set how argcomplete completes the arguments of a parser and of its commands."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for part in action.choices.values():
@@ -31,26 +31,26 @@ def attach(parser: argparse.ArgumentParser) -> None:
 
 
 def bags(prefix: str, **_: Any) -> list[str]:
-    """Return bags and single MCAP files whose path begins so, or else the folders there."""
+    """Return bags and MCAP files whose path begins with a text or, if there are none, folders."""
     found = [path for path in _below(os.path.dirname(prefix)) if path.startswith(prefix)]
     return found or _paths(prefix, '')
 
 
 def _below(folder: str) -> Iterator[str]:
     for looked, (root, folders, files) in enumerate(os.walk(folder or '.')):
-        shown = root if folder else root[2:]  # without ./, which nobody typed
+        shown = root if folder else root[2:]  # without ./, unless it was typed
         folders[:] = sorted(name for name in folders if not name.startswith('.'))
         if looked >= MOST or root.count('/') - folder.count('/') >= DEEPEST:
             folders.clear()
         if 'metadata.yaml' in files:
-            folders.clear()  # the files of a bag are part of it
+            folders.clear()  # offer the bag, not the MCAP files in it
             yield shown
         else:
             yield from (os.path.join(shown, name) for name in files if name.endswith('.mcap'))
 
 
 def _paths(prefix: str, ending: str) -> list[str]:
-    """Return files with that ending, if any, and folders whose path begins so."""
+    """Return folders, and files with an ending (none if it is empty), that begin with a text."""
     here, start = os.path.split(prefix)
     try:
         entries = sorted(os.scandir(here or '.'), key=lambda each: each.name)
@@ -65,7 +65,7 @@ def _paths(prefix: str, ending: str) -> list[str]:
 
 
 def _shipped(kind: str) -> Callable[..., list[str]]:
-    """Return what completes the names that ship of a kind, and YAML files of one's own."""
+    """Return a completer for shipped names (scenes or feet) or, if none fits, for YAML files."""
 
     def complete(prefix: str, **_: Any) -> list[str]:
         return [name for name in configuration.names(kind) if name.startswith(prefix)] or _paths(
@@ -76,15 +76,15 @@ def _shipped(kind: str) -> Callable[..., list[str]]:
 
 
 def _policies(prefix: str, **_: Any) -> list[str]:
-    """Complete the last of several policies with commas between them."""
-    from ros_pad.control import POLICIES  # takes its time, and few ask for it
+    """Return a list of policies completed by each policy that is not in it yet."""
+    from ros_pad.control import POLICIES  # imported here because it is slow
 
     before, comma, _last = prefix.rpartition(',')
     return [f'{before}{comma}{name}' for name in POLICIES if name not in before.split(',')]
 
 
 def _nothing(**_: Any) -> list[str]:
-    """Offer no file names where a number is wanted."""
+    """Offer no file names for a number."""
     return []
 
 

@@ -27,13 +27,13 @@ _UNITS = {'m': 'm', 'm3': 'm³', 'n': 'N'}
 _DESCRIPTION = """\
 Shape of a pad at a pressure, free or pressed, and its force limits.
 
-  height            of the sphere over the pad base, as if nothing were cut off
-  depth             what the floor cuts off that height
+  height            of the sphere over the pad base, before the floor cuts it
+  depth             part of that height that the floor cuts off
   gap               from pad base to floor: height less depth
-  ring of liquid    balance of weight and surface tension for a pad that stands alone: no
-                    prediction (docs/errata.md), and it does not know how wide the gap is
-  tangential force  of one half of the ring, a bound: the other half pushes back
-  force limit       what one pad carries; measured is the line through measurements"""
+  ring of liquid    balance of weight and surface tension around a single pad; it does not
+                    depend on the width of the gap, and is no prediction (docs/errata.md)
+  tangential force  of one half of the ring: a bound, because the other half pushes back
+  force limit       largest load of one pad; measured is the line through measurements"""
 
 
 def add(commands: Commands) -> None:
@@ -46,42 +46,44 @@ def add(commands: Commands) -> None:
         'pad contact --pressure 75000 --force 0.1',
     )
     part.description = _DESCRIPTION
-    part.add_argument('--pressure', type=float, required=True, metavar='PA', help='gauge, Pa')
     part.add_argument(
-        '--force', type=float, default=0.0, metavar='N', help='on the pad, N (default 0)'
+        '--pressure', type=float, required=True, metavar='PA', help='gauge pressure in the pad, Pa'
+    )
+    part.add_argument(
+        '--force', type=float, default=0.0, metavar='N', help='load on the pad, N (default 0)'
     )
     which = part.add_mutually_exclusive_group()
     which.add_argument(
         '--pad',
         choices=('large', 'small'),
         default='large',
-        help="the thesis' pads of 1.5 mm (default) and 0.5 mm",
+        help="one of the thesis' pads: radius 1.5 mm (large, default) or 0.5 mm (small)",
     )
     which.add_argument('--foot', help='the pad of a foot: a name in config/feet or a YAML file')
     part.add_argument(
         '--adhesion',
         choices=tuple(ADHESION_SIGNS),
         default='matlab',
-        help='sign of the adhesion between pad and floor (default matlab: it attracts)',
+        help='sign of the adhesion between pad and floor (default matlab: the floor attracts)',
     )
     part.add_argument(
         '--model',
         choices=MODELS,
         default='thesis',
-        help='spherical dome (default), or the exact membrane, which is slower; the free dome and '
-        'the force limits are those of the spherical dome with both',
+        help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
+        'the force limits remain those of the spherical dome',
     )
     part.add_argument(
         '--liquid',
         choices=('water', 'thesis'),
         default='water',
-        help="tensions of water on silicone (default), or those of the thesis' appendix",
+        help="surface tensions of water on silicone (default), or those of the thesis' appendix",
     )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what is known of the pad; return the exit status."""
+    """Print shape, ring of liquid and force limits of the pad; return the exit status."""
     pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
     name = f'{options.pad} pad'
     if options.foot is not None:
@@ -97,14 +99,14 @@ def run(options: argparse.Namespace) -> int:
         'pressure_pa': pressure,
         'force_n': force,
     }
-    trouble: NoEquilibrium | None = None
+    failure: NoEquilibrium | None = None
     try:
         for part, shape in _shapes(pad, liquid, options):
             values[part] = shape
-    except NoEquilibrium as error:  # what is known up to there is still told
-        trouble = error
+    except NoEquilibrium as error:  # the results before the error are still printed
+        failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
-    # A shape may be known where a limit is not: the membrane goes on, measurements end.
+    # The membrane model also has solutions above the pressures at which the force limits end.
     ends = {each: largest_pressure(pad, each) for each in ('measured', 'max_depth', 'flattening')}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
@@ -114,13 +116,16 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(values))
     else:
         _show(f'{name}, {pressure:g} Pa gauge, {force:g} N', values, ends, pad.radius)
-    return 0 if trouble is None else complain(f'{trouble} (status {trouble.status})', 1)
+    return 0 if failure is None else complain(f'{failure} (status {failure.status})', 1)
 
 
 def _shapes(
     pad: contact.Pad, liquid: contact.Liquid, options: argparse.Namespace
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the free dome, the pressed one and its ring of liquid, as far as there are such."""
+    """Yield name and values of the free dome, the pressed dome and its ring of liquid.
+
+    Raises NoEquilibrium at the first of them that does not exist.
+    """
     pressure, force = options.pressure, options.force
     free = contact.inflate(pad, pressure)
     yield (
@@ -143,7 +148,7 @@ def _shapes(
             'status': pressed.status,
         },
     )
-    if not force > 0.0:  # the ring of a dome that only touches has no size to speak of
+    if not force > 0.0:  # the ring around a dome without load is too small to compute
         yield 'meniscus', {'status': 'no_contact'}
         return
     wet = contact.meniscus(pressed, liquid)
@@ -173,4 +178,4 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
-            print('  (wider than the pad: this balance does not hold, see docs/errata.md)')
+            print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')

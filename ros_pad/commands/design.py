@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad design``: how many pads a sole holds, whether they carry a load, and at what pressure."""
+"""``pad design``: compute how many pads fit on a sole, and at which pressure they carry a load."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ import numpy as np
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.folder import refuse_existing
+from ros_pad.configuration import number
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import Design
 from ros_pad.contact import Foot
+from ros_pad.contact import Pad
 from ros_pad.contact import design
 from ros_pad.contact import pressure_for
 from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.contact.limits import resized
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 
-CEILING = 90e3  # Pa gauge, of the shipped feet
+CEILING = 90e3  # Pa gauge, the ceiling of the shipped feet
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
 OPTIMUM = (
-    'The optimum of 0.3 to 0.8 mm that the thesis claims for the pad radius comes out of no '
-    'reading: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
+    'The thesis claims that a pad radius of 0.3 to 0.8 mm is best. Neither set of equations '
+    'confirms this: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
 )
 
 
@@ -42,35 +44,41 @@ def add(commands: Commands) -> None:
         commands,
         'design',
         run,
-        'Pads on a sole: number, load, pressure, height of rise; corrected and as in the thesis.',
+        'Compute number, load, pressure and height of rise of the pads on a sole, with corrected '
+        'equations and with those printed in the thesis.',
         'pad design --load 7 --foot large37 --figure design.png',
     )
     part.description = f'{part.description}\nOne of --area, --sole-radius and --foot is needed.'
-    part.add_argument('--load', type=float, required=True, metavar='N', help='on one foot, N')
+    part.add_argument('--load', type=float, required=True, metavar='N', help='load on one foot, N')
     sole = part.add_mutually_exclusive_group()
-    sole.add_argument('--area', type=float, metavar='M2', help='of the sole, m²')
-    sole.add_argument('--sole-radius', type=float, metavar='M', help='of a round sole, m')
+    sole.add_argument('--area', type=float, metavar='M2', help='area of the sole, m²')
+    sole.add_argument('--sole-radius', type=float, metavar='M', help='radius of a round sole, m')
     part.add_argument(
-        '--radius', type=float, metavar='M', help=f'of a pad, m ({LARGE_PAD.radius:g})'
+        '--radius', type=float, metavar='M', help=f'radius of a pad, m ({LARGE_PAD.radius:g})'
     )
     part.add_argument(
-        '--stiffness', type=float, metavar='N/M', help=f'of a pad, N/m ({LARGE_PAD.stiffness:g})'
+        '--stiffness',
+        type=float,
+        metavar='N/M',
+        help=f'stiffness of a pad, N/m ({LARGE_PAD.stiffness:g})',
     )
     part.add_argument(
         '--pressure',
         type=float,
         metavar='PA',
-        help=f'highest of the supply, Pa gauge ({CEILING:g})',
+        help=f'highest pressure of the supply, Pa gauge ({CEILING:g})',
     )
     part.add_argument(
         '--margin', type=float, default=1.2, metavar='X', help='factor on the load (%(default)g)'
     )
-    part.add_argument('--criterion', choices=CRITERIA, help='of the force limit (measured)')
+    part.add_argument(
+        '--criterion', choices=CRITERIA, help='criterion of the force limit (measured)'
+    )
     part.add_argument(
         '--foot',
         metavar='FOOT',
-        help='shipped foot or .yaml file: gives sole, pad, number, ceiling and criterion '
-        'where nothing else is said',
+        help='a name in config/feet or a YAML file: sole, pad, number of pads, ceiling and '
+        'criterion are taken from this foot unless an option gives them',
     )
     part.add_argument(
         '--figure',
@@ -83,10 +91,7 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
-    if options.figure is not None and options.figure.exists():
-        raise InvalidInput(
-            f'--figure {options.figure}: exists already, and nothing is ever overwritten'
-        )
+    refuse_existing('--figure', options.figure)
     foot = None if options.foot is None else Foot.load(options.foot)
     pad = LARGE_PAD if foot is None else foot.pad
     if options.stiffness is not None:
@@ -104,49 +109,47 @@ def run(options: argparse.Namespace) -> int:
     if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
         built = design(options.load, area, pad, pads=foot.pads, **rules)
         designs = {'as built': built, **designs}
-
-    def over(radii: Sequence[float]) -> list[list[Design]]:
-        # Only such pads as the sole has room for.
-        return [
-            [
-                design(options.load, area, resized(pad, r), reading=reading, **rules)
-                for r in radii
-                if area >= CELL['corrected'] * r * r
-            ]
-            for reading in READINGS
-        ]
-
-    rows = over(RADII)
-    says = [
+    rows = _over(RADII, options.load, area, pad, rules)
+    sentences = [
         *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
-        *_overlap('Of the reading thesis ', designs['thesis']),
+        *_overlap('By the equations of the thesis, ', designs['thesis']),
         OPTIMUM,
     ]
     if options.figure is not None:
-        from ros_pad.figures.design import draw
+        from ros_pad.reports.design import draw
 
-        draw(options.figure, *over(np.linspace(0.3e-3, 2.5e-3, 221).tolist()))
+        radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
+        draw(options.figure, *_over(radii, options.load, area, pad, rules))
     if options.json:
-        print(
-            json.dumps(
-                {
-                    'designs': [{'name': name, **values(each)} for name, each in designs.items()],
-                    'radii': [values(each) for row in rows for each in row],
-                    'says': says,
-                    'figure': None if options.figure is None else str(options.figure),
-                }
-            )
-        )
-        return 0
-    _print(designs, rows)
-    print()
-    for sentence in says:
-        print(sentence)
+        summary = {
+            'designs': [{'name': name, **values(each)} for name, each in designs.items()],
+            'radii': [values(each) for row in rows for each in row],
+            'says': sentences,
+            'figure': None if options.figure is None else str(options.figure),
+        }
+        print(json.dumps(summary))
+    else:
+        _print(designs, rows)
+        print('', *sentences, sep='\n')
     return 0
 
 
+def _over(
+    radii: Sequence[float], load: float, area: float, pad: Pad, rules: dict[str, Any]
+) -> list[list[Design]]:
+    """Return corrected and printed designs for those radii, m, of which a pad fits on the sole."""
+    return [
+        [
+            design(load, area, resized(pad, r), reading=reading, **rules)
+            for r in radii
+            if area >= CELL['corrected'] * r * r
+        ]
+        for reading in READINGS
+    ]
+
+
 def values(each: Design) -> dict[str, Any]:
-    """Return what is known of a design, units in the names; None for what it has not."""
+    """Return the values of a design by name with unit; None for values that are not finite."""
     found = {
         'reading': each.reading,
         'load_n': each.load,
@@ -178,18 +181,18 @@ def values(each: Design) -> dict[str, Any]:
 
 
 def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterator[str]:
-    """Yield in words whether the load is carried and, if not, what would carry it.
+    """Yield sentences on whether the load is carried and, if not, which changes would be enough.
 
     Parameters
     ----------
     each : Design
-        The one that is asked about.
+        The design to judge.
     candidates : sequence of Design
-        The same load and sole with other radii.
+        Designs for the same load and sole with other radii, in rising order.
     supply : float
         Highest pressure of the supply, Pa gauge.
     """
-    ends = 'the supply ends' if each.ceiling == supply else 'what is known of such pads ends'
+    ends = 'the supply ends' if each.ceiling == supply else 'the data for such pads end'
     if each.carried:
         yield (
             f'{each.load:g} N is carried: {each.pads} pads with {each.load_per_pad:.3g} N each, '
@@ -197,7 +200,7 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
         )
     else:
         yield (
-            f'{each.load:g} N cannot be carried: {each.pads} pads reach {each.reachable_load:.3g} '
+            f'{each.load:g} N cannot be carried: {each.pads} pads carry {each.reachable_load:.3g} '
             f'N with a margin of {each.margin:g} at {each.ceiling:.0f} Pa, where {ends}.'
         )
         yield from _remedies(each, candidates)
@@ -206,8 +209,8 @@ def advice(each: Design, candidates: Sequence[Design], supply: float) -> Iterato
         yield (
             f'All pads pressed flat at {each.ceiling:.0f} Pa would push with '
             f'{each.flat_force:.3g} N: {each.flat_force / (each.pads * each.pad_limit):.3g} times '
-            f'the limit {each.criterion}, and equation 3.92 of the thesis takes that for what a '
-            'foot carries.'
+            f'the limit {each.criterion}. Equation 3.92 of the thesis uses this force as the '
+            'load of a foot.'
         )
 
 
@@ -226,20 +229,20 @@ def _overlap(of: str, each: Design) -> Iterator[str]:
 
 def _remedies(each: Design, candidates: Sequence[Design]) -> Iterator[str]:
     if each.pressure > each.ceiling:
-        yield f'A supply of {each.pressure:.0f} Pa would do.'
+        yield f'A supply of {each.pressure:.0f} Pa would be enough.'
     if math.isinf(each.pads_needed):
         least = pressure_for(each.pad, 0.0, each.criterion)
-        yield f'No number of them would do: such a pad carries nothing below {least:.0f} Pa.'
+        yield f'No number of pads is enough: such a pad carries nothing below {least:.0f} Pa.'
     else:
         area = each.pads_needed * CELL['corrected'] * each.pad.radius**2
         yield (
-            f'{each.pads_needed} pads would do, on a sole of {area:.3g} m² '
+            f'{each.pads_needed} pads would be enough, on a sole of {area:.3g} m² '
             f'(radius {math.sqrt(area / math.pi):.3g} m).'
         )
         if each.pads_needed <= each.pads_without_touching:
             yield (
-                'This sole would hold them in a closer pattern: the domes are '
-                f'{each.dome_width:.3g} m wide, not the {3 * each.pad.radius:.3g} m kept for them.'
+                'They would fit on this sole in a closer pattern: the domes are '
+                f'{each.dome_width:.3g} m wide, the pattern allows {3 * each.pad.radius:.3g} m.'
             )
     radii = [other.pad.radius for other in candidates if other.carried]
     if radii:
@@ -253,7 +256,7 @@ def _area(options: argparse.Namespace, foot: Foot | None) -> float:
         return math.pi * number('--sole-radius', options.sole_radius, 'm', above=True) ** 2
     if foot is None:
         raise InvalidInput(
-            'one of --area, --sole-radius and --foot must say how large the sole is'
+            'the size of the sole is missing: give --area (m²), --sole-radius (m) or --foot'
         )
     return foot.sole_area
 

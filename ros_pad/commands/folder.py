@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a command puts its files: in a folder of their own."""
+"""Create the new folder that a command writes into, and refuse existing paths."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from ros_pad.errors import InvalidInput
 
 
 def new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
-    """Make the folder that is wanted, or the next free one below ``runs``."""
+    """Create the folder that ``--out`` gives or, without it, the next free one in ``runs``."""
     if wanted is not None:
-        try:
-            wanted.mkdir(parents=True)
-        except FileExistsError:
-            raise InvalidInput(
-                f'--out {wanted}: exists already, and nothing is ever overwritten'
-            ) from None
+        refuse_existing('--out', wanted)
+        wanted.mkdir(parents=True)
         return wanted
     number = 1
     while True:
@@ -27,3 +23,9 @@ def new_folder(wanted: pathlib.Path | None, name: str) -> pathlib.Path:
             number += 1
         else:
             return folder
+
+
+def refuse_existing(option: str, path: pathlib.Path | None) -> None:
+    """Raise InvalidInput if the path that an option gives exists."""
+    if path is not None and path.exists():
+        raise InvalidInput(f'{option} {path}: exists already: give another name')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad replay``: what was recorded of feet, through estimators and controller once more."""
+"""``pad replay``: pass a bag through estimators and controller again, and compare."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import pathlib
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import parameters
 from ros_pad.control import POLICIES
@@ -19,15 +21,15 @@ from ros_pad.errors import InvalidInput
 from ros_pad.trials import replay as replays
 from ros_pad.trials import replayed_bag
 from ros_pad.trials.comparison import Comparison
-from ros_pad.trials.node_settings import Settings
+from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.node_settings import Value
 
-UNITS = {'slip': ' m/s', 'pressure_setpoint': ' Pa'}  # of what is no probability, share or number
+UNITS = {'slip': ' m/s', 'pressure_setpoint': ' Pa'}  # all other kinds have no unit
 WORDS = {
     'equal': 'equal to the bit',
-    'rounding': 'equal but for rounding: recorded on another kind of processor',
+    'rounding': 'equal except for rounding: recorded on another kind of processor',
     'different': 'different',
-    'gap': 'equal up to a gap in what was recorded; what differs after it, nobody can judge',
+    'gap': 'equal up to a gap in the recording; differences after the gap are not judged',
     'nothing': 'nothing to compare: no estimates and no decisions were recorded',
 }
 
@@ -38,15 +40,15 @@ def add(commands: Commands) -> None:
         commands,
         'replay',
         run,
-        'Feed recorded wrenches (N), positions (m) and pressures (Pa) through estimators and '
-        'controller once more, and compare with what they said then; try other parameters.',
-        'pad replay bags/hexapod_patches/bag --set estimator.wet_prior=0.3 --figure prior.png\n'
+        'Pass recorded wrenches (N), positions (m) and pressures (Pa) through estimators and '
+        'controller again, and compare the results with the recorded ones; try other parameters.',
+        'pad replay bags/hexapod_patches/bag --set wet_prior=0.3 --figure prior.png\n'
         '         pad replay my_bag --remap leg_{leg}/wrench:=/foot_{leg}/ft',
     )
     part.description = (
-        f'{part.description}\nThe robot walks as it walked: only what is estimated and decided may'
-        ' change. Exit status: 0 equal, or nothing\nthat can be compared differs; 1 different;'
-        ' 2 bad input.'
+        f'{part.description}\nThe motion stays as recorded: only estimates and decisions may'
+        ' change.\nExit status: 0 no difference except for rounding or after a gap in the'
+        ' recording; 1 another difference;\n2 bad input.'
     )
     part.add_argument(
         'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'
@@ -56,28 +58,17 @@ def add(commands: Commands) -> None:
         action='append',
         default=[],
         metavar='NAME=VALUE',
-        help='a value other than that of the bag, in SI units: expected_load (N), dome_pressure '
-        '(Pa gauge), margin, ambient_pressure (Pa), publish_rate (Hz), estimator.KEY '
-        '(estimator.force_noise, N) or policy.KEY (policy.wet_above); may be given more than once',
+        help='another value, in SI units, for a parameter of the estimator or controller node: '
+        'such as force_noise (N), expected_load (N), dome_pressure (Pa gauge) or policy.dwell '
+        '(steps); may be given more than once',
     )
     part.add_argument(
-        '--policy', choices=POLICIES, help="how shapes are chosen (default: the bag's own way)"
+        '--policy', choices=POLICIES, help="rule that chooses morphologies (default: the bag's)"
     )
     part.add_argument(
         '--foot', help="a foot other than the bag's: a name in config/feet or a YAML file"
     )
-    part.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='NAME:=TOPIC',
-        help='topic of the bag that takes the place of one of ros_pad, for one leg '
-        "(leg_1/wrench:=/left/ft) or all, '{leg}' being its number "
-        "('leg_{leg}/wrench:=/foot_{leg}/ft'); may be given more than once",
-    )
-    part.add_argument(
-        '--namespace', help='of the robot, such as /robot_1 (default: the only one of the bag)'
-    )
+    _add_topics(part)
     part.add_argument(
         '--figure',
         type=pathlib.Path,
@@ -86,33 +77,47 @@ def add(commands: Commands) -> None:
         'new .png, .svg or .pdf',
     )
     part.add_argument(
-        '--out', type=pathlib.Path, metavar='DIR', help='new bag, for the replayed topics'
+        '--out', type=pathlib.Path, metavar='DIR', help='write the replayed topics into a new bag'
     )
     part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def _add_topics(part: argparse.ArgumentParser) -> None:
+    part.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        metavar='NAME:=TOPIC',
+        help='read NAME of ros_pad from this TOPIC of the bag, for one leg '
+        "(leg_1/wrench:=/left/ft) or for all legs, with '{leg}' for the number "
+        "('leg_{leg}/wrench:=/foot_{leg}/ft'); may be given more than once",
+    )
+    part.add_argument(
+        '--namespace', help='namespace of the robot, such as /robot_1 (default: the only one)'
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Replay the bag; return the exit status."""
     remaps = _remaps(options.remap)
     values = _values(options.set)
-    for path in (options.figure, options.out):
-        if path is not None and path.exists():
-            raise InvalidInput(f'{path}: exists already, and nothing is ever overwritten')
+    refuse_existing('--figure', options.figure)
+    refuse_existing('--out', options.out)
     try:
         bag = replays.open_bag(options.bag)
-        settings = Settings.of(bag).changed(values, options.policy, options.foot)
-        with bar('replay', bag.message_count, 'messages') as reach:
+        settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
+        with bar('replay', bag.message_count, 'messages') as show:
             replay = replays.replay(
                 bag,
                 settings,
                 options.namespace,
                 remaps,
-                lambda share: reach(share * bag.message_count),
+                lambda share: show(share * bag.message_count),
             )
     except BagError as error:
-        return complain(error, 2)  # of this command, a bag is the input
+        return complain(error, 2)  # the bag is an input of this command
     if options.figure is not None:
-        from ros_pad.figures.replay import draw
+        from ros_pad.reports.replay import draw
 
         draw(options.figure, replay)
     if options.out is not None:
@@ -142,18 +147,18 @@ def _remaps(texts: list[str]) -> dict[str, str]:
         if not own or not sign or not other:
             raise InvalidInput(f'--remap {text}: NAME:=TOPIC is needed')
         if own in found:
-            raise InvalidInput(f'--remap {text}: {own} is there twice')
+            raise InvalidInput(f'--remap {text}: {own} is given twice')
         found[own] = other
     return found
 
 
 def _values(texts: list[str]) -> dict[str, Value]:
-    for text in texts:  # before they are read as those of a sweep, which advises lists and ranges
+    for text in texts:  # parameters() would also accept lists and ranges
         name, _, value = text.partition('=')
         if not name or not value:
             raise InvalidInput(f'--set {text}: NAME=VALUE is needed')
         if ',' in value or ':' in value:
-            raise InvalidInput(f'--set {text}: one value is needed, and no list or range')
+            raise InvalidInput(f'--set {text}: one value is needed, not a list or range')
     return {name: values[0] for name, values in parameters(texts).items()}
 
 
@@ -165,13 +170,13 @@ def _show(replay: replays.Replay) -> None:
     if replay.comparisons:
         print()
         rows = [_row(each) for each in _gathered(replay.comparisons)]
-        _table(
-            ['topic', 'compared', 'equal', 'largest difference', 'parts at', 'not replayed',
+        print_table(
+            ['topic', 'compared', 'equal', 'largest difference', 'first at', 'not replayed',
              'not recorded'],
             rows,
         )  # fmt: skip
     print()
-    _table(
+    print_table(
         ['leg', 'stances', 'wet at their end', 'slips', 'switches'],
         [
             [str(each.leg), str(each.stance_ends), *(
@@ -180,12 +185,12 @@ def _show(replay: replays.Replay) -> None:
             for each in replay.outcomes
         ],
     )  # fmt: skip
-    print('(recorded > replayed, where they are not the same; - where nobody recorded it)')
+    print('(recorded > replayed where the two differ; - for not recorded)')
     print(f'\n{WORDS[replay.verdict]}')
 
 
 def _gathered(comparisons: list[Comparison]) -> list[tuple[str, list[Comparison]]]:
-    """Return topics that are equal on several legs as one, and all others by themselves."""
+    """Return the rows of the table; a kind of topic that is equal on several legs shares a row."""
     found: dict[str, list[Comparison]] = {}
     for each in comparisons:
         name = each.topic
@@ -220,14 +225,3 @@ def _pair(pair: tuple[int | None, int]) -> str:
     if before == after:
         return str(after)
     return f'{"-" if before is None else before} > {after}'
-
-
-def _table(heads: list[str], rows: list[list[str]]) -> None:
-    widths = [max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads))]
-    for row in [heads, *rows]:
-        cells = [row[0].ljust(widths[0])]
-        cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        print('  '.join(cells).rstrip())
-
-
-__all__ = ['add', 'run']

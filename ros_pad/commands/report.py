@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad report``: the HTML page of a bag, of a sweep or of the thesis' figures, and figures."""
+"""``pad report``: write the page of a bag, a sweep or the thesis' figures, and their figures."""
 
 from __future__ import annotations
 
@@ -11,14 +11,19 @@ from collections.abc import Callable
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.progress import bar
+from ros_pad.commands.study import run_study
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.reports import report
+from ros_pad.reports import sweep_page
+from ros_pad.reports.files import refuse
+from ros_pad.reports.files import write_figures
+from ros_pad.reports.style import Drawn
 from ros_pad.trials import recorded
-from ros_pad.trials import report
-from ros_pad.trials.page import Drawn
-from ros_pad.trials.page import write_figures
+from ros_pad.trials import sweep as sweeps
 
 THESIS = 'thesis_figures.html'
+"""Default file name of the page with the thesis' figures."""
 
 
 def add(commands: Commands) -> None:
@@ -27,13 +32,14 @@ def add(commands: Commands) -> None:
         commands,
         'report',
         run,
-        'Write the HTML report of a bag or of a sweep, or a page with our versions of the '
-        "thesis' figures; and figures for a paper.",
+        'Write the HTML report of a bag or of a sweep, or a page with the figures of the thesis '
+        'as ros_pad computes them; write figures for a paper.',
         'pad report runs/hexapod_patches_adaptive_seed0/bag --figures figures',
     )
     part.description = (
-        f'{part.description}\nA page is one file that needs no network; a walk can be played in '
-        'it.\nFigures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 points.'
+        f'{part.description}\nA page is one file that needs no network; the page of a bag also '
+        'plays the walk.\nFigures are PDF and PNG (300 dpi), 85 or 175 mm wide, with type of 8 '
+        'points.'
     )
     part.add_argument(
         'path', metavar='PATH', nargs='?', type=pathlib.Path, help='folder of a bag or of a sweep'
@@ -41,7 +47,7 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--thesis',
         action='store_true',
-        help="draw the thesis' figures, without PATH; all of them take about 45 s",
+        help="draw the thesis' figures, without PATH; needs a checkout of ros_pad and about 45 s",
     )
     part.add_argument(
         '--only', type=int, nargs='+', metavar='N', help='with --thesis: figures of these numbers'
@@ -50,43 +56,40 @@ def add(commands: Commands) -> None:
         '--out',
         type=pathlib.Path,
         metavar='FILE',
-        help='page (default: report.html beside the bag, report.html in the folder of a sweep, '
-        f'{THESIS} here; none with --figures)',
+        help='page to write (default: report.html beside the bag or in the folder of the sweep, '
+        f'{THESIS} in this folder; no page with --figures)',
     )
     part.add_argument(
         '--figures',
         type=pathlib.Path,
         metavar='DIR',
-        help='write each figure there as PDF and PNG; the page then only with --out',
+        help='write each figure into this folder as PDF and PNG; no page without --out',
     )
-    part.add_argument('--force', action='store_true', help='replace files that are there')
+    part.add_argument('--force', action='store_true', help='replace existing files')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write page and figures, say where; return the exit status."""
+    """Write page and figures and print their paths; return the exit status."""
     if options.only and not options.thesis:
-        raise InvalidInput('--only: chooses among the figures of --thesis, which is not given')
+        raise InvalidInput('--only needs --thesis: it chooses figures of the thesis')
     if options.thesis:
         if options.path is not None:
-            raise InvalidInput(f'--thesis: draws from the models, and takes no {options.path}')
+            raise InvalidInput(f'--thesis draws no bag or sweep: leave out {options.path}')
         return _of_thesis(options)
     if options.path is None:
-        raise InvalidInput('PATH or --thesis: one of them is needed')
+        raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
-    # Figures import much: only where they are asked for.
-    from ros_pad.figures import sweep_page
-
-    if sweep_page.is_sweep(options.path):
-        page = _page(options, options.path / 'report.html')
-        found = sweep_page.read(options.path)
-        return _write(
+    if sweeps.is_sweep(options.path):
+        page = page_for(options, options.path / 'report.html')
+        found = sweeps.read(options.path)
+        return write_all(
             options,
             page,
             lambda out: sweep_page.write(found, out, options.force),
             lambda: sweep_page.draw(found),
         )
-    page = _page(options, pathlib.Path(os.path.normpath(options.path / '..' / 'report.html')))
+    page = page_for(options, pathlib.Path(os.path.normpath(options.path / '..' / 'report.html')))
     with bar('reading', 1.0, 'bag') as progress:
         trial = recorded.load(options.path, progress=progress)
 
@@ -98,48 +101,37 @@ def run(options: argparse.Namespace) -> int:
         with bar('figures', 1.0, 'trial') as progress:
             return report.drawn(trial, progress=progress)
 
-    return _write(options, page, write, drawn)
+    return write_all(options, page, write, drawn)
 
 
 def _of_thesis(options: argparse.Namespace) -> int:
-    from ros_pad.figures import thesis_page
-
-    numbers = tuple(options.only or thesis_page.NUMBERS)
-    page = _page(options, pathlib.Path(THESIS))
-    names = [f'figure_{number}' for number in numbers]
-    for name in names if options.figures is not None else []:
-        for kind in ('pdf', 'png'):
-            _refuse(options.figures / f'{name}.{kind}', options.force)
-    with bar("the thesis' figures", 1.0, 'page') as progress:
-        figures = thesis_page.draw(numbers, progress)
-    return _write(
-        options,
-        page,
-        lambda out: thesis_page.write(figures, out, options.force),
-        lambda: {f'figure_{each.number}': each.drawn for each in figures},
-    )
+    words = ['--force'] if options.force else []
+    words += ['--only', *map(str, options.only)] if options.only else []
+    for name in ('out', 'figures'):
+        value = getattr(options, name)
+        words += [f'--{name}', str(value)] if value is not None else []
+    return run_study('thesis', *words)
 
 
-def _page(options: argparse.Namespace, default: pathlib.Path) -> pathlib.Path | None:
-    """Return the page that is wanted; None for figures alone."""
+def page_for(options: argparse.Namespace, default: pathlib.Path) -> pathlib.Path | None:
+    """Return the path of the page; None if only figures are to be written.
+
+    Raises InvalidInput if the page exists and ``--force`` is not given.
+    """
     if options.figures is not None and options.out is None:
         return None
     page: pathlib.Path = options.out or default
-    _refuse(page, options.force)
+    refuse(page, options.force)
     return page
 
 
-def _refuse(path: pathlib.Path, force: bool) -> None:
-    if path.exists() and not force:
-        raise InvalidInput(f'{path}: exists already; --force replaces it, --out names another')
-
-
-def _write(
+def write_all(
     options: argparse.Namespace,
     page: pathlib.Path | None,
     write: Callable[[pathlib.Path], None],
     drawn: Callable[[], dict[str, Drawn]],
 ) -> int:
+    """Write a page (unless it is None) and figures (with ``--figures``); print paths, return 0."""
     if page is not None:
         write(page)
         print(page)

@@ -12,28 +12,37 @@ import pathlib
 from collections.abc import Iterator
 from typing import Any
 
-from ros_pad.commands.bench import run_bench
+from ros_pad.bags import annotate
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
+from ros_pad.commands.study import run_study
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
-from ros_pad.simulation import bench
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.reports import report
+from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import is_bench
 from ros_pad.trials import Trial
 from ros_pad.trials import label as labels
 from ros_pad.trials import loop
-from ros_pad.trials import report
-from ros_pad.trials.bag import annotate
-from ros_pad.trials.trial import told
+from ros_pad.trials.trial import fault_lines
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+# Options of a walk: default, and end of the error message if a bench scene is given.
+_ONLY_WALKS = {
+    'policy': (None, 'and gives the morphology of its pad itself'),
+    'cycles': (None, 'in which nothing walks'),
+    'seed': (0, 'in which nothing is random'),
+    'fidelity': ('auto', 'which is calculated, not simulated'),
+    'no_compare': (False, 'which has no policies to compare'),
+    'live': (False, 'which has no nodes'),
+}
 
 
 def add(commands: Commands) -> None:
@@ -42,7 +51,7 @@ def add(commands: Commands) -> None:
         commands,
         'run',
         run,
-        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; of a bench '
+        'Walk a scene in closed loop on ROS 2 nodes, record a bag and write a report; for a bench '
         'scene, draw the figures of the thesis.',
         'pad run hexapod_patches --seed 3',
     )
@@ -51,43 +60,52 @@ def add(commands: Commands) -> None:
         '--foot', help="a foot other than the scene's: a name in config/feet or a YAML file"
     )
     part.add_argument(
-        '--policy', choices=POLICIES, help="how shapes are chosen (default: the scene's own way)"
+        '--policy', choices=POLICIES, help="rule that chooses morphologies (default: the scene's)"
     )
-    part.add_argument('--seed', type=int, default=0, help='of floor and noise (default 0)')
-    part.add_argument('--cycles', type=int, help="gait cycles (default: the scene's own)")
+    part.add_argument(
+        '--seed', type=int, default=0, help='seed of floor and noise, 0 to 2147483647 (default 0)'
+    )
+    part.add_argument('--cycles', type=int, help="gait cycles, 1 to 100000 (default: the scene's)")
     part.add_argument(
         '--fidelity',
-        choices=ladder.FIDELITIES,
+        choices=levels.FIDELITIES,
         default='auto',
         help='L0 is the leg on its rail, L1 the hexapod in the plane, L2 the hexapod with joints '
         '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
     )
-    part.add_argument('--no-ros', action='store_true', help='without nodes and bag, much faster')
+    part.add_argument(
+        '--no-ros', action='store_true', help='walk without nodes and bag; much faster'
+    )
     part.add_argument(
         '--no-compare',
         action='store_true',
-        help='do not run the other policies on the same ground (an adaptive run does)',
+        help='do not also walk the other policies on the same ground, as an adaptive run does',
     )
     part.add_argument(
         '--live',
         action='store_true',
-        help='let other processes on this machine hear the topics, and be heard: '
-        'real regulators in the same ROS domain would obey',
+        help='share the topics with other processes, by default in the whole subnet: '
+        'real regulators in the same ROS domain receive the set-points',
     )
     part.add_argument(
-        '--out', type=pathlib.Path, metavar='DIR', help='new folder (default: runs/<scene>_...)'
+        '--out',
+        type=pathlib.Path,
+        metavar='DIR',
+        help='new folder for the results (default: runs/<scene>_...)',
     )
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Walk the scene, or work out the bench; return the exit status."""
-    scene = bench.load(options.scene)
-    if isinstance(scene, bench.BenchScene):
-        return run_bench(options, options.scene)
+    """Walk the scene, or run the study of a bench scene; return the exit status."""
+    if is_bench(options.scene):
+        return _run_bench(options)
+    scene = Scene.load(options.scene)
     if options.cycles is not None:
         if not 1 <= options.cycles <= 100000:
-            raise InvalidInput(f'--cycles {options.cycles}: from 1 to 100000 are needed')
+            raise InvalidInput(
+                f'--cycles {options.cycles}: a whole number from 1 to 100000 is needed'
+            )
         scene = dataclasses.replace(scene, cycles=options.cycles)
     if options.foot is not None:
         scene = _on_foot(scene, Foot.load(options.foot))
@@ -96,20 +114,32 @@ def run(options: argparse.Namespace) -> int:
             f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
         )
     policy = options.policy or scene.policy
-    rung = ladder.rung(scene, options.fidelity, policy)
+    level = levels.level(scene, options.fidelity, policy)
     folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
     try:
-        return _run_in(folder, options, scene, policy, rung)
+        return _run_in(folder, options, scene, policy, level)
     except KeyboardInterrupt:
         bag = folder / 'bag'
         if not bag.exists():
             raise
         return complain(
-            f'stopped: the bag is complete, pad report {bag} makes its page', INTERRUPTED
+            f'stopped: the bag is complete, pad report {bag} writes its report', INTERRUPTED
         )
     finally:
-        with contextlib.suppress(OSError):  # nothing came of it: the name stays free
+        # Remove the folder if it is empty, so that its name can be used again.
+        with contextlib.suppress(OSError):
             folder.rmdir()
+
+
+def _run_bench(options: argparse.Namespace) -> int:
+    for name, (default, why) in _ONLY_WALKS.items():
+        if getattr(options, name) != default:
+            flag = '--' + name.replace('_', '-')
+            raise InvalidInput(f'{flag} is not allowed: {options.scene} is a bench scene, {why}')
+    words = ['--json'] if options.json else []
+    words += ['--foot', options.foot] if options.foot else []
+    words += ['--out', str(options.out)] if options.out else []
+    return run_study('bench', options.scene, *words)
 
 
 def _on_foot(scene: Scene, foot: Foot) -> Scene:
@@ -122,45 +152,39 @@ def _on_foot(scene: Scene, foot: Foot) -> Scene:
 
 
 def _run_in(
-    folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, rung: str
+    folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, level: str
 ) -> int:
-    if options.no_ros:
-        trial, bag = _walk(scene, policy, options.seed, rung, f'{policy}, without ROS'), None
+    bag = None if options.no_ros else folder / 'bag'
+    if bag is None:
+        trial = _walk(scene, policy, options.seed, level, f'{policy}, without ROS')
     else:
-        bag = folder / 'bag'
-        trial = _walk_on_nodes(scene, policy, options.seed, rung, bag, options.live)
-        if trial.settings['interrupted']:
-            return complain(
-                f'stopped at {trial.metrics.duration_s:.1f} s of {scene.duration:.1f} s:'  # type: ignore[union-attr]
-                f' pads vented, bag closed: {bag}',
-                INTERRUPTED,
-            )
-    others = []
-    if policy == 'adaptive' and not options.no_compare:
-        others = [
-            _walk(scene, other, options.seed, rung, f'{other:8} on the same ground')
-            for other in POLICIES
-            if other != policy
-        ]
+        trial = _walk_on_nodes(scene, policy, options.seed, level, bag, options.live)
     assert trial.metrics is not None
+    if bag is not None and trial.settings['interrupted']:
+        return complain(
+            f'stopped at {trial.metrics.duration_s:.1f} s of {scene.duration:.1f} s:'
+            f' pads vented, bag closed: {bag}',
+            INTERRUPTED,
+        )
+    others = () if options.no_compare or policy != 'adaptive' else POLICIES
     trial.settings['comparison'] = [
-        {'policy': other.policy, **other.metrics.as_dict()}
+        {'policy': other, **each.metrics.as_dict()}
         for other in others
-        if other.metrics is not None
+        if other != policy
+        for each in [_walk(scene, other, options.seed, level, f'{other:8} on the same ground')]
+        if each.metrics is not None
     ]
     if bag is not None:
-        annotate(
-            bag,
-            labels.label(
-                scene,
-                policy,
-                options.seed,
-                rung,
-                metrics=trial.metrics,
-                real_time_factor=trial.real_time_factor,
-                comparison=trial.settings['comparison'],
-            ),
+        about = labels.label(
+            scene,
+            policy,
+            options.seed,
+            level,
+            metrics=trial.metrics,
+            real_time_factor=trial.real_time_factor,
+            comparison=trial.settings['comparison'],
         )
+        annotate(bag, about)
     page = folder / 'report.html'
     with bar('report', 1.0, 'page') as progress:
         report.write(trial, page, progress=progress)
@@ -175,31 +199,31 @@ def _run_in(
     return 0
 
 
-def _walk(scene: Scene, policy: str, seed: int, rung: str, text: str) -> Trial:
+def _walk(scene: Scene, policy: str, seed: int, level: str, text: str) -> Trial:
     with bar(text, scene.duration) as progress:
-        return loop.run(scene, policy, seed, rung, progress)
+        return loop.run(scene, policy, seed, level, progress)
 
 
 def _walk_on_nodes(
-    scene: Scene, policy: str, seed: int, rung: str, bag: pathlib.Path, live: bool
+    scene: Scene, policy: str, seed: int, level: str, bag: pathlib.Path, live: bool
 ) -> Trial:
     try:
         from ros_pad.nodes import composed
     except ModuleNotFoundError as error:
         raise PadError(
-            f'ROS 2 is not here ({error}): source it, or pip install "ros_pad[ros]",'
-            ' or walk without it: --no-ros'
+            f'ROS 2 is not found ({error}): source its setup.bash, or'
+            ' pip install "ros_pad[ros]", or run without ROS: --no-ros'
         ) from error
     with (
         contextlib.nullcontext() if live else _alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
-        return composed.run(scene, policy, seed, rung, bag=bag, progress=progress)
+        return composed.run(scene, policy, seed, level, bag=bag, progress=progress)
 
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """Let this process talk to itself alone: no real regulator hears its set-points."""
+    """Hide the topics of this process, so that no real regulator receives the set-points."""
     before = os.environ.get(_DISCOVERY)
     os.environ[_DISCOVERY] = 'OFF'
     try:
@@ -261,7 +285,7 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         )
     for refusal in own.refusals:
         print(f'stayed flat: {refusal}')
-    for fault in told(own.faults):
+    for fault in fault_lines(own.faults):
         print(f'fault: {fault}')
     for omission in trial.settings['omitted']:
         bound = omission['bound']

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad scenes``: what there is to run."""
+"""``pad scenes``: list the scenes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import Any
 from ros_pad import configuration
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
-from ros_pad.simulation import bench
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.bench import FIDELITY
+from ros_pad.simulation.scene import is_bench
 
 
 def add(commands: Commands) -> None:
@@ -24,8 +23,7 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List the scenes; return the exit status."""
-    scenes = [bench.load(name) for name in configuration.names('scenes')]
-    rows = {scene.name: _row(scene) for scene in scenes}
+    rows = {name: _row(name) for name in configuration.names('scenes')}
     if options.json:
         print(json.dumps(rows))
         return 0
@@ -39,13 +37,15 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _row(scene: Scene | bench.BenchScene) -> dict[str, Any]:
-    if isinstance(scene, bench.BenchScene):
-        nothing = {'policy': None, 'fidelity': FIDELITY, 'duration_s': None}
-        return {'description': scene.description} | nothing
+def _row(name: str) -> dict[str, Any]:
+    if is_bench(name):
+        table = configuration.Table.load(configuration.locate('scenes', name))
+        nothing = {'policy': None, 'fidelity': 'analytic', 'duration_s': None}
+        return {'description': table.text('description', default='')} | nothing
+    scene = Scene.load(name)
     return {
         'description': scene.description,
         'policy': scene.policy,
-        'fidelity': ladder.rung(scene),
+        'fidelity': levels.level(scene),
         'duration_s': scene.duration,
     }

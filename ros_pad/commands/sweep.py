@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad sweep``: walk every combination of scenes, policies, seeds and parameters."""
+"""``pad sweep``: run every combination of scenes, policies, seeds and parameters."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from ros_pad.commands.command import INTERRUPTED
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.command import print_table
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.simulation import fidelity as levels
 from ros_pad.trials import sweep as sweeps
 
-LINES = 60  # of the table on the screen
-MOST = 100_000  # values of a range, seeds
+LINES = 60  # largest number of rows of the table on the screen
+MOST = 100_000  # largest number of values in a range, and of seeds in FIRST:LAST
+_TABLES = ('trials.csv', 'trials.parquet')
 
 
 def add(commands: Commands) -> None:
@@ -34,14 +36,16 @@ def add(commands: Commands) -> None:
         commands,
         'sweep',
         run,
-        'Walk every combination of scenes, policies, seeds and parameters, without ROS, on all '
-        'cores or on a Dask cluster: trials.csv, a picture with confidence intervals, and a page.',
+        'Run every combination of scenes, policies, seeds and parameters, without ROS, on all '
+        'cores or on a Dask cluster; write trials.csv, a picture with confidence intervals, and a '
+        'page.',
         'pad sweep hexapod_patches --policy flat,dome,adaptive --seed 0:9 '
         '--set tow.weight=3:12:4 --set floor.wet_fraction=0.2,0.5 --out towing',
     )
     part.description = (
-        f'{part.description}\nA sweep that was stopped or killed goes on when the same command is '
-        'given again with its --out;\nmore seeds, policies, scenes and values may be asked for.'
+        f'{part.description}\nA sweep that was stopped or killed continues when the same command '
+        'is given again with --out and\nits folder; seeds, policies, scenes and values may be'
+        ' added.'
     )
     part.add_argument(
         'scenes', metavar='SCENE', nargs='+', help='names of scenes, or paths of YAML files'
@@ -49,51 +53,66 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--policy',
         metavar='NAMES',
-        help="with commas: flat, dome, adaptive, oracle (default: each scene's own)",
+        help='flat, dome, adaptive, oracle, with commas between several '
+        "(default: each scene's own)",
     )
     part.add_argument(
         '--seed',
         default='0:4',
         metavar='LIST',
-        help='of floor and noise, with commas, or FIRST:LAST (default 0:4, which are five)',
+        help='seeds of floor and noise, 0 to 2147483647: a list with commas, or FIRST:LAST'
+        ' (default 0:4, five seeds)',
     )
+    _add_parameters(part)
+    _add_execution(part)
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def _add_parameters(part: argparse.ArgumentParser) -> None:
     part.add_argument(
         '--set',
         action='append',
         default=[],
         metavar='NAME=VALUES',
-        help='values with commas, or START:STOP:COUNT, both ends included, in the units of the '
-        "scene's YAML (SI). NAME is a key of it, dotted (tow.weight, N; cycles), "
-        'estimator.KEY (estimator.filter_period, s) or policy.KEY (policy.wet_above); may be '
-        'given more than once, and the first that has several values is the axis of the picture',
+        help='values with commas, or START:STOP:COUNT with both ends, in SI units. NAME is a key '
+        "of the scene's YAML, with dots between levels (tow.weight, N; cycles), or a parameter of "
+        'the estimator node (filter_period, s) or of the adaptive policy (policy.wet_above). May '
+        'be given more than once; the first NAME with several values is the axis of the picture',
     )
     part.add_argument(
         '--fidelity',
-        choices=ladder.FIDELITIES,
+        choices=levels.FIDELITIES,
         default='auto',
-        help='rung of every trial; auto (default) chooses it for each scene and its parameters',
+        help='fidelity level; auto (default) chooses it for each scene and its parameters',
     )
+
+
+def _add_execution(part: argparse.ArgumentParser) -> None:
     where = part.add_mutually_exclusive_group()
-    where.add_argument('--workers', type=int, metavar='N', help='processes (default: all cores)')
+    where.add_argument(
+        '--workers',
+        type=int,
+        metavar='N',
+        help='number of processes, from 1 (default: one for each core)',
+    )
     where.add_argument(
         '--scheduler',
         metavar='ADDRESS',
-        help='walk on the cluster of this Dask scheduler (tcp://host:8786)',
+        help='address of a Dask scheduler on whose cluster to run (tcp://host:8786)',
     )
     part.add_argument(
-        '--retry', action='store_true', help='walk trials that failed before once more'
+        '--retry', action='store_true', help='also run trials again that failed before'
     )
     part.add_argument(
         '--out',
         type=pathlib.Path,
         metavar='DIR',
-        help='new folder, or that of this sweep, which then goes on (default: runs/sweep...)',
+        help='new folder, or the folder of this sweep, which continues (default: runs/sweep...)',
     )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Walk the sweep; return the exit status."""
+    """Run the sweep, write its table, picture and page; return the exit status."""
     sweep = sweeps.Sweep(
         options.scenes,
         () if options.policy is None else options.policy.split(','),
@@ -101,67 +120,69 @@ def run(options: argparse.Namespace) -> int:
         parameters(options.set),
         options.fidelity,
     )
-    total = len(sweep.jobs())  # refuses what is not allowed before there is a folder
+    total = len(sweep.jobs())  # invalid input is an error before a folder is created
     folder = new_folder(None, 'sweep') if options.out is None else options.out
-    print(f'{total} trials; after a stop --out {folder} goes on', file=sys.stderr)
-    done = 0
+    print(f'{total} trials; after a stop, --out {folder} continues them', file=sys.stderr)
+    done = 0.0
     try:
-        with bar('sweep', total, 'trials') as reach:
+        with bar('sweep', total, 'trials') as show:
 
-            def progress(now: int, _: int) -> None:
+            def progress(now: float) -> None:
                 nonlocal done
                 done = now
-                reach(now)
+                show(now)
 
             rows = sweeps.run(
                 sweep, folder, options.workers, options.scheduler, progress, options.retry
             )
     except KeyboardInterrupt:
         return complain(
-            f'stopped: {done} of {total} trials are in {folder};'
-            f' the same command with --out {folder} goes on',
+            f'stopped: {done:.0f} of {total} trials are in {folder};'
+            f' the same command with --out {folder} continues',
             INTERRUPTED,
         )
     finally:
-        with contextlib.suppress(OSError):  # nothing came of it: the name stays free
+        # Remove the folder if it is empty, so that its name can be used again.
+        with contextlib.suppress(OSError):
             folder.rmdir()
-    points = sweeps.points(rows, sweep.parameters)
-    from ros_pad.figures import sweep_page
-    from ros_pad.figures.sweep import draw
+    return _report(options, sweep, folder, rows)
 
-    picture: pathlib.Path | None = folder / 'sweep.png'
-    notes = _notes(rows)
+
+def _report(
+    options: argparse.Namespace,
+    sweep: sweeps.Sweep,
+    folder: pathlib.Path,
+    rows: list[sweeps.Row],
+) -> int:
+    """Write picture and page, print the means of the trials; return the exit status."""
+    from ros_pad.reports import sweep_page
+    from ros_pad.reports.sweep import draw
+
+    points, notes = sweeps.points(rows, sweep.parameters), _notes(rows)
+    files = [path for path in (folder / name for name in _TABLES) if path.exists()]
+    summary = {
+        'folder': str(folder),
+        'trials': len(rows),
+        'failed': sum(bool(row['error']) for row in rows),
+        'ended_early': sum(bool(row['verdict']) for row in rows),
+        'tables': [str(path) for path in files],
+        'picture': None,
+    }
     try:
         draw(folder / 'sweep.png', points, sweep)
+        files.append(folder / 'sweep.png')
+        summary['picture'] = str(files[-1])
     except InvalidInput as error:
-        picture = None
         notes.append(f'no picture: {error}')
-    page = folder / 'report.html'
-    sweep_page.write(sweep_page.read(folder), page, force=True)
-    failed = [row for row in rows if row['error']]
-    tables = [path for path in _tables(folder) if path.exists()]
+    files.append(folder / 'report.html')
+    sweep_page.write(sweeps.read(folder), files[-1], force=True)
     if options.json:
-        print(
-            json.dumps(
-                {
-                    'folder': str(folder),
-                    'trials': len(rows),
-                    'failed': len(failed),
-                    'ended_early': sum(bool(row['verdict']) for row in rows),
-                    'tables': [str(path) for path in tables],
-                    'picture': None if picture is None else str(picture),
-                    'report': str(page),
-                    'notes': notes,
-                    'points': [_flat(point) for point in points],
-                }
-            )
-        )
+        more = {'report': str(files[-1]), 'notes': notes, 'points': [_flat(p) for p in points]}
+        print(json.dumps(summary | more))
     else:
         _show(points, sweep)
-        for note in notes:
-            print(note)
-        for path in (*tables, *([picture] if picture else []), page):
-            print(path)
+        print(*notes, *files, sep='\n')
+    failed = [row for row in rows if row['error']]
     if failed:
         return complain(
             f'{len(failed)} of {len(rows)} trials failed, the first with: {failed[0]["error"]}', 1
@@ -170,7 +191,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def seeds(text: str) -> list[int]:
-    """Return the seeds of a list such as ``0,1,5:9``."""
+    """Return the seeds in a list such as ``0,1,5:9``; raise InvalidInput for any other text."""
     found: list[int] = []
     for part in text.split(','):
         ends = part.split(':')
@@ -181,14 +202,14 @@ def seeds(text: str) -> list[int]:
         first, last = int(ends[0]), int(ends[-1])
         if not 0 <= last - first < MOST:
             raise InvalidInput(
-                f'--seed {text}: {part!r}: LAST must be from FIRST to {MOST - 1} more'
+                f'--seed {text}: {part!r}: LAST must be from FIRST to FIRST + {MOST - 1}'
             )
         found += range(first, last + 1)
     return found
 
 
 def parameters(texts: list[str]) -> dict[str, list[sweeps.Value]]:
-    """Return the values of each ``NAME=VALUES``."""
+    """Return the values by name from texts ``NAME=VALUES``; raise InvalidInput for other texts."""
     found: dict[str, list[sweeps.Value]] = {}
     for text in texts:
         name, equals, values = text.partition('=')
@@ -197,7 +218,7 @@ def parameters(texts: list[str]) -> dict[str, list[sweeps.Value]]:
                 f'--set {text}: NAME=VALUE,VALUE or NAME=START:STOP:COUNT is needed'
             )
         if name in found:
-            raise InvalidInput(f'--set {text}: {name} is there twice')
+            raise InvalidInput(f'--set {text}: {name} is given twice')
         if ':' in values:
             found[name] = _spaced(text, values)
         else:
@@ -209,13 +230,15 @@ def _spaced(text: str, values: str) -> list[sweeps.Value]:
     parts = [_value(each) for each in values.split(':')]
     numbers = [each for each in parts if type(each) in (int, float) and math.isfinite(float(each))]
     if len(parts) != 3 or len(numbers) != 3 or not isinstance(parts[2], int):
-        raise InvalidInput(f'--set {text}: START:STOP:COUNT are two numbers and a whole one')
+        raise InvalidInput(
+            f'--set {text}: START:STOP:COUNT needs two finite numbers and a whole number'
+        )
     start, stop, count = float(numbers[0]), float(numbers[1]), parts[2]
     if not 2 <= count <= MOST or start == stop:
         raise InvalidInput(
-            f'--set {text}: a COUNT from 2 to {MOST} is needed, and a STOP that is not START'
+            f'--set {text}: a COUNT from 2 to {MOST} is needed, and a STOP other than START'
         )
-    # Twelve digits: 0.3 is meant, not 0.30000000000000004.
+    # Round to twelve digits: 0.3, not 0.30000000000000004.
     spaced = [float(f'{each:.12g}') for each in np.linspace(start, stop, count)]
     whole = all(isinstance(each, int) for each in numbers) and all(
         each.is_integer() for each in spaced
@@ -230,24 +253,18 @@ def _value(text: str) -> sweeps.Value:
     return text
 
 
-def _tables(folder: pathlib.Path) -> tuple[pathlib.Path, pathlib.Path]:
-    return folder / 'trials.csv', folder / 'trials.parquet'
-
-
 def _notes(rows: list[sweeps.Row]) -> list[str]:
     notes = []
     ended = [row for row in rows if row['verdict']]
     if ended:
         notes.append(
-            f'{len(ended)} of {len(rows)} walks ended early and are in no mean;'
-            f' the first: {ended[0]["verdict"]}'
+            f'{len(ended)} of {len(rows)} walks ended early and are left out of the means;'
+            f' the first because of: {ended[0]["verdict"]}'
         )
     for scene in dict.fromkeys(row['scene'] for row in rows):
-        own = sorted({row['rung'] for row in rows if row['scene'] == scene})
+        own = sorted({row['level'] for row in rows if row['scene'] == scene})
         if len(own) > 1:
-            notes.append(
-                f'{scene} was walked on {" and ".join(own)}: --fidelity {own[-1]} keeps to one'
-            )
+            notes.append(f'{scene} ran on {" and ".join(own)}: --fidelity {own[-1]} uses only one')
     return notes
 
 
@@ -259,7 +276,7 @@ def _flat(point: sweeps.Point) -> dict[str, Any]:
 
 def _show(points: list[sweeps.Point], sweep: sweeps.Sweep) -> None:
     names = ['scene', *(name for name, each in sweep.parameters.items() if len(each) > 1)]
-    heads = [*names, 'policy', 'mm/cycle', '95 % interval', 'walks']
+    head = [*names, 'policy', 'mm/cycle', '95 % interval', 'walks']
     table = []
     for point in points[:LINES]:
         interval, mean = '-', '-'
@@ -269,12 +286,8 @@ def _show(points: list[sweeps.Point], sweep: sweeps.Sweep) -> None:
             interval = f'{1e3 * point.low:.1f} to {1e3 * point.high:.1f}'
         cells = [_cell(point.labels[name]) for name in names]
         table.append([*cells, point.labels['policy'], mean, interval, str(point.walks)])
-    widths = [max(len(row[i]) for row in [heads, *table]) for i in range(len(heads))]
     print()
-    for row in [heads, *table]:
-        print(
-            '  '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        )
+    print_table(head, table, len(names) + 1)
     if len(points) > LINES:
         print(f'... and {len(points) - LINES} more')
     print()

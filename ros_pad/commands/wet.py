@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``pad wet``: how high liquid climbs a pad of any shape, and how it pulls."""
+"""``pad wet``: compute how high liquid rises on a pad of any shape, and its force on the pad."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from ros_pad.capillary.layers import BALANCES
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.configuration import number
 from ros_pad.contact import THESIS_LIQUID
 from ros_pad.contact import WATER
 from ros_pad.contact import Liquid
-from ros_pad.contact.pad import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
 LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
-# What each shape must be given, and may be given, of --radius --contact-radius and so on.
+# Of each shape: function that makes it, sizes that it needs, sizes that it allows.
 SHAPES: dict[str, tuple[Callable[..., Mesh], tuple[str, ...], tuple[str, ...]]] = {
     'dome': (Mesh.dome, ('radius', 'contact_radius'), ('height', 'rings', 'sectors')),
     'cone': (Mesh.cone, ('contact_radius', 'top_radius', 'height'), ('rings', 'sectors')),
@@ -43,19 +43,19 @@ SHAPES: dict[str, tuple[Callable[..., Mesh], tuple[str, ...], tuple[str, ...]]] 
 }
 _SIZES = ('radius', 'contact_radius', 'top_radius', 'height', 'pitch', 'rings', 'sectors')
 _ADVICE = {
-    'dry': 'the liquid does not rise there: it does not wet the wall enough for this balance',
-    'coarse': 'the rise is not resolved: more --layers, or a mesh that is cut off lower',
-    'saturated': 'the liquid goes over the top of the mesh',
+    'dry': 'by this balance the liquid does not rise: it does not wet the wall enough',
+    'coarse': 'the layers are too thick for this rise: use more --layers, or cut the mesh lower',
+    'saturated': 'the liquid would rise above the top of the mesh',
     'no_circle': 'no arc of a circle fits between wall and floor: this wall needs another method',
-    'far_off': 'no equilibrium of this balance on this wall, or no arc: --balance energy; --loose'
-    ' takes it as it is',
-    'far_off energy': 'on slender or wholly wetted walls arcs are off by a sixth and more:'
-    ' ros_pad.capillary.bath_meniscus; --loose takes it as it is',
-    'far_apart': 'the surface sags in gaps this wide: ros_pad.capillary.pattern_surface; --loose'
-    ' takes it as level',
+    'far_off': 'this balance has no equilibrium or no arc on this wall: try --balance energy;'
+    ' --loose accepts the height',
+    'far_off energy': 'on slender or wholly wetted walls, arcs are wrong by a sixth or more: use'
+    ' ros_pad.capillary.bath_meniscus; --loose accepts the height',
+    'far_apart': 'in gaps this wide the surface is not level: use'
+    ' ros_pad.capillary.pattern_surface; --loose accepts a level surface',
 }
 _DESCRIPTION = """\
-How high liquid climbs a pad that stands on a wet floor, and how it pulls.
+Compute how high liquid rises on a pad that stands on a wet floor, and its force.
 
 MESH is a closed STL, OBJ, PLY or MSH file (pip install 'ros_pad[mesh]'), z up, \
 the floor at z = 0, or one of these shapes:
@@ -65,12 +65,12 @@ the floor at z = 0, or one of these shapes:
   pattern   --pads --pitch --radius --contact-radius [--height]: domes in a hexagonal layout
 With --area, or for a pattern, the liquid stands between many pads with a level surface.
 
-  pressure         of the liquid over the air: below 0 it pulls
-  force            pressure times projected section: the thesis' estimate of what one side of the \
-pad feels, no bound. On the other side the liquid pulls back, and nothing is left of it round a \
-symmetric pad
-  capillary force  what a scene may be given: capillary_force in the file of its foot, N for each \
-pad; the size of that estimate, or with --hysteresis what the pinned line holds"""
+  pressure         of the liquid, relative to the air: below 0 the liquid pulls
+  force            pressure times projected section: the thesis' estimate of the force on one \
+side of the pad; it is no bound. The liquid on the other side pulls back; on a symmetric pad the \
+sum is 0
+  capillary force  value for the key capillary_force in the file of a foot, N for each pad: the \
+size of that estimate, or with --hysteresis the largest force of a pinned contact line"""
 
 
 def add(commands: Commands) -> None:
@@ -83,69 +83,111 @@ def add(commands: Commands) -> None:
         'pad wet dome --radius 1.55e-3 --contact-radius 0.6e-3 --figure dome.png',
     )
     part.add_argument('mesh', metavar='MESH', help=f'a file, or one of: {", ".join(SHAPES)}')
+    _add_mesh(part)
+    _add_liquid(part)
+    _add_method(part)
+    part.add_argument(
+        '--figure', metavar='FILE', help='draw the wetted mesh into a .png, .pdf or .svg'
+    )
+    part.add_argument(
+        '--html', metavar='FILE', help='write a page on which the mesh can be turned'
+    )
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def _add_mesh(part: argparse.ArgumentParser) -> None:
     shape = part.add_argument_group('shapes')
-    shape.add_argument('--radius', type=float, metavar='M', help='of sphere or cylinder, m')
-    shape.add_argument('--contact-radius', type=float, metavar='M', help='on the floor, m')
-    shape.add_argument('--top-radius', type=float, metavar='M', help='of a cone, m')
-    shape.add_argument('--height', type=float, metavar='M', help='m (of a dome: up to its widest)')
-    shape.add_argument('--pitch', type=float, metavar='M', help='of a pattern, m')
+    shape.add_argument('--radius', type=float, metavar='M', help='radius of sphere or cylinder, m')
     shape.add_argument(
-        '--rings', type=int, metavar='N', help='number of bands of triangles going up'
+        '--contact-radius', type=float, metavar='M', help='radius of the contact disc, m'
+    )
+    shape.add_argument(
+        '--top-radius', type=float, metavar='M', help='radius of a cone at its top, m'
+    )
+    shape.add_argument(
+        '--height',
+        type=float,
+        metavar='M',
+        help='m (default for a dome: up to its widest section)',
+    )
+    shape.add_argument('--pitch', type=float, metavar='M', help='distance of pads in a pattern, m')
+    shape.add_argument(
+        '--rings', type=int, metavar='N', help='number of bands of triangles from floor to top'
     )
     shape.add_argument(
         '--sectors', type=int, metavar='N', help='number of triangles round the axis'
     )
     file = part.add_argument_group('files')
     file.add_argument(
-        '--scale', type=float, metavar='S', help='unit of the file in m: 1e-3 for mm (1)'
+        '--scale', type=float, metavar='S', help='unit of the file in m: 1e-3 for mm (default 1)'
     )
-    file.add_argument('--lift', type=float, metavar='M', help='added to all heights, m (0)')
-    file.add_argument('--flip', action='store_true', help='turn a mesh that is inside out')
+    file.add_argument(
+        '--lift', type=float, metavar='M', help='added to all heights, m (default 0)'
+    )
+    file.add_argument(
+        '--flip', action='store_true', help='reverse the faces of a mesh that is inside out'
+    )
+
+
+def _add_liquid(part: argparse.ArgumentParser) -> None:
     liquid = part.add_argument_group('liquid')
     liquid.add_argument(
         '--liquid',
         choices=tuple(LIQUIDS),
         default='water',
-        help="tensions of water on silicone (default), or those of the thesis' appendix",
+        help="surface tensions of water on silicone (default), or those of the thesis' appendix",
     )
-    liquid.add_argument('--tension', type=float, metavar='N/M', help='of another liquid, N/m')
-    liquid.add_argument('--angle', type=float, metavar='DEG', help='of contact, degrees')
-    liquid.add_argument('--density', type=float, metavar='KG/M3', help='kg/m³ (1000)')
+    liquid.add_argument(
+        '--tension', type=float, metavar='N/M', help='surface tension of another liquid, N/m'
+    )
+    liquid.add_argument('--angle', type=float, metavar='DEG', help='contact angle, degrees')
+    liquid.add_argument('--density', type=float, metavar='KG/M3', help='density, kg/m³')
     many = part.add_argument_group('many pads')
-    many.add_argument('--pads', type=int, metavar='N', help='number that stands on the area')
-    many.add_argument('--area', type=float, metavar='M2', help='of all of them, m²')
+    many.add_argument('--pads', type=int, metavar='N', help='number of pads on the area')
+    many.add_argument(
+        '--area', type=float, metavar='M2', help='area of all pads with the gaps between them, m²'
+    )
+
+
+def _add_method(part: argparse.ArgumentParser) -> None:
     part.add_argument(
         '--balance',
         choices=BALANCES,
         default='energy',
-        help='how the height is found (%(default)s)',
+        help='balance from which the height is computed (%(default)s)',
     )
     part.add_argument(
         '--loose',
         action='store_true',
-        help='take heights that are known to be far off too: to compare, not to use',
+        help='also accept heights with large errors: to compare, not to use',
     )
     part.add_argument(
-        '--layers', type=int, metavar='N', help='number from floor to top (100, pattern 200)'
+        '--layers',
+        type=int,
+        metavar='N',
+        help='number of layers from floor to top (100; many pads 200)',
     )
-    part.add_argument('--slices', type=int, metavar='N', help='number round the axis (36)')
     part.add_argument(
-        '--direction', type=float, default=0.0, metavar='DEG', help='of the force, degrees (0)'
+        '--slices', type=int, metavar='N', help='number of slices round the axis (36)'
+    )
+    part.add_argument(
+        '--direction',
+        type=float,
+        default=0.0,
+        metavar='DEG',
+        help='azimuth of the force, degrees (0)',
     )
     part.add_argument(
         '--hysteresis',
         type=float,
         nargs=2,
         metavar=('ADVANCING', 'RECEDING'),
-        help='contact angles, degrees: the capillary force is then what pinning holds',
+        help='contact angles, degrees: the capillary force is then that of the pinned line',
     )
-    part.add_argument('--figure', metavar='FILE', help='draw the wetted mesh: .png, .pdf or .svg')
-    part.add_argument('--html', metavar='FILE', help='a page with the mesh, to be turned')
-    part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what liquid does on the mesh; return the exit status."""
+    """Find the height of the liquid on the mesh and print it; return the exit status."""
     number('--direction', options.direction, 'degrees', low=-math.inf)
     liquid = _liquid(options)
     try:
@@ -181,13 +223,13 @@ def run(options: argparse.Namespace) -> int:
     worst.pop('ok', None)
     name, _ = worst.most_common(1)[0]
     advice = _ADVICE.get(f'{name} {found.balance}', _ADVICE[name])
-    return complain(f'no height: status {values["status"]}: {advice}', 1)
+    return complain(f'no valid height, status {values["status"]}: {advice}', 1)
 
 
 def _liquid(options: argparse.Namespace) -> Liquid:
     liquid = LIQUIDS[options.liquid]
     if options.tension is not None and options.angle is None:
-        raise InvalidInput('--tension needs --angle: contact angles go with the liquid')
+        raise InvalidInput('--tension needs --angle: the contact angle depends on the liquid')
     angle = liquid.angle if options.angle is None else math.radians(options.angle)
     return replace(
         liquid,
@@ -203,7 +245,7 @@ def _mesh(options: argparse.Namespace) -> Mesh:
     if options.mesh not in SHAPES:
         if given:
             raise InvalidInput(
-                f'{_option(min(given))} is for shapes, and {options.mesh} is a file'
+                f'{_option(min(given))} is only for shapes, and {options.mesh} is a file'
             )
         return Mesh.read(
             options.mesh,
@@ -218,7 +260,7 @@ def _mesh(options: argparse.Namespace) -> Mesh:
     other = sorted(of_files | given - {*needed, *allowed})
     if other or options.flip:
         name = _option(other[0] if other else 'flip')
-        raise InvalidInput(f'{name} means nothing to a {options.mesh}')
+        raise InvalidInput(f'{name} is no option of the mesh {options.mesh}')
     sizes = {
         name: getattr(options, name) for name in (*needed, *allowed) if name in given | {'pads'}
     }
@@ -231,7 +273,7 @@ def _mesh(options: argparse.Namespace) -> Mesh:
 
 def _round(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> Wet:
     if options.pads is not None:
-        raise InvalidInput('--pads needs --area: of the whole pattern, m²')
+        raise InvalidInput('--pads needs --area, the area of all pads, m²')
     return wet(
         mesh,
         liquid,
@@ -246,10 +288,10 @@ def _between(mesh: Mesh, liquid: Liquid, options: argparse.Namespace) -> WetPatt
     if options.hysteresis is not None:
         raise InvalidInput('--hysteresis is for a single pad, which has one contact line')
     if options.slices is not None:
-        raise InvalidInput('--slices is for a single pad: between many the surface is level')
+        raise InvalidInput('--slices is for a single pad: between many pads the surface is level')
     pads, area = 1 if options.pads is None else options.pads, options.area
     if options.mesh == 'pattern':
-        # Each dome has a hexagon to itself, unless the area is given.
+        # Without --area, each dome has the area of its hexagon in the pattern.
         cells = math.sqrt(0.75) * options.pitch**2 * pads
         pads, area = 1, cells if area is None else area
     layers = 200 if options.layers is None else options.layers
@@ -292,7 +334,7 @@ def _values(found: Wet | WetPattern, direction: float) -> dict[str, Any]:
 
 
 def _of_a_foot(found: Wet | WetPattern, options: argparse.Namespace) -> float:
-    """Return what goes under ``capillary_force`` into the file of a foot: N for each pad."""
+    """Return the value of the key ``capillary_force`` in the file of a foot, N for each pad."""
     direction = math.radians(options.direction)
     if isinstance(found, WetPattern):
         return abs(found.force) / (options.pads or 1)
@@ -309,7 +351,7 @@ _UNITS = {
 
 
 def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return names in words and values with units, for the reader."""
+    """Return each name as words with its value and unit; leave out None and arrays."""
     rows = []
     for name, value in values.items():
         if value is None or isinstance(value, np.ndarray):
@@ -328,7 +370,7 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON knows: no arrays, and null for what has no answer."""
+    """Return a value for JSON: lists for arrays, null for NaN."""
     if isinstance(value, np.ndarray):
         return [_plain(each) for each in value.tolist()]
     return None if isinstance(value, float) and math.isnan(value) else value
@@ -340,12 +382,12 @@ def _draw(
     found: Wet | WetPattern,
     rows: list[tuple[str, str]],
 ) -> None:
-    from ros_pad.figures import wetted
-    from ros_pad.figures import wetted_page
+    from ros_pad.reports import wetted
+    from ros_pad.reports import wetted_page
 
     if options.figure is not None:
         wetted.draw(options.figure, mesh, found, math.radians(options.direction))
     if options.html is not None:
         title = f'{mesh.source}, {options.liquid}'
-        told = [row for row in rows if row[0] not in ('figure', 'html')]
-        wetted_page.write(options.html, title, told, wetted.picture(mesh, found))
+        shown = [row for row in rows if row[0] not in ('figure', 'html')]
+        wetted_page.write(options.html, title, shown, wetted.picture(mesh, found))

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Liquid bridge between a sphere and the plane below it.
 
-A meridian is described by its inclination φ and radius r at arc length s, upwards from the plane:
-``dr/ds = cos φ``, ``dz/ds = sin φ`` and, by Young and Laplace, ``dφ/ds = p/γ - sin φ / r`` where
-p, less its hydrostatic part, is the pressure of the liquid over that of the air. It starts at
+The meridian has inclination φ and radius r at arc length s, counted upwards from the plane:
+``dr/ds = cos φ``, ``dz/ds = sin φ`` and, by Young and Laplace, ``dφ/ds = p/γ - sin φ / r``, where
+p is the pressure difference between liquid and air at height z. The meridian starts at
 ``φ = π - plane angle`` and ends on the sphere at ``φ = filling angle + contact angle``.
 
-Without gravity ``ζ = r exp(iφ)`` obeys ``dζ/ds = 1 + i H ζ`` with ``H = p/γ``: a rotation about
-``i/H``, which is every nodoid, unduloid, catenoid, cylinder and sphere in one formula without
-cases (Kenmotsu's form of Delaunay's surfaces). The axial force is ``2π γ C`` with the first
-integral ``C = r sin φ - H r²/2``.
+Without gravity ``ζ = r exp(iφ)`` satisfies ``dζ/ds = 1 + i H ζ`` with ``H = p/γ``: a rotation
+about ``i/H``. This one formula covers nodoid, unduloid, catenoid, cylinder and sphere (Kenmotsu's
+form of Delaunay's surfaces). The axial force is ``2π γ C`` with the first integral
+``C = r sin φ - H r²/2``.
 
-Inside this module lengths are in units of the sphere's radius, those of the shapes without
-gravity in units of the radius of the contact line on the sphere, which makes them a family of
-one parameter for each pair of end inclinations.
+Units inside this module: lengths are divided by the sphere's radius, but in `_Shape` by the radius
+of the contact line on the sphere. Shapes without gravity then form a family with one parameter
+(``place``) for each pair of end inclinations.
 """
 
 from __future__ import annotations
@@ -31,36 +31,44 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoBridge
 
-# Filling angles beyond these, rad, are a liquid that hardly touches the sphere, or drowns it.
+# Allowed filling angles, rad. Outside, the liquid hardly touches the sphere, or covers it.
 SMALLEST_FILLING, LARGEST_FILLING = 1e-4, math.pi - 1e-3
 
 
 @dataclass(frozen=True)
 class Bridge:
-    """A liquid bridge. Floats for scalar input, arrays (circle only) otherwise.
+    """A liquid bridge. Floats for scalar input, arrays otherwise (method ``circle`` only).
 
     Attributes
     ----------
-    force : N, axial force of the liquid on the sphere, attraction positive: the pull of the
-        surface at the contact line less the pressure on the wetted cap. With gravity the plane is
-        pulled with this force less the liquid's weight.
-    pressure : Pa, of the liquid over that of the air, at the plane; negative is suction. Without
-        gravity it is the same everywhere.
-    volume : m³ of liquid.
-    neck_radius : m, of the narrowest section, which may be one of the ends.
-    filling_angle : rad, between the axis and the contact line, seen from the sphere's centre.
-    floor_radius : m, of the wetted disc on the plane.
-    height : m, of the contact line on the sphere above the plane.
-    status : ``ok``; ``unstable`` where a bridge of this volume would snap or slip to another
-        shape; in arrays ``no_bridge``, the numbers are then NaN.
+    force : float or array
+        Axial force of the liquid on the sphere, N, attraction positive: surface tension at the
+        contact line minus pressure on the wetted cap. With gravity, the force on the plane is
+        smaller by the weight of the liquid.
+    pressure : float or array
+        Pressure of the liquid minus that of the air, at the plane, Pa; negative is suction.
+        Without gravity it is the same everywhere.
+    volume : float or array
+        Volume of the liquid, m³.
+    neck_radius : float or array
+        Radius of the narrowest section, m; this may be one of the ends.
+    filling_angle : float or array
+        Angle at the sphere's centre between the axis and the contact line, rad.
+    floor_radius : float or array
+        Radius of the wetted disc on the plane, m.
+    height : float or array
+        Height of the contact line on the sphere above the plane, m.
+    status : str or array of str
+        ``ok``; with ``young_laplace`` also ``unstable``, where a bridge of this volume would break
+        or jump to another shape; in arrays also ``no_bridge``, where the numbers are NaN.
     """
 
     force: Floats
@@ -85,43 +93,46 @@ def bridge(
     density: float = 1000.0,
     plane_angle: npt.ArrayLike | None = None,
 ) -> Bridge:
-    """Return the liquid bridge between a sphere and a plane.
+    """Compute the liquid bridge between a sphere and a plane.
 
     Parameters
     ----------
     radius : float
-        Of the sphere, m, above 0.
+        Radius of the sphere, m, above 0.
     surface_tension : float
-        N/m, above 0.
-    contact_angle : float
-        On the sphere, rad, from 0 to pi.
-    filling_angle : float, optional
-        Half angle, at the sphere's centre, of the wetted cap, rad, from 1e-4 to pi - 1e-3.
+        Surface tension of the liquid, N/m, above 0.
+    contact_angle : float or array
+        Contact angle on the sphere, rad, from 0 to pi.
+    filling_angle : float or array, optional
+        Angle at the sphere's centre between the axis and the contact line, rad, from 1e-4 to
+        pi - 1e-3.
     volume : float, optional
-        Of the liquid, m³, above 0. Exactly one of filling angle and volume is given. Where a
-        volume has two bridges the stable one is returned: that with the larger filling angle,
-        whose volume grows with it.
-    separation : float
-        Least distance between sphere and plane, m, from 0.
+        Volume of the liquid, m³, above 0. Exactly one of filling angle and volume is required.
+        Where two bridges have this volume, the stable one is returned: it has the larger filling
+        angle, and its volume grows with the filling angle.
+    separation : float or array
+        Shortest distance between sphere and plane, m, from 0.
     method : {'circle', 'young_laplace'}
-        With a circular arc for a meridian (the toroidal approximation), whose pressure and force
-        are those of its narrowest section, or exact. The circle is 1 % off in the median, above
-        10 % where a bridge is wide, flat or near rupture. It takes arrays for angles and
-        separation, with a filling angle; all else is for scalars.
+        ``circle`` takes a circular arc as meridian (toroidal approximation), with the pressure and
+        force of its narrowest section. Its median error is 1 %, but above 10 % where a bridge is
+        wide, flat or close to rupture. ``young_laplace`` is exact. Arrays of angles and
+        separations are allowed only for ``circle`` with a filling angle.
     gravity : float
-        m/s², from 0, towards the plane. Above 0 for ``young_laplace`` alone.
+        Gravity towards the plane, m/s², from 0. Above 0 only with ``young_laplace``.
     density : float
-        Of the liquid, kg/m³, above 0.
-    plane_angle : float, optional
-        Contact angle on the plane, rad, from 0 to pi; by default that on the sphere.
+        Density of the liquid, kg/m³, above 0.
+    plane_angle : float or array, optional
+        Contact angle on the plane, rad, from 0 to pi; by default equal to ``contact_angle``.
 
     Raises
     ------
     NoBridge
-        When no bridge has this filling angle, or this volume: too little liquid for the
-        separation, or so much that it drowns the sphere.
+        When no bridge has this filling angle or volume: the liquid is too little for the
+        separation, covers the sphere, or is too heavy.
     InvalidInput
-        For values that are not finite or not in range, or an unknown method.
+        When a value is not finite or out of range, the method is unknown, shapes do not broadcast,
+        both or none of filling angle and volume are given, gravity is above 0 with ``circle``, or
+        a bridge with gravity is too wide, or its neck too narrow, to be resolved.
 
     Examples
     --------
@@ -133,12 +144,15 @@ def bridge(
     weight = number('density', density, 'kg/m³', above=True) * number('gravity', gravity, 'm/s²')
     choice('method', method, ('young_laplace', 'circle'))
     if (filling_angle is None) == (volume is None):
-        raise InvalidInput('exactly one of filling_angle and volume is needed')
+        raise InvalidInput(
+            'exactly one of filling_angle and volume is needed, but'
+            f' {"none" if volume is None else "both"} is given'
+        )
     if plane_angle is None:
         plane_angle = contact_angle
     if method == 'circle' and weight > 0.0:
         raise InvalidInput(
-            f"gravity = {gravity:g} m/s² is not allowed with method 'circle', which has none: "
+            f"gravity = {gravity:g} m/s² is not allowed with method 'circle', which ignores it: "
             "method='young_laplace' is needed"
         )
 
@@ -159,6 +173,11 @@ def bridge(
         found = _circle(theta, plane, gap, beta, share)
     else:
         found = _young_laplace(theta, plane, gap, beta, share, weight * size**2 / tension)
+    return _in_si(found, size, tension)
+
+
+def _in_si(found: Bridge, size: float, tension: float) -> Bridge:
+    """Convert a bridge from units of sphere radius and surface tension to SI units."""
     units = {
         'force': tension * size,
         'pressure': tension / size,
@@ -182,11 +201,11 @@ def bridge(
 def _circle(
     theta: Array, plane: Array, gap: Array, beta: Array | None, volume: float | None
 ) -> Bridge:
-    """Return the toroidal bridge in units of sphere radius and surface tension."""
+    """Compute the toroidal bridge in units of sphere radius and surface tension."""
     if volume is not None:
-        turns = _fillings(400)
-        turns = np.sort(np.append(turns, _least_arc(theta, plane, gap, turns)))
-        curve = _arc(theta, plane, gap, turns).volume
+        fillings = _fillings(400)
+        fillings = np.sort(np.append(fillings, _least_arc(theta, plane, gap, fillings)))
+        curve = _arc(theta, plane, gap, fillings).volume
         cells, least, most = _growing(curve, volume)
         k = next((k for k in cells[::2] if curve[k] <= volume <= curve[k + 1]), None)
         if k is None:
@@ -194,27 +213,34 @@ def _circle(
         from scipy.optimize import brentq
 
         beta = brentq(
-            lambda angle: _arc(theta, plane, gap, angle).volume - volume, turns[k], turns[k + 1]
+            lambda angle: _arc(theta, plane, gap, angle).volume - volume,
+            fillings[k],
+            fillings[k + 1],
         )
     try:
         found = _arc(theta, plane, gap, beta)
     except ValueError as error:
-        raise InvalidInput('angles and separation do not broadcast') from error
+        raise InvalidInput(
+            'contact_angle, plane_angle, separation and filling_angle of shapes'
+            f' {np.shape(theta)}, {np.shape(plane)}, {np.shape(gap)} and'
+            f' {np.asarray(beta).shape} do not broadcast'
+        ) from error
     if np.ndim(found.force) == 0 and not math.isfinite(found.force):
         raise NoBridge(
-            f'no circle joins the plane to the sphere at filling_angle = {beta:g} rad with a neck'
-            ' of positive radius'
+            f"no bridge of method 'circle' has filling_angle = {beta:g} rad at separation ="
+            f' {gap:g} radii and contact angles {theta:g} (sphere) and {plane:g} rad (plane): its'
+            ' arc would not rise, would have no neck, or would run through the sphere'
         )
     return found
 
 
-def _least_arc(theta: Array, plane: Array, gap: Array, turns: Array) -> float:
-    """Return the least filling angle whose arc has a neck: there bridges of a circle end."""
-    there = np.isfinite(_arc(theta, plane, gap, turns).neck_radius)
+def _least_arc(theta: Array, plane: Array, gap: Array, fillings: Array) -> float:
+    """Return the smallest filling angle with a neck; circular bridges do not exist below it."""
+    there = np.isfinite(_arc(theta, plane, gap, fillings).neck_radius)
     lost = np.flatnonzero(~there[:-1] & there[1:])
     if not lost.size:
-        return float(turns[0])
-    low, high = turns[lost[-1]], turns[lost[-1] + 1]
+        return float(fillings[0])
+    low, high = fillings[lost[-1]], fillings[lost[-1] + 1]
     for _ in range(50):
         middle = 0.5 * (low + high)
         reached = math.isfinite(_arc(theta, plane, gap, middle).neck_radius)
@@ -223,10 +249,10 @@ def _least_arc(theta: Array, plane: Array, gap: Array, turns: Array) -> float:
 
 
 def _arc(theta: Array, plane: Array, gap: Array, beta: Floats) -> Bridge:
-    """Return the circular arc at a filling angle; NaN where there is none.
+    """Compute the bridge of a circular arc at a filling angle; NaN where there is none.
 
-    Everything is written in the arc's length and turning, which stay finite where the arc is
-    flat (plane angle, contact angle and filling angle together pi).
+    The formulas use the length and the turning angle of the arc, which stay finite where the arc
+    is straight (plane angle + contact angle + filling angle = pi).
     """
     start, end = math.pi - plane, beta + theta
     turn = end - start
@@ -235,11 +261,11 @@ def _arc(theta: Array, plane: Array, gap: Array, beta: Floats) -> Bridge:
     length = height / np.where(rise > 0.0, rise, np.nan)
 
     def reach(share: Floats) -> Floats:
-        """Radius at a share of the arc, from the plane."""
+        """Return the radius at a share of the arc, counted from the plane."""
         rest = 0.5 * (1.0 - share) * turn
         return edge - length * (1.0 - share) * np.cos(end - rest) * np.sinc(rest / math.pi)
 
-    # Narrowest is an end, or where the arc stands upright.
+    # The narrowest section is at an end, or where the arc is vertical.
     with np.errstate(divide='ignore', invalid='ignore'):
         upright = np.nan_to_num((0.5 * math.pi - start) / turn)
     places = np.stack(np.broadcast_arrays(0.0, 1.0, np.clip(upright, 0.0, 1.0) + 0.0 * length))
@@ -252,7 +278,7 @@ def _arc(theta: Array, plane: Array, gap: Array, beta: Floats) -> Bridge:
     at = np.expand_dims(nodes, tuple(range(1, 1 + np.ndim(neck))))
     under = np.tensordot(weights, reach(at) ** 2 * np.sin(start + at * turn), axes=1)
     volume = math.pi * length * under - _cap(beta)
-    neck = np.where(volume > 0.0, neck, np.nan)  # else the arc runs through the sphere
+    neck = np.where(volume > 0.0, neck, np.nan)  # volume <= 0: the arc runs through the sphere
     good = 0.0 * neck
     return Bridge(
         force=math.pi * neck * (sine - neck * bend),
@@ -279,11 +305,11 @@ class _Shape(NamedTuple):
     height: Array  # NaN where there is no meridian
     volume: Array  # with the sphere's cap
     neck: Array
-    radius: Array  # at the nodes of the quadrature, from the narrower end, along the last axis
-    rise: Array  # rate of the height there, per unit of the quadrature's variable
+    radius: Array  # at the quadrature nodes (last axis), counted from the narrower end
+    rise: Array  # derivative of the height over the quadrature variable, at these nodes
 
 
-# Places along a family, see _shapes.
+# Grid of ``place``, and the value of q over sinh(place); see _floor_and_curvature.
 _PLACES = np.linspace(-46.0, 105.0, 303)
 _FINEST = 1e-12
 
@@ -296,7 +322,7 @@ def _young_laplace(
     volume: float | None,
     bond: float,
 ) -> Bridge:
-    """Return the exact bridge in units of sphere radius and surface tension."""
+    """Compute the exact bridge in units of sphere radius and surface tension."""
     if bond > 0.0:
         return _heavy(_Case(theta, plane, beta, volume, gap, bond))
     beta, place = _found_place(theta, plane, gap, beta, volume)
@@ -323,7 +349,7 @@ def _young_laplace(
 def _found_place(
     theta: float, plane: float, gap: float, beta: float | None, volume: float | None
 ) -> tuple[float, float]:
-    """Return filling angle and place, along its family, of a bridge without gravity."""
+    """Return filling angle and place (parameter of its family) of a bridge without gravity."""
     if beta is not None:
         return beta, _place_of_filling(theta, plane, gap, beta)
     assert volume is not None
@@ -333,61 +359,27 @@ def _found_place(
 def _inclinations(theta: float, plane: float, beta: Floats) -> tuple[Floats, Floats]:
     """Return the inclinations of the meridian at the plane and on the sphere."""
     start, end = math.pi - plane, beta + theta
-    # The cylinder is the one shape whose length its ends do not tell: take a cone beside it.
+    # Cylinders of all lengths have the same end inclinations: use an almost cylindrical cone.
     cylinder = np.maximum(abs(np.cos(start)), abs(np.cos(end))) < 1e-7
     upright = 0.5 * math.pi + 1e-7
     return np.where(cylinder, upright, start), np.where(cylinder, upright, end)
 
 
-@np.errstate(divide='ignore', invalid='ignore')  # necks and floors of 0, which are no bridges
+@np.errstate(divide='ignore', invalid='ignore')  # radii of 0 belong to no bridge
 def _shapes(place: Floats, start: Floats, end: Floats, order: int) -> _Shape:
-    """Return meridians of the family with these end inclinations.
+    """Compute the meridians of the family with these end inclinations.
 
-    With x = floor radius - 1 and y = H (1 + x/2) - sin start the first integral at both ends
-    reads ``x y = sin start - sin end``. The branch of this hyperbola that begins with the short
-    circular arc (place -> -inf, where H -> ±inf and x -> 0) is followed by ``q = |x| - |y|``,
-    which passes round its corner smoothly even where the right side is 0. The height grows from 0
-    along it until the neck is too thin.
+    Returns arrays that broadcast over the input; ``place`` is the parameter of the family.
     """
-    spread = 2.0 * np.cos(0.5 * (start + end)) * np.sin(0.5 * (start - end))
-    q = _FINEST * np.sinh(place)
-    large = np.maximum(0.5 * (abs(q) + np.sqrt(q * q + 4.0 * abs(spread))), 1e-300)
-    small = abs(spread) / large
-    bend = np.where(end > start, 1.0, -1.0)
-    side = np.where(spread != 0.0, bend * np.sign(spread), np.where(np.cos(start) < 0, 1.0, -1.0))
-    x = side * np.where(q > 0.0, large, small)
-    y = bend * np.where(q > 0.0, small, large)
-
-    floor = 1.0 + x
-    sine = np.sin(math.pi - start)  # 0 for complete wetting
-    h = 2.0 * (sine + y) / (1.0 + floor)
-    h = np.where(h == 0.0, 1e-300, h)
-    # Angle of the rotation about i/H from the plane to the sphere, between the spokes H ζ - i.
-    # Written in x and the turning, it is 0 where both are, however the sines are rounded.
-    below, above = h * floor * sine - 1.0, h * np.sin(end) - 1.0
-    half = 0.5 * (end - start)
-    turning = h * floor * np.cos(half) - np.sin(0.5 * (start + end))
-    cross = 2.0 * np.sin(half) * turning - x * np.cos(start)
-    tau = np.arctan2(h * cross, h * h * floor * np.cos(start) * np.cos(end) + below * above)
-    tau = np.where(tau * h < 0.0, tau + 2.0 * math.pi * np.sign(h), tau)
+    floor, h, tau = _floor_and_curvature(place, start, end)
     length = tau / h
-    integral = floor * (sine - 0.5 * h * floor)
-
-    # Distance, along the arc from its narrower end, of the narrowest place of the whole curve:
-    # there the spoke H ζ - i points down.
+    integral = floor * (np.sin(math.pi - start) - 0.5 * h * floor)
     outward = floor > 1.0
     radius, slope = np.where(outward, 1.0, floor), np.where(outward, end, start)
-    spoke = np.arctan2(h * radius * np.cos(slope), np.where(outward, -above, -below))
-    waist_at = np.where(outward, spoke, -spoke) / h
-    period = 2.0 * math.pi / abs(h)
-    other = waist_at - np.copysign(period, waist_at)
-    closer = _outside(other, length) < _outside(waist_at, length)
-    waist_at = np.where(closer, other, waist_at)
-    swing = np.sqrt(np.maximum(1.0 - 2.0 * h * integral, 0.0))
-    waist = 2.0 * abs(integral) / (1.0 + swing)
+    waist_at, waist, swing = _waist(floor, h, length, integral, start, end)
     neck = np.where(_outside(waist_at, length) > 0.0, radius, waist)
 
-    # The integrands have poles beside the narrowest place, so the nodes are close there.
+    # The integrands have poles next to the narrowest place, so the nodes are dense there.
     centre = np.clip(waist_at, 0.0, length)
     width = np.hypot(waist / np.sqrt(np.maximum(swing, 1e-6)), waist_at - centre)
     width = np.clip(width, 1e-100, 10.0 * length + 1e-100)
@@ -404,7 +396,7 @@ def _shapes(place: Floats, start: Floats, end: Floats, order: int) -> _Shape:
     rise = zeta.imag / r * per_node
     height = rise @ weights
     turn = 0.5 * tau - integral * ((per_node / r**2) @ weights)
-    # Past the sphere, where the neck has closed, the arc winds the other way.
+    # Past the shape whose neck has closed (a sphere) the arc turns the other way: no bridge.
     good = (floor > 0.0) & (abs(turn - (end - start)) < 1e-3)
     return _Shape(
         floor,
@@ -419,13 +411,68 @@ def _shapes(place: Floats, start: Floats, end: Floats, order: int) -> _Shape:
     )
 
 
+def _floor_and_curvature(place: Floats, start: Floats, end: Floats) -> tuple[Array, Array, Array]:
+    """Return floor radius, curvature H and rotation angle about i/H of meridians.
+
+    With x = floor radius - 1 and y = H (1 + x/2) - sin start, the first integral at both ends
+    gives the hyperbola ``x y = sin start - sin end``. The branch used begins with the short
+    circular arc (place -> -inf: H -> ±inf, x -> 0). Its parameter is ``q = |x| - |y|``, which is
+    smooth at the corner of the branch even where the right side is 0. Along the branch the height
+    grows from 0 until the neck is too thin.
+    """
+    spread = 2.0 * np.cos(0.5 * (start + end)) * np.sin(0.5 * (start - end))
+    q = _FINEST * np.sinh(place)
+    large = np.maximum(0.5 * (abs(q) + np.sqrt(q * q + 4.0 * abs(spread))), 1e-300)
+    small = abs(spread) / large
+    bend = np.where(end > start, 1.0, -1.0)
+    side = np.where(spread != 0.0, bend * np.sign(spread), np.where(np.cos(start) < 0, 1.0, -1.0))
+    x = side * np.where(q > 0.0, large, small)
+    y = bend * np.where(q > 0.0, small, large)
+
+    floor = 1.0 + x
+    sine = np.sin(math.pi - start)  # 0 for complete wetting
+    h = 2.0 * (sine + y) / (1.0 + floor)
+    h = np.where(h == 0.0, 1e-300, h)
+    # Rotation about i/H from the plane to the sphere: the angle between the two vectors H ζ - i.
+    # This form is exactly 0 where x and the turning angle are 0.
+    below, above = h * floor * sine - 1.0, h * np.sin(end) - 1.0
+    half = 0.5 * (end - start)
+    turning = h * floor * np.cos(half) - np.sin(0.5 * (start + end))
+    cross = 2.0 * np.sin(half) * turning - x * np.cos(start)
+    tau = np.arctan2(h * cross, h * h * floor * np.cos(start) * np.cos(end) + below * above)
+    tau = np.where(tau * h < 0.0, tau + 2.0 * math.pi * np.sign(h), tau)
+    return floor, h, tau
+
+
+def _waist(
+    floor: Array, h: Array, length: Array, integral: Array, start: Floats, end: Floats
+) -> tuple[Array, Array, Array]:
+    """Return place, radius and swing of the narrowest place of the whole periodic curve.
+
+    The place is the distance along the arc from its narrower end; at this place the vector
+    H ζ - i points down. Swing is the radius of the rotation about i/H, times H.
+    """
+    outward = floor > 1.0
+    radius, slope = np.where(outward, 1.0, floor), np.where(outward, end, start)
+    below = h * floor * np.sin(math.pi - start) - 1.0
+    above = h * np.sin(end) - 1.0
+    spoke = np.arctan2(h * radius * np.cos(slope), np.where(outward, -above, -below))
+    waist_at = np.where(outward, spoke, -spoke) / h
+    period = 2.0 * math.pi / abs(h)
+    other = waist_at - np.copysign(period, waist_at)
+    closer = _outside(other, length) < _outside(waist_at, length)
+    waist_at = np.where(closer, other, waist_at)
+    swing = np.sqrt(np.maximum(1.0 - 2.0 * h * integral, 0.0))
+    return waist_at, 2.0 * abs(integral) / (1.0 + swing), swing
+
+
 def _outside(place: Floats, length: Floats) -> Floats:
-    """Return how far a place is from the stretch from 0 to a length."""
+    """Return the distance of a place from the interval from 0 to a length."""
     return np.maximum(np.maximum(-place, place - length), 0.0)
 
 
 def _spokes(radius: Floats, slope: Floats, curvature: Floats, s: Floats) -> Floats:
-    """Return ``ζ = r exp(iφ)`` an arc length s on: the solution of ``dζ/ds = 1 + i H ζ``."""
+    """Return ``ζ = r exp(iφ)`` after an arc length s: the solution of ``dζ/ds = 1 + i H ζ``."""
     a = curvature * s
     turned = radius * np.exp(1j * (slope + a))
     return turned + s * np.exp(0.5j * a) * np.sinc(a / (2.0 * math.pi))
@@ -437,7 +484,7 @@ def _heights(place: Floats, theta: float, plane: float, beta: Floats, order: int
 
 
 def _place_of_filling(theta: float, plane: float, gap: float, beta: float) -> float:
-    """Return the place of the first meridian, of growing height, that spans the gap."""
+    """Return the smallest place at which the meridian is high enough to reach the sphere."""
     from scipy.optimize import brentq
     from scipy.optimize import minimize_scalar
 
@@ -451,7 +498,7 @@ def _place_of_filling(theta: float, plane: float, gap: float, beta: float) -> fl
     low = high = None
     inner = heights[1:-1]
     peaks = 1 + np.flatnonzero((inner > heights[:-2]) & (inner >= heights[2:]))
-    for peak in peaks[heights[peaks] > 0.7 * aim]:  # the grid may just miss the top of a hump
+    for peak in peaks[heights[peaks] > 0.7 * aim]:  # the grid may miss the top of a peak
         window = _PLACES[peak - 1], _PLACES[peak + 1]
         top = minimize_scalar(lack, bounds=window, method='bounded', options={'xatol': 1e-9})
         if top.fun <= 0.0:
@@ -463,16 +510,16 @@ def _place_of_filling(theta: float, plane: float, gap: float, beta: float) -> fl
     if low is None or high is None:
         raise NoBridge(
             f'no bridge has filling_angle = {beta:g} rad at separation = {gap:g} radii and contact'
-            f' angles {theta:g} and {plane:g} rad: it has ruptured'
+            f' angles {theta:g} (sphere) and {plane:g} rad (plane): the bridge would rupture'
         )
     return float(brentq(lack, low, high, xtol=1e-14, rtol=1e-15))
 
 
 def _stable_place(theta: float, plane: float, beta: float, place: float) -> bool:
-    """Return whether more volume makes a larger separation possible, near a bridge.
+    """Return whether a bridge is stable: whether more volume allows a larger separation.
 
-    That is the sign of the determinant of separation and volume over filling angle and place. It
-    changes where, with the volume fixed, the separation is largest: there the bridge snaps.
+    This is the sign of the determinant of (separation, volume) over (filling angle, place). It
+    changes at the largest separation for a fixed volume: there the bridge breaks.
     """
     step = 1e-5
     changes = np.array([-step, step])
@@ -484,7 +531,7 @@ def _stable_place(theta: float, plane: float, beta: float, place: float) -> bool
 
 
 def _stable_filling(theta: float, plane: float, gap: float, beta: float) -> bool:
-    """Return whether the volume grows with the filling angle, at this separation."""
+    """Return whether the volume grows with the filling angle at this separation (stable)."""
     step = 1e-4 * min(beta, math.pi - beta)
 
     def volume(angle: float) -> float:
@@ -512,33 +559,12 @@ def _gap_and_volume(theta: float, plane: float, beta: Floats, place: Floats) -> 
 def _place_of_volume(theta: float, plane: float, gap: float, volume: float) -> tuple[float, float]:
     """Return filling angle and place of the stable bridge of a volume.
 
-    At a fixed separation the bridges are a curve: from large volumes down to the least one,
-    where it snaps, and on to thinner necks. Filling angles are scanned for it, the crossing is
-    polished on both unknowns, because the curve may turn back in the filling angle.
+    Candidates come from the curve of all bridges at this separation. Each is refined in both
+    unknowns at once, because the curve may turn back in the filling angle.
     """
-    from scipy.optimize import brentq
     from scipy.optimize import root
 
-    turns = _fillings(96)
-    first, second = _scan(theta, plane, gap, turns)
-    first, second = (np.vstack([found, turns]) for found in (first, second))
-    # Between two rows the first bridges may end, the curve turning back into the second ones, or
-    # their place may leap, perhaps past the least volume.
-    before, after = first[0, :-1], first[0, 1:]
-    pieces, end = [], turns.size
-    for k in np.flatnonzero(np.isfinite(after) & ~(before - after < 3.0))[::-1]:
-        stop = np.nan_to_num(np.fmin(second[0, k + 1], before[k]), nan=60.0)
-        between = np.linspace(after[k], stop, 81)[1:]
-        turn = _turn(theta, plane, gap, turns[k : k + 2], between)
-        pieces += [first[:, k + 1 : end], turn[:, ::-1]]
-        end = k + 1
-        if np.isfinite(second[0, k + 1]) or np.isnan(before[k]):
-            pieces.append(second[:, k + 1 :][:, ::-1])
-            break
-    else:
-        pieces.append(first[:, :end])
-    curve = np.concatenate(pieces[::-1], axis=1)
-    places, volumes, angles = curve[:, np.isfinite(curve[0])]
+    places, volumes, angles = _curve(theta, plane, gap)
     guesses, least, most = _growing(volumes, volume)
 
     def misfit(unknown: Array) -> list[float]:
@@ -558,30 +584,70 @@ def _place_of_volume(theta: float, plane: float, gap: float, volume: float) -> t
         beta = math.pi / (1.0 + math.exp(-found.x[0]))
         if _stable_place(theta, plane, beta, found.x[1]):
             return beta, float(found.x[1])
+    # Near a cylinder the place changes too fast for this search: solve for the place separately.
+    for k in guesses[::2]:
+        with contextlib.suppress(NoBridge):
+            found_beta = _filling_of_volume(theta, plane, gap, volume, angles[k], angles[k + 1])
+            if found_beta is not None:
+                return found_beta, _place_of_filling(theta, plane, gap, found_beta)
+    raise NoBridge(_no_volume(volume, least, most))
 
-    # Next to a cylinder places change too fast for that: solve for them, filling angles apart.
+
+def _filling_of_volume(
+    theta: float, plane: float, gap: float, volume: float, low: float, high: float
+) -> float | None:
+    """Return the filling angle from ``low`` to ``high`` at which the bridge has this volume.
+
+    None if the volume does not grow past this value between the two angles.
+    """
+    from scipy.optimize import brentq
+
     def excess(beta: float) -> float:
         place = _place_of_filling(theta, plane, gap, beta)
         return float(_gap_and_volume(theta, plane, beta, place)[1]) - volume
 
-    for k in guesses[::2]:
-        low, high = angles[k], angles[k + 1]
-        with contextlib.suppress(NoBridge):
-            if low < high and excess(low) <= 0.0 <= excess(high):
-                beta = float(brentq(excess, low, high, rtol=1e-14))
-                return beta, _place_of_filling(theta, plane, gap, beta)
-    raise NoBridge(_no_volume(volume, least, most))
+    if low < high and excess(low) <= 0.0 <= excess(high):
+        return float(brentq(excess, low, high, rtol=1e-14))
+    return None
 
 
-def _scan(theta: float, plane: float, gap: float, turns: Array) -> Array:
+def _curve(theta: float, plane: float, gap: float) -> Array:
+    """Return place, volume and filling angle (rows) along all bridges of one separation.
+
+    The curve runs from thin necks through the smallest volume, where a bridge breaks, to large
+    volumes.
+    """
+    fillings = _fillings(96)
+    first, second = _scan(theta, plane, gap, fillings)
+    first, second = (np.vstack([found, fillings]) for found in (first, second))
+    # Between two filling angles the first bridges may end (the curve turns back into the second
+    # ones), or their place may jump, perhaps over the smallest volume.
+    before, after = first[0, :-1], first[0, 1:]
+    pieces, end = [], fillings.size
+    for k in np.flatnonzero(np.isfinite(after) & ~(before - after < 3.0))[::-1]:
+        stop = np.nan_to_num(np.fmin(second[0, k + 1], before[k]), nan=60.0)
+        between = np.linspace(after[k], stop, 81)[1:]
+        back = _turning_back(theta, plane, gap, fillings[k : k + 2], between)
+        pieces += [first[:, k + 1 : end], back[:, ::-1]]
+        end = k + 1
+        if np.isfinite(second[0, k + 1]) or np.isnan(before[k]):
+            pieces.append(second[:, k + 1 :][:, ::-1])
+            break
+    else:
+        pieces.append(first[:, :end])
+    curve: Array = np.concatenate(pieces[::-1], axis=1)
+    return curve[:, np.isfinite(curve[0])]
+
+
+def _scan(theta: float, plane: float, gap: float, fillings: Array) -> Array:
     """Return place and volume of the first and the second bridge of each filling angle.
 
-    Shape: which bridge, which of the two, filling angle. NaN where there is none.
+    Shape (2 bridges, 2 quantities, filling angles); NaN where there is no bridge.
     """
-    aims = (gap + 2.0 * np.sin(0.5 * turns) ** 2) / np.sin(turns)
-    coarse = _PLACES[_PLACES < 60.0]  # beyond, plane discs of 1e13 radii
-    ends = np.full((2, 2, turns.size), np.nan)  # of the cell in which the aim is crossed
-    for row, beta in enumerate(turns):
+    aims = (gap + 2.0 * np.sin(0.5 * fillings) ** 2) / np.sin(fillings)
+    coarse = _PLACES[_PLACES < 60.0]  # at larger places the wetted disc is 1e13 times wider
+    ends = np.full((2, 2, fillings.size), np.nan)  # places between which the height is reached
+    for row, beta in enumerate(fillings):
         heights = _heights(coarse, theta, plane, beta, 48)
         heights = heights[: int(np.argmin(np.append(np.isfinite(heights), False)))]
         reached = heights >= aims[row]
@@ -590,19 +656,19 @@ def _scan(theta: float, plane: float, gap: float, turns: Array) -> Array:
     low, high = np.nan_to_num(ends[:, 0]), np.nan_to_num(ends[:, 1])
     for _ in range(12):
         middle = 0.5 * (low + high)
-        reached = _heights(middle, theta, plane, turns, 48) >= aims
+        reached = _heights(middle, theta, plane, fillings, 48) >= aims
         reached[1] = ~reached[1]
         low, high = np.where(reached, low, middle), np.where(reached, middle, high)
     places = 0.5 * (low + high)
-    found = np.stack([places, _gap_and_volume(theta, plane, turns, places)[1]], axis=1)
+    found = np.stack([places, _gap_and_volume(theta, plane, fillings, places)[1]], axis=1)
     return np.where(np.isfinite(ends), found, np.nan)
 
 
-def _turn(theta: float, plane: float, gap: float, ends: Array, places: Array) -> Array:
-    """Return place, volume and filling angle of bridges between two filling angles.
+def _turning_back(theta: float, plane: float, gap: float, ends: Array, places: Array) -> Array:
+    """Return place, volume and filling angle of bridges where the curve turns back.
 
-    At the first of them there is no bridge, at the second the places begin past one; returned are
-    the places up to where the next is.
+    ``places`` begin after the first bridge of the second filling angle in ``ends``; the result
+    stops before the second bridge of this angle. The first angle has no bridge at these places.
     """
     low, high = (end + 0.0 * places for end in ends)
     within = _gap_and_volume(theta, plane, high, places)[0] >= gap
@@ -615,21 +681,29 @@ def _turn(theta: float, plane: float, gap: float, ends: Array, places: Array) ->
 
 
 def _fillings(count: int) -> Array:
-    """Return filling angles, dense in proportion at both ends."""
+    """Return filling angles, dense near both ends of the allowed range."""
     low, high = (math.log(b / (math.pi - b)) for b in (SMALLEST_FILLING, LARGEST_FILLING))
     return math.pi / (1.0 + np.exp(-np.linspace(low, high, count)))
 
 
 def _growing(volumes: Array, volume: float) -> tuple[list[int], float, float]:
-    """Return where, along bridges of one separation, a volume is reached while it grows.
+    """Find the cells in which growing volumes of bridges of one separation reach a volume.
 
-    The places, best first, include ends of growth that just miss the volume; with them come the
-    least and the largest volume reached.
+    A cell is the interval between two neighbours in ``volumes``.
+
+    Returns
+    -------
+    tuple
+        Indices of both ends of these cells, best first (including cells that miss the volume by
+        up to 2 %), and the smallest and the largest volume of all growing cells.
     """
     lower, upper = volumes[:-1], volumes[1:]
     grows = upper > lower
     if not grows.any():
-        raise NoBridge('no stable bridge spans this separation, whatever its volume')
+        raise NoBridge(
+            'no stable bridge of any volume spans this separation: a smaller separation or smaller'
+            ' contact angles are needed'
+        )
     cells = np.flatnonzero(grows & (0.98 * lower <= volume) & (volume <= 1.02 * upper))
     exact = (lower[cells] <= volume) & (volume <= upper[cells])
     cells = cells[np.lexsort((-cells, ~exact))][:6]
@@ -639,12 +713,12 @@ def _growing(volumes: Array, volume: float) -> tuple[list[int], float, float]:
 
 def _no_volume(volume: float, least: float, most: float) -> str:
     if volume > most:
-        why = f'at most {most:.6g}: more drowns the sphere'
+        why = f'at most {most:.6g} radius³ is allowed, because more liquid covers the sphere'
     elif volume < least:
-        why = f'at least {least:.6g}: with less the bridge has ruptured'
+        why = f'at least {least:.6g} radius³ is needed, because a bridge with less liquid ruptures'
     else:
-        why = 'more: with this the bridge has ruptured'
-    return f'no stable bridge has the volume {volume:.6g} cubed radii: it takes {why}'
+        why = 'a larger volume is needed, because a bridge of this volume ruptures'
+    return f'no stable bridge has volume = {volume:.6g} radius³: {why}'
 
 
 def _cap(beta: Floats) -> Floats:
@@ -653,10 +727,13 @@ def _cap(beta: Floats) -> Floats:
 
 
 def _clear_of_solids(radii: Array, heights: Array, gap: float, volume: float) -> None:
-    """Refuse a meridian that runs through the plane or the sphere."""
+    """Raise `NoBridge` where a meridian runs through the plane or the sphere."""
     inside = np.hypot(radii, heights - gap - 1.0) < 1.0 - 1e-7
     if inside.any() or np.min(heights) < -1e-7 or volume <= 0.0:
-        raise NoBridge('no bridge is free there: its surface would run through sphere or plane')
+        raise NoBridge(
+            f'no bridge exists at separation = {gap:g} radii: its surface would run through the'
+            ' sphere or the plane'
+        )
 
 
 # --- Gravity --------------------------------------------------------------------------------
@@ -664,73 +741,91 @@ def _clear_of_solids(radii: Array, heights: Array, gap: float, volume: float) ->
 
 @dataclass(frozen=True)
 class _Case:
-    """What is asked of a heavy bridge, in units of sphere radius and surface tension."""
+    """Input of a bridge with gravity, in units of sphere radius and surface tension."""
 
     theta: float
     plane: float
     beta: float | None
     volume: float | None
     gap: float
-    bond: float  # density gravity radius² / tension: its weight
+    bond: float  # Bond number: density gravity radius² / tension
 
 
 def _heavy(case: _Case) -> Bridge:
-    """Return the bridge with gravity, followed from one without.
+    """Compute the bridge with gravity by continuation from a bridge without gravity.
 
-    Where this one is none without gravity, the way leads over the touching sphere, or over the
-    volume that a middling filling angle has.
+    Where this fails, the continuation starts from the sphere in contact with the plane, or from
+    the volume that a filling angle of 1 rad gives without gravity.
     """
-    ways = [[dataclasses.replace(case, bond=0.0), case]]
+    paths = [[dataclasses.replace(case, bond=0.0), case]]
     if case.gap > 0.0:
         touching = dataclasses.replace(case, gap=0.0)
-        ways.append([dataclasses.replace(touching, bond=0.0), touching, case])
+        paths.append([dataclasses.replace(touching, bond=0.0), touching, case])
     if case.volume is not None:
         with contextlib.suppress(NoBridge):
-            middling = _young_laplace(case.theta, case.plane, case.gap, 1.0, None, 0.0)
-            if middling.volume > 0.0:
-                other = dataclasses.replace(case, volume=middling.volume)
-                ways.append([dataclasses.replace(other, bond=0.0), other, case])
-    refusals = []
-    for way in ways:
+            medium = _young_laplace(case.theta, case.plane, case.gap, 1.0, None, 0.0)
+            if medium.volume > 0.0:
+                other = dataclasses.replace(case, volume=medium.volume)
+                paths.append([dataclasses.replace(other, bond=0.0), other, case])
+    errors = []
+    for path in paths:
         try:
-            return _followed(way)
-        except NoBridge as refusal:
-            refusals.append(refusal)
-    raise refusals[0]
+            return _continued(path)
+        except NoBridge as error:
+            errors.append(error)
+    raise errors[0]
 
 
-def _followed(way: list[_Case]) -> Bridge:
+def _continued(path: list[_Case]) -> Bridge:
+    """Compute the last bridge of a path of cases; increase the number of nodes if needed."""
     for order in (64, 192):
         with contextlib.suppress(_Coarse):
-            return _at_order(way, order)
+            return _at_order(path, order)
     raise InvalidInput(
-        'this bridge is not allowed: its surface is too wide, or its neck too narrow, for the'
-        ' nodes that there are'
+        f'a bridge with density gravity radius² / surface_tension = {path[-1].bond:.3g} and'
+        f' separation = {path[-1].gap:g} radii is not allowed: its surface is too wide, or its'
+        ' neck too narrow, to be resolved with 192 nodes'
     )
 
 
 class _Coarse(Exception):
-    """The nodes are too few for a surface."""
+    """The nodes are too few to resolve a surface."""
 
 
-def _at_order(way: list[_Case], order: int) -> Bridge:
-    first, case = way[0], way[-1]
+def _at_order(path: list[_Case], order: int) -> Bridge:
+    """Compute the last bridge of a path with this number of nodes."""
+    first, case = path[0], path[-1]
+    state, stable = _without_gravity(first, order)
+    sign = _orientation(first, state)
+    state = _along_path(path, state)
+    nodes = _gauss(order)[0]
+    series = np.polynomial.legendre.legfit(2.0 * nodes - 1.0, state[:order], order - 1)
+    if np.max(abs(series[-4:])) > 1e-8 * np.max(abs(series)):
+        raise _Coarse
+    return _bridge_of(case, state, stable == (sign == _orientation(case, state)))
+
+
+def _without_gravity(first: _Case, order: int) -> tuple[Array, bool]:
+    """Return the state of the first case of a path, and whether this bridge is stable."""
     try:
         beta, place = _found_place(first.theta, first.plane, first.gap, first.beta, first.volume)
-    except NoBridge as refusal:
-        raise NoBridge(f'{refusal} (without gravity; none was found with it, either)') from None
+    except NoBridge as error:
+        raise NoBridge(
+            f'{error} (without gravity; with gravity no bridge was found either)'
+        ) from None
     start, end = _inclinations(first.theta, first.plane, beta)
     shape = _shapes(place, start, end, 128)
-    nodes, weights = _gauss(order)
-    zeta = _spokes(1.0, end, shape.curvature, (nodes - 1.0) * shape.length)
+    zeta = _spokes(1.0, end, shape.curvature, (_gauss(order)[0] - 1.0) * shape.length)
     turning = shape.length * (0.5 * shape.curvature - shape.integral / abs(zeta) ** 2)
     edge = math.sin(beta)
     state = np.append(turning, [shape.curvature / edge, shape.length * edge, beta])
     stable = bool(first.volume) or _stable_filling(first.theta, first.plane, first.gap, beta)
+    return _settled(first, state), stable
 
-    state = _settled(first, state)
-    sign = _orientation(first, state)
-    for old, new in itertools.pairwise(way):
+
+def _along_path(path: list[_Case], state: Array) -> Array:
+    """Follow the equilibrium along a path of cases, halving steps where Newton's method fails."""
+    for old, new in itertools.pairwise(path):
         done, step = 0.0, 1.0
         while done < 1.0:
             ahead = min(1.0, done + step)
@@ -746,15 +841,19 @@ def _at_order(way: list[_Case], order: int) -> Bridge:
                 step *= 0.5
                 if step < 2e-3:
                     raise NoBridge(
-                        'no bridge of this size carries its weight: as density gravity radius² /'
-                        f' tension grows to {case.bond:.3g} it tears at {between.bond:.3g}'
+                        'no bridge of this size carries its weight: when gravity is raised from 0,'
+                        ' the bridge ruptures at density gravity radius² / surface_tension ='
+                        f' {between.bond:.3g}, before the given {path[-1].bond:.3g}'
                     ) from None
                 continue
             done, step = ahead, 2.0 * step
+    return state
 
-    series = np.polynomial.legendre.legfit(2.0 * nodes - 1.0, state[:order], order - 1)
-    if np.max(abs(series[-4:])) > 1e-8 * np.max(abs(series)):
-        raise _Coarse
+
+def _bridge_of(case: _Case, state: Array, stable: bool) -> Bridge:
+    """Return the bridge of a state in equilibrium."""
+    order = state.size - 3
+    nodes, weights = _gauss(order)
     _, radius, height, volume, _ = _surface(case, state)
     _clear_of_solids(radius, height, case.gap, float(volume))
     pressure, length, beta = state[-3:]
@@ -763,7 +862,7 @@ def _at_order(way: list[_Case], order: int) -> Bridge:
     series = np.polynomial.legendre.legfit(2.0 * nodes - 1.0, radius, order - 1)
     radii = np.polynomial.legendre.legval(np.linspace(-1.0, 1.0, 4001), series)
     k = int(np.clip(np.argmin(radii), 1, 3999))
-    # The lowest point of the parabola through three, or an end.
+    # The neck is at the minimum of the parabola through three points, or at an end.
     slope, bend = 0.5 * (radii[k + 1] - radii[k - 1]), radii[k + 1] - 2 * radii[k] + radii[k - 1]
     inner = radii[k] - 0.5 * slope**2 / bend if abs(slope) < bend else math.inf
     force = 2.0 * edge * math.sin(beta + case.theta) - edge**2 * (pressure - case.bond * top)
@@ -775,19 +874,19 @@ def _at_order(way: list[_Case], order: int) -> Bridge:
         filling_angle=float(beta),
         floor_radius=floor,
         height=top,
-        status='ok' if stable == (sign == _orientation(case, state)) else 'unstable',
+        status='ok' if stable else 'unstable',
     )
 
 
 class _Lost(Exception):
-    """Newton does not settle near where it started."""
+    """Newton's method does not converge near its start."""
 
 
 def _surface(case: _Case, state: Array) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return inclination, radius and height at the nodes, volume, and the equations' misfits.
+    """Return inclination, radius and height at the nodes, volume, and residuals of the equations.
 
-    A state is the turning rate at the nodes, per unit of relative arc length, then the pressure
-    at the plane, the arc's length and the filling angle; any leading axes are many states.
+    A state (last axis) is the derivative of the inclination over relative arc length at the nodes,
+    then the pressure at the plane, the arc length and the filling angle. Leading axes are allowed.
     """
     order = state.shape[-1] - 3
     turning, rest = state[..., :order], state[..., order:]
@@ -809,20 +908,20 @@ def _surface(case: _Case, state: Array) -> tuple[Floats, Floats, Floats, Floats,
 
 
 def _slopes(case: _Case, state: Array) -> Array:
-    """Return the derivatives of the misfits, a row for each number of the state."""
-    tiny = 1e-100j  # a complex step has no cancellation
+    """Return the derivatives of the residuals, one row for each number of the state."""
+    tiny = 1e-100j  # the complex step has no cancellation
     steps: Array = _surface(case, state + tiny * np.eye(state.size))[4].imag * 1e100
     return steps
 
 
 def _orientation(case: _Case, state: Array) -> float:
-    """Return the sign that changes where bridges of this volume cease."""
+    """Return a sign that changes where bridges of this volume stop being stable."""
     of_volume = dataclasses.replace(case, volume=0.0)
     return float(np.linalg.slogdet(_slopes(of_volume, state))[0])
 
 
 def _settled(case: _Case, state: Array) -> Array:
-    """Return the state in equilibrium near a given one, by Newton."""
+    """Return the state in equilibrium near a given one, by Newton's method."""
     begun = _surface(case, state)[0]
     for _ in range(7):
         misfit = _surface(case, state)[4]
@@ -843,14 +942,14 @@ def _settled(case: _Case, state: Array) -> Array:
 
 @functools.lru_cache(maxsize=8)
 def _gauss(order: int) -> tuple[Array, Array]:
-    """Return Gauss' nodes and weights on 0 to 1."""
+    """Return Gauss-Legendre nodes and weights on the interval from 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
 @functools.lru_cache(maxsize=8)
 def _cumulative(order: int) -> Array:
-    """Return the matrix that takes values at the nodes to integrals from 0 to the nodes."""
+    """Return the matrix that maps values at the nodes to integrals from 0 to each node."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     values = np.polynomial.legendre.legvander(nodes, order)
     # Integral of P_k from -1: (P_{k+1} - P_{k-1}) / (2k + 1).

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fitting a foot's constants to measurements: stiffness, force limit, friction, film.
+"""Fit the constants of a foot to measurements: stiffness, force limit, friction, film.
 
-Constants that are positive are fitted by their logarithm, to relative errors; intervals are those
-of Student's t at 95 %, from the curvature of the sum of squares at its least value.
+Stiffness and the constants of friction are fitted by their logarithms and minimise relative
+errors. The line of the force limit minimises absolute errors. Confidence intervals are those of
+Student's t at 95 %, from the curvature of the sum of squares at its minimum.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ros_pad.configuration import number
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.dome import largest_tension
@@ -32,31 +34,39 @@ from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import number
+from ros_pad.contact.resistance import FOOT_SETTINGS
+from ros_pad.contact.resistance import LIMIT_SETTINGS
+from ros_pad.contact.resistance import PAD_SETTINGS
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 
 CONFIDENCE = 0.95
-# A constant is told by the data if its interval ends within this factor, and if no change of the
-# constants by 1 % leaves the data alone to one part in 10^5.
+# A constant is identified if its interval is within this factor of its value, and if every change
+# of the constants by 1 % changes the modelled data by more than one part in 10^5.
 _WIDEST = 10.0
 _LEAST_EFFECT = 1e-3
 
-# Constants of friction in the order in which measurements tell them: unit, where a fit starts if
-# the foot has none, and the range in which a foot file may have it.
-_FRICTION = {
-    'friction': ('(coefficient)', 0.3, 0.01, 3.0),
-    'shear_strength': ('Pa', 3e3, 1.0, 1e6),
-    'conforming_pressure': ('Pa', 1e4, 1.0, 1e7),
-    'boundary_friction': ('(coefficient)', 0.1, 1e-4, 3.0),
-    'critical_film': ('m', 3e-7, 1e-9, 1e-3),
-    'film_exponent': ('(exponent)', 2.0, 0.1, 10.0),
+# Constants of friction in the order in which they are fitted: start value for a foot in which the
+# constant is 0, and lower bound where a foot file allows 0.
+_STARTS = {
+    'friction': (0.3, 0.0),
+    'shear_strength': (3e3, 1.0),
+    'conforming_pressure': (1e4, 0.0),
+    'boundary_friction': (0.1, 1e-4),
+    'critical_film': (3e-7, 0.0),
+    'film_exponent': (2.0, 0.0),
 }
-# The ranges in which it may have what is fitted without bounds.
+_SETTINGS = {each.name: each for each in FOOT_SETTINGS}
+# The same constants with unit, start value, and lower and upper bound.
+_FRICTION = {
+    name: (_SETTINGS[name].unit, start, max(low, _SETTINGS[name].low), _SETTINGS[name].high)
+    for name, (start, low) in _STARTS.items()
+}
+# Settings of a foot file for the constants that are checked only after the fit.
 _IN_FOOT = {
-    'stiffness': (1.0, 1e4),
-    'force_limit': (0.0, 1e3),
-    'force_limit_slope': (1e-9, 1.0),
+    'stiffness': PAD_SETTINGS[1],
+    'force_limit': LIMIT_SETTINGS[0],
+    'force_limit_slope': LIMIT_SETTINGS[2],
 }
 
 
@@ -67,15 +77,17 @@ class Constant:
     Attributes
     ----------
     name, unit : str
+        Name and unit of the constant.
     value : float
+        Value in this unit.
     low, high : float
         95 % interval; NaN where there are no more points than constants, or nothing was fitted.
     points : int
-        Measurements that it rests on.
+        Number of measurements used for the fit.
     fitted : bool
-        Fitted to them, or kept as it was.
+        True if fitted, False if kept from the start foot.
     note : str
-        What it is for, or why it was kept.
+        Purpose of the constant, or the reason why it was kept.
     """
 
     name: str
@@ -90,20 +102,21 @@ class Constant:
 
 @dataclass(frozen=True)
 class Residual:
-    """One measured number beside the calibrated model's.
+    """One measured number and the value of the calibrated model.
 
     Attributes
     ----------
     quantity : str
         ``height``, ``depth``, ``contact_radius``, ``gap``, ``force_limit``, ``tangential_force``.
     setting : str
-        At which pressure, force and so on, in words.
+        Pressure, force and so on of the measurement, in words.
     pressure : float
-        Pa gauge.
+        Gauge pressure, Pa.
     measured, modelled : float
-        SI units; the model's is NaN where it has no equilibrium, or knows no force limit.
+        Values in SI units; ``modelled`` is NaN where the model has no equilibrium or no force
+        limit.
     used : bool
-        In a fit; the others only show what the model makes of them.
+        Whether the measurement was used in a fit, and not only compared with the model.
     """
 
     quantity: str
@@ -115,22 +128,26 @@ class Residual:
 
     @property
     def error(self) -> float:
-        """Model over measurement, less one."""
+        """Relative error of the model: modelled / measured - 1."""
         return self.modelled / self.measured - 1.0 if self.measured else math.nan
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a calibration found.
+    """Result of a calibration.
 
     Attributes
     ----------
     measurements : Measurements
+        Input of the calibration.
     foot : Foot
-        The foot to start from, with the constants that were fitted.
+        The start foot with the fitted constants.
     constants : tuple of Constant
+        All constants, fitted or kept.
     residuals : tuple of Residual
+        All measurements against the calibrated model.
     warnings : tuple of str
+        Messages about results that the user should check.
     """
 
     measurements: Measurements
@@ -151,21 +168,27 @@ def calibrate(
     Parameters
     ----------
     measurements : Measurements
-        Of which kinds there are decides what is fitted: free domes give ``stiffness`` (pressed
-        ones where there are fewer than two free ones), force limits the line of the criterion
-        ``measured``, tangential forces the constants of friction and film.
+        Measured points. Free domes give ``stiffness`` (pressed domes, if there are no free ones),
+        force limits give the line of the criterion ``measured``, tangential forces give the
+        constants of friction and film.
     foot : Foot
-        Where the fit starts; it gives the radius of the pads, and whatever is not fitted.
+        Start of the fit. It gives the radius of the pads and every constant that is not fitted.
     film_thickness : float
-        Of the liquid on the wet floor before a foot stands in it, m, above 0.
+        Thickness of the film on the wet floor before the foot touches down, m, above 0.
     viscosity : float
-        Of that liquid, Pa s, above 0.
+        Viscosity of that liquid, Pa s, above 0.
+
+    Returns
+    -------
+    Calibration
+        The calibrated foot, its constants and residuals.
 
     Raises
     ------
     InvalidInput
-        When nothing can be fitted: the message says what each fit needs; or when a measurement
-        contradicts the model or the foot.
+        When nothing can be fitted (the message lists the data that each fit needs), when a
+        measurement contradicts the model or the foot, when a fitted constant is out of the range
+        of a foot file, or when film thickness or viscosity is not finite or not above 0.
     """
     number('film_thickness', film_thickness, 'm', above=True)
     number('viscosity', viscosity, 'Pa s', above=True)
@@ -178,8 +201,9 @@ def calibrate(
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     if not any(constant.fitted for constant in constants):
         raise InvalidInput(
-            f'{measurements.source}: nothing can be fitted: stiffness needs a free or a pressed '
-            'dome, the force limit two pressures, friction tangential forces'
+            f'{measurements.source}: nothing can be fitted: stiffness needs a free dome, or a'
+            ' pressed dome with height or gap; the line of the force limit needs force limits at'
+            ' two pressures; friction needs tangential forces'
         )
     for constant in constants:
         _fits_a_foot(measurements.source, constant)
@@ -193,7 +217,7 @@ def calibrate(
 
 
 def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
-    """Return the foot's ceiling, lowered in whole kPa to where the model of softer pads ends."""
+    """Return the foot's ceiling, Pa; lower it to whole kPa if the pad's model ends below."""
     end = largest_pressure(pad, foot.limit)
     if foot.ceiling <= end:
         return foot.ceiling
@@ -206,12 +230,11 @@ def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
 
 
 def _fits_a_foot(source: str, constant: Constant) -> None:
-    least, most = _IN_FOOT.get(constant.name, (-math.inf, math.inf))
-    if constant.fitted and not least <= constant.value <= most:
+    allowed = _IN_FOOT.get(constant.name)
+    if constant.fitted and allowed and not allowed.low <= constant.value <= allowed.high:
         raise InvalidInput(
-            f'{source}: {constant.name} comes out as {constant.value:.4g} {constant.unit}, which'
-            f' no foot may have: from {least:g} to {most:g} {constant.unit} is needed. Are the'
-            ' units right?'
+            f'{source}: the fit gives {constant.name} = {constant.value:.4g} {constant.unit}, but'
+            f' {allowed.allowed} is needed: check the units of the measurements'
         )
 
 
@@ -222,46 +245,47 @@ def _with(foot: Foot, **changes: float | Pad) -> Foot:
 def foot_file(calibration: Calibration) -> str:
     """Return the YAML text of the calibrated foot, for :meth:`Foot.load` and every command.
 
-    Comments say of each constant whether it was fitted, and how sure it is.
+    The comment behind each constant states whether it was fitted, with its 95 % interval.
     """
     foot, pad = calibration.foot, calibration.foot.pad
-    said = {constant.name: _comment(constant) for constant in calibration.constants}
+    comments = {constant.name: _comment(constant) for constant in calibration.constants}
 
     def entry(name: str, value: float, unit: str, indent: str = '') -> str:
-        # YAML takes 1e-05 for a text: a number needs its point.
+        # PyYAML reads 1e-05 as text: a number needs a decimal point.
         text = f'{value:.9g}'
         text = text if '.' in text else text.replace('e', '.0e') if 'e' in text else f'{text}.0'
         return f'{f"{indent}{name}: {text}":35} # {unit}'
 
     def known(name: str, unit: str) -> str:
-        comment = f'{unit}, {said[name]}' if name in said else f'{unit}, of the start foot'
+        comment = f'{unit}, {comments.get(name, "of the start foot")}'
         return entry(name, getattr(foot, name), comment)
 
     source = pathlib.PurePath(calibration.measurements.source).name
     lines = [
         f'# Calibrated by pad calibrate from {source}.',
-        '# What was fitted has its 95 % interval; the rest is that of the foot it started from.',
+        '# Fitted constants have a 95 % interval; all others are those of the start foot.',
         *(f'# {warning}' for warning in calibration.warnings),
-        # Between quotes, for a path may hold what YAML takes for a mark of its own.
+        # In quotes: a path may contain characters with a meaning in YAML.
         f'description: {json.dumps(foot.source + ", calibrated", ensure_ascii=False)}',
         '',
         'pad:',
         entry('radius', pad.radius, 'm', '  '),
-        entry('stiffness', pad.stiffness, f'N/m, {said["stiffness"]}', '  '),
+        entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
         entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
     ]
-    if pad.measured_limit is not None:
+    limit = pad.measured_limit
+    if limit is not None:
         lines += [
             '  measured_limit: # of one pad',
-            entry('force', pad.measured_limit.force, f'N, {said["force_limit"]}', '    '),
-            entry('pressure', pad.measured_limit.pressure, 'Pa gauge', '    '),
-            entry('slope', pad.measured_limit.slope, f'N/Pa, {said["force_limit_slope"]}', '    '),
+            entry('force', limit.force, f'N, {comments["force_limit"]}', '    '),
+            entry('pressure', limit.pressure, 'Pa gauge', '    '),
+            entry('slope', limit.slope, f'N/Pa, {comments["force_limit_slope"]}', '    '),
         ]
     lines += ['', f'pads: {foot.pads}', entry('sole_radius', foot.sole_radius, 'm')]
     lines += [known(name, unit) for name, (unit, *_) in _FRICTION.items()]
     lines += [
         entry('shear_stiffness', foot.shear_stiffness, 'N/m of the whole foot'),
-        entry('chamber_volume', foot.chamber_volume, 'm3 of air besides that under the pads'),
+        entry('chamber_volume', foot.chamber_volume, 'm3 of air without the domes'),
         entry('ceiling', foot.ceiling, 'Pa gauge'),
         f'force_limit: {foot.limit}',
     ]
@@ -280,16 +304,23 @@ def _comment(constant: Constant) -> str:
 
 
 def stiffness_of(pad: Pad, pressure: Array, height: Array) -> Array:
-    """Return the stiffness, N/m, with which each free dome would have just the height it has.
+    """Return the stiffness, N/m, that gives each free dome its measured height.
 
     Thesis 3.60 with F = 0, solved for k: ``k = p r/(6 sin t - 2 sin 2t)``, ``tan t = height/r``.
+
+    Parameters
+    ----------
+    pad : Pad
+        Its radius is used.
+    pressure, height : array
+        Gauge pressure, Pa, and height, m, above 0, of each dome.
     """
     t = np.arctan(height / pad.radius)
     return pressure * pad.radius / (6.0 * np.sin(t) - 2.0 * np.sin(2.0 * t))
 
 
-def tension_law(pad: Pad, pressure: Array, height: Array) -> tuple[Array, Array]:
-    """Return the membrane's tension, N/m, and its stretch, of free domes.
+def _tension_and_stretch(pad: Pad, pressure: Array, height: Array) -> tuple[Array, Array]:
+    """Return tension, N/m, and stretch of the membrane of free domes.
 
     Laplace: ``2 T = p R`` with ``R = (r² + height²)/(2 height)``; ``sigma² = 1 + (height/r)²``.
     """
@@ -301,6 +332,7 @@ def tension_law(pad: Pad, pressure: Array, height: Array) -> tuple[Array, Array]
 def _stiffness(
     measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
 ) -> Pad:
+    """Return the pad with its fitted stiffness; add constants and warnings."""
     free, pressed = measurements.free, measurements.pressed
     for name, values in (
         ('height', free.height),
@@ -309,7 +341,7 @@ def _stiffness(
         ('height of a pressed dome', pressed.height),
         ('gap', pressed.gap),
     ):
-        _tall_enough(measurements.source, name, values)
+        _above_zero(measurements.source, name, values)
     if len(free.pressure):
         least = float(free.pressure.max()) * pad.radius / BURST
 
@@ -318,47 +350,57 @@ def _stiffness(
 
         fit = _fit(heights, free.height, [pad.stiffness], [least])
         constants.append(fit.constant('stiffness', 'N/m', "of the thesis' law, free domes"))
-        best = _stiff(pad, fit.values[0])
-        _two_parameters(measurements, best, constants, warnings)
-    else:
-        best = pad
+        pad = _stiff(pad, fit.values[0])
+        _two_parameters(measurements, pad, constants, warnings)
+    by_pressed = _stiffness_pressed(measurements, pad)
+    if by_pressed is None:
+        if not len(free.pressure):
+            constants.append(_kept('stiffness', 'N/m', pad.stiffness, 'no dome was measured'))
+        return pad
+    if len(free.pressure):
+        note = 'stiffness from pressed domes: not used'
+        constants.append(by_pressed.constant('stiffness_pressed', 'N/m', note))
+        return pad
+    constants.append(by_pressed.constant('stiffness', 'N/m', "of the thesis' law, pressed domes"))
+    return _stiff(pad, by_pressed.values[0])
+
+
+def _stiffness_pressed(measurements: Measurements, pad: Pad) -> _Fit | None:
+    """Fit the stiffness to height or gap of pressed domes; return None if neither is measured."""
+    pressed = measurements.pressed
     wall = np.where(np.isnan(pressed.height), pressed.gap, pressed.height)
-    there = ~np.isnan(wall)
-    if there.any():
-        least = float(pressed.pressure[there].max()) * pad.radius / largest_tension(0.01)
+    known = ~np.isnan(wall)
+    if not known.any():
+        return None
+    least = float(pressed.pressure[known].max()) * pad.radius / largest_tension(0.01)
 
-        def walls(k: Array) -> Array:
-            dome = press(_stiff(pad, k[0]), pressed.pressure[there], pressed.force[there])
-            by_gap = np.isnan(pressed.height[there])
-            return np.asarray(np.where(by_gap, dome.gap, dome.height))
+    def walls(k: Array) -> Array:
+        dome = press(_stiff(pad, k[0]), pressed.pressure[known], pressed.force[known])
+        by_gap = np.isnan(pressed.height[known])
+        return np.asarray(np.where(by_gap, dome.gap, dome.height))
 
-        fit = _fit(walls, wall[there], [best.stiffness], [least])
-        if np.isnan(fit.values).any():
-            raise InvalidInput(
-                f'{measurements.source}: the pressed domes carry more than the model of a pad of '
-                f'radius {pad.radius:g} m at their pressure: is the radius right?'
-            )
-        if len(free.pressure):
-            constants.append(
-                fit.constant('stiffness_pressed', 'N/m', 'the same by pressed domes: not used')
-            )
-        else:
-            constants.append(fit.constant('stiffness', 'N/m', "of the thesis' law, pressed domes"))
-            best = _stiff(pad, fit.values[0])
-    elif not len(free.pressure):
-        constants.append(_kept('stiffness', 'N/m', pad.stiffness, 'no shape was measured'))
-    return best
+    fit = _fit(walls, wall[known], [pad.stiffness], [least])
+    if np.isnan(fit.values).any():
+        raise InvalidInput(
+            f'{measurements.source}: the pressed domes carry more than the model of a pad of '
+            f'radius = {pad.radius:g} m allows at their pressure: check the radius in the foot'
+            ' file'
+        )
+    return fit
 
 
 def _two_parameters(
     measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
 ) -> None:
-    """Fit ``T = T0 + k (sigma - 1)`` to the pressures of free domes, and compare."""
+    """Fit the law ``T = T0 + k (sigma - 1)`` to the pressures of free domes.
+
+    Warns if this law fits much better than one stiffness.
+    """
     free = measurements.free
     if len(np.unique(free.pressure)) < 2:
         return
-    tension, stretch = tension_law(pad, free.pressure, free.height)
-    # p = 2 T/R, linear in both constants; least squares of the pressure.
+    tension, stretch = _tension_and_stretch(pad, free.pressure, free.height)
+    # p = 2 T/R is linear in both constants: linear least squares of the pressure.
     curvature = free.pressure / tension
     design = np.column_stack([curvature, curvature * (stretch - 1.0)])
     fit = _line(design, free.pressure)
@@ -372,9 +414,10 @@ def _two_parameters(
         order = np.argsort(free.pressure)
         first, last = each[order[0]], each[order[-1]]
         warnings.append(
-            f'one stiffness does not fit: that of single points goes from {first:.3g} N/m at'
-            f' {free.pressure.min():g} Pa to {last:.3g} at {free.pressure.max():g} Pa; the law of'
-            f' two constants misses the pressures by {two:.3g} Pa instead of {one:.3g} Pa (rms)'
+            f'one stiffness does not fit all points: single points give {first:.3g} N/m at'
+            f' {free.pressure.min():g} Pa and {last:.3g} N/m at {free.pressure.max():g} Pa; with'
+            f' the law of two constants the pressure error is {two:.3g} Pa instead of {one:.3g} Pa'
+            ' (rms)'
         )
 
 
@@ -382,9 +425,12 @@ def _stiff(pad: Pad, stiffness: float) -> Pad:
     return dataclasses.replace(pad, stiffness=float(stiffness))
 
 
-def _tall_enough(source: str, name: str, values: Array) -> None:
+def _above_zero(source: str, name: str, values: Array) -> None:
     if (values <= 0.0).any():
-        raise InvalidInput(f'{source}: {name} = 0 cannot be fitted to: above 0 is needed')
+        raise InvalidInput(
+            f'{source}: {name} = {values[values <= 0.0][0]:g} is not allowed: a fit needs values'
+            ' above 0'
+        )
 
 
 def _shape_residuals(measurements: Measurements, pad: Pad, used_free: bool) -> list[Residual]:
@@ -417,10 +463,14 @@ def _shape_residuals(measurements: Measurements, pad: Pad, used_free: bool) -> l
 def _limit(
     measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
 ) -> Pad:
+    """Return the pad with the fitted line of its force limit; add constants and warnings."""
     pressure, limit = measurements.force_limits
     if len(np.unique(pressure)) < 2:
         if len(pressure):
-            warnings.append('one pressure is not enough for the line of the force limit')
+            warnings.append(
+                'the line of the force limit is kept: the measured force limits are all at one'
+                ' pressure, and a line needs two'
+            )
         line = measured_line(pad)
         note = "the thesis' line" if pad.measured_limit is None else "the start foot's line"
         constants.append(
@@ -433,12 +483,13 @@ def _limit(
     force, slope = fit.values
     if slope <= 0.0 or force < 0.0:
         raise InvalidInput(
-            f'{measurements.source}: the force limits fall with pressure (slope {slope:.3g} N/Pa):'
-            ' a limit that rises is needed'
+            f'{measurements.source}: the line through the measured force limits has slope ='
+            f' {slope:.3g} N/Pa and a force of {force:.3g} N at {middle:g} Pa: a slope above 0 and'
+            ' a force of at least 0 N are needed'
         )
     at = f'line of the force limit of one pad, at {middle:g} Pa'
     constants.append(fit.constant('force_limit', 'N', at, 0))
-    constants.append(fit.constant('force_limit_slope', 'N/Pa', 'and how it rises', 1))
+    constants.append(fit.constant('force_limit_slope', 'N/Pa', 'slope of this line', 1))
     return dataclasses.replace(
         pad, measured_limit=MeasuredLimit(float(force), middle, float(slope))
     )
@@ -462,12 +513,12 @@ def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
 
 @dataclass(frozen=True)
 class _WetFloor:
-    film_thickness: float
-    viscosity: float
+    film_thickness: float  # m
+    viscosity: float  # Pa s
 
 
-def _slips_at(friction: Friction, foot: Foot, floor: _WetFloor) -> Array:
-    """Return the model's tangential force of each row of measurements, N."""
+def _modelled_forces(friction: Friction, foot: Foot, floor: _WetFloor) -> Array:
+    """Return the model's largest tangential force for each row of measurements, N."""
     forces = []
     for pressure, load, _, wet, stance_time in zip(
         *(column.tolist() for column in friction), strict=True
@@ -491,32 +542,66 @@ def _friction(
     constants: list[Constant],
     warnings: list[str],
 ) -> Foot:
+    """Return the foot with the fitted constants of friction; add constants and warnings."""
     friction = measurements.friction
     if not len(friction.load):
         for name, (unit, *_) in _FRICTION.items():
             constants.append(_kept(name, unit, getattr(foot, name), 'no friction was measured'))
         return foot
+    _check_friction(measurements, foot)
+    fitted, fit = _identified_friction(friction, foot, floor)
+    for name, (unit, *_) in _FRICTION.items():
+        if fit is not None and name in fitted:
+            constants.append(
+                fit.constant(name, unit, f'{len(friction.load)} forces', fitted.index(name))
+            )
+        else:
+            note = 'not identified by these forces: kept'
+            constants.append(_kept(name, unit, getattr(foot, name), note))
+    if fit is None:
+        warnings.append(
+            'all constants of friction are kept: the tangential forces identify none of them'
+        )
+        return foot
+    kept = [name for name in _FRICTION if name not in fitted]
+    if kept:
+        warnings.append(
+            f'{", ".join(kept)}: not identified by the tangential forces; the fitted constants of'
+            f' friction are valid only if these values of {foot.source} are right'
+        )
+    return _with(foot, **dict(zip(fitted, fit.values.tolist(), strict=True)))
+
+
+def _check_friction(measurements: Measurements, foot: Foot) -> None:
+    """Raise `InvalidInput` where friction measurements cannot be fitted."""
+    friction = measurements.friction
     for name in ('load', 'tangential_force'):
-        _tall_enough(measurements.source, name, getattr(friction, name))
+        _above_zero(measurements.source, name, getattr(friction, name))
     if np.isnan(friction.stance_time[friction.wet]).any():
         raise InvalidInput(
-            f'{measurements.source}: friction on a wet floor needs stance_time: how long the foot '
-            'stood before it slipped'
+            f'{measurements.source}: friction on a wet floor needs stance_time, the time from'
+            ' touch-down to slip, s'
         )
     if (friction.pressure > foot.ceiling).any():
         raise InvalidInput(
-            f'{measurements.source}: friction at {friction.pressure.max():g} Pa, above the ceiling'
-            f' of {foot.source}, {foot.ceiling:g} Pa'
+            f'{measurements.source}: pressure = {friction.pressure.max():g} Pa of a friction row'
+            f' is above the ceiling of the foot {foot.source}, {foot.ceiling:g} Pa'
         )
+
+
+def _identified_friction(
+    friction: Friction, foot: Foot, floor: _WetFloor
+) -> tuple[list[str], _Fit | None]:
+    """Fit as many constants of friction as the forces identify; return their names and the fit."""
 
     def forces(names: Sequence[str], values: Array) -> Array:
         changed = _with(foot, **dict(zip(names, values.tolist(), strict=True)))
-        return _slips_at(friction, changed, floor)
+        return _modelled_forces(friction, changed, floor)
 
     fitted: list[str] = []
     fit = None
-    # A constant is added if the data tell it apart from those before it. The second round is for
-    # those that had to wait for a later one.
+    # A constant is added if the data identify it together with the earlier ones. The second round
+    # is for constants that are identified only after a later one has been added.
     for name in [*_FRICTION, *_FRICTION]:
         if name in fitted or len(fitted) == len(friction.load):
             continue
@@ -525,7 +610,7 @@ def _friction(
         start = getattr(foot, name) or _FRICTION[name][1]
         model = functools.partial(forces, trial)
         least, most = zip(*(_FRICTION[each][2:] for each in trial), strict=True)
-        # The law has kinks: a fit may end on the wrong side of one.
+        # The law has kinks: a fit can stop on the wrong side of one.
         attempts = [
             _fit(model, friction.tangential_force, [*before, factor * start], least, most)
             for factor in (1.0, 0.3, 3.0)
@@ -533,28 +618,11 @@ def _friction(
         best = min(attempts, key=lambda attempt: attempt.cost)
         if best.identified():
             fitted, fit = trial, best
-    for name, (unit, *_) in _FRICTION.items():
-        if fit is not None and name in fitted:
-            constants.append(
-                fit.constant(name, unit, f'{len(friction.load)} forces', fitted.index(name))
-            )
-        else:
-            note = 'these forces do not tell it: kept'
-            constants.append(_kept(name, unit, getattr(foot, name), note))
-    if fit is None:
-        warnings.append('the tangential forces tell none of the constants of friction')
-        return foot
-    kept = [name for name in _FRICTION if name not in fitted]
-    if kept:
-        warnings.append(
-            f'{", ".join(kept)} could not be told from these forces: what was fitted holds if the '
-            f'values of {foot.source} are right'
-        )
-    return _with(foot, **dict(zip(fitted, fit.values.tolist(), strict=True)))
+    return fitted, fit
 
 
 def _friction_residuals(friction: Friction, foot: Foot, floor: _WetFloor) -> list[Residual]:
-    modelled = _slips_at(friction, foot, floor)
+    modelled = _modelled_forces(friction, foot, floor)
     residuals = []
     for row, model in enumerate(modelled.tolist()):
         pressure, load = float(friction.pressure[row]), float(friction.load[row])
@@ -571,14 +639,14 @@ def _friction_residuals(friction: Friction, foot: Foot, floor: _WetFloor) -> lis
 
 @dataclass(frozen=True)
 class _Fit:
-    """Values of constants with half-widths of their intervals, in value or in logarithm."""
+    """Fitted constants."""
 
     values: Array
-    half_widths: Array
+    half_widths: Array  # of the 95 % intervals; for logarithms of the values if ``logarithmic``
     logarithmic: bool
     points: int
     cost: float
-    sensitivity: Array  # of the residuals to each constant
+    sensitivity: Array  # derivatives of the residuals (rows) over the constants
 
     def constant(self, name: str, unit: str, note: str, index: int = 0) -> Constant:
         value, width = float(self.values[index]), float(self.half_widths[index])
@@ -589,7 +657,7 @@ class _Fit:
         return Constant(name, unit, value, low, high, self.points, True, note)
 
     def identified(self) -> bool:
-        """Return whether the data tell each constant apart from the others."""
+        """Return whether the data determine each constant separately."""
         if not np.isfinite(self.values).all():
             return False
         singular = np.linalg.svd(self.sensitivity, compute_uv=False)
@@ -607,7 +675,7 @@ def _fit(
     least: Sequence[float],
     most: Sequence[float] | None = None,
 ) -> _Fit:
-    """Fit positive constants, within bounds, to relative errors."""
+    """Fit positive constants within bounds, minimising relative errors."""
     from scipy.optimize import least_squares
 
     low = np.log(least) + 1e-9
@@ -616,7 +684,7 @@ def _fit(
 
     def errors(logarithms: Array) -> Array:
         error = model(np.exp(logarithms)) / measured - 1.0
-        # A trial outside the model: as bad as twice what was measured.
+        # Where the model has no value, the error counts as 100 %.
         return np.where(np.isnan(error), 1.0, error)
 
     found = least_squares(errors, first, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
@@ -628,7 +696,7 @@ def _fit(
 
 
 def _line(design: Array, measured: Array) -> _Fit:
-    """Fit the constants of a linear law to absolute errors."""
+    """Fit the constants of a linear law, minimising absolute errors."""
     values = np.asarray(np.linalg.lstsq(design, measured, rcond=None)[0], dtype=np.float64)
     missed = design @ values - measured
     widths = _half_widths(design, missed)
@@ -636,7 +704,7 @@ def _line(design: Array, measured: Array) -> _Fit:
 
 
 def _half_widths(jacobian: Array, residuals: Array) -> Array:
-    """Return half-widths of the intervals; NaN without a point to spare."""
+    """Return half-widths of the intervals; NaN unless there are more points than constants."""
     from scipy.stats import t as student
 
     points, constants = jacobian.shape

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Design of a sole: how many pads it holds, what they carry, how high liquid climbs between them.
+"""Design of a sole: number of pads, load they carry, height of liquid between them.
 
-Thesis 3.83 to 3.101, for pads in a hexagonal pattern whose domes have grown to a sphere radius of
-1.5 pad radii. Two readings: ``corrected``, and ``thesis``, as printed. The printed cell of
-2.78 radius² per pad is smaller than even the flat pad needs (3.46), so the counts and loads of
-that reading are for comparison only.
+Thesis 3.83 to 3.101, for pads in a hexagonal pattern with domes of a sphere radius of 1.5 pad
+radii. The parameter ``reading`` selects the equations: ``corrected``, or ``thesis`` as printed.
+The printed cell of 2.78 radius² per pad is smaller than a flat pad needs (3.46), so numbers of
+pads and loads by ``thesis`` are for comparison only.
 """
 
 from __future__ import annotations
@@ -16,6 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import largest_pressure
@@ -26,56 +30,56 @@ from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
 READINGS = ('corrected', 'thesis')
 
-# Sphere radius of the dome that the pattern leaves room for, over the pad radius (3.83).
+# Sphere radius of the largest dome for which the pattern has room, over the pad radius (3.83).
 DOME = 1.5
-# Floor area per pad over radius²: a hexagon about that sphere; the thesis' 3.87.
+# Floor area per pad over radius²: hexagon around that sphere; 3.87 of the thesis.
 CELL = {'corrected': 2.0 * math.sqrt(3.0) * DOME**2, 'thesis': math.pi / 3.0 + math.sqrt(3.0)}
-# Pressure that inflates a pad to that dome, over stiffness/radius (3.89). The law of the free
-# dome at sin t = height/√(radius² + height²) and sin 2t = 1/1.5.
+# Pressure that inflates a pad to that dome, over stiffness/radius (3.89): the law of the free dome
+# with sin t = height/√(radius² + height²) and sin 2t = 1/1.5.
 TENSION = {'corrected': math.sqrt(18.0 + 6.0 * math.sqrt(5.0)) - 4.0 / 3.0, 'thesis': 4.3}
-# Area over squared radius from which pads cannot be counted to the last one.
+# Area over squared radius above which a float cannot hold the exact number of pads.
 _MOST_PADS = 2.0**53
 
-# The liquid of the thesis' figure 10: water at a contact angle of 60 degrees.
+# The liquid of figure 10 of the thesis: water at a contact angle of 60 degrees.
 DESIGN_WATER = Liquid(surface_tension=0.073, solid_tension=0.0410625, contact_angle=math.pi / 3)
 
 
 def pads_in(area: npt.ArrayLike, radius: npt.ArrayLike, reading: str = 'corrected') -> Floats:
-    """Return how many pads an area holds in a hexagonal pattern (thesis 3.87).
+    """Return how many pads fit on an area in a hexagonal pattern (thesis 3.87).
 
     Parameters
     ----------
     area : float or array
-        Of the sole, m², 0 or more.
+        Area of the sole, m², from 0.
     radius : float or array
-        Of the flat pads, m, above 0. Broadcasts with the area.
+        Radius of the flat pads, m, above 0. Broadcasts with the area.
     reading : {'corrected', 'thesis'}
-        ``corrected`` gives each dome of 1.5 radii its hexagon of 7.794 radius²; ``thesis`` has
-        2.779 radius², on which not even flat pads fit.
+        ``corrected`` gives each dome (sphere radius 1.5 radii) a hexagon of 7.794 radius².
+        ``thesis`` has 2.779 radius², which is too small even for flat pads.
 
     Returns
     -------
     float or array
-        The ratio of areas. It is no whole number, and a small sole loses more at its edge:
-        :func:`design` rounds down.
+        The ratio of areas, not rounded (:func:`design` rounds down). Losses at the edge of the
+        sole are ignored.
 
     Raises
     ------
     InvalidInput
-        For values out of range, an unknown reading, or shapes that do not broadcast.
+        When a value is out of range, the reading is unknown, or shapes do not broadcast.
     """
     cell = CELL[choice('reading', reading, READINGS)]
     room = quantity('area', area, 'm²')
     r = quantity('radius', radius, 'm', above=True)
-    return _plain(_broadcast(room, r, names='area and radius')[0] / (cell * r * r))
+    room, r = broadcast('area and radius', room, r)
+    return plain(room / (cell * r * r))
 
 
 def design_pressure(
@@ -86,23 +90,23 @@ def design_pressure(
     Parameters
     ----------
     radius : float or array
-        Of the flat pad, m, above 0.
+        Radius of the flat pad, m, above 0.
     stiffness : float or array
-        Of the membrane, N/m, above 0. Broadcasts with the radius.
+        Stiffness of the membrane, N/m, above 0. Broadcasts with the radius.
     reading : {'corrected', 'thesis'}
-        4.2717 stiffness/radius, or the 4.3 of the print. Both lie beyond the end of the pressed
-        dome (3.426): see :func:`ros_pad.contact.press`.
+        4.2717 stiffness/radius, or 4.3 as printed. Both are above the end of the model of the
+        pressed dome (3.426), see :func:`ros_pad.contact.press`.
 
     Raises
     ------
     InvalidInput
-        For values out of range, an unknown reading, or shapes that do not broadcast.
+        When a value is out of range, the reading is unknown, or shapes do not broadcast.
     """
     tension = TENSION[choice('reading', reading, READINGS)]
     r = quantity('radius', radius, 'm', above=True)
     k = quantity('stiffness', stiffness, 'N/m', above=True)
-    r, k = _broadcast(r, k, names='radius and stiffness')
-    return _plain(tension * k / r)
+    r, k = broadcast('radius and stiffness', r, k)
+    return plain(tension * k / r)
 
 
 def foot_force(
@@ -113,30 +117,30 @@ def foot_force(
 ) -> Floats:
     """Return the force that presses all pads of a sole flat, N (thesis 3.92).
 
-    Every pad is taken to push with :func:`design_pressure` on all of its flat area. What was
-    measured is far less: a design rests on :func:`ros_pad.contact.force_limit`.
+    The pressure :func:`design_pressure` is assumed to act on the whole flat area of each pad.
+    Measured forces are much smaller: use :func:`ros_pad.contact.force_limit` for a design.
 
     Parameters
     ----------
     area : float or array
-        Of the sole, m², 0 or more.
+        Area of the sole, m², from 0.
     radius : float or array
-        Of the flat pads, m, above 0.
+        Radius of the flat pads, m, above 0.
     stiffness : float or array
-        Of the membrane, N/m, above 0. All three broadcast.
+        Stiffness of the membrane, N/m, above 0. All three broadcast.
     reading : {'corrected', 'thesis'}
         1.7218 or 4.8606 times ``stiffness * area / radius``.
 
     Raises
     ------
     InvalidInput
-        For values out of range, an unknown reading, or shapes that do not broadcast.
+        When a value is out of range, the reading is unknown, or shapes do not broadcast.
     """
     share = math.pi / CELL[choice('reading', reading, READINGS)]
     room = quantity('area', area, 'm²')
     pressure = design_pressure(radius, stiffness, reading)
-    room, pressure = _broadcast(room, pressure, names='area, radius and stiffness')
-    return _plain(share * room * pressure)
+    room, pressure = broadcast('area, radius and stiffness', room, pressure)
+    return plain(share * room * pressure)
 
 
 def rise_height(
@@ -145,44 +149,45 @@ def rise_height(
     reading: str = 'corrected',
     cell: float | None = None,
 ) -> Floats:
-    """Return how high liquid climbs between the domes of a sole, m (thesis 3.101).
+    """Return the height to which liquid climbs between the domes of a sole, m (thesis 3.101).
 
     Parameters
     ----------
     radius : float or array
-        Of the flat pads, m, above 0.
+        Radius of the flat pads, m, above 0.
     liquid : Liquid
-        Its surface tension, density and contact angle count; the angle must be below 90 degrees.
+        Its surface tension, density and contact angle are used; the angle must be below pi/2.
     reading : {'corrected', 'thesis'}
-        ``thesis`` is 3.101 as typed. A factor of height is missing there from the last term, so
-        its answer depends on the unit of length; it is evaluated in millimetres, as the thesis'
-        figure 10 is drawn, and returned in metres.
+        ``thesis`` is 3.101 as printed. There a factor of height is missing in the last term, so
+        the result depends on the unit of length. It is evaluated in millimetres, as in figure 10
+        of the thesis, and returned in metres.
     cell : float, optional
-        Floor area per pad over radius², from that of touching domes, 7.794, which is the default.
-        Not for the reading ``thesis``, which has its own.
+        Floor area per pad over radius², from 7.794 (domes that touch, the default). Not allowed
+        with the reading ``thesis``, which has a fixed cell.
 
     Returns
     -------
     float or array
-        Between 0 and 3 radii, where the gap between floor and sole is full. NaN in arrays where
-        3.101 as typed has no root: below a radius of 0.5652 mm, whatever the liquid.
+        From 0 to 3 radii, where the gap between floor and sole is full. NaN in arrays where
+        3.101 as printed has no root: below a radius of 0.5652 mm, for every liquid.
 
     Raises
     ------
     NoEquilibrium
         For a scalar radius without a root, status ``no_rise``.
     InvalidInput
-        For values out of range, or an unknown reading.
+        When a value is out of range or of the wrong type, the reading is unknown, or ``cell`` is
+        given with the reading ``thesis``.
 
     Notes
     -----
-    With ``L = 2 γ cos θ / (ρ g)`` the pull round all domes lifts the liquid between them:
-    ``L √((3 r - h) h) = (cell/π) r² h - h (9 r h - 2 h²)/6``. Divided by h, with
-    ``u² = (3 r - h)/h``, the left side is proportional to u and meets the right one once; as
-    typed, too.
+    With ``L = 2 γ cos θ / (ρ g)`` the surface tension around all domes carries the liquid between
+    them: ``L √((3 r - h) h) = (cell/π) r² h - h (9 r h - 2 h²)/6``. Divided by h, with
+    ``u² = (3 r - h)/h``, the left side is proportional to u and crosses the right side once. The
+    same holds for the equation as printed.
 
-    The wall is taken to be upright. It leans over above the equator of the dome, where liquid
-    of contact angle θ stops at ``1.5 r (1 + cos θ)``, at 60 degrees 2.25 r instead of 3 r.
+    The wall is assumed to be vertical. Above the equator of the dome the real wall leans inwards:
+    liquid with contact angle θ stops at ``1.5 r (1 + cos θ)``, for 60 degrees 2.25 r, not 3 r.
     """
     choice('reading', reading, READINGS)
     r = quantity('radius', radius, 'm', above=True)
@@ -191,11 +196,13 @@ def rise_height(
     if liquid.angle >= math.pi / 2:
         raise InvalidInput(
             f'contact_angle = {liquid.angle:g} rad is not allowed: below pi/2 rad is needed, '
-            'other liquids are not drawn in'
+            'because other liquids do not rise'
         )
     if cell is not None:
         if reading == 'thesis':
-            raise InvalidInput('cell is not allowed with the reading thesis, which has its own')
+            raise InvalidInput(
+                f"cell = {cell:g} is not allowed with reading='thesis', which has a fixed cell"
+            )
         cell = number('cell', cell, '(radius²)', low=CELL['corrected'])
     drawn = 2.0 * liquid.surface_tension * math.cos(liquid.angle) / (liquid.density * GRAVITY)
     if reading == 'corrected':
@@ -203,24 +210,25 @@ def rise_height(
         u = _crossing(
             drawn / (r * r), lambda y: share + (y / 3.0 - 1.5) * y, share - 1.6875, share
         )
-        return _plain(3.0 * r / (1.0 + u * u))
+        return plain(3.0 * r / (1.0 + u * u))
     r_mm = 1e3 * r
     room = CELL['thesis'] / math.pi * r_mm
     if np.ndim(r) == 0 and room <= 0.5:
+        least = 0.5e-3 * math.pi / CELL['thesis']
         raise NoEquilibrium(
-            f'radius {r:g} m has no height of rise by 3.101 as typed: '
-            f'only above {0.5e-3 * math.pi / CELL["thesis"]:.6g} m has',
+            f'radius = {r:g} m has no rise height by equation 3.101 as printed in the thesis:'
+            f' above {least:.6g} m is needed',
             'no_rise',
         )
     room = np.where(room > 0.5, room, np.nan)
     u = _crossing(1e6 * drawn / r_mm, lambda y: room - 1.5 + y / 3.0, 0.0, room - 0.5)
-    return _plain(3.0 * r / (1.0 + u * u))
+    return plain(3.0 * r / (1.0 + u * u))
 
 
 def _crossing(pull: Array, weight: Callable[[Array], Array], low: Floats, high: Floats) -> Array:
-    """Return where ``pull u`` comes up to ``weight(y)``, which is from low to high.
+    """Return u where ``pull u = weight(y)``, by bisection; the weight is between low and high.
 
-    ``y = 3/(1 + u²)`` is height over radius. Halving cannot miss the one crossing.
+    ``y = 3/(1 + u²)`` is height over radius.
     """
     low, high = low / pull, high / pull
     for _ in range(80):
@@ -232,29 +240,43 @@ def _crossing(pull: Array, weight: Callable[[Array], Array], low: Floats, high: 
 
 @dataclass(frozen=True)
 class Design:
-    """A sole with equal pads under a load. All figures belong to one reading.
+    """A sole with equal pads under a load. All numbers belong to one reading.
 
     Attributes
     ----------
-    reading : ``corrected`` or ``thesis``.
+    reading : str
+        ``corrected`` or ``thesis``.
     pad : Pad
-    area : m², of the sole.
-    pads : how many it has.
-    pitch : m, between the centres of neighbouring pads in a hexagonal pattern.
-    load : N, on the whole foot.
-    load_per_pad : N.
-    margin : factor on the load that the force limit has to cover.
-    criterion : of :func:`ros_pad.contact.force_limit`.
-    pressure : Pa gauge, needed for the load; NaN where no pressure of the model carries it.
-    ceiling : Pa gauge, the highest there is: that of the supply, or where the model or the
-        measurements end if that is lower.
-    pad_limit : N, the force limit of one pad at the ceiling.
-    reachable_load : N, on the whole foot at the ceiling, margin taken off.
-    flat_force : N, by :func:`foot_force`'s rule that a pad pushes with all its area, at the
-        ceiling. Nobody has measured such forces.
-    dome_width : m, the widest diameter of the free domes at the pressure needed, or at the
-        ceiling where that is less.
-    rise_height : m, of liquid between the domes by :func:`rise_height`; NaN where it has none.
+        One of the pads.
+    area : float
+        Area of the sole, m².
+    pads : int
+        Number of pads.
+    pitch : float
+        Distance between the centres of neighbouring pads in a hexagonal pattern, m.
+    load, load_per_pad : float
+        Normal force on the whole foot and on one pad, N.
+    margin : float
+        Safety factor: the force limit covers the load times this factor.
+    criterion : str
+        Criterion of :func:`ros_pad.contact.force_limit`.
+    pressure : float
+        Gauge pressure needed for the load, Pa; NaN where no pressure of the model carries it.
+    ceiling : float
+        Highest available gauge pressure, Pa: that of the supply, or the end of the model or of the
+        measurements if that is lower.
+    pad_limit : float
+        Force limit of one pad at the ceiling, N.
+    reachable_load : float
+        Largest load on the whole foot at the ceiling, N, divided by the margin.
+    flat_force : float
+        Ceiling times the area of all pads, N, the rule of :func:`foot_force`. Such forces have
+        never been measured.
+    dome_width : float
+        Largest diameter of the free domes at the needed pressure, or at the ceiling if that is
+        lower, m.
+    rise_height : float
+        Height of liquid between the domes by :func:`rise_height`, m; NaN where there is none.
     """
 
     reading: str
@@ -281,19 +303,19 @@ class Design:
 
     @property
     def touching(self) -> bool:
-        """Whether neighbouring domes touch one another before they touch the floor."""
+        """Whether neighbouring free domes would touch each other."""
         return self.dome_width > self.pitch
 
     @property
     def pads_needed(self) -> float:
-        """How many such pads carry the load at the ceiling; infinite where no number does."""
+        """Number of pads that carry the load at the ceiling; infinite where no number does."""
         if self.pad_limit == 0.0:
             return math.inf
         return math.ceil(self.load * self.margin / self.pad_limit)
 
     @property
     def pads_without_touching(self) -> int:
-        """How many pads the sole holds whose domes, as wide as these, just do not touch."""
+        """Largest number of pads on the sole for which domes of this width do not touch."""
         return math.floor(self.area / (0.5 * math.sqrt(3.0) * self.dome_width**2))
 
 
@@ -309,64 +331,48 @@ def design(
     liquid: Liquid = DESIGN_WATER,
     reading: str = 'corrected',
 ) -> Design:
-    """Return what a sole full of pads makes of a load.
+    """Design a sole with equal pads for a load.
 
     Parameters
     ----------
     load : float
         Normal force on the foot, N, above 0.
     area : float
-        Of the sole, m², at least one cell of :func:`pads_in`.
+        Area of the sole, m², at least one cell of :func:`pads_in`.
     pad : Pad
-        What one pad is made of.
+        Size and material of one pad.
     pads : int, optional
-        How many there are. By default as many as :func:`pads_in` says, rounded down.
+        Number of pads. By default :func:`pads_in`, rounded down.
     ceiling : float
-        Highest pressure of the supply, Pa gauge, above 0. Where the model or, for ``measured``,
-        the measurements end below it, their end is taken instead and told as ``ceiling``.
+        Highest pressure of the supply, Pa gauge, above 0. ``ceiling`` of the result is at most
+        :func:`ros_pad.contact.limits.largest_pressure` of the criterion.
     margin : float
-        Factor on the load, above 0.
+        Safety factor on the load, above 0.
     criterion : {'measured', 'flattening', 'max_depth'}
-        Of the force limit.
+        Criterion of the force limit.
     liquid : Liquid
-        For the height of rise.
+        Liquid for the rise height.
     reading : {'corrected', 'thesis'}
-        Of the cell and of the height of rise. The force limit has but one.
+        Reading of the cell and of the rise height. The force limit has only one reading.
+
+    Returns
+    -------
+    Design
+        The sole, and the load that it carries.
 
     Raises
     ------
     InvalidInput
-        For values out of range, or a sole too small for its pads.
+        When a value is out of range, criterion or reading is unknown, or the sole is too small for
+        its pads.
     """
     load = number('load', load, 'N', above=True)
     area = number('area', area, 'm²', above=True)
     end = largest_pressure(pad, criterion)
-    # The end itself is refused where rounding carries it a digit too far.
+    # force_limit can refuse the end itself because of rounding.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)
-    if area >= _MOST_PADS * pad.radius**2:
-        raise InvalidInput(
-            f'radius = {pad.radius:g} m is not allowed on an area of {area:g} m²: '
-            f'{math.sqrt(area / _MOST_PADS):.3g} m or more is needed, for pads to be counted'
-        )
-    if pads is None:
-        # A sole of exactly so many cells holds them all, whatever the last digit says.
-        pads = math.floor(pads_in(area, pad.radius, reading) * (1.0 + 1e-12))
-        if pads < 1:
-            raise InvalidInput(
-                f'area = {area:g} m² is not allowed: one pad of radius {pad.radius:g} m needs '
-                f'{CELL[reading] * pad.radius**2:g} m² or more'
-            )
-    else:
-        choice('reading', reading, READINGS)
-        most = math.floor(area / (math.pi * pad.radius**2))
-        whole = isinstance(pads, int | np.integer) and not isinstance(pads, bool)
-        if not whole or not 1 <= pads <= most:
-            raise InvalidInput(
-                f'pads = {pads!r} is not allowed: a whole number from 1 to {most}, as many as '
-                f'lie beside one another on {area:g} m²'
-            )
-        pads = int(pads)  # a number of NumPy's is no number to JSON
+    pads = _number_of_pads(pads, area, pad, choice('reading', reading, READINGS))
     try:
         pressure = pressure_for(pad, load / pads, criterion, margin)
     except NoEquilibrium:
@@ -393,27 +399,38 @@ def design(
     )
 
 
+def _number_of_pads(pads: int | None, area: float, pad: Pad, reading: str) -> int:
+    """Return the number of pads on a sole: the given one if allowed, or else as many as fit."""
+    if area >= _MOST_PADS * pad.radius**2:
+        least = math.sqrt(area / _MOST_PADS)
+        raise InvalidInput(
+            f'radius = {pad.radius:g} m is not allowed on an area of {area:g} m²: at least'
+            f' {least:.3g} m is needed, because more than 2^53 pads cannot be counted exactly'
+        )
+    if pads is not None:
+        return integer('pads', pads, 1, math.floor(area / (math.pi * pad.radius**2)))
+    # Rounding must not remove a pad from a sole whose area is a whole number of cells.
+    fitting = math.floor(pads_in(area, pad.radius, reading) * (1.0 + 1e-12))
+    if fitting < 1:
+        raise InvalidInput(
+            f'area = {area:g} m² is not allowed: at least {CELL[reading] * pad.radius**2:g} m² is'
+            f' needed for one pad of radius {pad.radius:g} m'
+        )
+    return fitting
+
+
 def _width(pad: Pad, pressure: float) -> float:
+    """Return the largest diameter of the free dome, m."""
     dome = inflate(pad, pressure)
     return 2.0 * (dome.sphere_radius if dome.height > pad.radius else pad.radius)
 
 
 def _rise(radius: float, liquid: Liquid, reading: str, cell: float) -> float:
+    """Return the rise height, m; NaN where there is none."""
     if reading == 'corrected':
-        # Domes of 1.5 radii do not fit on a smaller cell, and 3.101 with them.
+        # 3.101 assumes domes with a sphere radius of 1.5 radii, too wide for a smaller cell.
         return rise_height(radius, liquid, cell=cell) if cell >= CELL['corrected'] else math.nan
     try:
         return rise_height(radius, liquid, reading)
     except NoEquilibrium:
         return math.nan
-
-
-def _broadcast(*values: Array, names: str) -> tuple[Array, ...]:
-    try:
-        return tuple(each[()] for each in np.broadcast_arrays(*values))
-    except ValueError as error:
-        raise InvalidInput(f'{names} do not broadcast') from error
-
-
-def _plain(value: Floats) -> Floats:
-    return float(value) if np.ndim(value) == 0 else value

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shape of an inflated pad, free (thesis 3.34-3.41, 3.60) and pressed on a floor (3.44-3.61).
 
-Inside this module lengths are in units of the pad radius, pressure is ``P = p r/k``, force is
-``f = F/(pi k r)`` and adhesion is ``a = sign * adhesion_energy/k``. Then one pad is every pad,
-and pi appears only in the force.
+Units inside this module: lengths are divided by the pad radius, pressure is ``P = p r/k``, force
+is ``f = F/(pi k r)`` and adhesion is ``a = sign * adhesion_energy/k``. In these units all pads are
+the same, and pi appears only in the force.
 
-The formulas serve floats and arrays alike: they are handed the square root of their kind. A
-single dome is found by Newton inside a bracket. A batch takes three or four plain Newton steps
-from a polynomial seed, keeps what meets the certificate of the branch, and hands the few others
-to the solver for one.
+The formulas work on floats and on arrays; the matching square root is passed in. A single dome is
+found by Newton's method inside a bracket. A batch takes three or four plain Newton steps from a
+polynomial start value. Rows that fail the certificate of the branch go to the solver for one dome.
 """
 
 from __future__ import annotations
@@ -23,19 +22,21 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import quantity
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import quantity
+from ros_pad.contact.pad import broadcast
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
-# Sign of the adhesion term: the appendix' program adds it, the text (3.43) subtracts it.
+# Sign of the adhesion term: the program in the appendix of the thesis adds this term, the text
+# (3.43) subtracts it.
 ADHESION_SIGNS = {'matlab': 1.0, 'text': -1.0, 'none': 0.0}
 MODELS = ('thesis', 'membrane')
 
-# Pressure ``P`` from which the free dome has no equilibrium: it grows without end.
+# Pressure ``P`` from which on the free dome grows without limit and has no equilibrium.
 BURST = 6.0
 # Largest relative adhesion ``a`` for which the branch structure below was checked.
 LARGEST_ADHESION = 0.01
@@ -43,14 +44,14 @@ LARGEST_ADHESION = 0.01
 Codes: TypeAlias = npt.NDArray[np.int8]
 STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation'])
 OK, NO_CONTACT, FLATTENED, FOLD_ZONE, NO_INFLATION = range(5)
-# Least-squares fits that start Newton; they decide how long it takes, not where it ends.
-# Half-angle of the free dome over P, by falling powers of P up to 6: within 4e-4.
+# Least-squares fits for start values of Newton's method; they affect time, not results.
+# tan of half the edge angle of the free dome, over P, by falling powers of P up to 6: error 4e-4.
 _FREE_SEED = (
     *(1.50052e-07, -6.18748e-06, 1.0885e-04, -1.0662e-03, 6.39084e-03),
     *(-2.41485e-02, 5.63496e-02, -7.00170e-02, 3.55966e-03, 2.49909e-01),
 )
-# Pressed height over ``P (1 - f/P)``: rows by falling powers of P, columns of f/P. Half of the
-# domain is within 4e-3, the corner of high pressure and large force within 0.4.
+# Pressed height over ``P (1 - f/P)``: rows by falling powers of P, columns by those of f/P. The
+# error is below 4e-3 in half of the domain, up to 0.4 at high pressure and large force.
 _PRESSED_SEED = (
     (-0.0081003, 0.030039, -0.019133, 0.0054206),
     (-0.16593, 0.12952, 0.013939, -0.0083308),
@@ -58,7 +59,7 @@ _PRESSED_SEED = (
     (-0.15422, 0.3986, -0.50011, 0.50239),
 )
 
-# Rows of a batch that are worked on at a time: their temporaries stay in the processor's cache.
+# Rows of a batch computed at a time, so that temporary arrays fit the processor's cache.
 _CHUNK = 16384
 
 
@@ -67,10 +68,14 @@ class Inflated(NamedTuple):
 
     Attributes
     ----------
-    height : m
-    sphere_radius : m; infinite for a flat pad.
-    volume : m³ under the dome.
-    status : ``ok`` or ``no_inflation`` (the numbers are then NaN).
+    height : float or array
+        Height of the dome, m.
+    sphere_radius : float or array
+        Radius of its sphere, m; infinite for a flat pad.
+    volume : float or array
+        Volume under the dome, m³.
+    status : str or array of str
+        ``ok``, or ``no_inflation``, where the numbers are NaN.
     """
 
     height: Floats
@@ -84,13 +89,19 @@ class Pressed(NamedTuple):
 
     Attributes
     ----------
-    height : m, of the uncut spherical cap (c2).
-    depth : m, how much of the cap the floor cuts off (a).
-    contact_radius : m (b).
-    sphere_radius : m, of the wall (R2).
-    gap : m, from pad base to floor, ``height - depth`` without its cancellation.
-    status : ``ok``; ``no_contact`` (the free dome, contact radius 0); or ``flattened``,
-        ``fold_zone``, ``no_inflation`` (the numbers are then NaN).
+    height : float or array
+        Height of the complete spherical cap, m (c2 in the thesis).
+    depth : float or array
+        Depth that the floor cuts off the cap, m (a).
+    contact_radius : float or array
+        Radius of the contact with the floor, m (b).
+    sphere_radius : float or array
+        Radius of the sphere, m (R2).
+    gap : float or array
+        Distance from pad base to floor, m: ``height - depth``, computed without cancellation.
+    status : str or array of str
+        ``ok``; ``no_contact`` (the free dome, contact radius 0); or ``flattened``, ``fold_zone``,
+        ``no_inflation``, where the numbers are NaN.
     """
 
     height: Floats
@@ -102,12 +113,12 @@ class Pressed(NamedTuple):
 
 
 def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
-    """Return the free dome of a pad.
+    """Compute the free dome of a pad.
 
     Parameters
     ----------
     pad : Pad
-        What the pad is made of.
+        Size and material.
     pressure : float or array
         Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome.
 
@@ -116,7 +127,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     NoEquilibrium
         For a scalar pressure at or above that bound, status ``no_inflation``.
     InvalidInput
-        For a pressure that is negative or not finite.
+        When a pressure is negative or not finite.
 
     Notes
     -----
@@ -153,21 +164,23 @@ def press(
     adhesion: str = 'matlab',
     model: str = 'thesis',
 ) -> Pressed:
-    """Return the dome of a pad pressed on a floor, always on the branch of the free dome.
+    """Compute the dome of a pad pressed on a floor, on the branch of the free dome.
 
     Parameters
     ----------
     pad : Pad
-        What the pad is made of.
+        Size and material.
     pressure : float or array
         Gauge pressure, Pa, from 0. The thesis' model ends at ``P = p r/k`` of about 3.425
-        (91.3 kPa for the large pad): beyond, the same force has several equilibria. The membrane
-        has one up to 5.14, and for smaller forces up to bursting.
+        (91.3 kPa for the large pad): above, the same force has several equilibria. The membrane
+        has one equilibrium up to P = 5.14, and up to bursting if the force is at most 0.71 of
+        ``pressure pi radius²``.
     force : float or array
         Normal force on this one pad, N, from 0. Broadcasts with the pressure.
     adhesion : {'matlab', 'text', 'none'}
-        Sign of the adhesion term: attractive (default), as the thesis' text has it, or left out.
-        The membrane has none, whatever is said here: it meets the floor at a tangent.
+        Sign of the adhesion term: attractive (default, as in the thesis' program), repulsive (as
+        in the thesis' text), or no adhesion. The membrane has no adhesion: it meets the floor at a
+        tangent.
     model : {'thesis', 'membrane'}
         The spherical dome of thesis 3.44-3.61, or the exact membrane of the same energy
         (:mod:`ros_pad.contact.membrane`).
@@ -176,18 +189,18 @@ def press(
     ------
     NoEquilibrium
         For scalar input without an equilibrium in the model. Its status is ``flattened`` (the
-        contact would span the pad), ``fold_zone`` (pressure above the model's end) or
-        ``no_inflation`` (pressure above that of the free dome).
+        contact would cover the whole pad), ``fold_zone`` (pressure above the end of the model) or
+        ``no_inflation`` (pressure at which even the free dome has no equilibrium).
     InvalidInput
-        For values that are negative, not finite, do not broadcast, or an unknown word; and for
-        ``adhesion_energy`` above 0.01 ``stiffness``.
+        When a value is negative or not finite, shapes do not broadcast, ``adhesion`` or ``model``
+        is unknown, or ``adhesion_energy`` is above 0.01 ``stiffness``.
 
     Notes
     -----
     Force balances of thesis 3.53 and 3.58 with the cap geometry of 3.48, reduced to one equation
-    in the height. A root is returned only with its certificate: at this height the depth is the
-    one that grows out of the free dome, the floor is above the pad base and the contact inside
-    the rim.
+    in the height. A root is returned only if it passes the certificate: the depth at this height
+    is continuous with the free dome, the floor is above the pad base and the contact is inside the
+    rim.
     """
     if model != 'thesis':
         choice('model', model, MODELS)
@@ -199,7 +212,7 @@ def press(
     p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
     if isinstance(p, float) and isinstance(load, float):
         return _press_one(pad, float(p), float(load), a)
-    p, load = broadcast(p, load)
+    p, load = broadcast('pressure and force', p, load)
     rows, loads = p.ravel(), load.ravel()
     pressed = np.empty((5, rows.size))
     code = np.zeros(rows.size, dtype=np.int8)
@@ -214,25 +227,25 @@ def press(
 
 
 def free_height(tension: Floats, deficit: Floats) -> Floats:
-    """Return height over radius of the free dome, to the last digits.
+    """Return height over radius of the free dome, to rounding error.
 
     Parameters
     ----------
     tension : float or array
         ``P = p r/k``, from 0 to 6.
     deficit : float or array
-        ``6 - P``, given apart because near 6 it carries all the digits.
+        ``6 - P``, given separately because ``6 - tension`` loses digits near 6.
 
     Notes
     -----
     With ``w = tan(t/2)`` the pressure is rational, ``P = 4 w (1 + 5 w²)/(1 + w²)²``, and the
-    height is ``2 w/(1 - w²)``: no trigonometry is needed.
+    height is ``2 w/(1 - w²)``, without trigonometric functions.
     """
     w = _FREE_SEED[0] * tension + _FREE_SEED[1]
     for coefficient in _FREE_SEED[2:]:
         w = w * tension + coefficient
     w = w * tension
-    for _ in range(2):  # 4e-4, 1e-7, the last digit
+    for _ in range(2):  # errors after 0, 1 and 2 steps: 4e-4, 1e-7, rounding
         square = w * w
         sum_ = 1.0 + square
         pull = tension * sum_
@@ -247,7 +260,7 @@ def free_height(tension: Floats, deficit: Floats) -> Floats:
 
 
 def _tall_height(w: Floats, deficit: Floats) -> Floats:
-    """Return the height near the bursting pressure, from ``v = 1 - w`` and ``6 - P``."""
+    """Return the height near the bursting pressure, computed from ``v = 1 - w`` and ``6 - P``."""
     v = 1.0 - w
     for _ in range(2):
         square = 2.0 + v * (v - 2.0)
@@ -258,7 +271,7 @@ def _tall_height(w: Floats, deficit: Floats) -> Floats:
 
 
 def _free_cap(r: float, height: Floats, inflated: bool) -> tuple[Floats, Floats, Floats]:
-    """Return height, sphere radius and volume of a free dome in metres."""
+    """Return height, m, sphere radius, m, and volume, m³, of a free dome."""
     sphere = 0.5 * r * (height + 1.0 / height) if inflated else math.inf
     return r * height, sphere, math.pi / 6.0 * r * r * r * height * (3.0 + height * height)
 
@@ -285,8 +298,8 @@ def _deficit(pad: Pad, p: Floats) -> Floats:
 def largest_tension(a: float) -> float:
     """Return the pressure ``P`` up to which every force has one equilibrium on the branch.
 
-    Above it force against height is S-shaped. The cusp is at 3.4263 - 4.1 a (91.368 kPa for the
-    large pad without adhesion); the bound stays a little below.
+    Above P = 3.4263 - 4.1 a (91.368 kPa for the large pad without adhesion) the curve of force
+    over height is S-shaped; the returned bound is slightly lower.
     """
     return 3.426 - 4.5 * max(a, 0.0)
 
@@ -294,9 +307,9 @@ def largest_tension(a: float) -> float:
 def flattening_force(tension: Floats, a: float) -> Floats:
     """Return the force ``f`` at which the contact reaches the rim, for attraction ``a >= 0``.
 
-    There height equals depth and 3.53 and 3.58 leave ``P x³ - (2 - a) x² + a = 0`` with
-    ``f = P (1 + x²) - 2x``. To first order this is the closed form ``P - sqrt(2a)``. Negative
-    where the pad is flat without any force.
+    At this force height x equals depth, and 3.53 and 3.58 reduce to
+    ``P x³ - (2 - a) x² + a = 0`` with ``f = P (1 + x²) - 2x``. To first order
+    ``f = P - sqrt(2a)``. It is negative where adhesion alone holds the pad flat.
     """
     if a == 0.0:
         return tension
@@ -311,7 +324,7 @@ def flattening_force(tension: Floats, a: float) -> Floats:
 def _balance(
     x: Floats, tension: Floats, f: Floats, a: float, sqrt: Callable[[Floats], Floats]
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return what a trial height x says of the equilibrium.
+    """Evaluate the equilibrium at a trial height x.
 
     Terms of order P are subtracted once, as ``P - f``, so that the residual keeps its digits near
     flattening.
@@ -319,15 +332,15 @@ def _balance(
     Returns
     -------
     residual : float or array
-        Of 3.58. It falls through zero at the equilibrium.
+        Residual of 3.58. At the equilibrium it changes from positive to negative.
     slope : float or array
-        Of the residual over the height.
+        Derivative of the residual over the height.
     certificate : float or array
-        Positive where the depth that balances this height is continuous with the free dome.
+        Positive where the depth at this height is continuous with the free dome.
     spread : float or array
         Squared contact radius (3.53).
     depth : float or array
-        What the floor cuts off (3.48).
+        Depth that the floor cuts off (3.48).
     """
     inverse = 1.0 / x
     rho = 0.5 * (x + inverse)
@@ -354,10 +367,10 @@ def _balance(
 def _settled(
     x: Floats, step: Floats, slope: Floats, certificate: Floats, spread: Floats, depth: Floats
 ) -> Floats:
-    """Return whether a Newton step from x ends at the physical root, to the last digits.
+    """Return whether a Newton step from x ends at the physical root, to rounding error.
 
     The step is so short that the next one would be a rounding error, and that the certificate
-    cannot change its sign on the way.
+    cannot change its sign over the step.
     """
     return (
         (abs(step) <= 1e-7 * x)
@@ -369,6 +382,7 @@ def _settled(
 
 
 def _seed(tension: Floats, f: Floats) -> Floats:
+    """Return the start value of the height."""
     share = f / tension
     height = 0.0
     for row in _PRESSED_SEED:
@@ -380,26 +394,26 @@ def _seed(tension: Floats, f: Floats) -> Floats:
 
 
 def _height_of_one(tension: float, f: float, a: float) -> float:
-    """Return the height in equilibrium; NaN where no root has the certificate."""
+    """Return the height in equilibrium; NaN where no root passes the certificate."""
     x = _seed(tension, f)
     try:
-        for _ in range(4):  # nearly all settle in three
+        for _ in range(4):  # nearly all converge in three
             residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
             step = -residual / slope
             if _settled(x, step, slope, certificate, spread, depth):
                 return x + step
             x += step
     except (ValueError, ZeroDivisionError):
-        pass  # no sphere of this height has the contact
+        pass  # no sphere of this height has this contact
     return _bracketed_height(tension, f, a)
 
 
 def _bracketed_height(tension: float, f: float, a: float) -> float:
-    """Return the height in equilibrium; NaN where no root has the certificate.
+    """Return the height in equilibrium; NaN where no root passes the certificate.
 
-    Safeguarded Newton. A trial height is too small where the residual is positive and the
-    certificate holds; elsewhere it is too large. That splits the bracket at the physical root
-    alone: between the unphysical roots near flattening the certificate fails.
+    Newton's method inside a bracket. A trial height is too small where the residual is positive
+    and the certificate holds; elsewhere it is too large. So the bracket closes on the physical
+    root only: between the unphysical roots near flattening the certificate fails.
     """
     low, high = (tension - f) / (8.0 if a >= 0.0 else 16.0), 0.6 * tension
     x = min(max(low, _seed(tension, f)), high)
@@ -408,7 +422,7 @@ def _bracketed_height(tension: float, f: float, a: float) -> float:
         small, newton = False, math.nan
         try:
             residual, slope, certificate, spread, depth = _balance(x, tension, f, a, math.sqrt)
-            # With the text's sign a second root lies left of the fold; there the residual rises.
+            # With repulsion ('text') there is a second, smaller root where the residual rises.
             small = certificate > 0.0 and (
                 residual > 0.0 or (a < 0.0 and slope > 0.0 and x * x < -a)
             )
@@ -417,9 +431,9 @@ def _bracketed_height(tension: float, f: float, a: float) -> float:
                 if _settled(x, newton - x, slope, certificate, spread, depth):
                     return newton
         except (ValueError, ZeroDivisionError):
-            pass  # no sphere of this height has the contact: too large
+            pass  # no sphere of this height has this contact: too large
         low, high = (x, high) if small else (low, x)
-        # Newton where it stays inside and at least halves; else halve the decades.
+        # Take Newton's step if it stays inside and is at most half of the last; else bisect ln x.
         if not (low <= newton <= high and abs(newton - x) <= 0.5 * last):
             newton = math.sqrt(low * high)
         last = abs(newton - x)
@@ -430,9 +444,9 @@ def _bracketed_height(tension: float, f: float, a: float) -> float:
 
 
 def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
-    """Return the heights in equilibrium; NaN where no root has the certificate.
+    """Return the heights in equilibrium; NaN where no root passes the certificate.
 
-    Nine of ten rows settle in three steps; the others go on by themselves.
+    Nine of ten rows converge in three steps; only the others take further steps.
     """
     height, active = _seed(tension, f), np.arange(tension.size)
     x, p, load = height, tension, f
@@ -454,10 +468,10 @@ def _heights_of_rows(tension: Array, f: Array, a: float) -> Array:
 
 
 def _flattens(tension: Floats, f: Floats, a: float) -> Floats:
-    """Return where the force spreads the contact to the rim."""
+    """Return where the force extends the contact to the rim."""
     if a <= 0.0:
         return f >= tension
-    # The limit lies between P - 1.25 sqrt(2a) and P: most domes are far from it.
+    # The limit is between P - 1.25 sqrt(2a) and P: most forces are below this range.
     near = f > tension - 1.25 * math.sqrt(2.0 * a)
     if isinstance(near, bool):
         return near and f >= flattening_force(tension, a)
@@ -467,9 +481,9 @@ def _flattens(tension: Floats, f: Floats, a: float) -> Floats:
 
 
 def _hovers(x: Floats, f: Floats, a: float) -> Floats:
-    """Return where the floor repels a dome of height x as much as it is pressed, and none touches.
+    """Return where the repulsion of the floor carries the whole force, so that nothing touches.
 
-    True of the free dome it is true of every lower one, which is more curved.
+    If this holds for the free dome of height x, it holds for every lower (more curved) dome.
     """
     return f <= -a * (x + 1.0 / x)
 
@@ -481,12 +495,13 @@ def _shape(
     rho = 0.5 * (x + 1.0 / x)
     spread = (f + 2.0 * a * rho) / tension
     depth = spread / (rho + sqrt(rho * rho - spread))
-    # (1 - b²) = (c - a)(1/c - a) has no cancellation where the dome is nearly flat.
+    # gap = (1 - b²)/(1/c2 - depth), without cancellation where the dome is nearly flat.
     unspread = ((tension - f) - 2.0 * a * rho) / tension
     return x, depth, sqrt(spread), rho, unspread / (1.0 / x - depth)
 
 
 def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
+    """Return one pressed dome; raise `NoEquilibrium` where there is none."""
     r = pad.radius
     tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
     deficit = _deficit(pad, p)
@@ -498,7 +513,7 @@ def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
         _refuse(FLATTENED, pad, p, load, a)
     free = free_height(tension, deficit) if a <= 0.0 else math.nan
     x = free if _hovers(free, f, a) else _height_of_one(tension, f, a)
-    if math.isnan(x):  # past the fold where the text's sign ends the branch
+    if math.isnan(x):  # only with repulsion ('text'): beyond the fold that ends the branch
         _refuse(FLATTENED, pad, p, load, a)
     if _hovers(x, f, a):
         return Pressed(r * free, 0.0, 0.0, r * 0.5 * (free + 1.0 / free), r * free, 'no_contact')
@@ -506,10 +521,10 @@ def _press_one(pad: Pad, p: float, load: float, a: float) -> Pressed:
     return Pressed(r * height, r * depth, r * contact, r * rho, r * gap, 'ok')
 
 
-# Only domes far lower than an atom overflow or underflow: they fail the certificate.
+# Only domes lower than an atom overflow or underflow; these fail the certificate.
 @np.errstate(divide='ignore', invalid='ignore', over='ignore')
 def _press_rows(pad: Pad, p: Array, load: Array, a: float, lengths: Array) -> Codes:
-    """Write the five lengths of each row, return its code."""
+    """Write the five lengths of each row into ``lengths``; return the status codes."""
     r = pad.radius
     tension, f = p * (r / pad.stiffness), load / (math.pi * pad.stiffness * r)
     code = np.zeros(p.size, dtype=np.int8)
@@ -528,7 +543,7 @@ def _press_rows(pad: Pad, p: Array, load: Array, a: float, lengths: Array) -> Co
         rows = code == OK
     tension, f = tension[rows], f[rows]
     x = _heights_of_rows(tension, f, a)
-    # Without a certified root the force is past the fold, where the text's sign ends the branch.
+    # No certified root, only with repulsion ('text'): beyond the fold that ends the branch.
     code[rows] = np.isnan(x) * np.int8(FLATTENED)
     for row, length in zip(lengths, _shape(x, tension, f, a, np.sqrt), strict=True):
         row[rows] = r * length
@@ -542,51 +557,40 @@ def _press_rows(pad: Pad, p: Array, load: Array, a: float, lengths: Array) -> Co
 
 
 def signed_adhesion(pad: Pad, adhesion: str) -> float:
-    """Return the relative adhesion ``a`` of a pad; InvalidInput beyond what was checked."""
+    """Return the relative adhesion ``a`` of a pad; raise `InvalidInput` above 0.01."""
     if adhesion not in ADHESION_SIGNS:
         choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
     a = ADHESION_SIGNS[adhesion] * pad.adhesion_energy / pad.stiffness
     if abs(a) > LARGEST_ADHESION:
+        most = LARGEST_ADHESION * pad.stiffness
         raise InvalidInput(
-            f'adhesion_energy = {pad.adhesion_energy:g} J/m² is not allowed here: from 0 to '
-            f'{LARGEST_ADHESION:g} of the stiffness, {LARGEST_ADHESION * pad.stiffness:g} J/m²'
+            f'adhesion_energy = {pad.adhesion_energy:g} J/m² is not allowed here: from 0 to'
+            f' {most:g} J/m² ({LARGEST_ADHESION:g} of the stiffness) is needed'
         )
     return a
 
 
-def broadcast(p: Array, load: Array) -> tuple[Array, Array]:
-    """Return pressure and force in their common shape; InvalidInput where there is none."""
-    try:
-        first, second = np.broadcast_arrays(p, load)
-    except ValueError as error:
-        raise InvalidInput(
-            f'pressure of shape {np.shape(p)} and force of shape {np.shape(load)} do not broadcast'
-        ) from error
-    return first, second
-
-
 def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float = 0.0) -> NoReturn:
+    """Raise `NoEquilibrium` with the status of a code, and what pressure or force is needed."""
     unit = pad.stiffness / pad.radius
-    what = f'pressure {p:g} Pa' + ('' if load is None else f' with force {load:g} N')
-    what += f' on {pad} '
     if code == NO_INFLATION:
-        what += f'makes the dome grow without end: below {BURST * unit:.6g} Pa is needed'
+        why = (
+            f'the dome would grow without limit: a pressure below {BURST * unit:.6g} Pa is needed'
+        )
     elif code == FOLD_ZONE:
         most = largest_tension(a) * unit
-        what += f'has an answer that depends on the history of the load: up to {most:.6g} Pa '
-        what += 'is needed'
+        why = f'the shape depends on the history of the load: at most {most:.6g} Pa is allowed'
+    elif p == 0.0:
+        why = 'a pad without pressure is flat, so the contact covers it: more pressure is needed'
     else:
         most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
-        if p == 0.0:
-            what += 'spreads the contact over the whole pad: it is flat without pressure'
-        elif most <= 0.0:
-            what += (
-                'leaves the pad flat, for adhesion alone holds it there: more pressure is needed'
-            )
+        if most <= 0.0:
+            why = 'adhesion alone holds the pad flat: more pressure is needed'
         else:
-            what += f'spreads the contact over the whole pad: below {most:.6g} N is needed'
-            what += ' (and, with the repulsion of the text, less)' if a < 0.0 else ''
-    raise NoEquilibrium(what, str(STATUS[code]))
+            why = f'the contact would cover the whole pad: a force below {most:.6g} N is needed'
+            why += " (with adhesion='text' an even smaller force)" if a < 0.0 else ''
+    given = f'pressure = {p:g} Pa' + ('' if load is None else f', force = {load:g} N')
+    raise NoEquilibrium(f'{given} on {pad}: {why}', str(STATUS[code]))
 
 
 def words(code: Codes) -> npt.NDArray[np.str_]:

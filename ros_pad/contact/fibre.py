@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meniscus that a vertical fibre draws out of a wide bath, or pushes down into it."""
+"""Meniscus around a vertical fibre in a wide bath."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 
-# Radii over capillary length: what the exact method was checked in, and where the asymptote ends.
+# Radii over capillary length: range in which the exact method is checked, and upper end of the
+# range of the asymptote.
 THINNEST, THICKEST, THIN = 1e-6, 1e4, 0.1
 
 
@@ -30,37 +32,39 @@ def fibre_meniscus(
     gravity: npt.ArrayLike = GRAVITY,
     method: str = 'young_laplace',
 ) -> Floats:
-    """Return how high a liquid climbs the outside of a vertical fibre, m.
+    """Return the height to which a liquid climbs the outside of a vertical fibre, m.
 
     Parameters
     ----------
-    radius : float
-        Of the fibre, m; from 1e-6 to 1e4 capillary lengths sqrt(surface_tension / (density
-        gravity)) for ``young_laplace``, above 0 to 0.1 for ``derjaguin``.
-    surface_tension : float
-        N/m, above 0.
-    contact_angle : float
-        rad, from 0 to pi. Above pi/2 the liquid is pushed down: the height is negative.
-    density : float
-        Of the liquid less that of the gas, kg/m³, above 0.
-    gravity : float
-        m/s², above 0.
+    radius : float or array
+        Radius of the fibre, m; from 1e-6 to 1e4 capillary lengths sqrt(surface_tension / (density
+        gravity)) for ``young_laplace``, above 0 to 0.1 of them for ``derjaguin``.
+    surface_tension : float or array
+        Surface tension, N/m, above 0.
+    contact_angle : float or array
+        Contact angle, rad, from 0 to pi. Above pi/2 the liquid is pushed down: height below 0.
+    density : float or array
+        Density of the liquid minus that of the gas, kg/m³, above 0.
+    gravity : float or array
+        Gravity, m/s², above 0.
     method : {'young_laplace', 'derjaguin'}
-        Exact (scalars only), or the asymptote for thin fibres of Derjaguin and James, 0.006 %
-        high at 0.1 capillary lengths and complete wetting, but 0.7 and 1.5 % low there at 30 and
-        60 degrees; it takes arrays.
+        ``young_laplace`` is exact (scalars only). ``derjaguin`` is the asymptote for thin fibres
+        of Derjaguin and James (scalars and arrays). At 0.1 capillary lengths its error is
+        +0.006 % at complete wetting, -0.7 % at 30 degrees and -1.5 % at 60 degrees.
 
     Raises
     ------
     InvalidInput
-        For values that are not finite or not in range, or an unknown method.
+        When a value is not finite or out of range, shapes do not broadcast, or the method is
+        unknown.
 
     Notes
     -----
     With lengths in capillary lengths and ψ the slope angle of the surface at radius r and height
-    z, ``dr/dψ = -cos ψ / (z + sin ψ / r)`` and ``dz/dψ = sin ψ / (z + sin ψ / r)``. In ln ψ this
-    is smooth from the linear surface far away, ``z/ψ = K0(r)/K1(r)``, to the fibre. The asymptote
-    is ``ε cos θ (ln(4 / (ε (1 + sin θ))) - 0.57722)``, ε = radius in capillary lengths.
+    z, ``dr/dψ = -cos ψ / (z + sin ψ / r)`` and ``dz/dψ = sin ψ / (z + sin ψ / r)``. They are
+    integrated over ln ψ, from the linear surface far away, ``z/ψ = K0(r)/K1(r)``, to the fibre.
+    The asymptote is ``ε cos θ (ln(4 / (ε (1 + sin θ))) - 0.57722)`` with ε the radius in
+    capillary lengths.
 
     Examples
     --------
@@ -74,58 +78,56 @@ def fibre_meniscus(
     theta = check('contact_angle', contact_angle, 'rad', high=math.pi)
     rho = check('density', density, 'kg/m³', above=True)
     g = check('gravity', gravity, 'm/s²', above=True)
-    try:
-        length = np.sqrt(tension / (rho * g))
-        thickness = a / length + 0.0 * theta
-    except ValueError as error:
-        raise InvalidInput('the values do not broadcast') from error
+    names = 'radius, surface_tension, contact_angle, density and gravity'
+    a, tension, theta, rho, g = broadcast(names, a, tension, theta, rho, g)
+    length = np.sqrt(tension / (rho * g))
+    thickness = a / length
     if method == 'derjaguin':
         quantity('radius / capillary length', thickness, '(ratio)', high=THIN, above=True)
         cosine, sine = np.cos(theta), np.sin(theta)
         logarithm = np.log(4.0 / (thickness * (1.0 + sine))) - np.euler_gamma
-        height = length * thickness * cosine * logarithm
-        return float(height) if np.ndim(height) == 0 else height
+        return plain(length * thickness * cosine * logarithm)
     thickness = number('radius / capillary length', thickness, '(ratio)', THINNEST, THICKEST)
     return float(length) * _height(thickness, 0.5 * math.pi - theta)
 
 
 def _height(radius: float, slope: float) -> float:
-    """Return the height at a radius and slope angle there, in capillary lengths."""
+    """Return the height at a radius and slope angle, in capillary lengths."""
     if slope <= 0.0:
         return -_height(radius, -slope) if slope < 0.0 else 0.0
     return float(outer_surface(radius, slope)[2, -1])
 
 
 def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points: int = 2) -> Array:
-    """Return the surface of a wide bath outside a circle where it stands at a slope angle.
+    """Compute the surface of a wide bath outside a circle on which its slope angle is given.
 
     Parameters
     ----------
     radius : float
-        Of the circle, in capillary lengths, above 0.
+        Radius of the circle, in capillary lengths, above 0.
     slope : float
-        By which the surface falls outwards there, rad, above 0 and below pi. Above pi/2 it first
-        leads inwards, below what it hangs on.
+        Angle by which the surface falls outwards at the circle, rad, above 0 and below pi. Above
+        pi/2 the surface first goes inwards, under the circle.
     tolerance : float
-        Relative error of the heights, about.
+        Approximate relative error of the heights.
     points : int
-        How many to return, from 2.
+        Number of points to return, from 2.
 
     Returns
     -------
     array, shape (3, points)
-        Slope angle (rad), radius and height above the bath (capillary lengths) at places that
-        begin far away and end on the circle, evenly in the logarithm of the slope.
+        Slope angle (rad), radius and height above the bath (capillary lengths), from far away to
+        the circle, at equal steps of the logarithm of the slope.
     """
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
     from scipy.special import k0e
     from scipy.special import k1e
 
-    outer = 1e-6 * slope  # there the surface is linear to 1e-12
+    outer = 1e-6 * slope  # at this slope the surface is linear, with an error of 1e-12
 
     def surface(distance: float) -> Array:
-        """Return ln slope, r - radius and z of a surface that is linear at this distance."""
+        """Return ln slope, r - radius and z of a surface that is linear from this distance on."""
         start = radius + distance
 
         def rates(log: float, state: Array) -> tuple[float, float]:
@@ -146,7 +148,7 @@ def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points:
         )
         return np.vstack([path.t, path.y])
 
-    # A slope falls off at least as fast as exp(-2/3 distance).
+    # The slope decays at least as fast as exp(-2/3 distance), so 25 is far enough.
     distance = brentq(
         lambda far: math.log1p(surface(far)[1, -1] / radius), 0.0, 25.0, xtol=tolerance
     )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drainage of the liquid film under a pad, and how much dry contact it leaves.
+"""Drainage of the liquid film under a pad.
 
-A disc of radius a, pressed with pressure p on a film of thickness h and viscosity η, obeys the
+A disc of radius a, pressed with pressure p on a film of thickness h and viscosity η, follows the
 Stefan-Reynolds equation dh/dt = -2 p h³ / (3 η a²). In 1/h² it is linear, d(1/h²)/dt =
-4 p / (3 η a²), so that is the state that :class:`Film` keeps: its steps are exact.
+4 p / (3 η a²). :class:`Film` stores 1/h², so its time steps are exact.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 
 if TYPE_CHECKING:
     from ros_pad.contact.resistance import Foot
@@ -31,58 +32,63 @@ def film_thickness(
     time: ArrayLike,
     viscosity: float = WATER_VISCOSITY,
 ) -> np.ndarray | float:
-    """Film thickness in metres left under a disc after a time of squeezing.
+    """Return the film thickness under a disc after a time under pressure, m.
 
     Parameters
     ----------
-    initial : array_like
-        Thickness at time zero, m, > 0.
-    contact_pressure : array_like
-        Mean pressure under the disc, Pa, >= 0.
-    patch_radius : array_like
-        Radius of the disc, m, > 0.
-    time : array_like
-        Duration of the squeeze, s, >= 0.
+    initial : float or array
+        Thickness at time zero, m, above 0.
+    contact_pressure : float or array
+        Mean pressure under the disc, Pa, from 0.
+    patch_radius : float or array
+        Radius of the disc, m, above 0.
+    time : float or array
+        Duration, s, from 0.
     viscosity : float
-        Dynamic viscosity, Pa s, > 0.
+        Dynamic viscosity, Pa s, above 0.
 
     Returns
     -------
-    float or ndarray
-        h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2, broadcast over the inputs.
+    float or array
+        h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2 (Stefan-Reynolds), broadcast over the inputs.
 
     Raises
     ------
     InvalidInput
-        When a value is not finite or out of its range.
+        When a value is not finite or out of range, or shapes do not broadcast.
     """
     start = quantity('initial', initial, 'm', above=True)
     pressure = quantity('contact_pressure', contact_pressure, 'Pa')
     radius = quantity('patch_radius', patch_radius, 'm', above=True)
     duration = quantity('time', time, 's')
     eta = quantity('viscosity', viscosity, 'Pa s', above=True)
-    try:
-        drained = 4.0 * pressure * duration / (3.0 * eta * radius**2)
-        result = start / np.sqrt(1.0 + drained * start**2)
-    except ValueError as error:
-        raise InvalidInput('initial, pressure, radius and time do not broadcast') from error
-    return float(result) if np.ndim(result) == 0 else result
+    names = 'initial, contact_pressure, patch_radius, time and viscosity'
+    start, pressure, radius, duration, eta = broadcast(
+        names, start, pressure, radius, duration, eta
+    )
+    drained = 4.0 * pressure * duration / (3.0 * eta * radius**2)
+    return plain(start / np.sqrt(1.0 + drained * start**2))
 
 
 class Film:
-    """The liquid under one foot through one stance: under its domes and under its flat sole.
+    """The liquid film under one foot during one stance: under its domes and under its flat sole.
 
-    The film is squeezed out as the foot stands; it is taken to travel with the foot when the foot
-    slips (no new liquid is dragged in), see docs/assumptions.md. Domes touch on more ground as
-    their load grows, and what is new under them has not drained yet: 1/h² is then averaged over
-    the area. So a foot that is put down softly gains nothing from the moment when it is light.
+    The film drains while the foot stands. When the foot slips, the film is assumed to move with
+    it, without new liquid (docs/assumptions.md). The contact area of domes grows with their load,
+    and the added area has not drained yet: 1/h² is averaged over the area. So a light load at
+    touch-down does not drain the area that touches later.
 
     Parameters
     ----------
     foot : Foot
-        The foot that presses.
+        The foot that stands on the film.
     viscosity : float
-        Dynamic viscosity of the liquid, Pa s.
+        Dynamic viscosity of the liquid, Pa s, above 0.
+
+    Raises
+    ------
+    InvalidInput
+        When the viscosity is not finite or not above 0.
     """
 
     __slots__ = (
@@ -91,7 +97,8 @@ class Film:
 
     def __init__(self, foot: Foot, viscosity: float = WATER_VISCOSITY) -> None:
         number('viscosity', viscosity, 'Pa s', above=True)
-        # Domes: p acts on b² = A/(n π) each, A = N/p, hence d(1/h²)/dt = 4 π n p / (3 η A).
+        # Each of n domes has a disc of radius b, b² = A/(n π), with total area A = N/p, so
+        # d(1/h²)/dt = 4 π n p / (3 η A).
         self._dome_rate = 4.0 * math.pi * foot.pads / (3.0 * viscosity)
         self._sole_rate = 4.0 / (3.0 * viscosity * foot.sole_radius**2)
         self._area = foot.sole_area
@@ -99,13 +106,16 @@ class Film:
         self._dome_state = self._sole_state = self._fresh = math.inf
 
     def touch_down(self, thickness: float) -> None:
-        """Start a stance on a film of this thickness, m; zero means dry ground."""
+        """Start a stance on a film of this thickness, m, from 0; 0 is dry ground."""
         self._fresh = thickness**-2 if thickness > 0.0 else math.inf
         self._dome_state = self._sole_state = self._fresh
         self._dome_area = 0.0
 
     def drain(self, dome_load: float, sole_load: float, pressure: float, duration: float) -> None:
-        """Squeeze for a duration, s, with the loads, N, that domes and flat sole carry."""
+        """Drain for a duration, s, under the loads of domes and flat sole, N.
+
+        The gauge pressure, Pa, must be above 0 if the domes carry load.
+        """
         if dome_load > 0.0:
             area = dome_load / pressure
             if area > self._dome_area and self._fresh < math.inf:

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much force an inflated pad carries, by three named criteria, and the pressure for a force.
+"""Largest force on an inflated pad by three criteria, and the pressure for a force.
 
 ``measured``
-    A line through what was measured: on the pad itself, else the thesis' three measurements on its
-    large pad (0.15, 0.30, 0.40 N at 65, 75, 85 kPa), in proportion to the area.
+    A straight line through measurements: of this pad, or else the three measurements of the thesis
+    on its large pad (0.15, 0.30, 0.40 N at 65, 75, 85 kPa), in proportion to the area.
 ``max_depth``
-    The force at which the cap is cut off deepest: pressing on lets the dome collapse sideways.
+    The force at which the floor cuts deepest into the cap; under a larger force the dome
+    collapses sideways.
 ``flattening``
     The force at which the contact reaches the rim and the model ends.
 
-The two of the model use its default adhesion, and the variables of :mod:`ros_pad.contact.dome`.
+The last two follow from the model with its default adhesion; the code uses the dimensionless
+variables of :mod:`ros_pad.contact.dome`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import quantity
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import flattening_force
 from ros_pad.contact.dome import largest_tension
@@ -30,37 +34,36 @@ from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import quantity
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 from ros_pad.errors import NoEquilibrium
 
 CRITERIA = ('measured', 'flattening', 'max_depth')
 
-# The fit to the thesis' measurements on its large pad.
+# Line fitted to the thesis' measurements on its large pad.
 THESIS_LIMIT = MeasuredLimit(force=0.2833, pressure=75e3, slope=1.25e-5)
-# It measured nothing above 85 kPa; the line is drawn on to where that pad's model ends.
+# The thesis measured up to 85 kPa; the line is extrapolated to the end of this pad's model.
 _THESIS_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
-# Bounds, over the radius, of height and depth of the deepest dome at the model's largest
-# pressure. A second, uncertified solution has depths above 0.57.
+# Upper bounds of height and depth (over the radius) of the deepest dome. A second solution, which
+# fails the certificate, has depths above 0.57.
 _HIGHEST, _DEEPEST = 0.655, 0.55
 
 
 def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') -> Floats:
-    """Return the largest normal force one pad carries at a pressure, N.
+    """Return the largest normal force on one pad at a pressure, N.
 
     Parameters
     ----------
     pad : Pad
-        What the pad is made of.
+        Size and material.
     pressure : float or array
-        Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`);
-        for the thesis' measurements also at most 91.36 kPa, whatever the pad.
+        Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`).
+        With the measurements of the thesis also at most 91.36 kPa, for every pad.
     criterion : {'measured', 'flattening', 'max_depth'}
         ``measured`` is the pad's own ``measured_limit``. Without one it is
-        ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm and in proportion to the radius
-        squared for others, which nobody has measured.
+        ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm radius; for other radii this is
+        scaled with the radius squared, which has not been measured.
 
     Returns
     -------
@@ -71,9 +74,10 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
     Raises
     ------
     NoEquilibrium
-        For a scalar pressure above the end of the model: ``fold_zone``, or ``no_inflation``.
+        For a scalar pressure above the end of the model; status ``fold_zone`` or
+        ``no_inflation``.
     InvalidInput
-        For an unknown criterion, or a pressure that is negative, not finite, or past the
+        When the criterion is unknown, or a pressure is negative, not finite, or above the
         measurements.
     """
     choice('criterion', criterion, CRITERIA)
@@ -83,9 +87,9 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
     inside = tension <= largest_tension(a)
     if np.ndim(p) == 0 and not inside:
         status = 'fold_zone' if tension < BURST else 'no_inflation'
+        end = largest_tension(a) * pad.stiffness / pad.radius
         raise NoEquilibrium(
-            f'pressure {p:g} Pa on {pad} has no force limit: the model ends at '
-            f'{largest_tension(a) * pad.stiffness / pad.radius:.6g} Pa',
+            f'pressure = {p:g} Pa on {pad} has no force limit: up to {end:.6g} Pa is needed',
             status,
         )
     if criterion == 'measured':
@@ -99,22 +103,21 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         else:
             f = _deepest_force(tension, a)
         limit = f * (math.pi * pad.stiffness * pad.radius)
-    limit = np.where(inside, np.maximum(limit, 0.0), np.nan)
-    return float(limit) if limit.ndim == 0 else limit
+    return plain(np.where(inside, np.maximum(limit, 0.0), np.nan))
 
 
 def pressure_for(
     pad: Pad, force: npt.ArrayLike, criterion: str = 'measured', margin: npt.ArrayLike = 1.0
 ) -> Floats:
-    """Return the least pressure whose force limit is ``margin * force``, Pa gauge.
+    """Return the lowest pressure with a force limit of ``margin * force``, Pa gauge.
 
     Parameters
     ----------
     pad : Pad
-        What the pad is made of.
+        Size and material.
     force : float or array
-        Normal force on this one pad, N, from 0. For no force at all the answer is the pressure
-        at which the limit leaves zero.
+        Normal force on this one pad, N, from 0. For 0 the result is the pressure above which the
+        limit is above 0.
     criterion : {'measured', 'flattening', 'max_depth'}
         As for :func:`force_limit`.
     margin : float or array
@@ -128,45 +131,44 @@ def pressure_for(
     Raises
     ------
     NoEquilibrium
-        For scalars where no pressure up to the end of the model carries that force: a higher
-        one would be in the ``fold_zone``.
+        For scalars where no pressure up to the end of the model carries the force; status
+        ``fold_zone``.
     InvalidInput
-        For an unknown criterion, or values that are negative, not finite, or do not broadcast.
+        When the criterion is unknown, a value is negative or not finite, or shapes do not
+        broadcast.
     """
     choice('criterion', criterion, CRITERIA)
     load = quantity('force', force, 'N')
     factor = quantity('margin', margin, '(factor)', above=True)
-    try:
-        load = load * factor
-    except ValueError as error:
-        raise InvalidInput('force and margin do not broadcast') from error
+    load, factor = broadcast('force and margin', load, factor)
+    load = load * factor
     a = signed_adhesion(pad, 'matlab')
     end = largest_pressure(pad, criterion)
     strongest = force_limit(pad, end * (1.0 - 1e-15), criterion)
     carried = load <= strongest
     if np.ndim(load) == 0 and not carried:
         raise NoEquilibrium(
-            f'force {load:g} N (margin included) on {pad} is more than any pressure carries: '
-            f'at most {strongest:.6g} N at {end:.6g} Pa by the criterion {criterion}',
+            f'force times margin = {load:g} N on {pad} is too high for any pressure: at most'
+            f' {strongest:.6g} N, at {end:.6g} Pa, is allowed by the criterion {criterion}',
             'fold_zone',
         )
     load = np.where(carried, load, 0.0)
     if criterion == 'measured':
         line = measured_line(pad)
-        # A line that starts above zero carries small forces without any pressure.
+        # A line that is above 0 at pressure 0 carries small forces without any pressure.
         p = np.maximum(line.pressure + (load - line.force) / line.slope, 0.0)
     else:
         f = load / (math.pi * pad.stiffness * pad.radius)
         invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
         p = invert(f, a) * (pad.stiffness / pad.radius)
-    p = np.where(carried, p, np.nan)
-    return float(p) if p.ndim == 0 else p
+    return plain(np.where(carried, p, np.nan))
 
 
 def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
-    """Return the pressure, Pa gauge, at which a criterion's force limits end.
+    """Return the highest pressure for which a criterion has a force limit, Pa gauge.
 
-    That is the end of the pressed dome's model, or of the measurements if they end before.
+    This is the end of the model of the pressed dome. For ``measured`` it is at most 91.36 kPa, the
+    end of the thesis' line, if the pad has no ``measured_limit`` of its own.
     """
     choice('criterion', criterion, CRITERIA)
     end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
@@ -174,7 +176,7 @@ def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
 
 
 def measured_line(pad: Pad) -> MeasuredLimit:
-    """Return the line of measured force limits that holds for a pad: its own, or the thesis'."""
+    """Return the line of measured force limits for a pad: its own, or that of the thesis."""
     if pad.measured_limit is not None:
         return pad.measured_limit
     scale = (pad.radius / LARGE_PAD.radius) ** 2
@@ -184,12 +186,12 @@ def measured_line(pad: Pad) -> MeasuredLimit:
 
 
 def resized(pad: Pad, radius: float) -> Pad:
-    """Return a pad of another radius, m; what was measured of its force limit goes with its area.
+    """Return the pad with another radius, m; a measured force limit is scaled with the area.
 
     Raises
     ------
     InvalidInput
-        When the radius is not a finite number above zero.
+        When the radius is not finite or not above 0.
     """
     pad, old = replace(pad, radius=radius), pad
     line = pad.measured_limit
@@ -221,16 +223,16 @@ def _tension_at_deepest(f: Array, a: float) -> Array:
 
 
 def _heights(like: Array, a: float) -> tuple[Array, Array]:
-    """Return the heights between which the deepest domes of the model lie."""
+    """Return lower and upper bound of the heights of the deepest domes."""
     return math.sqrt(a / (2.0 - a)) + 1e-12 + 0.0 * like, _HIGHEST + 0.0 * like
 
 
 def _deepest(x: Array, a: float) -> tuple[Array, Array]:
-    """Return pressure ``P`` and force ``f`` at which a dome of height x is at its deepest.
+    """Return pressure ``P`` and force ``f`` at which a dome of height x has its largest depth.
 
-    Without the force, 3.53 and 3.58 say ``P A(x, d) = B(x, d)`` for height x and depth d. The
-    depth is greatest where also ``P dA/dx = dB/dx``, so ``A dB/dx = B dA/dx`` gives d for each x,
-    and the pressure follows. At the lowest pressures d reaches x first: the dome flattens.
+    Eliminating the force, 3.53 and 3.58 give ``P A(x, d) = B(x, d)`` for height x and depth d. The
+    depth is largest where also ``P dA/dx = dB/dx``, so ``A dB/dx = B dA/dx`` gives d for each x,
+    and then P. At the lowest pressures d reaches x first: the dome flattens.
     """
     rho = 0.5 * (x + 1.0 / x)
     rho_slope = 0.5 - 0.5 / (x * x)
@@ -250,20 +252,20 @@ def _deepest(x: Array, a: float) -> tuple[Array, Array]:
 
 
 def _rising_root(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Return where a rising function crosses zero (Illinois); the end where it does not."""
+    """Return the zero of a rising function (Illinois method); without a zero, the nearer end."""
     at_low, at_high = function(low), function(high)
-    # An end that is already past zero is the answer: close the bracket on it.
+    # Where the function does not change its sign, close the bracket on the nearer end.
     high = np.where(at_low >= 0, low, high)
     low = np.where(at_high <= 0, high, low)
     at_low, at_high = np.minimum(at_low, 0.0), np.maximum(at_high, 0.0)
     x = low
-    kept = np.zeros_like(low)  # which end stayed last time: -1 the low one, 1 the high one
+    kept = np.zeros_like(low)  # end that was kept in the last step: -1 the low one, 1 the high one
     for _ in range(100):
         rise = at_high - at_low
         new = high - at_high * (high - low) / np.where(rise > 0, rise, 1.0)
         value = function(new)
         above = value > 0
-        # An end that stays twice gets half its weight, so that the other one moves too.
+        # An end that is kept twice gets half its weight, so that the other end moves too.
         at_low = np.where(above, np.where(kept < 0, 0.5 * at_low, at_low), value)
         at_high = np.where(above, value, np.where(kept > 0, 0.5 * at_high, at_high))
         low, high = np.where(above, low, new), np.where(above, new, high)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured shapes and forces of pads, read from a CSV file whose header names quantity and unit.
 
-One wide table holds everything: a row says what was measured together and leaves the rest blank.
+All kinds of rows are in one table; cells in columns of other kinds stay empty.
 
 =====================  ==============================================  =========================
-row                    columns it needs                                and may have
+row                    required columns                                optional columns
 =====================  ==============================================  =========================
 free dome              pressure, height
 pressed dome           pressure, force, one of height, depth,          the others
@@ -31,7 +31,7 @@ import numpy.typing as npt
 from ros_pad.contact.pad import Array
 from ros_pad.errors import ConfigError
 
-# Factors to SI, the usual unit first, and the largest value in SI that is believed.
+# Factors to SI, usual unit first, and largest plausible value in SI.
 _UNITS = {
     'pressure': {'kPa': 1e3, 'Pa': 1.0, 'MPa': 1e6, 'mbar': 1e2, 'bar': 1e5, 'psi': 6894.757293},
     'length': {'mm': 1e-3, 'm': 1.0, 'cm': 1e-2, 'um': 1e-6, 'µm': 1e-6},
@@ -53,7 +53,7 @@ COLUMNS = {
 }
 SURFACE = 'surface'
 _SHAPE = ('height', 'depth', 'contact_radius', 'gap')
-# ``height [mm]``, ``height (mm)``, ``height/mm`` or ``height_mm``; the longest name that fits.
+# ``height [mm]``, ``height (mm)``, ``height/mm`` or ``height_mm``; longer names are tried first.
 _NAMES = '|'.join(sorted(COLUMNS, key=len, reverse=True))
 _HEAD = re.compile(rf'(?P<name>{_NAMES})(?:\s*\[(.*)\]|\s*\((.*)\)|\s*/(.*)|_(.*))?')
 
@@ -66,7 +66,7 @@ class FreeDomes(NamedTuple):
 
 
 class PressedDomes(NamedTuple):
-    """Pressed domes in Pa, N and m; NaN for what was not measured."""
+    """Pressed domes: pressure, Pa, force, N, lengths, m; NaN where not measured."""
 
     pressure: Array
     force: Array
@@ -77,17 +77,17 @@ class PressedDomes(NamedTuple):
 
 
 class ForceLimits(NamedTuple):
-    """Largest normal force on one pad, N, at a pressure, Pa."""
+    """Largest normal force on one pad, N, and its pressure, Pa."""
 
     pressure: Array
     force_limit: Array
 
 
 class Friction(NamedTuple):
-    """Tangential force at which a whole foot slips, N, at load, N, and pressure, Pa, 0 for flat.
+    """Tangential force at which a whole foot slips, N, with load, N, and pressure, Pa (0: flat).
 
-    ``wet`` says on which floor, and ``stance_time``, s, how long the foot had stood there (NaN
-    where it was not said).
+    ``wet`` is true on a wet floor; ``stance_time``, s, is the time from touch-down to slip (NaN
+    where not given).
     """
 
     pressure: Array
@@ -99,17 +99,14 @@ class Friction(NamedTuple):
 
 @dataclass(frozen=True)
 class Measurements:
-    """What one file of measurements holds, in SI units.
+    """Content of one file of measurements, in SI units.
 
     Attributes
     ----------
     source : str
-        The file.
-    free : FreeDomes
-    pressed : PressedDomes
-    force_limits : ForceLimits
-    friction : Friction
-        Each with one entry for a row of its kind, in the order of the file.
+        Path of the file.
+    free, pressed, force_limits, friction : FreeDomes, PressedDomes, ForceLimits, Friction
+        Arrays with one entry for each row of this kind, in the order of the file.
     """
 
     source: str
@@ -125,9 +122,9 @@ class Measurements:
         Raises
         ------
         ConfigError
-            Naming file, line and column: for a column that is not known or has no unit, for a
-            value that is no number or out of range, for a row that is of no kind, and for a file
-            without rows.
+            When the file cannot be read or has no rows, a column is unknown, has no unit or occurs
+            twice, a value is not a number or out of range, or a row is of no kind or of several.
+            The message names file, line and column.
         """
         source = os.fspath(path)
         try:
@@ -140,7 +137,10 @@ class Measurements:
         except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise ConfigError(f'{source}: cannot be read: {error}') from error
         if len(lines) < 2:
-            raise ConfigError(f'{source}: a header and at least one row are needed')
+            raise ConfigError(
+                f'{source}: a header and at least one row are needed besides comments and empty'
+                ' lines'
+            )
         header = _header(f'{source}:{lines[0][0]}', lines[0][1])
         rows: dict[str, list[dict[str, float]]] = {kind: [] for kind in _KINDS}
         for number, cells in lines[1:]:
@@ -169,7 +169,7 @@ class Measurements:
         )
 
 
-# Kind of a row by the columns that only it has.
+# Kinds of rows, and the columns by which a kind is recognised.
 _KINDS = {
     'friction': ('load', 'tangential_force', SURFACE, 'stance_time'),
     'limit': ('force_limit',),
@@ -191,28 +191,31 @@ def _header(where: str, cells: list[str]) -> list[tuple[str, float, float]]:
         match = _HEAD.fullmatch(head)
         if match is None:
             known = ', '.join((*COLUMNS, SURFACE))
-            raise ConfigError(f'{where}: column {head!r} is not known: {known}')
+            raise ConfigError(f'{where}: unknown column {head!r}; allowed are {known}')
         name, *given = match.groups()
         unit = next((text.strip() for text in given if text is not None), '')
         unit = unit.replace('\N{GREEK SMALL LETTER MU}', '\N{MICRO SIGN}')
         units = _UNITS[COLUMNS[name]]
         if unit not in units:
             raise ConfigError(
-                f'{where}: column {head!r} needs its unit, as in {name} [{next(iter(units))}]: '
+                f'{where}: column {head!r} needs a unit, as in {name} [{next(iter(units))}]: '
                 f'one of {", ".join(units)}'
             )
         columns.append((name, units[unit], _LARGEST[COLUMNS[name]]))
     names = [name for name, _, _ in columns]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ConfigError(f'{where}: column {twice[0]} is there twice')
+        raise ConfigError(f'{where}: column {twice[0]} occurs twice')
     return columns
 
 
 def _row(where: str, header: list[tuple[str, float, float]], cells: list[str]) -> dict[str, float]:
-    """Return what a line gives, in SI; ``surface`` as 0 for dry and 1 for wet."""
+    """Return the values of a line by column, in SI; ``surface`` is 0 for dry and 1 for wet."""
     if len(cells) > len(header) and any(cell.strip() for cell in cells[len(header) :]):
-        raise ConfigError(f'{where}: {len(cells)} values for {len(header)} columns')
+        raise ConfigError(
+            f'{where}: {len(cells)} values for {len(header)} columns: a row must not have more'
+            ' values than the header has columns'
+        )
     row = {}
     for (name, factor, largest), cell in zip(header, cells, strict=False):
         value = cell.strip()
@@ -220,7 +223,9 @@ def _row(where: str, header: list[tuple[str, float, float]], cells: list[str]) -
             continue
         if name == SURFACE:
             if value not in ('dry', 'wet'):
-                raise ConfigError(f'{where}: surface = {value!r} is not allowed: dry or wet')
+                raise ConfigError(
+                    f'{where}: surface = {value!r} is not allowed: dry or wet is needed'
+                )
             row[name] = float(value == 'wet')
             continue
         try:
@@ -229,26 +234,26 @@ def _row(where: str, header: list[tuple[str, float, float]], cells: list[str]) -
             raise ConfigError(f'{where}: {name} = {value!r} is not a number') from None
         if not 0.0 <= number <= largest:
             raise ConfigError(
-                f'{where}: {name} = {value} is not allowed: from 0 to {largest / factor:g} in the '
-                'unit of its column'
+                f'{where}: {name} = {value} is not allowed: from 0 to {largest / factor:g}, in the'
+                ' unit of the column, is needed'
             )
         row[name] = number
     return row
 
 
 def _kind(where: str, row: dict[str, float]) -> str:
-    """Return of which kind a row is; ConfigError where it mixes them or lacks something."""
+    """Return the kind of a row; raise `ConfigError` where it mixes kinds or lacks a column."""
     if row.get('force') == 0.0 and not row.keys() & {'depth', 'contact_radius', 'gap'}:
-        del row['force']  # an untouched dome
+        del row['force']  # a free dome
     kinds = [kind for kind, own in _KINDS.items() if row.keys() & set(own)]
-    if kinds == ['pressed', 'free']:  # a pressed dome has a height, too
+    if kinds == ['pressed', 'free']:  # pressed domes can have a height as well
         kinds = ['pressed']
     if len(kinds) != 1:
         given = ', '.join(row) or 'nothing'
         raise ConfigError(
-            f'{where}: a row is one of free dome (pressure, height), pressed dome (pressure, force'
-            ' and shape), force limit (pressure, force_limit) or friction (pressure, load,'
-            f' tangential_force, surface); this one gives {given}'
+            f'{where}: a row is a free dome (pressure, height), a pressed dome (pressure, force'
+            ' and shape), a force limit (pressure, force_limit) or friction (pressure, load,'
+            f' tangential_force, surface); this one has {given}'
         )
     needed = {
         'friction': ('pressure', 'load', 'tangential_force', SURFACE),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Liquid ring round a pressed dome, in closed form (thesis 3.65-3.82)."""
+"""Ring of liquid around a pressed dome, in closed form (thesis 3.65-3.82)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import choice
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.dome import Pressed
 from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 from ros_pad.errors import InvalidInput
 
 GRAVITY = 9.81  # m/s², as in the thesis' appendix
@@ -25,24 +27,22 @@ def contact_angle(solid_tension: npt.ArrayLike, surface_tension: npt.ArrayLike) 
     Parameters
     ----------
     solid_tension, surface_tension : float or array
-        Of the solid and of the liquid, N/m. The solid's must be from a quarter of the liquid's
-        (90 degrees) to all of it (complete wetting); elsewhere the formula means nothing.
+        Surface energy of the solid and surface tension of the liquid, N/m, above 0. Their ratio
+        must be from 0.25 (angle of 90 degrees) to 1 (complete wetting).
 
     Raises
     ------
     InvalidInput
-        For tensions that are not positive or finite, or outside that ratio.
+        When a tension is not finite or not above 0, the ratio is out of range, or shapes do not
+        broadcast.
     """
     solid = quantity('solid_tension', solid_tension, 'N/m', above=True)
     liquid = quantity('surface_tension', surface_tension, 'N/m', above=True)
-    try:
-        ratio = solid / liquid
-    except ValueError as error:
-        raise InvalidInput('solid_tension and surface_tension do not broadcast') from error
-    ratio = quantity('solid_tension / surface_tension', ratio, '(ratio)', low=0.25, high=1.0)
-    # acos(2 s - 1) with s = sqrt(ratio), in the form that keeps its digits at both ends.
-    angle = 2.0 * np.arcsin(np.sqrt(1.0 - np.sqrt(ratio)))
-    return float(angle) if np.ndim(angle) == 0 else angle
+    solid, liquid = broadcast('solid_tension and surface_tension', solid, liquid)
+    name = 'solid_tension / surface_tension'
+    ratio = quantity(name, solid / liquid, '(ratio)', low=0.25, high=1.0)
+    # acos(2 s - 1) with s = sqrt(ratio), in a form without cancellation at both ends.
+    return plain(2.0 * np.arcsin(np.sqrt(1.0 - np.sqrt(ratio))))
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,19 @@ class Liquid:
     Parameters
     ----------
     surface_tension : float
-        Of the liquid, N/m, above 0.
+        Surface tension of the liquid, N/m, above 0.
     solid_tension : float
         Surface energy of the solid, N/m, above 0.
     density : float
-        kg/m³, above 0.
+        Density, kg/m³, above 0.
     contact_angle : float, optional
-        rad, from 0 to below pi. By default it follows from the two tensions (3.81).
+        Contact angle, rad, from 0 to below pi. By default computed from the tensions (3.81).
 
     Raises
     ------
     InvalidInput
-        When a value is out of range, or no contact angle is given and the tensions have none.
+        When a value is out of range; without a contact angle also when the ratio of the tensions
+        is out of the range of :func:`contact_angle`.
     """
 
     surface_tension: float
@@ -82,28 +83,32 @@ class Liquid:
 
     @property
     def angle(self) -> float:
-        """Contact angle in use, rad: the one given, else that of the tensions."""
+        """Contact angle, rad: the given one, else the one computed from the tensions."""
         if self.contact_angle is None:
             return float(contact_angle(self.solid_tension, self.surface_tension))
         return self.contact_angle
 
 
 WATER = Liquid(surface_tension=0.073, solid_tension=0.027)
-# Both tensions of the thesis' appendix are ten times below those of water and silicone.
+# Both tensions in the appendix of the thesis are a tenth of those of water and silicone.
 THESIS_LIQUID = Liquid(surface_tension=0.0073, solid_tension=0.0027, contact_angle=1.35)
 
 
 @dataclass(frozen=True)
 class Meniscus:
-    """The ring of liquid round a contact. Floats for scalar input, arrays otherwise.
+    """The ring of liquid around a contact. Floats for scalar input, arrays otherwise.
 
     Attributes
     ----------
-    height : m, how far the liquid climbs the wall.
-    ring_radius : m, of the ring where liquid, wall and air meet (r_i).
-    tangential_force : N, Laplace pressure times the ring's section (F_cap). It is the bound that
-        one side alone would feel: round a whole symmetric ring it cancels.
-    status : that of the pressed dome; with ``no_contact`` there is no ring and all are 0.
+    height : float or array
+        Height to which the liquid climbs the wall, m.
+    ring_radius : float or array
+        Radius of the line where liquid, wall and air meet, m (r_i).
+    tangential_force : float or array
+        Laplace pressure times the section of the ring, N (F_cap). This is an upper bound for one
+        side of the ring; over a whole symmetric ring the force cancels.
+    status : str or array of str
+        Status of the pressed dome; with ``no_contact`` there is no ring and the numbers are 0.
     """
 
     height: Floats
@@ -113,24 +118,24 @@ class Meniscus:
 
 
 def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Meniscus:
-    """Return the liquid ring round a pressed dome.
+    """Compute the ring of liquid around a pressed dome.
 
     Parameters
     ----------
     pressed : Pressed
-        What :func:`ros_pad.contact.press` returned.
+        Result of :func:`ros_pad.contact.press`.
     liquid : Liquid
-        What wets the pad; its contact angle is ``liquid.angle``.
+        Liquid on the pad; its contact angle is ``liquid.angle``.
     reading : {'corrected', 'thesis'}
         ``thesis`` evaluates 3.80, 3.77 and 3.82 as printed. ``corrected`` solves the weight
-        balance exactly, hangs the weight from the liquid's tension, and takes the ring's own
-        curvature with its right sign in 3.70.
+        balance exactly, with the tension of the liquid (not of the solid), and uses the correct
+        sign of the curvature around the ring in 3.70.
 
     Raises
     ------
     InvalidInput
-        For an unknown reading, or where contact angle and wall angle together reach pi: there
-        the liquid is pushed down and has no ring.
+        When an argument has the wrong type, the reading is unknown, or contact angle plus wall
+        angle reach pi: then the liquid is pushed down and forms no ring.
 
     Notes
     -----
@@ -148,15 +153,16 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     status = np.asarray(pressed.status)
     b, sphere = np.asarray(pressed.contact_radius), np.asarray(pressed.sphere_radius)
     touching = b > 0
-    # Rows without a ring go through the formulas as a harmless one.
+    # Rows without a ring are computed with harmless values and replaced at the end.
     b, sphere = np.where(touching, b, 1.0), np.where(touching, sphere, 2.0)
     across = np.sqrt((sphere - b) * (sphere + b))
     theta = liquid.angle
     rise = (math.sin(theta) * across + math.cos(theta) * b) / sphere  # sin(θ + α)
     if np.any(touching & (rise <= 0)):
+        steepest = float(np.max(np.where(touching, np.arcsin(b / sphere), 0.0)))
         raise InvalidInput(
             f'contact_angle = {theta:g} rad is not allowed on this wall: '
-            f'below {math.pi - float(np.max(np.arcsin(b / sphere))):g} rad is needed'
+            f'below {math.pi - steepest:g} rad is needed'
         )
 
     rise = np.where(touching, rise, 1.0)
@@ -165,7 +171,7 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     m = 6.0 * tension * rise * across / (liquid.density * GRAVITY * b**3)
     y = np.sqrt(0.5 * m)
     if corrected:
-        for _ in range(7):  # convex, and 3.80 is above the root: Newton falls on it
+        for _ in range(7):  # convex, and 3.80 is above the root: Newton's method converges
             y = y - (((2.0 * y + 3.0) * y - m) * y - m) / ((6.0 * y + 6.0) * y - m)
     height = y * b * b / across
     ring = b * (1.0 + y)
@@ -186,31 +192,31 @@ def hysteresis_force(
     receding_angle: npt.ArrayLike,
     shape_factor: npt.ArrayLike = 1.0,
 ) -> Floats:
-    """Return the lateral force that pinning of a liquid ring can resist, N. Arrays broadcast.
+    """Return the largest lateral force of a pinned contact line, N. Arrays broadcast.
 
     Parameters
     ----------
     contact_radius : float or array
-        Of the wetted disc, m, from 0.
+        Radius of the wetted disc, m, from 0.
     surface_tension : float or array
-        Of the liquid, N/m, above 0.
+        Surface tension of the liquid, N/m, above 0.
     advancing_angle, receding_angle : float or array
-        Contact angles at which the line starts to move on and back, rad, from 0 to pi, the
-        advancing one at least the receding one.
+        Contact angles at which the line starts to move forwards and backwards, rad, from 0 to pi;
+        advancing >= receding.
     shape_factor : float or array
-        K, from pi/4 (the angle's cosine follows that of the azimuth) to 1 (it jumps between the
-        two halves of the line), which bounds the force.
+        K, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth) to 1
+        (two constant angles, one for each half of the line), which is the upper bound.
 
     Raises
     ------
     InvalidInput
-        For values that are not finite, not in range or do not broadcast.
+        When a value is not finite or out of range, or shapes do not broadcast.
 
     Notes
     -----
-    ``K γ w (cos θ_receding - cos θ_advancing)`` with w twice the contact radius. It is what a
-    symmetric ring, whose net tangential force is zero, can resist at most; 3.82 without its second
-    radius is this bound for angles of 180 and 0 degrees.
+    ``K γ w (cos θ_receding - cos θ_advancing)`` with w twice the contact radius. The tangential
+    force of a symmetric ring is zero, so a ring can resist motion by this hysteresis only. 3.82
+    without its second radius is this bound for angles of 180 and 0 degrees.
 
     Examples
     --------
@@ -222,13 +228,9 @@ def hysteresis_force(
     ahead = quantity('advancing_angle', advancing_angle, 'rad', high=math.pi)
     back = quantity('receding_angle', receding_angle, 'rad', high=math.pi)
     factor = quantity('shape_factor', shape_factor, '(factor)', low=0.25 * math.pi, high=1.0)
-    try:
-        quantity('advancing_angle - receding_angle', ahead - back, 'rad')
-        # cos(back) - cos(ahead), without cancellation.
-        drop = 2.0 * np.sin(0.5 * (ahead + back)) * np.sin(0.5 * (ahead - back))
-        force = factor * tension * 2.0 * r * drop
-    except InvalidInput:
-        raise
-    except ValueError as error:
-        raise InvalidInput('radius, tension, angles and factor do not broadcast') from error
-    return float(force) if np.ndim(force) == 0 else force
+    names = 'contact_radius, surface_tension, angles and shape_factor'
+    r, tension, ahead, back, factor = broadcast(names, r, tension, ahead, back, factor)
+    quantity('advancing_angle - receding_angle', ahead - back, 'rad')
+    # cos(back) - cos(ahead), without cancellation.
+    drop = 2.0 * np.sin(0.5 * (ahead + back)) * np.sin(0.5 * (ahead - back))
+    return plain(factor * tension * 2.0 * r * drop)

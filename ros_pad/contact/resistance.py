@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tangential resistance of a whole foot: flat or dome, dry or wet.
 
-The thesis writes F_re = μ N + τ A + F_cap (Eqs 3.65 to 3.67) and gives neither μ nor τ. Two
-contact areas turn that one law into the four states it describes:
+The thesis gives F_re = μ N + τ A + F_cap (Eqs 3.65 to 3.67), without values of μ and τ. The
+contact area A depends on the morphology and on the liquid film:
 
-- a *flat* sole conforms to the floor: A = N / p_c until the whole sole touches, which on dry
-  ground makes adhesion its larger part;
-- *domes* touch only where their air pressure p carries the load, A = N / p (Eq. 3.53 without
-  adhesion), several times less: a dome holds less on dry ground;
+- a *flat* sole conforms to the floor: A = N / p_c until the whole sole touches. On dry ground
+  most of its resistance is adhesion, τ A;
+- *domes* touch only where their air pressure p carries the load: A = N / p (Eq. 3.53 without
+  adhesion), several times less. On dry ground a dome has less resistance than a flat sole;
 - a liquid film of thickness h leaves dry contact on a share exp(-(h/h_c)^m) of the area, and
-  boundary friction on the rest; the high pressure under a dome drains it, the flat sole floats.
+  boundary friction on the rest. The high pressure under a dome drains the film; under a flat sole
+  it hardly drains.
 
-Domes past their force limit are pressed flat, and the sole carries what they cannot.
+Domes above their force limit are pressed flat; the flat sole carries the rest of the load.
 """
 
 from __future__ import annotations
@@ -21,46 +22,89 @@ import os
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
-from typing import Any
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad import configuration
+from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
+from ros_pad.configuration import choice
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
-from ros_pad.contact.pad import quantity
+from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import plain
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
 THICK_FILM = 1.0e-3
-"""Film of liquid that does not drain within a stance under a flat sole, m."""
+"""Thickness of a liquid film that does not drain under a flat sole within a stance, m."""
 
 DOMED = 0.85
-"""Share of the ceiling at which domes are taken to be walked on."""
+"""Typical pressure of domes while walking, as a share of the ceiling."""
+
+DISC_TURNING_RADIUS = 2.0 / 3.0
+"""Radius at which the friction of a turning disc acts, as a share of the disc's radius.
+
+Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 531, approximate the limit surface of a
+sliding contact by an ellipsoid through its largest force and its largest moment. For a disc of
+radius R under uniform pressure these are μN and 2/3 R μN."""
 
 FORCE_LIMITS = ('measured', 'max_depth', 'flattening')
 
-# Unit of each number of a foot, and whether it must be above zero.
-_UNITS = (
-    ('sole_radius', 'm', True),
-    ('friction', '(coefficient)', False),
-    ('shear_strength', 'Pa', False),
-    ('conforming_pressure', 'Pa', True),
-    ('boundary_friction', '(coefficient)', False),
-    ('critical_film', 'm', True),
-    ('film_exponent', '(exponent)', True),
-    ('shear_stiffness', 'N/m', True),
-    ('chamber_volume', 'm³', False),
-    ('ceiling', 'Pa', True),
-    ('capillary_force', 'N', False),
+PAD_SETTINGS = (
+    Setting('radius', float, 'Radius of the flat pad.', 'm', 1e-4, 1e-2),
+    Setting('stiffness', float, 'Tension stiffness of the membrane.', 'N/m', 1.0, 1e4),
+    Setting('adhesion_energy', float, 'Work of adhesion on the floor.', 'J/m²', 0.0, 1.0),
+)
+"""Settings of each pad in a foot file."""
+
+LIMIT_SETTINGS = (
+    Setting('force', float, 'Largest normal force at this pressure.', 'N', 0.0, 1e3),
+    Setting('pressure', float, 'Gauge pressure.', 'Pa', 1.0, 1e6),
+    Setting('slope', float, 'Slope of the limit over pressure.', 'N/Pa', 1e-9, 1.0),
+)
+"""Settings of the measured force limit in a foot file."""
+
+FOOT_SETTINGS = (
+    Setting('pads', int, 'Number of pads.', '', 1, 10000),
+    Setting('sole_radius', float, 'Radius of the sole.', 'm', 1e-3, 0.2),
+    Setting('friction', float, 'Dry friction in proportion to load.', '(coefficient)', 0.01, 3.0),
+    Setting('shear_strength', float, 'Shear strength of adhesive contact.', 'Pa', 0.0, 1e6),
+    Setting(
+        'conforming_pressure',
+        float,
+        'Mean pressure at which a flat sole touches all over.',
+        'Pa',
+        1.0,
+        1e7,
+    ),
+    Setting(
+        'boundary_friction',
+        float,
+        'Friction on a film that has not drained.',
+        '(coefficient)',
+        0.0,
+        3.0,
+    ),
+    Setting('critical_film', float, 'Film thickness for 1/e of dry contact.', 'm', 1e-9, 1e-3),
+    Setting('film_exponent', float, 'Steepness of the loss of contact.', '(exponent)', 0.1, 10.0),
+    Setting('shear_stiffness', float, 'Tangential stiffness of the foot.', 'N/m', 1.0, 1e7),
+    Setting('chamber_volume', float, 'Air volume without the domes.', 'm³', 0.0, 1e-3),
+    Setting('ceiling', float, 'Highest gauge pressure allowed.', 'Pa', 1e3, 1e6),
+    Setting('capillary_force', 0.0, 'Tangential force of the liquid on a dome.', 'N', 0.0, 1.0),
+)
+"""The other settings of a foot file."""
+
+_MAY_BE_ZERO = (
+    *('friction', 'shear_strength', 'boundary_friction', 'chamber_volume', 'capillary_force'),
 )
 
 
@@ -71,11 +115,11 @@ class Foot:
     Attributes
     ----------
     source : str
-        Name of the shipped foot, or path of the file, that describes it.
+        Name of the shipped foot, or path of the foot file.
     pad : Pad
         One pad.
     pads : int
-        How many of them share the load.
+        Number of pads that share the load.
     sole_radius : float
         Radius of the sole, m.
     friction : float
@@ -85,22 +129,28 @@ class Foot:
     conforming_pressure : float
         Mean pressure at which a flat sole touches all over, Pa.
     boundary_friction : float
-        Friction coefficient on a film that does not drain.
+        Friction coefficient on a film that has not drained.
     critical_film : float
-        Film thickness that leaves 1/e of dry contact, whatever the exponent, m.
+        Film thickness that leaves 1/e of dry contact, for every exponent, m.
     film_exponent : float
-        How sharply contact is lost with film thickness.
+        Exponent m: how steeply contact is lost with film thickness.
     shear_stiffness : float
         Tangential stiffness of sole and pads, N/m.
     chamber_volume : float
-        Air in the foot besides that under the pads, m³.
+        Volume of air in the foot without the domes, m³.
     ceiling : float
         Highest gauge pressure that may be commanded, Pa.
     limit : str
         Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
     capillary_force : float
-        Tangential force that liquid round one dome on wet ground adds, F_cap of Eq. 3.65, N: from
-        ``pad wet``, or measured. 0 leaves it out.
+        Tangential force that the liquid around one dome adds on wet ground, F_cap of Eq. 3.65, N:
+        from ``pad wet``, or measured. 0 for none.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of range, the pads do not fit on the sole, or there is no
+        force limit at the ceiling.
     """
 
     source: str
@@ -122,67 +172,54 @@ class Foot:
     _limit_cell: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name, unit, positive in _UNITS:
-            number(name, getattr(self, name), unit, above=positive)
-        if not isinstance(self.pads, int) or self.pads < 1:
-            raise InvalidInput(f'pads = {self.pads!r} is not allowed: a whole number from 1')
+        for each in FOOT_SETTINGS[1:]:
+            above = each.name not in _MAY_BE_ZERO
+            number(each.name, getattr(self, each.name), each.unit, above=above)
+        integer('pads', self.pads, 1)
         if self.pads * math.pi * self.pad.radius**2 > self.sole_area:
             raise InvalidInput(
-                f'pads = {self.pads} is not allowed: so many of radius {self.pad.radius:g} m'
-                f' do not fit on a sole of sole_radius = {self.sole_radius:g} m'
+                f'pads = {self.pads} of radius {self.pad.radius:g} m do not fit on a sole with'
+                f' sole_radius = {self.sole_radius:g} m: the area of the sole allows at most'
+                f' {int((self.sole_radius / self.pad.radius) ** 2)}'
             )
         choice('limit', self.limit, FORCE_LIMITS)
-        # The limit is asked for at every simulated step: tabulate it once, about each 0.5 kPa.
+        # Every simulated step needs the limit: tabulate it once, in steps of about 0.5 kPa.
         cells = math.ceil(self.ceiling / 500.0)
         try:
             force_limit(self.pad, self.ceiling, self.limit)
         except (NoEquilibrium, InvalidInput) as error:
-            raise InvalidInput(
-                f'no force limit is known up to ceiling = {self.ceiling:g} Pa: {error}'
-            ) from error
+            raise InvalidInput(f'ceiling = {self.ceiling:g} Pa is not allowed: {error}') from error
         limits = force_limit(self.pad, np.linspace(0.0, self.ceiling, cells + 1), self.limit)
         object.__setattr__(self, '_limit_table', tuple((self.pads * limits).tolist()))
         object.__setattr__(self, '_limit_cell', self.ceiling / cells)
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Foot:
-        """Read ``config/feet/<name>.yaml`` or a file of one's own.
+        """Read ``config/feet/<name>.yaml`` or another foot file.
 
         Raises
         ------
         ConfigError
-            Naming file, key, value and allowed range.
+            When the file is missing, or a key or value is not allowed. The message names file,
+            key, value and allowed range.
         """
         path = configuration.locate('feet', name_or_path)
         table = Table.load(path)
         table.text('description', default='')
-        with table.table('pad') as pad_table:
-            pad = Pad(
-                radius=pad_table.number('radius', 'm', 1e-4, 1e-2),
-                stiffness=pad_table.number('stiffness', 'N/m', 1.0, 1e4),
-                adhesion_energy=pad_table.number('adhesion_energy', 'J/m2', 0.0, 1.0),
-                measured_limit=_measured_limit(pad_table),
-            )
-        values: dict[str, Any] = {
-            'pads': table.integer('pads', 1, 10000),
-            'sole_radius': table.number('sole_radius', 'm', 1e-3, 0.2),
-            'friction': table.number('friction', '(coefficient)', 0.01, 3.0),
-            'shear_strength': table.number('shear_strength', 'Pa', 0.0, 1e6),
-            'conforming_pressure': table.number('conforming_pressure', 'Pa', 1.0, 1e7),
-            'boundary_friction': table.number('boundary_friction', '(coefficient)', 0.0, 3.0),
-            'critical_film': table.number('critical_film', 'm', 1e-9, 1e-3),
-            'film_exponent': table.number('film_exponent', '(exponent)', 0.1, 10.0),
-            'shear_stiffness': table.number('shear_stiffness', 'N/m', 1.0, 1e7),
-            'chamber_volume': table.number('chamber_volume', 'm3', 0.0, 1e-3),
-            'ceiling': table.number('ceiling', 'Pa', 1e3, 1e6),
-            'limit': table.choice('force_limit', FORCE_LIMITS, default='measured'),
-            'capillary_force': table.number('capillary_force', 'N', 0.0, 1.0, default=0.0),
-        }
+        with table.table('pad') as part:
+            pad = Pad(**part.values(PAD_SETTINGS), measured_limit=_measured_limit(part))
+        values = table.values(FOOT_SETTINGS)
+        limit = table.choice('force_limit', FORCE_LIMITS, default='measured')
         table.finish()
         try:
-            return cls(source=os.fspath(name_or_path), pad=pad, **values)
+            return cls(source=os.fspath(name_or_path), pad=pad, limit=limit, **values)
         except InvalidInput as error:
             raise ConfigError(f'{table.origin}: {error}') from error
+
+    @property
+    def turning_radius(self) -> float:
+        """Lever of friction against turning about the vertical, m."""
+        return DISC_TURNING_RADIUS * self.sole_radius
 
     @property
     def sole_area(self) -> float:
@@ -190,28 +227,31 @@ class Foot:
         return math.pi * self.sole_radius**2
 
     def on_rough(self, roughness: float) -> Foot:
-        """Return this foot as it is on a floor with a texture of its own.
+        """Return the foot with its constants on a rough floor.
 
         Parameters
         ----------
         roughness : float
-            Root mean square height of the texture under a foot, m, >= 0.
+            Root mean square height of the floor under a foot, m, from 0.
 
         Returns
         -------
         Foot
-            With a critical film and a conforming pressure that are larger by the factor
-            √(1 + (roughness/critical_film)²). The critical film stands for the roughness of pad
-            and smooth floor; heights of floor and pad are taken to be independent, Gaussian and
-            of one wavelength. Then what a film must cover is their composite, as in the
-            film-thickness ratio of mixed lubrication (Tallian 1967), and the mean slope, hence the
-            pressure at which soft rubber touches everywhere (Persson 2001), grows by the same.
-            That valleys hold liquid is left out.
+            With critical film and conforming pressure increased by the factor
+            √(1 + (roughness/critical_film)²).
 
         Raises
         ------
         InvalidInput
             When the roughness is negative or not finite.
+
+        Notes
+        -----
+        The critical film represents the roughness of the pad and a smooth floor. Heights of floor
+        and pad are assumed independent, Gaussian and of one wavelength. Then the film must cover
+        the composite roughness (film-thickness ratio of mixed lubrication, Tallian 1967). The mean
+        slope grows by the same factor, and with it the pressure at which soft rubber touches
+        everywhere (Persson 2001). Liquid stored in valleys is ignored.
         """
         number('roughness', roughness, 'm')
         if not roughness:
@@ -225,14 +265,15 @@ class Foot:
         )
 
     def air_volume(self, pressure: float) -> float:
-        """Air that pads and chamber hold at a gauge pressure, Pa: m³ (free domes)."""
+        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³."""
         domes = self.pads * float(inflate(self.pad, pressure).volume) if pressure > 0.0 else 0.0
         return self.chamber_volume + domes
 
     def dome_load(self, load: float, pressure: float) -> float:
-        """Part of the load, N, that the domes carry at a gauge pressure, Pa: up to their limit.
+        """Return the part of the load, N, that the domes carry at a gauge pressure, Pa.
 
-        Made to be fast: nothing is checked. Above the ceiling the limit stays what it is there.
+        At most their force limit; above the ceiling, the limit at the ceiling. For speed the input
+        is not checked.
         """
         if pressure <= 0.0:
             return 0.0
@@ -253,10 +294,22 @@ class Foot:
         dome_film: float,
         sole_film: float,
     ) -> float:
-        """Resistance in newtons for a given share of the load: the kernel, scalars only."""
+        """Return the tangential resistance, N, for given loads of domes and flat sole.
+
+        For speed the input is not checked; scalars only.
+
+        Parameters
+        ----------
+        dome_load, sole_load : float
+            Normal force on the domes and on the flat sole, N, from 0.
+        pressure : float
+            Gauge pressure, Pa, from 0.
+        dome_film, sole_film : float
+            Thickness of the film under the domes and under the flat sole, m, from 0 (dry).
+        """
         total = under_domes = 0.0
         if dome_load > 0.0:
-            # Where the air presses less than it takes to conform, only a share touches.
+            # Below the conforming pressure, only a share of the dome's contact area touches.
             under_domes = dome_load / max(pressure, self.conforming_pressure)
             dry = self.friction * dome_load + self.shear_strength * under_domes
             total += self._on_film(dry, dome_load, dome_film)
@@ -269,6 +322,7 @@ class Foot:
         return total
 
     def _on_film(self, dry: float, load: float, film: float) -> float:
+        """Return the resistance, N, with a film, from the dry resistance and the load, N."""
         if film <= 0.0:
             return dry
         touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
@@ -279,11 +333,7 @@ def _measured_limit(pad_table: Table) -> MeasuredLimit | None:
     if 'measured_limit' not in pad_table:
         return None
     with pad_table.table('measured_limit') as table:
-        return MeasuredLimit(
-            force=table.number('force', 'N', 0.0, 1e3),
-            pressure=table.number('pressure', 'Pa', 1.0, 1e6),
-            slope=table.number('slope', 'N/Pa', 1e-9, 1.0),
-        )
+        return MeasuredLimit(**table.values(LIMIT_SETTINGS))
 
 
 def tangential_resistance(
@@ -293,32 +343,33 @@ def tangential_resistance(
     dome_film: ArrayLike = 0.0,
     sole_film: ArrayLike = 0.0,
 ) -> np.ndarray | float:
-    """Largest tangential force that a foot holds, N (Eqs 3.65 to 3.67 with a film model).
+    """Return the largest tangential force of a foot, N (Eqs 3.65 to 3.67 with a film model).
 
     Parameters
     ----------
     foot : Foot
         The foot.
-    load : array_like
-        Normal force on the foot, N, >= 0.
-    pressure : array_like
+    load : float or array
+        Normal force on the foot, N, from 0.
+    pressure : float or array
         Gauge pressure in the pads, Pa, from 0 (flat) to ``foot.ceiling``.
-    dome_film, sole_film : array_like
-        Liquid film under the domes and under the flat sole, m, >= 0; 0 is dry ground.
+    dome_film, sole_film : float or array
+        Liquid film under the domes and under the flat sole, m, from 0 (dry ground).
 
     Returns
     -------
-    float or ndarray
-        Resistance in newtons, broadcast over the inputs. The capillary force is what the foot
-        says, by default none: the hysteresis of a contact line
-        (:func:`ros_pad.contact.hysteresis_force`) is at most 1e-3 of the friction of a loaded pad.
+    float or array
+        Resistance, N, broadcast over the inputs. It includes ``foot.capillary_force``, by default
+        0: the hysteresis of a contact line (:func:`ros_pad.contact.hysteresis_force`) is at most
+        1e-3 of the friction of a loaded pad.
 
     Raises
     ------
     InvalidInput
-        When a value is not finite or out of its range.
+        When a value is not finite or out of range, or shapes do not broadcast.
     """
-    values = (
+    values = broadcast(
+        'load, pressure and films',
         quantity('load', load, 'N'),
         quantity('pressure', pressure, 'Pa', high=foot.ceiling),
         quantity('dome_film', dome_film, 'm'),
@@ -329,15 +380,11 @@ def tangential_resistance(
         on_domes = foot.dome_load(load, pressure)
         return foot.resistance_of(on_domes, load - on_domes, pressure, dome_film, sole_film)
 
-    try:
-        result = np.vectorize(one, otypes=[float])(*values)
-    except ValueError as error:
-        raise InvalidInput('load, pressure and films do not broadcast') from error
-    return float(result) if result.ndim == 0 else result
+    return plain(np.vectorize(one, otypes=[float])(*values))
 
 
 class ExpectedFriction(NamedTuple):
-    """Coefficients of friction of a foot, flat on dry and on wet ground, and as a dome."""
+    """Friction coefficients of a foot: flat on dry and on wet ground, and as a dome."""
 
     flat_dry: float
     flat_wet: float
@@ -345,9 +392,9 @@ class ExpectedFriction(NamedTuple):
 
 
 def expected_friction(foot: Foot, load: float) -> ExpectedFriction:
-    """Return what the contact model lets expect of a foot under a load, N, > 0.
+    """Return the friction coefficients of a foot by the contact model, at a load, N, above 0.
 
-    A dome holds about the same on wet and dry ground.
+    The coefficient of a dome is about the same on wet and dry ground.
     """
     return ExpectedFriction(
         float(tangential_resistance(foot, load, 0.0)) / load,

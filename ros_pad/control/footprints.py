@@ -1,90 +1,96 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of where the ground was felt: hind feet step where fore feet have been."""
+"""Memory of where ground was wet or dry, because hind feet step where fore feet have stood."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import number
+from ros_pad.estimation import Tuning
 
 PRIOR_EVIDENCE = 2.0
-"""Footprints that the prior of the wet share is worth: Beta(1, 1) where it is one half."""
+"""Weight of the prior of the wet share, in footprints: for a prior of 1/2 this is Beta(1, 1)."""
 
 MOST_EVIDENCE = 12.0
-"""Footprints that the wet share rests on at most, the prior's included: floors change."""
+"""Largest weight of all footprints and the prior together: older footprints lose weight, because
+floors change.
+"""
 
 
 class Footprints:
-    """Remembers flat footprints of all legs, and what each said about the ground.
+    """Footprints of the flat feet of all legs, and the wet share estimated from them.
 
-    Wetness is taken to fade with distance d as in a chain of patches of two kinds,
-    P(d) = P0 + (P - P0) exp(-d / ℓ), and of all footprints the one that says most is believed; of
-    equal ones the last.
+    With the distance d from a footprint, the probability fades to the prior as in a two-state
+    Markov chain of patches, P(d) = P0 + (P - P0) exp(-d / ℓ). Only the footprint whose P(d) is
+    farthest from P0 counts, and of equally far ones the last.
 
-    The share of wet ground is learnt as the mean of a Beta distribution: a footprint that says P
-    counts |2P - 1| (1 - exp(-w / ℓ)), w being the way since the last one, so that neither feet
-    that could not tell nor many feet on one patch count for much.
+    The wet share is estimated as the mean of a Beta distribution. A footprint with P has the
+    weight |2P - 1| (1 - exp(-w / ℓ)), with w the distance since the last footprint: footprints
+    with P near 1/2, and many footprints on one patch, count little.
 
     Parameters
     ----------
     wet_prior : float
-        Probability P0 of wet ground where nothing is known, 0 to 1.
+        Prior probability P0 of wet ground, 0 to 1.
     fading_length : float
         ℓ, m, above 0.
     memory : int
-        How many footprints are kept, 1 or more.
+        Number of footprints that are kept, 1 or more.
 
     Raises
     ------
     InvalidInput
-        Naming the value that is outside its range.
+        When a value is outside its range; the message names it.
     """
 
     def __init__(
-        self, wet_prior: float = 0.5, fading_length: float = 1.0, memory: int = 60
+        self, wet_prior: float = Tuning.wet_prior, fading_length: float = 1.0, memory: int = 60
     ) -> None:
         self._wet_prior = number('wet_prior', wet_prior, '(probability)', high=1.0)
         self.fading_length = number('fading_length', fading_length, 'm', above=True)
         number('memory', memory, 'footprints', low=1.0)
         self._prints: deque[tuple[float, float, float]] = deque(maxlen=memory)
-        self._wet, self._told = PRIOR_EVIDENCE * self._wet_prior, PRIOR_EVIDENCE
+        self._wet, self._evidence = PRIOR_EVIDENCE * self._wet_prior, PRIOR_EVIDENCE
 
     def add(self, x: float, y: float, wet_probability: float, walked: float = 0.0) -> None:
-        """Remember what a flat foot felt at a position, m.
+        """Add a footprint of a flat foot.
 
         Parameters
         ----------
         x, y : float
-            Position, m.
+            Position of the foot, m.
         wet_probability : float
-            What it felt.
+            Probability of wet ground that the foot has estimated, 0 to 1.
         walked : float
-            Way since the last footprint, m: of a patch that was felt before little is new.
+            Distance since the last footprint, m: the shorter it is, the less this footprint counts
+            in the wet share.
         """
         self._prints.append((x, y, wet_probability - self._wet_prior))
-        # A foot that could not tell counts for nothing.
         new = -math.expm1(-walked / self.fading_length) * abs(2.0 * wet_probability - 1.0)
-        keep = min(1.0, MOST_EVIDENCE / (self._told + new))
+        keep = min(1.0, MOST_EVIDENCE / (self._evidence + new))
         self._wet = keep * (self._wet + new * wet_probability)
-        self._told = keep * (self._told + new)
+        self._evidence = keep * (self._evidence + new)
 
     @property
     def wet_share(self) -> float:
-        """Share of wet ground that has been learnt."""
-        return self._wet / self._told
+        """Estimated share of wet ground, 0 to 1."""
+        return self._wet / self._evidence
 
     def wet_probability(self, x: float, y: float) -> float:
-        """Probability that the ground is wet at a position, m."""
+        """Return the probability that the ground is wet at a position, m."""
         return self._wet_prior + self._strongest(x, y)[0]
 
     def wet_expected(self, x: float, y: float) -> float:
-        """Probability of wet ground that fades to the share learnt, not to the prior."""
+        """Return the probability that the ground is wet at a position, m, from the wet share.
+
+        Far from all footprints this is the wet share, where :meth:`wet_probability` is the prior.
+        """
         felt, known = self._strongest(x, y)
         return self._wet_prior + felt + (1.0 - known) * (self.wet_share - self._wet_prior)
 
     def _strongest(self, x: float, y: float) -> tuple[float, float]:
-        """Return what is felt there above the prior, and how like it is to where it was felt."""
+        """Return the largest excess over the prior at a position, m, and its fading factor."""
         best, known = 0.0, 0.0
         for at_x, at_y, excess in self._prints:
             likeness = math.exp(-math.hypot(x - at_x, y - at_y) / self.fading_length)

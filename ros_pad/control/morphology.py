@@ -1,263 +1,113 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flat or dome: the choice for each foot's next step.
+"""Choose flat or dome for the next step of each foot.
 
-A foot never changes shape while it stands. It decides when it lifts off, so that the air has the
-swing to move, and keeps the shape to the next lift-off. A foot whose air fails goes flat, or keeps
-what it has, and the others go on.
+A foot never changes its morphology while it stands. The choice is made at lift-off, so that the
+pad can fill or vent during the swing, and is kept until the next lift-off. A foot whose air fails
+becomes flat, or keeps its morphology; the other feet are not affected.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import field
+from typing import NamedTuple
 
-from ros_pad.contact.pad import choice as one_of
-from ros_pad.contact.pad import number
+from ros_pad.configuration import Setting
+from ros_pad.configuration import choice as one_of
+from ros_pad.configuration import number
+from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
+from ros_pad.control.monitor import PadMonitor
+from ros_pad.control.monitor import RunningMedian
+from ros_pad.control.policies import DOME
+from ros_pad.control.policies import FLAT
+from ros_pad.control.policies import Choice
+from ros_pad.control.policies import LiftOff
+from ros_pad.control.policies import Policy
 from ros_pad.control.pressure import dome_pressure
-from ros_pad.control.probing import Plan
 from ros_pad.control.probing import Planner
 from ros_pad.control.probing import Stakes
 from ros_pad.control.probing import Step
-from ros_pad.control.watch import PadWatch
-from ros_pad.control.watch import RunningMedian
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
+from ros_pad.estimation.load_gate import LIFT_OFF_SHARE
+from ros_pad.estimation.load_gate import TOUCH_DOWN
+from ros_pad.estimation.load_gate import LoadGate
 
-FLAT = 'flat'
-DOME = 'dome'
+COMMAND_TIMEOUT = Setting(
+    'command_timeout', 0.5, 'A pad is vented when it has received no set-point for this long.',
+    's', 0.02, 60.0,
+)  # fmt: skip
+"""Time without a set-point after which a regulator vents its pad. The controller uses the same
+time: a leg that has no estimates for longer counts as flat."""
 
-LOWEST_DOME = 1000.0
-"""Gauge pressure below which a pad is flat, Pa; who asks for less of a dome meant kilopascals."""
+MARGIN = Setting(
+    'margin', 1.2, 'Pressure margin: factor on the load when the pressure of a dome is chosen.',
+    '', 1.0, 5.0,
+)  # fmt: skip
 
-TOUCH_DOWN = 0.3
-"""Of the expected load, above the gate, at which a foot stands again: noise makes no steps.
-
-Nor does a foot that lands: it touches with up to 0.55 of its load (0.8 on rough ground), and is
-light once more until the other tripod lifts off.
-"""
-
-UNFELT = 0.5
-"""Without an estimate for so long a leg is flat, s: the regulators vent it then."""
+LIFT_OFF = Setting(
+    'lift_off_share', LIFT_OFF_SHARE,
+    'Share of the expected load below which a foot has lifted off; it stands again at this share'
+    ' plus 0.3.',
+    '', 0.01, 0.6,
+)  # fmt: skip
 
 FIRST_WAIT = 5
-"""Steps for which a foot whose air failed is flat before a dome is tried again."""
+"""Number of flat steps after a fault of the air before a dome is tried again."""
 
 LONGEST_WAIT = 40
-"""The wait doubles with each try in vain, up to so many steps."""
+"""Largest number of flat steps between two tries; the number doubles with each failed try."""
 
 FURTHEST_LEAD = 3
-"""Steps that a foot with a slow hose looks further ahead at most."""
+"""Largest lead of a leg with a slow hose, steps."""
 
 
-@dataclass(frozen=True)
-class LiftOff:
-    """What a policy knows when a foot lifts off.
+class FootState(NamedTuple):
+    """Inputs of a decision about a foot, all of one time.
 
     Attributes
     ----------
-    leg : int
-        Number of the leg.
-    morphology : str
-        Shape of the step that ends, ``flat`` or ``dome``.
-    steps : float
-        Steps taken since that shape was chosen, this one counted; infinite for the shape that the
-        foot started with, which nobody chose of late.
-    probing : bool
-        Whether that step was a probe.
-    wet_ahead : float
-        Probability that the ground is wet where the foot will stand next.
-    next_position : tuple of float
-        Where that is, m.
-    others_probing : bool
-        Whether another leg is probing now.
-    wet_expected : float
-        As ``wet_ahead``, but where nothing is known it is the share of wet ground on the way so
-        far, not the prior.
-    plan : Plan
-        What the walk so far advises.
-    lead : int
-        Whole steps that the foot needs to fill beyond its swing; 0 where the swing is enough.
-    wet_beyond : float
-        Highest probability of wet ground in that many steps after the next one; 0 without such.
-        A policy that fills a pad early heeds it. The adaptive one does not: measured, it does not
-        pay.
+    time : float
+        Time of the inputs, s; the same clock for all legs.
+    wet_probability : float
+        Probability of wet ground below the foot, 0 to 1.
+    load : float
+        Largest normal force since the last estimate, N; NaN if there was none.
+    position : tuple of float
+        Position of the foot, x and y, m; NaN if it is old or missing.
+    pressure : float or None
+        Gauge pressure of the pad, Pa; None without a reading since the last estimate.
+    sensor_fault : str
+        Why the sensors of the foot cannot be used; empty if they can.
     """
 
-    leg: int
-    morphology: str
-    steps: float
-    probing: bool
-    wet_ahead: float
-    next_position: tuple[float, float]
-    others_probing: bool
-    wet_expected: float
-    plan: Plan
-    lead: int = 0
-    wet_beyond: float = 0.0
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A shape for the next step, and whether it is only a probe of the ground."""
-
-    morphology: str
-    probe: bool = False
-
-
-Policy = Callable[[LiftOff], Choice]
-
-PROBING = ('value', 'count', 'threshold')
-"""Ways to plan the probes of :func:`adaptive`."""
-
-
-def flat(step: LiftOff) -> Choice:
-    """Stay flat."""
-    return Choice(FLAT)
-
-
-def dome(step: LiftOff) -> Choice:
-    """Stay domed."""
-    return Choice(DOME)
-
-
-def adaptive(
-    wet_above: float = 0.65,
-    dry_below: float = 0.35,
-    probe_below: float = 0.75,
-    dwell: int = 2,
-    probing: str = 'value',
-    probe_every: int = 20,
-) -> Policy:
-    """Return a policy that follows the belief, with hysteresis, dwell and probes.
-
-    A dome feels wet and dry ground alike, so what is known only fades, and without probes feet
-    that were once on wet ground would stay domed for ever: a probe is one flat step of a domed
-    foot. One leg probes at a time.
-
-    Parameters
-    ----------
-    wet_above, dry_below : float
-        Probabilities of wet ground ahead beyond which a foot turns to dome, and back to flat.
-    probe_below : float
-        Probability below which a domed foot probes, if ``probing`` is ``threshold``.
-    dwell : int
-        Steps that a shape is kept at least; probes and trials are exempt.
-    probing : str
-        How probes are planned. ``value``: by what they have cost and may bring on this walk, see
-        :class:`ros_pad.control.probing.Planner`; then feet also stay domes where flat ones do not
-        pay. Baselines that do not learn are ``count``, every so many steps, and ``threshold``,
-        when the belief has faded.
-    probe_every : int
-        Steps as a dome after which a foot probes, if ``probing`` is ``count``.
-
-    Raises
-    ------
-    InvalidInput
-        For what is no probability, ``dry_below`` above ``wet_above``, a dwell or a count below 1,
-        or an unknown way of probing.
-    """
-    number('wet_above', wet_above, '(probability)', high=1.0)
-    number('dry_below', dry_below, '(probability)', high=wet_above)
-    number('probe_below', probe_below, '(probability)', high=1.0)
-    number('dwell', dwell, 'steps', low=1.0)
-    one_of('probing', probing, PROBING)
-    number('probe_every', probe_every, 'steps', low=1.0)
-
-    def choose(step: LiftOff) -> Choice:
-        if probing == 'value':
-            wet, plan, due = step.wet_expected, step.plan, step.plan.probe
-        else:
-            wet, plan = step.wet_ahead, Plan()
-            due = step.steps >= probe_every if probing == 'count' else wet < probe_below
-        settled = step.probing or step.steps >= dwell
-        if step.morphology == FLAT:
-            if settled and (wet > wet_above or not plan.flat_pays):
-                return Choice(DOME)
-            if settled and plan.trial and wet < dry_below:
-                return Choice(DOME, probe=True)
-            return Choice(FLAT)
-        if settled and wet < dry_below and plan.flat_pays:
-            return Choice(FLAT)
-        if settled and due and not step.others_probing:
-            return Choice(FLAT, probe=True)
-        return Choice(DOME)
-
-    return choose
-
-
-def oracle(is_wet: Callable[[float, float], bool]) -> Policy:
-    """Return a policy that sees the ground where the foot will stand next.
-
-    Parameters
-    ----------
-    is_wet : callable
-        ``is_wet(x, y)`` tells whether the ground is wet at a position, m.
-    """
-
-    def choose(step: LiftOff) -> Choice:
-        return Choice(DOME if is_wet(*step.next_position) else FLAT)
-
-    return choose
-
-
-def first_shapes(policy: str, legs: Sequence[int]) -> dict[int, str]:
-    """Return the shape that each leg starts with under a policy.
-
-    Adaptive feet start as domes, but for the first and the last leg, one of each tripod, which
-    feel the ground: with what is known of a floor, nothing, six flat feet lose more on wet ground
-    than six domes on dry, and two flat feet are enough to tell.
-
-    Parameters
-    ----------
-    policy : str
-        Name of a policy, see :data:`POLICIES`.
-    legs : sequence of int
-        Numbers of the legs, in their order about the body.
-    """
-    if policy == 'adaptive':
-        return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
-    return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)
-
-
-POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
-
-
-def policy_named(name: str, is_wet: Callable[[float, float], bool] | None = None) -> Policy:
-    """Return a policy by its name; ``oracle`` needs the ground.
-
-    Raises
-    ------
-    InvalidInput
-        For an unknown name, or an oracle without ground to look at.
-    """
-    if name == 'oracle':
-        if is_wet is None:
-            raise InvalidInput("policy = 'oracle': needs a floor that is known")
-        return oracle(is_wet)
-    policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive()}
-    if name not in policies:
-        raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
-    return policies[name]
+    time: float
+    wet_probability: float
+    load: float
+    position: tuple[float, float]
+    pressure: float | None
+    sensor_fault: str
 
 
 @dataclass(frozen=True)
 class FootFault:
-    """What was wrong with a leg, and for how long.
+    """A fault of a leg, with its start and end.
 
     Attributes
     ----------
     leg : int
         Number of the leg.
     start, end : float
-        When it was found and when it was found mended, s; the end is None while it lasts.
+        Times at which the fault was found and at which its end was found, s; the end is None while
+        the fault lasts.
     reason : str
-        In words, with numbers; what was known last.
+        Last description of the fault, with numbers.
     """
 
     leg: int
@@ -266,50 +116,98 @@ class FootFault:
     reason: str
 
 
-class _Leg:
+@dataclass(slots=True)
+class _Ground:
+    """Load and positions of a foot in this stance and in the one before."""
+
+    gate: LoadGate
+    peak: float  # largest recent load, N, for which the pressure of domes is chosen
+    largest: float = 0.0  # largest load of this stance, N
+    landed: tuple[float, float] = (0.0, 0.0)  # position at touch-down, m
+    stood: tuple[float, float] = (0.0, 0.0)  # last position in stance, m
+    lifted: tuple[float, float] | None = None  # position at the last lift-off, m
+
+    def end_stance(self) -> None:
+        """Update the largest recent load, which decays over some tens of steps."""
+        self.peak = max(self.largest, self.peak + 0.1 * (self.largest - self.peak))
+        self.largest = 0.0
+
+    def next_position(self, position: Sequence[float]) -> tuple[float, float]:
+        """Return where a foot that lifts off will stand, m, if its steps are of equal length."""
+        x, y = position[0], position[1]
+        before_x, before_y = self.lifted or (x, y)
+        self.lifted = (x, y)
+        return 2.0 * x - before_x, 2.0 * y - before_y
+
+
+@dataclass(slots=True)
+class _Air:
+    """Air of a foot, and the tries to fill it after a fault."""
+
+    monitor: PadMonitor
+    sent: float | None = None  # last set-point commanded; None before the first or after a timeout
+    needed: float = 0.0  # least pressure that carries the load, without margin, Pa
+    shortfall: str = ''  # warning, if the pressure was too low at the last touch-down
+    wait: int = 0  # steps until a dome is tried again
+    patience: int = FIRST_WAIT  # steps to wait after the next fault
+    trying: bool = False  # whether a dome is being tried after a fault
+
+    @property
+    def holds(self) -> bool:
+        """Whether the measured pressure (not the set-point) is that of a dome.
+
+        A pressure that the monitor accepts as vented counts as flat here, too. Otherwise a small
+        offset of the sensor would discard all footprints of the foot.
+        """
+        return self.monitor.pressure > max(DOME_PRESSURE, self.monitor.tolerance)
+
+
+@dataclass(slots=True)
+class _Faults:
+    """Faults of a leg except those of its air, and its faults in the list that still last."""
+
+    sensors: str = ''
+    timeout: str = ''
+    no_step: str = ''
+    open: dict[str, FootFault] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Timing:
+    """Times of events of a leg, and durations, s."""
+
+    now: float = math.nan  # last observation
+    updated: float = math.nan  # last estimate
+    lifted: float = math.nan  # last lift-off
+    swing: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))
+    stride: RunningMedian = field(default_factory=lambda: RunningMedian(math.inf))
+
+
+@dataclass(slots=True)
+class _LegState:
     """Memory of the controller about one leg."""
 
-    __slots__ = (
-        'decided', 'doubt', 'footprint', 'landed', 'lifted', 'morphology', 'need', 'open',
-        'patience', 'peak', 'probing', 'sent', 'setpoint', 'short', 'standing', 'steps', 'stood',
-        'stride', 'swing', 'time', 'touched', 'trying', 'unfelt', 'unmoved', 'updated', 'wait',
-        'watch',
-    )  # fmt: skip
+    ground: _Ground
+    air: _Air
+    morphology: str
+    faults: _Faults = field(default_factory=_Faults)
+    timing: _Timing = field(default_factory=_Timing)
+    steps: float = math.inf  # steps since the morphology changed last
+    probing: bool = False
+    decided: int = 0  # number of this leg's last decision, counted over all legs
+    setpoint: float = 0.0
 
-    def __init__(self, morphology: str, peak: float, ceiling: float) -> None:
-        self.morphology = morphology
-        self.steps = math.inf
-        self.probing = False
-        self.standing = False
-        self.decided = 0
-        self.peak = peak
-        self.touched = 0.0
-        self.setpoint = 0.0
-        self.footprint: tuple[float, float] | None = None
-        self.landed = self.stood = (0.0, 0.0)
-        # Of its air.
-        self.watch = PadWatch(ceiling)
-        self.sent: float | None = None  # the set-point in force, if any
-        self.need = 0.0  # Pa that carry the load without margin
-        self.short = ''  # why the last touch-down lacked pressure
-        self.wait = 0  # steps until a dome is tried again
-        self.patience = FIRST_WAIT
-        self.trying = False
-        # Of its senses.
-        self.doubt = ''
-        self.unfelt = ''
-        self.unmoved = ''
-        self.open: dict[str, FootFault] = {}
-        # Of its time, s.
-        self.time = math.nan
-        self.updated = math.nan
-        self.lifted = math.nan
-        self.swing = RunningMedian(math.inf)
-        self.stride = RunningMedian(math.inf)
+    @property
+    def lead(self) -> int:
+        """Whole steps by which a fill takes longer than a swing, at most `FURTHEST_LEAD`."""
+        late = self.air.monitor.fill_time - self.timing.swing.value
+        if not late > 0.0:
+            return 0
+        return min(math.ceil(late / self.timing.stride.value), FURTHEST_LEAD)
 
 
 class MorphologyController:
-    """Turns each foot's load and belief into a shape and a set-point.
+    """Decide the morphology and the set-point of each foot.
 
     Parameters
     ----------
@@ -318,37 +216,47 @@ class MorphologyController:
     legs : sequence of int
         Numbers of the legs.
     policy : callable
-        Chooses at each lift-off, see :func:`adaptive`.
+        Policy that chooses at each lift-off, see :func:`ros_pad.control.adaptive`.
     expected_load : float
         Normal force in stance, N, above 0.
     start : str or mapping
-        Shape before the first lift-off, of all legs or of each, see :func:`first_shapes`.
+        Morphology before the first lift-off, one for all legs or one for each, see
+        :func:`ros_pad.control.first_morphologies`.
     margin : float
-        Factor on the load, for the pressure of a dome, above 0.
+        Pressure margin: factor on the load when the pressure of a dome is chosen, above 0.
     fixed_pressure : float or None
         Gauge pressure of every dome, Pa, from 1000 up to the foot's ceiling; None chooses it from
         the load.
-    load_gate : float
-        Share of the expected load below which a foot has lifted off, above 0 up to 0.6. It stands
-        again with 0.3 of the expected load more.
+    lift_off_share : float
+        Share of the expected load below which a foot has lifted off, 0.01 to 0.6. The foot stands
+        again at this share plus 0.3.
+    command_timeout : float
+        Time without a set-point after which regulators vent, s, 0.02 to 60: a leg without an
+        estimate for longer counts as flat.
 
     Attributes
     ----------
     faults : list of FootFault
-        What was wrong with legs so far, by the time it was found.
+        Faults of all legs so far, in the order in which they were found.
+    footprints : Footprints
+        Places where flat feet of all legs stood, with the probability of wet ground there.
     margin : float
-        As given; another one counts from the next lift-off on.
+        Pressure margin as given; a new value applies from the next lift-off.
+    policy : callable
+        Policy as given; a new one applies from the next lift-off.
+    command_timeout : float
+        Timeout as given; a new value applies at once.
     refusals : dict
-        For each leg that wanted to be a dome and may not, why.
+        For each leg for which a dome was chosen but would need more than the ceiling, the reason.
     switches : dict
-        For each leg, how often its shape has changed.
+        For each leg, how often its morphology has changed.
     underpressure : dict
-        For each leg, how often it came down as a dome with less pressure than its load needs.
+        For each leg, number of touch-downs as a dome with less pressure than its load needs.
 
     Raises
     ------
     InvalidInput
-        Naming the value that is outside its range.
+        When a value is outside its range; the message names it.
     LimitError
         When the fixed pressure is above the foot's ceiling.
     """
@@ -360,41 +268,48 @@ class MorphologyController:
         policy: Policy,
         expected_load: float,
         start: str | Mapping[int, str] = FLAT,
-        margin: float = 1.2,
+        margin: float = MARGIN.default,
         fixed_pressure: float | None = None,
-        load_gate: float = 0.3,
+        lift_off_share: float = LIFT_OFF.default,
+        command_timeout: float = COMMAND_TIMEOUT.default,
     ) -> None:
         number('expected_load', expected_load, 'N', above=True)
-        shapes = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
+        first = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
         for leg in legs:
-            one_of('start', shapes.get(leg, f'no shape of leg {leg}'), (FLAT, DOME))
+            one_of('start', first.get(leg, f'no morphology of leg {leg}'), (FLAT, DOME))
         number('margin', margin, '(factor)', above=True)
-        number('load_gate', load_gate, '(share)', high=0.6, above=True)
+        LIFT_OFF.accept(lift_off_share)
         if fixed_pressure is not None:
-            number('fixed_pressure', fixed_pressure, 'Pa', low=LOWEST_DOME)
+            number('fixed_pressure', fixed_pressure, 'Pa', low=DOME_PRESSURE)
             if fixed_pressure > foot.ceiling:
                 raise LimitError(
                     f'fixed_pressure = {fixed_pressure:g} Pa is above the ceiling of'
                     f' {foot.ceiling:g} Pa of {foot.source}'
                 )
         self._foot = foot
-        self._policy = policy
+        self.policy = policy
         self.margin = margin
+        self.command_timeout = COMMAND_TIMEOUT.accept(command_timeout)
         self._fixed_pressure = fixed_pressure
-        self._gate = load_gate * expected_load
-        self._stands = (load_gate + TOUCH_DOWN) * expected_load
-        self._footprints = Footprints()
+        self.footprints = Footprints()
         self._planner = Planner(Stakes.expected(foot, expected_load), legs)
         self._decisions = 0
-        self._legs = {leg: _Leg(shapes[leg], 1.5 * expected_load, foot.ceiling) for leg in legs}
+        self._legs = {
+            leg: _LegState(
+                _Ground(LoadGate(expected_load, lift_off_share, TOUCH_DOWN), 1.5 * expected_load),
+                _Air(PadMonitor(foot.ceiling)),
+                first[leg],
+            )
+            for leg in legs
+        }
         self.faults: list[FootFault] = []
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
         self.underpressure = dict.fromkeys(legs, 0)
         for leg in legs:
-            self._apply(leg, Choice(shapes[leg]))
+            self._apply(leg, Choice(first[leg]))
 
-    def _state(self, leg: int) -> _Leg:
+    def _state(self, leg: int) -> _LegState:
         state = self._legs.get(leg)
         if state is None:
             raise InvalidInput(
@@ -403,228 +318,262 @@ class MorphologyController:
         return state
 
     def morphology(self, leg: int) -> str:
-        """Shape chosen for a leg's current or next step; of a faulty pad the shape it has."""
+        """Return the morphology of a leg in the present step, or in swing in the next one.
+
+        If its pad has a fault or no readings, return the measured morphology of the pad instead.
+        """
         state = self._legs[leg]
-        if not state.watch.reason:
+        if not state.air.monitor.reason:
             return state.morphology
-        return DOME if self._holds_air(state) else FLAT
+        return DOME if state.air.holds else FLAT
 
     def setpoint(self, leg: int) -> float:
-        """Gauge pressure wanted for a leg, Pa."""
+        """Return the set-point of a leg, gauge Pa."""
         return self._legs[leg].setpoint
 
     def fault(self, leg: int) -> str:
-        """Return what is wrong with a leg now, in words; empty when nothing is."""
+        """Return the present faults of a leg as text; empty if there are none."""
         state = self._state(leg)
-        reasons = (state.unfelt, state.unmoved, state.doubt, state.watch.reason)
+        faults = state.faults
+        reasons = (faults.timeout, faults.no_step, faults.sensors, state.air.monitor.reason)
         return '; '.join(filter(None, reasons))
 
     def remark(self, leg: int) -> str:
-        """Return what is no fault and yet worth saying of a leg, as a slow hose; or nothing."""
+        """Return warnings about a leg that are no faults, such as a slow hose; empty if none."""
         state = self._state(leg)
         slow = ''
-        if self._lead(state):
+        if state.lead:
             slow = (
-                f'slow hose: a fill takes {state.watch.fill_time:.2f} s, a swing'
-                f' {state.swing.value:.2f} s'
+                f'slow hose: a fill takes {state.air.monitor.fill_time:.2f} s, a swing'
+                f' {state.timing.swing.value:.2f} s'
             )
-        return '; '.join(filter(None, (self.refusals.get(leg), state.short, slow)))
+        return '; '.join(filter(None, (self.refusals.get(leg), state.air.shortfall, slow)))
 
     def lead(self, leg: int) -> int:
-        """Return how many steps ahead a leg must decide for its pad to be full in time."""
-        return self._lead(self._state(leg))
+        """Return by how many whole steps the fill of a leg's pad takes longer than its swing."""
+        return self._state(leg).lead
 
-    def watch(self, leg: int) -> PadWatch:
-        """Return what is known of a leg's air."""
-        return self._state(leg).watch
+    def monitor(self, leg: int) -> PadMonitor:
+        """Return the monitor of a leg's air."""
+        return self._state(leg).air.monitor
 
-    def doubt(self, leg: int, reason: str) -> None:
-        """Take note why a foot's sensors are not believed; an empty reason ends it.
+    def decide(self, leg: int, state: FootState) -> float | None:
+        """Process an estimate with all its inputs: :meth:`observe`, then :meth:`update`.
 
-        Call it before :meth:`observe`. Such a foot leaves no footprints and does not probe; what
-        other feet felt still counts for it.
+        Returns
+        -------
+        float or None
+            Set-point, gauge Pa; None if load, position or probability is not finite.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled, or a probability outside 0 to 1.
         """
-        self._state(leg).doubt = reason
+        self.observe(leg, state.time, state.pressure, state.sensor_fault)
+        x, y = state.position
+        if not math.isfinite(state.load + state.wet_probability + x + y):
+            return None
+        return self.update(leg, state.load, state.wet_probability, state.position)
 
-    def observe(self, leg: int, time: float, pressure: float | None) -> None:
-        """Take a reading of a pad before the leg's :meth:`update` of the same moment.
+    def observe(
+        self, leg: int, time: float, pressure: float | None, sensor_fault: str = ''
+    ) -> None:
+        """Process the measurements of a leg that can arrive without an estimate.
+
+        Call it before the :meth:`update` of the same time.
 
         Parameters
         ----------
         leg : int
             Number of the leg.
         time : float
-            s; of all legs on one clock.
+            Time of the measurements, s; the same clock for all legs.
         pressure : float or None
-            Gauge Pa; None where there was no reading. Without any nothing is watched.
+            Reading, gauge Pa; None without a reading. The air is monitored only after a first
+            reading.
+        sensor_fault : str
+            Why the sensors of the foot cannot be used; empty if they can. A foot with such a fault
+            adds no footprints and does not probe; it uses the footprints of the other feet.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
         """
         state = self._state(leg)
-        if not 0.0 <= time - state.time <= UNFELT:  # nobody looked
-            state.updated = time
-            state.lifted = math.nan
-        state.time = time
-        watch = state.watch
-        faulty = watch.fault
-        watch.update(time, state.sent, pressure)
-        if faulty and not watch.fault:
-            # What came back for one may have come back for all.
-            state.patience = FIRST_WAIT
+        timing, air = state.timing, state.air
+        state.faults.sensors = sensor_fault
+        if (
+            not 0.0 <= time - timing.now <= self.command_timeout
+        ):  # the first time, or after a pause
+            timing.updated = time
+            timing.lifted = math.nan
+        timing.now = time
+        monitor = air.monitor
+        faulty = monitor.fault
+        monitor.update(time, air.sent, pressure)
+        if faulty and not monitor.fault:
+            # If the supply is back, the pads of the other legs can be filled again, too.
+            air.patience = FIRST_WAIT
             for other in self._legs.values():
-                other.wait = 0
-        elif watch.fault and not faulty:
-            state.wait = state.patience
-        if time - state.updated <= UNFELT:
-            state.unfelt = ''
-        elif not state.unfelt:
-            state.unfelt = f'no load, position or estimate for {time - state.updated:.1f} s'
+                other.air.wait = 0
+        elif monitor.fault and not faulty:
+            air.wait = air.patience
+        self._find_timeout(leg, state)
+        self._find_missing_steps(state)
+        self._list_faults(leg, state)
+
+    def _find_timeout(self, leg: int, state: _LegState) -> None:
+        """Make a leg flat if it has had no estimate for the command timeout."""
+        age = state.timing.now - state.timing.updated
+        if age <= self.command_timeout:
+            state.faults.timeout = ''
+        elif not state.faults.timeout:
+            state.faults.timeout = f'no load, position or estimate for {age:.1f} s'
             if state.morphology == DOME:
                 self.switches[leg] += 1
             self._apply(leg, Choice(FLAT))
             state.steps = math.inf
-            state.sent = None  # the regulator vents when it has waited long enough
-        if self._decisions - state.decided <= 2 * len(self._legs):
-            state.unmoved = ''
-        elif not state.unmoved:
-            state.unmoved = (
-                f'no step felt while the others took {self._decisions - state.decided}:'
-                ' its load is not measured, or it is held up'
-            )
-        self._note(leg, state)
+            state.air.sent = None  # the regulator vents after its own timeout
 
-    def _note(self, leg: int, state: _Leg) -> None:
-        """Keep the list of faults: one entry for each time that something was wrong."""
-        watch = state.watch
+    def _find_missing_steps(self, state: _LegState) -> None:
+        """Set or clear the fault of a leg that has no lift-offs while the other legs step."""
+        missed = self._decisions - state.decided
+        if missed <= 2 * len(self._legs):
+            state.faults.no_step = ''
+        elif not state.faults.no_step:
+            state.faults.no_step = (
+                f'no step measured while the other legs took {missed}:'
+                ' its load is not measured, or the leg does not step'
+            )
+
+    def _list_faults(self, leg: int, state: _LegState) -> None:
+        """Update the list of faults: one entry from the start of a fault to its end."""
+        monitor, faults = state.air.monitor, state.faults
         for kind, reason in (
-            ('fault', watch.fault), ('silence', watch.silence),
-            ('unfelt', state.unfelt), ('unmoved', state.unmoved), ('doubt', state.doubt),
+            ('fault', monitor.fault), ('silence', monitor.silence),
+            ('timeout', faults.timeout), ('no step', faults.no_step),
+            ('sensors', faults.sensors),
         ):  # fmt: skip
-            known = state.open.get(kind)
-            if known is None:
+            entry = faults.open.get(kind)
+            if entry is None:
                 if reason:
-                    state.open[kind] = FootFault(leg, state.time, None, reason)
-                    self.faults.append(state.open[kind])
-            elif known.reason != reason:
-                if reason:  # more is known of it
-                    now = state.open[kind] = dataclasses.replace(known, reason=reason)
+                    faults.open[kind] = FootFault(leg, state.timing.now, None, reason)
+                    self.faults.append(faults.open[kind])
+            elif entry.reason != reason:
+                if reason:  # the same fault with a new description
+                    now = faults.open[kind] = dataclasses.replace(entry, reason=reason)
                 else:
-                    now = dataclasses.replace(known, end=state.time)
-                    del state.open[kind]
-                self.faults[self.faults.index(known)] = now
+                    now = dataclasses.replace(entry, end=state.timing.now)
+                    del faults.open[kind]
+                self.faults[self.faults.index(entry)] = now
 
     def update(
         self, leg: int, load: float, wet_probability: float, position: Sequence[float]
     ) -> float:
-        """Take an estimate and return the gauge pressure wanted, Pa.
+        """Process an estimate and return the set-point, gauge Pa.
 
         Parameters
         ----------
         leg : int
             Number of the leg.
         load : float
-            Normal force now, N.
+            Normal force on the foot now, N.
         wet_probability : float
-            Belief about the ground below it, 0 to 1.
+            Probability of wet ground below the foot, 0 to 1.
         position : sequence of float
-            Of the foot, x and y, m.
+            Position of the foot, x and y, m.
 
         Raises
         ------
         InvalidInput
             For a leg that is not controlled, a probability outside 0 to 1, or a value that is not
-            finite. Nothing has changed then.
+            finite. The state is then unchanged.
         """
         state = self._state(leg)
-        # A load that is no number is below no gate: it must not pass for a lift-off.
+        # Comparisons with NaN are False, so a load of NaN would count as a lift-off.
         if not (math.isfinite(load + position[0] + position[1]) and 0.0 <= wet_probability <= 1.0):
             raise InvalidInput(
-                f'leg {leg}: load = {load!r} N, position = {tuple(position)!r} m: must be finite;'
-                f' wet_probability = {wet_probability!r}: must be from 0 to 1'
+                f'leg {leg}: load = {load!r} N and position = {tuple(position)!r} m must be'
+                f' finite, and wet_probability = {wet_probability!r} must be from 0 to 1; at least'
+                ' one is not'
             )
-        state.updated = state.time
-        if load >= self._gate:
-            if load >= self._stands and not state.standing:
-                state.landed = (position[0], position[1])
-                state.standing = True
-                self._touch_down(leg, state)
-            state.touched = max(state.touched, load)
-            state.stood = (position[0], position[1])
-        elif state.standing:
-            state.standing = False
-            self._lift_off(leg, wet_probability, position)
-        state.sent = state.setpoint
+        state.timing.updated = state.timing.now
+        ground, gate = state.ground, state.ground.gate
+        stood = gate.standing
+        if gate.update(load) and not stood:
+            ground.landed = (position[0], position[1])
+            self._touch_down(leg, state)
+        if load >= gate.lift_off:
+            ground.largest = max(ground.largest, load)
+            ground.stood = (position[0], position[1])
+        elif stood:
+            self._lift_off(leg, state, wet_probability, position)
+        state.air.sent = state.setpoint
         return state.setpoint
 
-    @staticmethod
-    def _holds_air(state: _Leg) -> bool:
-        # What the watch lets pass as vented is flat here, too: a sensor that reads a little too
-        # much must not cost a foot all its footprints.
-        return state.watch.pressure > max(LOWEST_DOME, state.watch.tolerance)
-
-    def _touch_down(self, leg: int, state: _Leg) -> None:
+    def _touch_down(self, leg: int, state: _LegState) -> None:
         """Compare the pressure of a dome with what its load needs."""
-        state.short = ''
-        if state.footprint is None:
-            return  # it has stood from the beginning
-        if state.time > state.lifted:
-            state.swing.add(state.time - state.lifted)
-        pressure = state.watch.pressure
-        if state.morphology == DOME and pressure < state.need:
+        timing, air = state.timing, state.air
+        air.shortfall = ''
+        if state.ground.lifted is None:
+            return  # the foot stood from the beginning: this is no step
+        if timing.now > timing.lifted:
+            timing.swing.add(timing.now - timing.lifted)
+        pressure = air.monitor.pressure
+        if state.morphology == DOME and pressure < air.needed:
             self.underpressure[leg] += 1
-            state.short = (
-                f'{1e-3 * pressure:.1f} kPa at touch-down, {1e-3 * state.need:.1f} needed'
+            air.shortfall = (
+                f'{1e-3 * pressure:.1f} kPa at touch-down, {1e-3 * air.needed:.1f} kPa needed'
             )
 
-    def _lead(self, state: _Leg) -> int:
-        late = state.watch.fill_time - state.swing.value
-        if not late > 0.0:
-            return 0
-        return min(math.ceil(late / state.stride.value), FURTHEST_LEAD)
+    def _permitted(self, leg: int, state: _LegState, choice: Choice) -> Choice:
+        """Return the choice, changed where faults of sensors or air do not permit it.
 
-    def _permitted(self, leg: int, state: _Leg, choice: Choice) -> Choice:
-        """Return what a leg is fit for: flat where its air failed, but for a try."""
-        if state.doubt and choice.probe and choice.morphology == FLAT:
-            choice = Choice(state.morphology)  # it would not learn anything
-        if not state.watch.fault:
-            state.trying = False
-            # A device that is silent keeps what it has, and would change it when it hears again.
-            return Choice(state.morphology) if state.watch.silence else choice
-        if choice.morphology == FLAT or state.watch.silence:
-            state.trying = False
+        After a fault of its air a leg is flat, except when a dome is tried.
+        """
+        air, monitor = state.air, state.air.monitor
+        if state.faults.sensors and choice.probe and choice.morphology == FLAT:
+            choice = Choice(state.morphology)  # a probe without sensors would measure nothing
+        if not monitor.fault:
+            air.trying = False
+            # A silent device keeps its pressure; a new set-point would act when it answers again.
+            return Choice(state.morphology) if monitor.silence else choice
+        if choice.morphology == FLAT or monitor.silence:
+            air.trying = False
             return Choice(FLAT)
-        if state.trying:
-            if not state.watch.stalled:
-                return choice  # its hose may be slow
-            state.trying = False
-            state.patience = min(2 * state.patience, LONGEST_WAIT)
-            state.wait = state.patience
-        state.wait -= 1
-        others = (other for name, other in self._legs.items() if name != leg)
-        # One leg at a time, but for those that another's success, or a try put off, lets through.
-        if state.wait > 0 or (state.wait == 0 and any(other.trying for other in others)):
+        if air.trying:
+            if not monitor.stalled:
+                return choice  # the pad may still be filling through a slow hose
+            air.trying = False
+            air.patience = min(2 * air.patience, LONGEST_WAIT)
+            air.wait = air.patience
+        air.wait -= 1
+        others = (other.air for name, other in self._legs.items() if name != leg)
+        # At 0 a leg waits once more while another leg tries. Below 0 it has done so, or another
+        # pad has recovered (see `observe`).
+        if air.wait > 0 or (air.wait == 0 and any(other.trying for other in others)):
             return Choice(FLAT)
-        state.trying = True
+        air.trying = True
         return choice
 
-    def _lift_off(self, leg: int, wet_probability: float, position: Sequence[float]) -> None:
-        state = self._legs[leg]
+    def _lift_off(
+        self, leg: int, state: _LegState, wet_probability: float, position: Sequence[float]
+    ) -> None:
+        """Evaluate the step that ends, and choose the morphology of the next one."""
+        ground, timing = state.ground, state.timing
         state.steps += 1
-        # Remember the heaviest step, but forget it over some tens of steps.
-        state.peak = max(state.touched, state.peak + 0.1 * (state.touched - state.peak))
-        state.touched = 0.0
-        if state.time > state.lifted:
-            state.stride.add(state.time - state.lifted)
-        state.lifted = state.time
-        x, y = position[0], position[1]
-        if not (state.watch.silence or state.doubt):
-            # A pad that holds air is no flat one, whatever was asked of it.
-            flat = state.morphology == FLAT and not self._holds_air(state)
-            made = Step(state.landed, state.stood, flat, state.probing, wet_probability)
-            self._planner.step(leg, made, self._footprints)
-        # The next step is taken to be as long as the last one.
-        before_x, before_y = state.footprint or (x, y)
-        state.footprint = (x, y)
-        ahead = (2.0 * x - before_x, 2.0 * y - before_y)
-        lead = self._lead(state)
+        ground.end_stance()
+        if timing.now > timing.lifted:
+            timing.stride.add(timing.now - timing.lifted)
+        timing.lifted = timing.now
+        if not (state.air.monitor.silence or state.faults.sensors):
+            # A pad under pressure is not flat, even if its set-point is zero.
+            flat = state.morphology == FLAT and not state.air.holds
+            made = Step(ground.landed, ground.stood, flat, state.probing, wet_probability)
+            self._planner.step(leg, made, self.footprints)
+        ahead = ground.next_position(position)
         self._decisions += 1
         state.decided = self._decisions
         step = LiftOff(
@@ -632,30 +581,20 @@ class MorphologyController:
             morphology=self.morphology(leg),
             steps=state.steps,
             probing=state.probing,
-            wet_ahead=self._footprints.wet_probability(*ahead),
+            wet_ahead=self.footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
-            wet_expected=self._footprints.wet_expected(*ahead),
+            wet_expected=self.footprints.wet_expected(*ahead),
             plan=self._planner.plan(leg),
-            lead=lead,
-            wet_beyond=max(
-                (
-                    self._footprints.wet_probability(
-                        (1 + far) * x - far * before_x, (1 + far) * y - far * before_y
-                    )
-                    for far in range(2, 2 + lead)
-                ),
-                default=0.0,
-            ),
         )
         before = state.morphology
-        self._apply(leg, self._permitted(leg, state, self._policy(step)))
+        self._apply(leg, self._permitted(leg, state, self.policy(step)))
         if state.morphology != before:
             self.switches[leg] += 1
             state.steps = 0
 
     def _others_probing(self, leg: int) -> bool:
-        # A leg that is held up since the others have long stepped again keeps nobody waiting.
+        # A probing leg that has stopped stepping must not delay the probes of the others.
         recent = self._decisions - 2 * len(self._legs)
         return any(
             other.probing and other.decided > recent
@@ -664,23 +603,22 @@ class MorphologyController:
         )
 
     def _apply(self, leg: int, choice: Choice) -> None:
+        """Apply a choice; make the leg flat if no pressure up to the ceiling carries the load."""
         state = self._legs[leg]
+        air, peak = state.air, state.ground.peak
         morphology = choice.morphology
         setpoint = 0.0
         self.refusals.pop(leg, None)
         if morphology == DOME:
             try:
-                setpoint = self._fixed_pressure or dome_pressure(
-                    self._foot, state.peak, self.margin
-                )
-                # What a fixed pressure is worth is not for the controller to say.
-                state.need = (
-                    setpoint - state.watch.tolerance
-                    if self._fixed_pressure
-                    else dome_pressure(self._foot, state.peak, 1.0)
-                )
+                if self._fixed_pressure:
+                    setpoint = self._fixed_pressure
+                    air.needed = setpoint - air.monitor.tolerance
+                else:
+                    setpoint = dome_pressure(self._foot, peak, self.margin)
+                    air.needed = dome_pressure(self._foot, peak, 1.0)
             except LimitError as error:
-                # Domes that cannot carry the foot are worse than none.
+                # Overloaded domes have less capacity than a flat sole.
                 self.refusals[leg] = str(error)
                 morphology = FLAT
         state.morphology = morphology

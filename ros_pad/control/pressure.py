@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pressure a foot needs so that its domes carry its load."""
+"""Gauge pressure that a foot needs so that its domes carry its load."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import LimitError
 from ros_pad.errors import NoEquilibrium
 
-RESOLUTION = 10.0  # Pa: what the regulators take, and exact when an ambient pressure is added
+RESOLUTION = 10.0  # Pa; regulators resolve it, and adding an ambient pressure rounds nothing off
 
 
 def dome_pressure(foot: Foot, load: float, margin: float) -> float:
-    """Gauge pressure, Pa, at which the domes carry a load with a margin.
+    """Return the gauge pressure, Pa, at which the domes carry a load with a margin.
 
     Parameters
     ----------
@@ -23,19 +23,20 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
     load : float
         Largest normal force expected on the foot, N, 0 or more.
     margin : float
-        Factor on the load, above 0: 10 % of missing pressure costs a third of the limit at 75 kPa.
+        Factor on the load, above 0. At 75 kPa, 10 % less pressure lowers the force limit by a
+        third.
 
     Returns
     -------
     float
-        Rounded up to :data:`RESOLUTION`.
+        Gauge pressure, Pa, rounded up to a multiple of :data:`RESOLUTION`.
 
     Raises
     ------
     LimitError
-        When the pressure would be above the foot's ceiling, or past the end of the pads' model.
+        When the pressure would be above the foot's ceiling, or beyond the model of the pads.
     InvalidInput
-        When load or margin are not finite, negative, or (the margin) zero.
+        When the load is negative or not finite, or the margin is not finite and above 0.
     """
     try:
         wanted = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
@@ -44,7 +45,7 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
             f'{load:.3g} N with margin {margin:g} on {foot.pads} pads of {foot.source} is more'
             f' than domes carry at any pressure up to the ceiling of {foot.ceiling:.0f} Pa'
         ) from error
-    # Rounded up, or the margin would not be kept; the last digits of the inverse are no reason to.
+    # Rounding up keeps the margin. Rounding errors of `wanted` must not add a whole step.
     pressure = RESOLUTION * math.ceil(wanted / RESOLUTION - 1e-6)
     if pressure > foot.ceiling:
         raise LimitError(

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When is it worth asking the ground: what shapes have cost, and how often to probe.
+"""Plan probes of the ground: measure the loss of each morphology, and choose how often to probe.
 
-Under a dome wet and dry ground feel alike, so a robot on domes has to set down a flat foot now and
-then to find out that the ground has become dry. The :class:`Planner` learns from the walk itself
-what that costs and what it may bring; :func:`probe_interval` turns both into a way.
+Under domes wet and dry ground cannot be distinguished, so a robot on domes must set down a flat
+foot from time to time to detect dry ground. The :class:`Planner` estimates cost and gain of such a
+probe from the steps of the walk; :func:`probe_interval` computes the best distance between probes.
+A *trial* in names of this module is a dome test: one step of all feet as domes on dry ground.
 """
 
 from __future__ import annotations
@@ -17,52 +18,57 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import number
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control.footprints import Footprints
 
 STAKE_PER_FRICTION = 0.25
-"""Share of a stride that a difference of one in friction is taken to be worth, before it is known.
+"""Assumed gain of a difference of 1 in friction, share of a stride, until gains are measured.
 
-Between nothing, where the gait demands less than either shape holds, and half, where one shape
-stands still.
+The true gain is between 0, if both morphologies have more capacity than the gait demands, and 0.5,
+if a robot with one of them does not advance at all.
 """
 
 LEAST_GAIN = 0.01
-"""Gain of flat feet on dry ground, share of a stride, below which it is worth no air."""
+"""Gain of flat feet on dry ground, share of a stride, below which feet stay domes: the gain is not
+worth the air of the switches.
+"""
 
 PREMIUM = 0.0025
-"""Share of the way that is paid for probes where none seems to pay: the world may have changed."""
+"""Share of the distance that probes may cost where no probe is expected to pay. They detect that
+the ground has changed.
+"""
 
 TRIAL_STRIDES = 300.0
-"""Strides after which it is forgotten what domes lose on dry ground."""
+"""Number of strides after which the measured loss of domes on dry ground is discarded."""
 
 MEMORY = 20
-"""Steps of tripods of each kind that are remembered."""
+"""Number of losses of a tripod that are kept for each kind of step."""
 
 HINDSIGHT = 2
-"""Strides after which a step is judged: what was below a dome, later flat footprints show."""
+"""Number of strides after which a step is evaluated: by then, flat footprints may have shown the
+ground under a dome."""
 
 
 @dataclass(frozen=True)
 class Stakes:
-    """What hangs on the shape of feet in one step of the body, as shares of the stride.
+    """Gains and losses by morphology in one step of the body, as shares of the stride.
 
     Attributes
     ----------
     gain : float
-        What is kept on dry ground if all feet are flat and not domes; below zero where domes hold
-        better.
+        Gain on dry ground if all feet are flat instead of domes; below zero if domes have more
+        capacity there.
     cost : float
-        What is lost on wet ground if all feet are flat and not domes.
+        Loss on wet ground if all feet are flat instead of domes.
     probe_cost : float
-        What is lost on wet ground if one foot is flat among domes.
+        Loss on wet ground if one foot is flat among domes.
 
     Raises
     ------
     InvalidInput
-        For what is not finite, or a cost below zero.
+        When a value is not finite, or a cost is below zero.
     """
 
     gain: float
@@ -76,7 +82,7 @@ class Stakes:
 
     @classmethod
     def expected(cls, foot: Foot, load: float) -> Stakes:
-        """Return what the contact model of a foot lets expect at a load, N."""
+        """Return the values that the contact model of a foot predicts at a load, N."""
         flat_dry, flat_wet, dome = expected_friction(foot, load)
         cost = STAKE_PER_FRICTION * max(0.0, dome - flat_wet)
         return cls(STAKE_PER_FRICTION * (flat_dry - dome), cost, cost / 3.0)
@@ -84,17 +90,17 @@ class Stakes:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the walk so far advises for a foot that lifts off.
+    """Plan for the next step of a foot that lifts off.
 
     Attributes
     ----------
     probe : bool
-        Whether it is time to feel the ground with a flat foot.
+        Whether the foot should be flat for one step, to measure the ground.
     flat_pays : bool
-        Whether flat feet are worth it on dry ground.
+        Whether flat feet gain distance on dry ground.
     trial : bool
-        Whether this foot, flat on dry ground, should be a dome for one step, to show what domes
-        lose there.
+        Whether this foot, flat on dry ground, should be a dome for one step of a dome test, which
+        measures the loss of domes there.
     """
 
     probe: bool = False
@@ -103,44 +109,45 @@ class Plan:
 
 
 def probe_interval(stakes: Stakes, wet_share: float, fading_length: float, stride: float) -> float:
-    """Return the way between probes that brings most, m.
+    """Return the distance between probes that maximises the gain, m.
 
-    Wet and dry patches follow each other as in a chain of two kinds. A way d after ground that was
-    wet a probe finds it dry with p = (1 - q) (1 - exp(-d/ℓ)). Then all feet are flat for the rest
-    of the dry patch, ℓ/q in the mean, and keep g in each of the two steps of a stride s, less the
-    one step with which they come upon the next wet patch. Else the probe has cost c₁. From one
-    such beginning to the next is a renewal, and the gain per metre is
+    Wet and dry patches are a two-state Markov chain. At a distance d after wet ground, a probe
+    finds dry ground with the probability p = (1 - q) (1 - exp(-d/ℓ)). Then all feet are flat for
+    the rest of the dry patch, ℓ/q on average. They gain g in each of the two steps of a stride s,
+    and lose c in the step onto the next wet patch. If the ground is wet, the probe costs c₁. After
+    each probe the process starts anew, so the gain per metre is
 
         J(d) = [p (2 g ℓ/q - c s) - (1 - p) c₁ s] / (d + p ℓ/q).
 
     Parameters
     ----------
     stakes : Stakes
-        g, c and c₁.
+        g (``gain``), c (``cost``) and c₁ (``probe_cost``).
     wet_share : float
-        q, above 0 and below 1.
+        Wet share q, above 0 up to 1.
     fading_length : float
         ℓ, m, above 0.
     stride : float
-        s, m, above 0.
+        Stride s, m, above 0.
 
     Returns
     -------
     float
-        The way with the greatest J, from one stride, for the answer takes that to come, up to the
-        one whose probes take :data:`PREMIUM` of the way (each taken to cost :data:`LEAST_GAIN` at
-        least), which is also the answer where J is nowhere above zero.
+        The distance with the greatest J, m. It is at least one stride, because the result of a
+        probe is that late. It is at most the distance at which probes, each counted with at least
+        :data:`LEAST_GAIN`, cost the share :data:`PREMIUM` of the distance. This upper bound is
+        also the result if J is nowhere above zero.
 
     Raises
     ------
     InvalidInput
-        Naming the value that is outside its range.
+        When a value is outside its range; the message names it.
     """
     number('wet_share', wet_share, '(probability)', high=1.0, above=True)
     number('fading_length', fading_length, 'm', above=True)
     number('stride', stride, 'm', above=True)
-    # On dry ground a probe costs where domes hold better. And that probes have cost nothing so far
-    # is no reason to make more of them.
+    # If domes have more capacity, a probe costs distance on dry ground, too. Even if probes have
+    # cost nothing so far, they must not become more frequent: hence LEAST_GAIN.
     longest = max(stakes.probe_cost, -stakes.gain, LEAST_GAIN) * stride / PREMIUM
     ways = np.geomspace(stride, longest, 100)
     dry = fading_length / wet_share
@@ -157,13 +164,13 @@ class Step(NamedTuple):
     Attributes
     ----------
     landed, lifted : (float, float)
-        Where the foot stood first and last, m.
+        Positions where the foot stood first and last, x and y, m.
     flat : bool
-        Whether it was flat.
+        Whether the foot was flat.
     probing : bool
-        Whether it was a probe, or a trial.
+        Whether the step was a probe or a dome test.
     wet : float
-        What it felt: probability of wet ground.
+        Probability of wet ground that the foot has estimated, 0 to 1.
     """
 
     landed: tuple[float, float]
@@ -174,7 +181,7 @@ class Step(NamedTuple):
 
 
 class _Judged(NamedTuple):
-    """A step, and how much of which stride it lost, m."""
+    """A step, with its stride and its loss, m."""
 
     step: Step
     lost: float
@@ -182,21 +189,26 @@ class _Judged(NamedTuple):
 
 
 class Planner:
-    """Learns from the steps of a walk what shapes cost, and plans probes and trials.
+    """Measure losses of each morphology from the steps of a walk; plan probes and dome tests.
 
-    A foot that gives way while it stands moves backwards, against its swing: that is what a step
-    loses. Feet that stand together slip together, as one body, so losses are means over steps of
-    a tripod; and they depend on what is towed and where, so shapes are compared within a few
-    strides. What a probe costs is the loss of its tripod less that of its last step; what domes
-    lose on dry ground is tried on purpose, all feet for a step, in the middle of a dry patch, or
-    seen where they stay domes.
+    The loss of a step is the distance that a standing foot slips backwards, against its swing.
+    Feet that stand together slip together, so losses are means over the steps of a tripod. Losses
+    depend on the towed load and on the place, so morphologies are compared within a few strides.
+    The cost of a probe is the loss of its tripod minus that of the tripod's last step. The loss of
+    domes on dry ground is measured where feet stay domes, or by a dome test: all feet are domes
+    for one step in the middle of a dry patch.
 
     Parameters
     ----------
     expected : Stakes
-        Before anything has been seen.
+        Values before anything has been measured.
     legs : sequence of int
-        Their numbers.
+        Numbers of the legs.
+
+    Attributes
+    ----------
+    interval : float
+        Present distance between probes, m; infinite before it is first computed.
     """
 
     def __init__(self, expected: Stakes, legs: Sequence[int]) -> None:
@@ -212,31 +224,31 @@ class Planner:
         self._trying: set[int] = set()
         self._strides = 0.0
         self._tried = 0.0
-        self._unfelt = 0.0
+        self._unmeasured = 0.0
         self.interval = math.inf
 
     @property
     def stakes(self) -> Stakes:
-        """What hangs on a step, as far as is known."""
+        """Measured gains and losses; expected values where nothing has been measured."""
         gain, cost, probe_cost = (
             self._expected.gain, self._expected.cost, self._expected.probe_cost,
         )  # fmt: skip
         if self._trials and self._flat_dry:
             gain = statistics.median(self._trials) - statistics.median(self._flat_dry)
         if self._probes:
-            # The expectation counts for one probe; no probe helps against slipping.
+            # The expected value has the weight of one probe. A probe cannot reduce slip.
             probe_cost = max(0.0, statistics.median([probe_cost, *self._probes]))
         return Stakes(gain, cost, probe_cost)
 
     def plan(self, leg: int) -> Plan:
-        """Return what is advised for a leg that has just been told of by :meth:`step`."""
+        """Return the plan for a leg; call it after :meth:`step` of that leg."""
         trial = leg in self._trying
         self._trying.discard(leg)
         pays = self.stakes.gain > LEAST_GAIN or self._outdated
-        return Plan(self._unfelt >= self.interval, pays, trial)
+        return Plan(self._unmeasured >= self.interval, pays, trial)
 
     def step(self, leg: int, step: Step, ground: Footprints) -> None:
-        """Take a step that a leg has made; what it felt, if flat, goes to the footprints."""
+        """Add a step of a leg; if the foot was flat, add a footprint to ``ground``."""
         self._strides += 1.0 / len(self._legs)
         before = self._lifted.get(leg)
         self._lifted[leg] = step.lifted
@@ -246,10 +258,10 @@ class Planner:
             ahead = [(to - start) / swing for to, start in zip(step.landed, before, strict=True)]
             slid = [to - start for to, start in zip(step.lifted, step.landed, strict=True)]
             lost = -sum(map(float.__mul__, ahead, slid))
-            self._unfelt += max(0.0, swing - lost) / len(self._legs)
+            self._unmeasured += max(0.0, swing - lost) / len(self._legs)
         if step.flat:
-            ground.add(*step.lifted, step.wet, self._unfelt)
-            self._unfelt = 0.0
+            ground.add(*step.lifted, step.wet, self._unmeasured)
+            self._unmeasured = 0.0
         if not before or swing + lost <= 0.0:
             return
         self._steps.append(_Judged(step, lost, swing + lost))
@@ -266,20 +278,20 @@ class Planner:
         return self._strides - self._tried > TRIAL_STRIDES
 
     def _try_domes(self) -> None:
-        """Start a trial, if one is due and has been all flat and dry for some strides."""
+        """Start a dome test if one is due, after some strides with all feet flat on dry ground."""
         if self._strides - self._tried <= 3 * HINDSIGHT:
-            return  # what the last one showed is not yet known
+            return  # the last dome test has not been evaluated yet
         if self._trials and not self._outdated:
             return
         if len(self._flat_dry) < HINDSIGHT or statistics.median(self._flat_dry) < LEAST_GAIN:
-            return  # flat feet lose nothing that domes could keep
+            return  # flat feet lose nothing that domes could save
         if all(each.step.flat and each.step.wet < 0.5 for each in self._steps):
             self._trying = set(self._legs)
             self._tried = self._strides
             self._trials.clear()
 
     def _judge(self, judged: Sequence[_Judged], ground: Footprints) -> None:
-        """Learn from the steps that a tripod made together."""
+        """Evaluate the steps that the legs of a tripod made together."""
         steps = [each.step for each in judged]
         lost = sum(each.lost for each in judged) / sum(each.stride for each in judged)
         wet = [

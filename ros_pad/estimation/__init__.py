@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a foot feels: slip alarm, wetness, friction and margin, from force and motion."""
+"""Estimate slip, wetness, friction and friction margin of one foot from its force and motion."""
 
 from ros_pad.estimation.doubt import OF_THE_GROUND
 from ros_pad.estimation.foot import Estimate
 from ros_pad.estimation.foot import FootEstimator
-from ros_pad.estimation.foot import Tuning
-from ros_pad.estimation.sensing import TROUBLES
-from ros_pad.estimation.sensing import trouble_in
+from ros_pad.estimation.sensing import SENSOR_FAULTS
+from ros_pad.estimation.sensing import sensor_fault
+from ros_pad.estimation.tuning import SETTINGS
+from ros_pad.estimation.tuning import Tuning
 
-DOUBTS = ('', *OF_THE_GROUND, *TROUBLES)
-"""How doubts begin, before the colon; the first is none."""
+DOUBTS = ('', *OF_THE_GROUND, *SENSOR_FAULTS)
+"""Kinds of doubt, which are the texts before the colon; the first one, empty, is no doubt."""
 
-__all__ = ['DOUBTS', 'Estimate', 'FootEstimator', 'Tuning', 'trouble_in']
+__all__ = ['DOUBTS', 'SETTINGS', 'Estimate', 'FootEstimator', 'Tuning', 'sensor_fault']

@@ -1,85 +1,104 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Slip alarm: one-sided CUSUM tests on the slip speed (Page 1954), of slow slips and fast ones."""
+"""Slip alarm: one-sided CUSUM tests (Page 1954) of the slip speed, for slow and for fast slip."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import number
 
 SLOW_SLIP = 0.01
-"""Slip speed worth an alarm, m/s ..."""
+"""Slip speed for which the test for slow slip is designed, m/s."""
 
 FAST_SLIP = 0.03
-"""... and one that noise hides less, m/s: a test for one of them is slow to hear the other."""
+"""Slip speed for which the test for fast slip is designed, m/s. Each test alone detects slip at
+the speed of the other test late.
+"""
+
+THRESHOLD = 4.0
+"""Threshold of the statistic, nats."""
 
 
 class SlipAlarm:
-    """Raises when the evidence for slip at a given speed has piled up.
+    """Raise an alarm when there is enough evidence for slip at a given speed.
 
-    The statistic g ← max(0, g + v1/σ² (v - v1/2)) is the log-likelihood ratio of slip at v1
-    against stick, added up since stick last looked likelier.
+    The statistic g ← max(0, g + v1/σ² (v - v1/2)) is the log-likelihood ratio of slip at v1 to
+    stick, summed since the time when stick was last more likely than slip.
 
     Parameters
     ----------
     noise : float
         Standard deviation of the speed while the foot sticks, m/s, above 0.
     correlation_time : float
-        Over which the noise of the speed is correlated, s: samples closer than this count less.
+        Correlation time of the noise of the speed, s, from 0: samples closer together have less
+        weight.
     speed : float
-        Slip speed v1 worth an alarm, m/s, above 0.
+        Slip speed v1 for which the test is designed, m/s, above 0.
     threshold : float
-        Of the statistic, above 0. With independent noise at least e^threshold samples pass between
-        false alarms on average, whatever the noise (Lorden 1971); mostly far more.
+        Threshold of the statistic, nats, above 0. With independent noise of any level, at least
+        e^threshold samples lie between false alarms on average (Lorden 1971), mostly far more.
+
+    Attributes
+    ----------
+    statistic : float
+        The statistic g, nats, from 0 to 1.25 times the threshold.
 
     Raises
     ------
     InvalidInput
-        Naming the value that is outside its range.
+        When a value is outside its range; the message names it.
     """
 
-    __slots__ = ('_correlation_time', '_noise', '_speed', '_threshold', 'statistic')
+    __slots__ = (
+        '_correlation_time', '_half', '_highest', '_speed', '_threshold', '_variance', 'statistic',
+    )  # fmt: skip
 
     def __init__(
         self,
         noise: float,
         correlation_time: float,
         speed: float = SLOW_SLIP,
-        threshold: float = 4.0,
+        threshold: float = THRESHOLD,
     ) -> None:
-        self._noise = number('noise', noise, 'm/s', above=True)
+        self._variance = number('noise', noise, 'm/s', above=True) ** 2
         self._correlation_time = number('correlation_time', correlation_time, 's')
         self._speed = number('speed', speed, 'm/s', above=True)
         self._threshold = number('threshold', threshold, '(nats)', above=True)
+        self._half = 0.5 * self._speed
+        self._highest = 1.25 * self._threshold  # so that the alarm ends soon after the slip
         self.statistic = 0.0
 
     def reset(self) -> None:
-        """Forget; call it at touch-down."""
+        """Discard all evidence; call it at touch-down."""
         self.statistic = 0.0
 
     def update(self, speed: float, dt: float) -> bool:
-        """Take one sample of the slip speed, m/s, dt seconds after the last; True is alarm."""
-        variance = self._noise**2 * max(1.0, self._correlation_time / dt)
-        gain = self._speed / variance * (speed - 0.5 * self._speed)
-        # Bounded above so that the alarm ends soon after the slip does.
-        self.statistic = min(max(0.0, self.statistic + gain), 1.25 * self._threshold)
+        """Process a slip speed, m/s, measured dt seconds after the previous one.
+
+        Return whether the alarm is on.
+        """
+        variance = self._variance * max(1.0, self._correlation_time / dt)
+        gain = self._speed / variance * (speed - self._half)
+        self.statistic = min(max(0.0, self.statistic + gain), self._highest)
         return self.statistic > self._threshold
 
 
 class SlipAlarms:
-    """Several :class:`SlipAlarm` on one speed; the first to raise is heard.
+    """Run several :class:`SlipAlarm` on one slip speed; the alarm is on when any of them is on.
 
     Parameters
     ----------
     noise, correlation_time : float
-        As of each.
+        As for :class:`SlipAlarm`, the same for all.
     speeds : sequence of float
-        Of each, m/s.
+        Slip speed for which each alarm is designed, m/s.
+    threshold : float
+        Threshold of each alarm, nats.
 
     Raises
     ------
     InvalidInput
-        Naming the value that is outside its range.
+        When a value is outside its range; the message names it.
     """
 
     __slots__ = ('_alarms',)
@@ -89,16 +108,20 @@ class SlipAlarms:
         noise: float,
         correlation_time: float,
         speeds: Sequence[float] = (SLOW_SLIP, FAST_SLIP),
+        threshold: float = THRESHOLD,
     ) -> None:
-        self._alarms = [SlipAlarm(noise, correlation_time, speed) for speed in speeds]
+        self._alarms = [SlipAlarm(noise, correlation_time, speed, threshold) for speed in speeds]
 
     def reset(self) -> None:
-        """Forget; call it at touch-down."""
+        """Discard all evidence; call it at touch-down."""
         for alarm in self._alarms:
             alarm.reset()
 
     def update(self, speed: float, dt: float) -> bool:
-        """Take one sample of the slip speed, m/s, dt seconds after the last; True is alarm."""
+        """Process a slip speed, m/s, measured dt seconds after the previous one.
+
+        Return whether the alarm is on.
+        """
         raised = False
         for alarm in self._alarms:
             raised |= alarm.update(speed, dt)

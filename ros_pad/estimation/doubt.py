@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a stance says nothing about the ground, in words: what it is, a colon, and details."""
+"""Reason why the ground is unobservable in a stance, as text: a kind, a colon, and details."""
 
 from __future__ import annotations
 
@@ -7,53 +7,55 @@ from typing import NamedTuple
 
 from ros_pad.estimation.friction import FrictionPrior
 
-TELLING = 1.0
-"""What a stance must add to the log odds of wet ground, or take from them, to have told."""
+CONCLUSIVE = 1.0
+"""Change of the log odds of wet ground, up or down, above which a stance is conclusive."""
 
 SURE = 0.9
-"""Probability of wet or dry ground from which a stance that fits it need not tell more."""
+"""Probability of wet or of dry ground above which a stance with enough pull leaves no doubt, even
+if it is not conclusive."""
 
 DOMED = 0.1
-"""Part of the load on domes from which a foot no longer tells wet from dry."""
+"""Share of the load on domes above which wet and dry ground cannot be distinguished."""
 
 ALL_DOMED = 0.9
-"""Part of the load on domes from which a foot is a dome, and not half inflated."""
+"""Share of the load on domes above which a foot is a dome, and not half inflated."""
 
 PULLED = 1.5
-"""T/N that tells wet ground from dry, over what wet ground is expected to hold: it may hold half
-as much again."""
+"""Ratio of T/N to the expected friction of wet ground up to which a foot was not pulled enough:
+the true friction of wet ground may be 1.5 times the expected one."""
 
 LIGHT = 0.3
-"""Share of the expected load below which sensor noise hides what a foot feels."""
+"""Share of the expected load below which sensor noise hides the friction."""
 
 OF_THE_GROUND = (
     'not yet', 'domed', 'half inflated', 'light', 'turning', 'not pulled', 'undecided',
 )  # fmt: skip
-"""How doubts begin that are of the ground; for the others see :data:`sensing.TROUBLES`."""
+"""Kinds of doubt about the ground; kinds of doubt about sensors are in
+:data:`ros_pad.estimation.sensing.SENSOR_FAULTS`."""
 
 
-class Stance(NamedTuple):
-    """What a stance has felt so far.
+class StanceEvidence(NamedTuple):
+    """Evidence of a stance so far.
 
     Attributes
     ----------
     dome_share : float
-        Part of the expected load that domes carry, 0 to 1.
-    told : float
-        What it has added to the log odds of wet ground.
+        Share of the expected load that domes carry, 0 to 1.
+    log_odds : float
+        Change of the log odds of wet ground by this stance.
     peak_load : float
         Largest normal force, N.
     peak_ratio : float
         Largest T/N of a window.
     turning_ratio : float
-        Largest share of friction that turning about the vertical has taken up, as a T/N; 0 where
-        nobody measures it.
+        Largest part of the friction that turning about the vertical has used, as T/N; 0 where the
+        yaw moment is not measured.
     wet_probability, friction_mean, friction_sd : float
-        What is believed now.
+        Present estimate: probability of wet ground, 0 to 1, mean and standard deviation of μ.
     """
 
     dome_share: float
-    told: float
+    log_odds: float
     peak_load: float
     peak_ratio: float
     turning_ratio: float
@@ -62,13 +64,16 @@ class Stance(NamedTuple):
     friction_sd: float
 
 
-def doubt(stance: Stance, prior: FrictionPrior, expected_load: float) -> str:
-    """Return why a stance has told nothing of the ground, or '' where it has."""
+def doubt(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) -> str:
+    """Return why the ground is unobservable in a stance; '' if it is observable.
+
+    The expected load is in N.
+    """
     if stance.dome_share > ALL_DOMED:
         return 'domed: wet and dry ground feel alike'
     if stance.dome_share > DOMED:
         return f'half inflated: domes carry {100 * stance.dome_share:.0f} % of the load'
-    if abs(stance.told) >= TELLING:
+    if abs(stance.log_odds) >= CONCLUSIVE:
         return ''
     if stance.peak_load < LIGHT * expected_load:
         return f'light: {stance.peak_load:.2g} N of {expected_load:.2g} N'

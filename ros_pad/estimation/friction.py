@@ -1,55 +1,65 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Belief about the ground below one foot: wet or dry, and its friction coefficient.
+"""Estimate of the ground below one foot: wet or dry, and its friction coefficient.
 
-A Bayes filter on {dry, wet} x a grid of friction coefficients. A foot that sticks at T/N only
-says that friction is larger (censored evidence); a foot that slips shows it, or what its turning
-leaves of it. Whether it sticks is itself uncertain, so each sample is a mixture of both, weighed
-by the slip speed. Ground changes with the way that the foot steps or slides, not with time: a foot
-that stands still knows what it knows.
+The estimate is a Bayes filter on {dry, wet} x a grid of friction coefficients. A foot that sticks
+at T/N shows only that friction is larger (censored evidence). A foot that slips shows the friction
+itself, less the part that turning uses. Whether a foot sticks is uncertain, so the likelihood of
+each sample is a mixture of stick and slip, weighted by the slip speed. Ground changes with the
+distance that the foot steps or slides, not with time: the estimate of a foot that stands still
+does not fade.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy import special
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import expected_friction
+from ros_pad.estimation.tuning import Tuning
 
 GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
 _UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
-_ONES = np.ones_like(GRID)  # a product with it sums several times faster than sum(axis=1)
+_ONES = np.ones_like(GRID)  # a matrix product with it is several times faster than sum(axis=1)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
 
+Posterior: TypeAlias = tuple[np.ndarray, bool]
+"""Joint probabilities of ground (dry, wet) and friction, shape (2, grid), and whether the friction
+is that of a dome.
+"""
+
 DEMAND = 0.3
-"""Mean T/N that gaits ask for, taken to be exponential."""
+"""Mean T/N that gaits demand; its distribution is assumed exponential."""
 
 SLIP_SPEED = 0.04
-"""Most frequent speed v of slips, m/s; their density is taken to go as x exp(-x), x = speed / v.
-It starts at zero, so that the noise of a foot at rest does not add up to slow slip."""
+"""Most frequent slip speed v, m/s; the density is assumed proportional to x exp(-x), x = speed /
+v. This density is zero at zero speed, so that the noise of a foot at rest does not count as slip.
+"""
 
-# The half-normal distribution in eight shares, finer in its tail, each by its middle.
+# The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
 MODEL_SHARE = 0.05
-"""Share of friction by which what a slip shows is off, on the average over a walk: windows hold
-some stick, and feet turn more or less than is believed."""
+"""Relative error of friction measured in slip, mean over a walk: a window may contain some stick,
+and feet turn more or less than assumed."""
 
 
 @dataclass(frozen=True)
 class FrictionPrior:
-    """What friction is expected of a foot before it is felt, for each ground and shape.
+    """Expected friction of a foot before it is measured, for each ground and morphology.
 
     Attributes
     ----------
     flat_dry, flat_wet, dome : float
-        Expected coefficients. A dome has one: wet and dry ground feel the same to it.
+        Expected coefficients of friction. One is enough for a dome, whose friction is about the
+        same on wet and dry ground.
     spread : float
-        Relative standard deviation of each.
+        Relative standard deviation of each coefficient.
     """
 
     flat_dry: float
@@ -59,69 +69,67 @@ class FrictionPrior:
 
     @classmethod
     def of(cls, foot: Foot, load: float, spread: float = 0.2) -> FrictionPrior:
-        """Return the contact model's friction of a foot at a load, N."""
+        """Return the friction that the contact model predicts for a foot at a load, N."""
         return cls(*expected_friction(foot, load), spread=spread)
 
     def table(self, dome: bool) -> np.ndarray:
-        """Probabilities on :data:`GRID` for dry and wet ground, shape (2, grid)."""
+        """Return the probabilities on :data:`GRID` for dry and wet ground, shape (2, grid)."""
         means = (self.dome, self.dome) if dome else (self.flat_dry, self.flat_wet)
         rows = []
         for mean in means:
             spread = self.spread * mean + 0.03
-            # Heavy tails: the foot may have met ground that nobody expected. They also keep wet or
-            # dry from ever being certain.
+            # Heavy tails: unexpected ground stays possible, and wet or dry never become certain.
             row = np.exp(-0.5 * ((GRID - mean) / spread) ** 2) / spread + 0.01
             rows.append(row / row.sum())
         return np.array(rows)
 
 
 class GroundFilter:
-    """Belief over dry and wet ground and friction, for one foot.
+    """Posterior of wet ground and friction for one foot.
 
     Parameters
     ----------
     prior : FrictionPrior
         Expected friction.
     wet_prior : float
-        Probability of wet ground where nothing is known, in (0, 1).
+        Prior probability of wet ground, in (0, 1).
     patch_length : float
-        Way over which wet and dry ground typically change, m.
+        Distance over which wet and dry ground are assumed to change, m, above 0.
     forgetting_time : float
-        Over which friction under domes may change within a stance, s.
+        Time over which friction under domes may change within a stance, s.
     temper : float
         Weight of a sample, in (0, 1]: successive samples are not independent.
     rim_speed : float
         Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
         0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
         its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
-        and Cutkosky 1996); nobody measures s.
+        and Cutkosky 1996); s is not measured.
     model_error : float
-        Standard deviation of what T/N shows of friction, > 0, besides :data:`MODEL_SHARE` of it.
-        It is the same in every sample: no number of them averages it out.
+        Standard deviation of T/N as a measure of friction, > 0, in addition to
+        :data:`MODEL_SHARE` of T/N. It is the same in every sample: averaging does not reduce it.
 
     Attributes
     ----------
     prior : FrictionPrior
-        As given.
+        Expected friction, as given.
     wet_probability : float
-        0 to 1.
+        Probability of wet ground, 0 to 1.
     scales : tuple of float
-        What friction is at the load of the last sample on dry and on wet ground, over what it is
-        at the load that the prior is for: the belief is about that one.
-    told : float
-        What this stance has added to the logarithm of the odds of wet ground: about zero where it
-        said nothing.
+        Friction at the load of the last sample over that at the load of the prior, on dry and on
+        wet ground. The posterior refers to the load of the prior.
+    log_odds : float
+        Change of the log odds of wet ground by this stance: about zero if it gave no evidence.
     """
 
     def __init__(
         self,
         prior: FrictionPrior,
-        wet_prior: float = 0.5,
-        patch_length: float = 1.5,
+        wet_prior: float = Tuning.wet_prior,
+        patch_length: float = Tuning.patch_length,
         forgetting_time: float = 1.0,
         temper: float = 0.5,
         rim_speed: float = 0.0,
-        model_error: float = 0.03,
+        model_error: float = Tuning.ratio_noise,
     ) -> None:
         self.prior = prior
         self._tables = {dome: prior.table(dome) for dome in (False, True)}
@@ -135,33 +143,34 @@ class GroundFilter:
         self._blur = blur / blur.sum(axis=0)
         self._dome = False
         self.scales = (1.0, 1.0)
-        self.told = 0.0
-        self._settle(self._grounds * self._tables[False])
+        self.log_odds = 0.0
+        self._normalise(self._grounds * self._tables[False])
 
     def touch_down(self, distance: float, dome: bool) -> None:
-        """Begin a stance, some metres from the last one, flat or domed."""
+        """Begin a stance at a distance, m, from the last one, as a dome or flat."""
         if dome != self._dome:
-            # Friction of one shape says nothing of the other's; what stays is wet or dry.
+            # The friction of one morphology gives no evidence of the friction of the other: keep
+            # only the probability of wet ground.
             self._dome = dome
-            self._belief = self._grounds_known() * self._tables[dome]
+            self._posterior = self._wet_or_dry() * self._tables[dome]
         self.scales = (1.0, 1.0)
-        self.told = 0.0
-        self.go(distance)
+        self.log_odds = 0.0
+        self.fade(distance)
 
-    def go(self, distance: float) -> None:
-        """Fade towards the prior over some metres on which nothing is felt."""
+    def fade(self, distance: float) -> None:
+        """Fade towards the prior over a distance, m, without measurements."""
         self._move(distance)
-        self._settle(self._belief)
+        self._normalise(self._posterior)
 
     @property
-    def belief(self) -> tuple[np.ndarray, bool]:
-        """All that is believed; set it to take back what has been learnt since."""
-        return self._belief, self._dome
+    def posterior(self) -> Posterior:
+        """Whole state of the filter; set it to an earlier one to undo the samples since then."""
+        return self._posterior, self._dome
 
-    @belief.setter
-    def belief(self, belief: tuple[np.ndarray, bool]) -> None:
-        grid, self._dome = belief
-        self._settle(grid)
+    @posterior.setter
+    def posterior(self, posterior: Posterior) -> None:
+        grid, self._dome = posterior
+        self._normalise(grid)
 
     def update(
         self,
@@ -174,7 +183,7 @@ class GroundFilter:
         turning_known: bool = False,
         scales: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Take one sample of T/N and of slip speed.
+        """Process one sample of T/N and of slip speed.
 
         Parameters
         ----------
@@ -183,13 +192,14 @@ class GroundFilter:
         speed, speed_noise : float
             Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
         dt : float
-            Time that the sample stands for, s.
+            Duration that the sample represents, s.
         weight : float
-            How much of it is new, 0 to 1.
+            Share of the sample that is new evidence, 0 to 1.
         turning_known : bool
-            Whether T/N has in it what turning takes up, so that nothing of that is left to guess.
+            Whether T/N includes the friction used by turning; if not, that part is estimated from
+            `rim_speed`.
         scales : tuple of float
-            See the attribute.
+            New value of the attribute.
         """
         self.scales = scales
         friction = np.multiply.outer(scales, GRID)
@@ -197,8 +207,8 @@ class GroundFilter:
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick: T/N is what the gait demands, and μ is above it. Slip: more is demanded than μ,
-        # and T/N shows as much of μ as turning leaves.
+        # Stick: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ, and T/N
+        # is μ less the part used by turning.
         likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         if slip > 0.0:
             if turning_known:
@@ -210,55 +220,59 @@ class GroundFilter:
             unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
-        self._belief = self._belief * (likelihood + 1e-6) ** (weight * self._temper)
-        self._belief /= self._belief.sum()
-        dry, wet = (self._belief @ _ONES).tolist()
-        self.told += math.log(wet / dry) - math.log(before / (1.0 - before))
+        self._posterior = self._posterior * (likelihood + 1e-6) ** (weight * self._temper)
+        self._posterior /= self._posterior.sum()
+        dry, wet = (self._posterior @ _ONES).tolist()
+        self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
         if speed > 0.0:
             self._move(speed * dt)
         if self._dome:
-            # The film under domes drains as they stand: their friction rises on the same ground.
+            # The film under domes drains during a stance, so friction rises on the same ground.
             keep = math.exp(-dt / self._forgetting_time)
-            self._belief = keep * self._belief + (1.0 - keep) * (
-                self._grounds_known() * self._tables[True]
+            self._posterior = keep * self._posterior + (1.0 - keep) * (
+                self._wet_or_dry() * self._tables[True]
             )
-        self._settle(self._belief)
+        self._normalise(self._posterior)
 
     def _move(self, distance: float) -> None:
-        """Go some metres: perhaps onto other ground, of which nothing is known."""
+        """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         stay = math.exp(-distance / self._patch_length)
         table = self._tables[self._dome]
         if self._dome:
-            # Grounds that feel alike must not be told apart by when each was last thought of.
-            grounds = stay * self._grounds_known() + (1.0 - stay) * self._grounds
-            friction = self._belief[0] + self._belief[1]
-            self._belief = grounds * (stay * friction + (1.0 - stay) * table[0])
+            # Under domes wet and dry ground have the same friction: when friction fades, the
+            # probability of wet ground must not change.
+            grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
+            friction = self._posterior[0] + self._posterior[1]
+            self._posterior = grounds * (stay * friction + (1.0 - stay) * table[0])
         else:
-            self._belief = stay * self._belief + (1.0 - stay) * (self._grounds * table)
+            self._posterior = stay * self._posterior + (1.0 - stay) * (self._grounds * table)
 
-    def _grounds_known(self) -> np.ndarray:
-        return self._belief.sum(axis=1, keepdims=True)
+    def _wet_or_dry(self) -> np.ndarray:
+        return self._posterior.sum(axis=1, keepdims=True)
 
-    def _settle(self, belief: np.ndarray) -> None:
-        # Moving on squares the rounding of the sum: a foot that bounces a hundred times would be
-        # left without a belief.
-        self._belief = belief = belief / belief.sum()
-        dry, wet = (belief @ _ONES).tolist()
+    def _normalise(self, posterior: np.ndarray) -> None:
+        # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
+        # would be zero.
+        self._posterior = posterior = posterior / posterior.sum()
+        dry, wet = (posterior @ _ONES).tolist()
         self.wet_probability = wet / (dry + wet)
-        self._known = belief @ self._blur.T / (dry + wet)
+        self._blurred = posterior @ self._blur.T / (dry + wet)
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
         scales = np.array(self.scales)
-        mean = float(scales @ (self._known @ GRID))
-        square = float(scales * scales @ (self._known @ _SQUARES))
+        mean = float(scales @ (self._blurred @ GRID))
+        square = float(scales * scales @ (self._blurred @ _SQUARES))
         return mean, math.sqrt(max(square - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
-        """Friction coefficient that is larger with probability 1 - share, share in [0, 1]."""
+        """Return the friction coefficient that is exceeded with probability 1 - share.
+
+        The share is from 0 to 1; the coefficient is that at the load of the last sample.
+        """
         dry, wet = self.scales
         edges = dry * _UPPER_EDGES
-        on_dry, on_wet = np.cumsum(self._known, axis=1)
+        on_dry, on_wet = np.cumsum(self._blurred, axis=1)
         below = on_dry + np.interp(edges, wet * _UPPER_EDGES, on_wet, left=0.0)
         return float(np.interp(share, below, edges))

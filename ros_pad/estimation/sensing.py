@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether force sensor and marker of a foot can be believed, from what they say alone.
+"""Find faults of the force sensor and the marker of a foot from their readings alone.
 
-Analogue sensors scatter: one that repeats a number to the last bit has stopped, or has reached the
-end of its range. Nothing here knows what is being sensed, or by how much a believable sensor is
-off.
+Readings of analogue sensors have noise: a sensor that repeats a number to the last bit has
+stopped, or is at the end of its range. Readings are also faulty if they are too large, too old or
+change faster than a foot can move. An offset cannot be found from one sensor, and is not a fault
+here.
 """
 
 from __future__ import annotations
@@ -12,53 +13,53 @@ import math
 from collections.abc import Sequence
 
 PATIENCE = 0.1
-"""Time for which a value may stay the same to the last bit, s: markers are slower than forces, and
-converters have steps."""
+"""Time for which a value may stay the same to the last bit, s: markers are sampled more slowly
+than forces, and converters have steps."""
 
 FEWEST = 12
-"""Samples that must agree besides: at low rates two may do so by chance."""
+"""Number of equal samples that a fault also requires: at low rates two may be equal by chance."""
 
 OLDEST_POSITION = 0.05
-"""Age of the last position from which slip cannot be told, s: a foot slides 2 mm in it at 40
-mm/s."""
+"""Age above which a position is too old to measure slip, s: in that time a foot at 40 mm/s slides
+2 mm."""
 
 DEAD = 2.0
-"""Time for which a force sensor may read exactly nothing, s: simulated feet do so in the air. And
-for which one may repeat itself whose steps are larger than twice its noise."""
+"""Time for which a force sensor may read exactly zero, s, as simulated feet do in the air. A
+sensor whose resolution is coarser than twice its noise may repeat any reading for this time."""
 
 DEAD_ON_GROUND = 0.4
-"""The same at the height where the foot has stood, s."""
+"""Time for which a force sensor may read exactly zero at the height of the last stance, s."""
 
-TROUBLES = (
+SENSOR_FAULTS = (
     'force stands still', 'force out of range',
     'marker lost', 'marker stands still', 'marker leapt',
     'no wrench', 'no position', 'sample refused',
 )  # fmt: skip
-"""How doubts begin that are of sensors and not of the ground; the last three are the node's."""
-
+"""Kinds of doubt about sensors, not about the ground. The last three come from
+:class:`ros_pad.estimation.stage.EstimationStage`."""
 
 LEAP = 5.0
-"""Speed at which nothing moves that carries load, m/s ..."""
+"""Speed above which a loaded foot cannot move, m/s."""
 
-LEAP_WAY = 0.02
-"""... over a way that no jitter of a clock makes up, m."""
+LEAP_DISTANCE = 0.02
+"""Distance above which a jump at such a speed cannot come from clock jitter, m."""
 
 
-def trouble_in(doubt: str) -> str:
-    """Return what of a doubt is trouble with sensors: how it begins; empty where it is none."""
+def sensor_fault(doubt: str) -> str:
+    """Return the kind of a doubt if it is a fault of sensors, else an empty text."""
     kind = doubt.partition(':')[0]
-    return kind if kind in TROUBLES else ''
+    return kind if kind in SENSOR_FAULTS else ''
 
 
 class Repeats:
-    """How long each of some values has not changed at all.
+    """Measure for how long each of several values has not changed at all.
 
     Parameters
     ----------
     values : int
-        How many there are.
+        Number of values.
     noise : float
-        Their standard deviation; values without noise never count as stopped.
+        Standard deviation of the values; values without noise never count as stopped.
     """
 
     __slots__ = ('_counts', '_last', '_noise', '_since', '_steps')
@@ -71,11 +72,11 @@ class Repeats:
         self._counts = [0] * values
 
     def since(self, place: int) -> float:
-        """Return the time at which a value was first what it is, s."""
+        """Return the time since which the value with an index has not changed, s."""
         return self._since[place]
 
     def update(self, time: float, values: Sequence[float]) -> list[int]:
-        """Take the values of a time, s; return the places of those that have stopped."""
+        """Process the values of a time, s; return the indices of those that have stopped."""
         stopped: list[int] = []
         if not self._noise:
             return stopped
@@ -98,22 +99,21 @@ class Repeats:
 
 
 class Sensing:
-    """Watches the force sensor and the marker of one foot.
+    """Find faults of the force sensor and the marker of one foot.
 
     Parameters
     ----------
     force_noise, position_noise : float
-        Standard deviations that the sensors are said to have, N and m; one without noise may
-        repeat itself.
+        Standard deviations of the sensors, N and m; if one is 0, its sensor may repeat readings.
     force_range : float
-        Largest component of force that the sensor shows, N.
+        Largest component of force that the sensor can show, N; infinite if not known.
 
     Attributes
     ----------
-    marker_sound : bool
-        Whether the last position can be believed.
+    marker_valid : bool
+        Whether the last position can be used.
     since : float
-        When that which is the trouble began, s.
+        Time at which the last fault began, s; infinite if there was none.
     """
 
     def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
@@ -123,16 +123,16 @@ class Sensing:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what was seen: the clock has been set."""
+        """Discard all readings, because the clock has been set back."""
         self._forces = Repeats(3, self._force_noise)
         self._positions = Repeats(3, self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
         self._grounded = math.inf
         self._dead = False
-        self.marker_sound = True
+        self.marker_valid = True
         self.since = math.inf
 
-    def trouble(
+    def update(
         self,
         time: float,
         force: Sequence[float],
@@ -141,38 +141,40 @@ class Sensing:
         standing: bool,
         aloft: bool,
     ) -> str:
-        """Take a sample; return why nothing can be learnt from it, or '' where something can.
+        """Process a sample; return why it cannot be used, or '' if it can.
 
         Parameters
         ----------
         time : float
-            s.
+            Time of the sample, s.
         force, position : sequence of 3 floats
-            N and m.
+            Force, N, and position, m.
         age : float
-            Of the position, s.
+            Age of the position, s.
         standing : bool
-            Whether the foot stood at the sample before: then it cannot be elsewhere at once.
+            Whether the foot stood at the sample before: then its position cannot jump.
         aloft : bool
-            Whether it is above where it stood last, or has not stood yet.
+            Whether the foot is above the height at which it stood last, or has not stood yet.
         """
         if aloft:
             self._grounded = math.inf
         elif self._grounded == math.inf:
             self._grounded = time
         forces = self._forces.update(time, force)
-        marker = self._trouble_of_marker(time, position, age, standing)
-        self.marker_sound = not marker
-        return self._trouble_of_force(time, force, forces) or marker
+        marker = self._marker_fault(time, position, age, standing)
+        self.marker_valid = not marker
+        return self._force_fault(time, force, forces) or marker
 
-    def _trouble_of_force(self, time: float, force: Sequence[float], stopped: list[int]) -> str:
-        nothing = not any(force)
+    def _force_fault(self, time: float, force: Sequence[float], stopped: list[int]) -> str:
+        if not stopped and self._range == math.inf:
+            self._dead = False
+            return ''
         if len(stopped) == 3:
             self.since = max(map(self._forces.since, stopped))
-            if not nothing:
+            if any(force):
                 return f'force stands still: {force[2]:.3g} N to the last digit'
             grounded = time - max(self._grounded, self.since)
-            # Once found dead it is so in the air as well, until it reads anything.
+            # A sensor once found dead also counts as dead in the air, until it reads a force.
             self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
             if self._dead:
                 return 'force stands still: reads exactly nothing'
@@ -182,17 +184,17 @@ class Sensing:
             if abs(force[place]) >= self._range:
                 self.since = time
                 return f'force out of range: {axis} = {force[place]:.3g} N'
-            # An axis that a sensor does not have reads zero for ever.
+            # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
                 self.since = self._forces.since(place)
                 return f'force out of range: {axis} stays at {force[place]:.3g} N'
         return ''
 
-    def _trouble_of_marker(
+    def _marker_fault(
         self, time: float, position: Sequence[float], age: float, standing: bool
     ) -> str:
         stopped = self._positions.update(time, position)
-        # Markers may be slower than forces: what counts is when each was where it was.
+        # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
         seen = time - age
         last, self._last = self._last, (seen, tuple(position))
         if age > OLDEST_POSITION:
@@ -202,8 +204,8 @@ class Sensing:
             self.since = max(map(self._positions.since, stopped))
             return 'marker stands still: to the last digit'
         if standing and last and 0.0 < seen - last[0] < PATIENCE:
-            way = math.dist(last[1], position)
-            if way > LEAP_WAY and way > LEAP * (seen - last[0]):
+            distance = math.dist(last[1], position)
+            if distance > LEAP_DISTANCE and distance > LEAP * (seen - last[0]):
                 self.since = time
-                return f'marker leapt: {1e3 * way:.0f} mm'
+                return f'marker leapt: {1e3 * distance:.0f} mm'
         return ''

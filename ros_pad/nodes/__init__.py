@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rclpy nodes: parameters in, messages in, one call into the core, messages out."""
+"""The rclpy nodes: each passes parameters and messages to the core, and publishes the results."""

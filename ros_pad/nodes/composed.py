@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole trial on the real nodes, composed in one process, in lock-step on ``/clock``.
+"""Run a whole trial on the real nodes, in one process, in lock-step with ``/clock``.
 
-The simulator takes a step, and only when every node has answered to it does it take the next. All
-nodes publish from one thread, which is the condition under which rclpy's EventsExecutor is safe;
-it hands messages over in the order they were published, several times faster than the others.
+The simulator takes its next step only when estimator, controller and regulator have processed the
+last one. rclpy's EventsExecutor is used: it delivers messages in the order in which they were
+published, several times faster than other executors. It is safe only because all nodes publish
+from one thread.
 """
 
 from __future__ import annotations
@@ -28,7 +29,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
+from ros_pad.bags import annotate
+from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
+from ros_pad.estimation import SETTINGS
+from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
@@ -36,46 +41,59 @@ from ros_pad.nodes.parameters import values_of
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import Pace
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.pace import Progress
+from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.bag import annotate
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.label import label
-from ros_pad.trials.loop import CONTROL_PERIOD_NS
-from ros_pad.trials.loop import Progress
-from ros_pad.trials.loop import tuning_for
 from ros_pad.trials.metrics import summarise
-from ros_pad.trials.trial import DOME_PRESSURE
+from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.trial import Trial
 
-_PATIENCE = 10.0  # s of wall time for one step
-_VENTING = 5.0  # s of simulated time for the pads to empty
+PATIENCE = 30.0
+"""Longest wall time for one step, s."""
+
+_VENTING = 5.0  # longest simulated time for the pads to vent, s
 
 
 class ComposedTrial:
-    """Five nodes of one trial, and the lock-step between them.
+    """Run the five nodes of one trial in lock-step.
 
     Parameters
     ----------
     scene : Scene
-        As loaded from ``scene.source``, which the nodes load again.
+        Loaded from ``scene.source``, which the simulator and the policy oracle load again.
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
     seed : int
-        Of floor and noise.
+        Seed of the floor and of the sensor noise.
     bag : path
         Folder of the bag to write; must not exist.
     context : rclpy.Context
-        Initialised context that the nodes live in.
+        Initialised context of the nodes.
     fidelity : str
-        ``auto`` or a rung of the ladder.
+        ``auto`` or a fidelity level.
 
     Attributes
     ----------
+    scene : Scene
+        As given.
+    stopped : bool
+        Set it to True to end the walk early.
+    executor : EventsExecutor
+        Runs the nodes.
+    recorder, regulator, estimator, controller, simulator : rclpy.node.Node
+        The nodes.
     walked : MorphologyController
-        The controller as it was at the end of the walk; there only then.
+        Copy of the controller at the end of the walk; not set before.
+
+    Raises
+    ------
+    PadError
+        When a node cannot be made, or the nodes do not discover one another within ``PATIENCE``.
     """
 
     def __init__(
@@ -89,99 +107,110 @@ class ComposedTrial:
     ) -> None:
         self.scene = scene
         self.stopped = False
-        self._executor = EventsExecutor(context=context)
+        self._context = context
+        self.executor = EventsExecutor(context=context)
         self._nodes: list[Node] = []
         self._pace = Pace(CONTROL_PERIOD_NS)
-        legs = list(scene.legs)
-        tuning = tuning_for(scene)
-        rate = 1e9 / CONTROL_PERIOD_NS
-        feet = {'legs': legs, 'foot': scene.foot.source}
-        felt = feet | {'expected_load': scene.expected_load}
-        ground = {'scene': scene.source, 'seed': seed}
-
-        def add(kind: Callable[..., Any], **parameters: Any) -> Any:
-            overrides = [Parameter(key, value=value) for key, value in parameters.items()]
-            # Services that nobody calls here would only slow the run.
-            node = kind(
-                context=context,
-                parameter_overrides=overrides,
-                start_parameter_services=False,
-                enable_rosout=False,
-            )
-            self._nodes.append(node)
-            self._executor.add_node(node)
-            return node
-
         try:
-            self.recorder = add(
-                partial(RecorderNode, label(scene, policy, seed, fidelity)),
-                use_sim_time=True,
-                legs=legs,
-                folder=os.fspath(bag),
-            )
-            self.regulator = add(
-                RegulatorNode,
-                use_sim_time=True,
-                ceiling=scene.foot.ceiling,
-                publish_rate=rate,
-                **feet,
-                # And not by its name: this scene may be another than that of its file.
-                **{
-                    f'{BACKEND_OPTIONS}.{key}': value
-                    for key, value in scene.regulator_options.items()
-                },
-            )
-            self.estimator = add(
-                EstimatorNode,
-                use_sim_time=True,
-                position_noise=tuning.position_noise,
-                force_noise=tuning.force_noise,
-                moment_noise=tuning.moment_noise,
-                publish_rate=rate,
-                **felt,
-            )
-            self.controller = add(
-                ControllerNode,
-                use_sim_time=True,
-                policy=policy,
-                dome_pressure=scene.dome_pressure or 0.0,
-                **felt,
-                **(ground if policy == 'oracle' else {}),
-            )
-            self.simulator = add(
-                SimulatorNode,
-                foot=scene.foot.source,
-                fidelity=fidelity,
-                publish_clock=True,
-                free_running=False,
-                **ground,
-            )
-            said = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
-            self.recorder.describe({PARAMETERS: json.dumps(said)})
-            # The executor takes in new nodes as it spins: messages that come before would be
-            # handed over in another order.
-            self._executor.spin_once(timeout_sec=0.01)
-            self._spin(self._connected, 'the nodes to find one another')
+            self._add_nodes(policy, seed, bag, fidelity)
+            parameters = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
+            self.recorder.describe({PARAMETERS: json.dumps(parameters)})
+            # The executor adds nodes only while it spins; messages that were published before
+            # that would arrive in another order.
+            self.executor.spin_once(timeout_sec=0.01)
+            self._spin(self._connected, 'the nodes to discover one another on DDS')
         except BaseException:
             self.close()
             raise
 
+    def _add(self, kind: Callable[..., Any], **parameters: Any) -> Any:
+        """Make a node with these parameters and hand it to the executor."""
+        # Services that nothing calls here would only slow the run.
+        node = kind(
+            context=self._context,
+            parameter_overrides=[Parameter(key, value=each) for key, each in parameters.items()],
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        self._nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def _add_nodes(
+        self,
+        policy: str,
+        seed: int,
+        bag: str | os.PathLike[str],
+        fidelity: str,
+    ) -> None:
+        """Make the five nodes: the recorder first; last the simulator, which starts the trial."""
+        scene = self.scene
+        legs, foot = list(scene.legs), scene.foot.source
+        shared = {'use_sim_time': True, 'legs': legs, 'foot': foot}
+        loaded = shared | {'expected_load': scene.expected_load}
+        ground = {'scene': scene.source, 'seed': seed}
+        tuning = tuning_for(scene)
+
+        self.recorder = self._add(
+            partial(RecorderNode, label(scene, policy, seed, fidelity)),
+            use_sim_time=True,
+            legs=legs,
+            folder=os.fspath(bag),
+        )
+        # The node gets the options of the scene, not its name, because the scene in memory may
+        # differ from its file.
+        options = {
+            f'{BACKEND_OPTIONS}.{key}': value for key, value in scene.regulator_options.items()
+        }
+        self.regulator = self._add(
+            RegulatorNode,
+            ceiling=scene.foot.ceiling,
+            **shared,
+            **options,
+        )
+        self.estimator = self._add(
+            EstimatorNode,
+            **{each.name: getattr(tuning, attribute(each)) for each in SETTINGS},
+            **loaded,
+        )
+        self.controller = self._add(
+            ControllerNode,
+            policy=policy,
+            dome_pressure=scene.dome_pressure or 0.0,
+            **loaded,
+            **(ground if policy == 'oracle' else {}),
+        )
+        self.simulator = self._add(
+            SimulatorNode,
+            foot=foot,
+            fidelity=fidelity,
+            publish_clock=True,
+            free_running=False,
+            **ground,
+        )
+
     def _connected(self) -> bool:
-        """Whether every publisher and subscription here has found its counterparts here."""
+        """Return whether every publisher and subscription here has found its counterparts."""
         publishers = [publisher for node in self._nodes for publisher in node.publishers]
         subscriptions = [each for node in self._nodes for each in node.subscriptions]
         for publisher in publishers:
             name = publisher.topic_name
-            heard_by = [each for each in subscriptions if each.topic_name == name]
-            if publisher.get_subscription_count() < len(heard_by):
+            sinks = [each for each in subscriptions if each.topic_name == name]
+            if publisher.get_subscription_count() < len(sinks):
                 return False
-            spoken_by = [each for each in publishers if each.topic_name == name]
-            if any(each.get_publisher_count() < len(spoken_by) for each in heard_by):
+            sources = [each for each in publishers if each.topic_name == name]
+            if any(each.get_publisher_count() < len(sources) for each in sinks):
                 return False
         return True
 
     def step(self) -> None:
-        """Advance by one sample, and wait until every node has dealt with it."""
+        """Advance by one sample, and wait until the nodes have processed it.
+
+        Raises
+        ------
+        PadError
+            When that takes more than ``PATIENCE``.
+        """
         answered = self.regulator.answered
         self.simulator.step()
         now_ns = self.simulator.time_ns
@@ -191,22 +220,22 @@ class ComposedTrial:
         controller, estimator = self.controller, self.estimator
 
         def settled() -> bool:
-            # The cheapest question first: this is asked after every message.
+            # The cheapest condition comes first, because it is evaluated after every message.
             if controller.wrenches < samples or estimator.samples < samples:
                 return False
             return not control or (
                 self.regulator.answered == answered + legs and self._reported(now_ns)
             )
 
-        self._spin(settled, f'the nodes to answer to {now_ns * 1e-9:.3f} s')
+        self._spin(settled, f'all nodes to process the sample of {now_ns * 1e-9:.3f} s')
         if control and self.scene.faults:
-            # Messages carry what devices say; a robot stands on what is in its pads.
+            # Messages carry measured pressures; the simulated robot needs the true ones.
             self.simulator.pressures[:] = [
                 channel.regulator.pad_pressure for channel in self.regulator.channels.values()
             ]
 
     def _reported(self, now_ns: int) -> bool:
-        """Whether each pressure of this moment has come back, or its device did not answer."""
+        """Return whether each device has reported its present pressure, or failed to answer."""
         return all(
             now_ns in (stamp, channel.unread_ns)
             for stamp, channel in zip(
@@ -215,14 +244,25 @@ class ComposedTrial:
         )
 
     def _spin(self, done: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + PATIENCE
         while not done():
-            self._executor.spin_once(timeout_sec=0.1)
+            self.executor.spin_once(timeout_sec=0.1)
             if time.monotonic() > deadline:
-                raise PadError(f'waited {_PATIENCE:g} s in vain for {what}')
+                raise PadError(f'waited more than {PATIENCE:g} s of wall time for {what}')
 
     def walk(self, progress: Progress | None = None) -> None:
-        """Walk the scene to its end, or until ``stopped`` is set; then vent the pads."""
+        """Walk the scene to its end, to a verdict or until ``stopped`` is set; then vent the pads.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called every 25 samples with the simulated time, s.
+
+        Raises
+        ------
+        PadError
+            When the nodes do not process a sample within ``PATIENCE``, or the pads do not vent.
+        """
         samples = round(self.scene.duration * 1e9) // self.simulator.period_ns
         try:
             for sample in range(samples):
@@ -231,29 +271,32 @@ class ComposedTrial:
                     progress(self.simulator.robot.time)
                 if self.simulator.robot.verdict or self.stopped:
                     break
-            # While the pads are vented it hears of no feet, and takes note of that.
+            # While the pads vent, the controller receives no samples and would report faults.
             self.walked = copy.deepcopy(self.controller.controller)
         except BaseException:
-            with suppress(PadError):  # what went wrong first is what is told
+            with suppress(PadError):  # the first error is the cause of the later ones
                 self._vent()
             raise
         self._vent()
 
     def _vent(self) -> None:
-        """Deactivate the regulators, and let time pass until the pads are flat."""
+        """Deactivate the regulator node, and advance time until the pads are flat."""
         self.regulator.trigger_deactivate()
         simulator, channels = self.simulator, self.regulator.channels.values()
         for _ in range(round(_VENTING * 1e9) // simulator.period_ns):
             simulator.tick()
             if self._pace.due(simulator.time_ns):
-                self._spin(lambda: self._reported(simulator.time_ns), 'pads to vent')
+                self._spin(lambda: self._reported(simulator.time_ns), 'pressures of venting pads')
                 if all(channel.pressure < DOME_PRESSURE for channel in channels):
                     return
-        if not self.scene.faults:  # which may well keep a pad from being vented
-            raise PadError(f'pads still hold pressure {_VENTING:g} s after they were told to vent')
+        if not self.scene.faults:  # a fault may keep a pad from venting
+            raise PadError(
+                f'at least one pad is not vented (below {DOME_PRESSURE:g} Pa gauge) {_VENTING:g} s'
+                ' of simulated time after the command'
+            )
 
     def close(self) -> None:
-        """Let the recorder catch up, and close bag and nodes."""
+        """Wait until the recorder has written everything, and close bag and nodes."""
         recorder = getattr(self, 'recorder', None)
         try:
             if recorder is not None:
@@ -261,18 +304,18 @@ class ComposedTrial:
                 while recorder.message_count > count:
                     count = recorder.message_count
                     for _ in range(200):
-                        self._executor.spin_once(timeout_sec=0.001)
+                        self.executor.spin_once(timeout_sec=0.001)
                 recorder.close()
-        finally:  # nodes that stay behind would go on talking to others
+        finally:  # open nodes would continue to publish
             for node in self._nodes:
-                self._executor.remove_node(node)
+                self.executor.remove_node(node)
                 node.destroy_node()
-            self._executor.shutdown()
+            self.executor.shutdown()
 
 
 @contextmanager
 def _interruptible(trial: ComposedTrial) -> Iterator[None]:
-    """Turn the first Ctrl-C or SIGTERM into an orderly end; the second one is not waited for."""
+    """Let the first Ctrl-C or SIGTERM stop the walk; a second one ends the process at once."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -289,6 +332,30 @@ def _interruptible(trial: ComposedTrial) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _walked(
+    scene: Scene,
+    policy: str,
+    seed: int,
+    bag: str | os.PathLike[str],
+    context: rclpy.Context,
+    level: str,
+    progress: Progress | None,
+) -> tuple[ComposedTrial, float]:
+    """Walk a scene and close its nodes; return them, and the wall time of the walk, s."""
+    trial = ComposedTrial(scene, policy, seed, bag, context, level)
+    started = time.perf_counter()
+    try:
+        with _interruptible(trial):
+            trial.walk(progress)
+    except BaseException:
+        with suppress(PadError):  # a bag on a full disk cannot be closed either
+            trial.close()
+        raise
+    wall = time.perf_counter() - started
+    trial.close()
+    return trial, wall
 
 
 def run(
@@ -312,59 +379,41 @@ def run(
     Returns
     -------
     Trial
-        As read back from the bag; ``interrupted`` in its settings says whether it was cut short.
+        As read from the bag; ``interrupted`` in its settings is whether it was stopped early.
 
     Raises
     ------
     BagError
         When the folder exists or cannot be written.
     ConfigError, InvalidInput
-        Naming what is wrong with scene, policy or fidelity.
+        When scene, policy or fidelity is not allowed.
+    PadError
+        When ROS 2 does not start, the nodes do not answer in time, or the pads do not vent.
     """
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = policy or scene.policy
-    rung = ladder.rung(scene, fidelity, policy)
+    level = levels.level(scene, fidelity, policy)
     context = rclpy.Context()
-    # Signals are ours: rclpy's handlers would cut the nodes off before the pads are vented.
+    # rclpy's own signal handlers would stop the nodes before the pads are vented.
     try:
         rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}') from error
     try:
-        trial = ComposedTrial(scene, policy, seed, bag, context, rung)
-        started = time.perf_counter()
-        try:
-            with _interruptible(trial):
-                trial.walk(progress)
-        except BaseException:
-            with suppress(PadError):  # a bag on a full disk cannot be closed either
-                trial.close()
-            raise
-        wall = time.perf_counter() - started
-        trial.close()
+        trial, wall = _walked(scene, policy, seed, bag, context, level, progress)
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    walked, stopped = trial.walked, trial.stopped
-    # Lifecycle nodes hold themselves, and stay on the graph until they are collected.
+    controller, stopped = trial.walked, trial.stopped
+    # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
-    annotate(bag, label(scene, policy, seed, rung, interrupted=stopped))
+    describe = partial(label, scene, policy, seed, level, interrupted=stopped)
+    annotate(bag, describe())
     result = recorded.load(bag)
     result.floor = floor
-    result.metrics = summarise(scene, result, robot, walked)
+    result.metrics = summarise(scene, result, robot, controller)
     result.real_time_factor = robot.time / wall
-    annotate(
-        bag,
-        label(
-            scene,
-            policy,
-            seed,
-            rung,
-            interrupted=stopped,
-            metrics=result.metrics,
-            real_time_factor=result.real_time_factor,
-        ),
-    )
+    annotate(bag, describe(metrics=result.metrics, real_time_factor=result.real_time_factor))
     return result

@@ -1,34 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The controller node: flat or dome for each foot, and the pressure that takes."""
+"""The controller node: decides flat or dome for each foot, and publishes set-points."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
-import struct
 import sys
+from collections.abc import Callable
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import PointStamped
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import qos_profile_parameter_events
+from rclpy.task import Future
+from rclpy.time import Time
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64
 from std_msgs.msg import String
 
+from ros_pad.bags import codec
+from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
-from ros_pad.control import first_shapes
+from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
-from ros_pad.control.listening import LOOK_PERIOD_NS
-from ros_pad.control.listening import LegListener
+from ros_pad.control.morphology import LIFT_OFF
+from ros_pad.control.morphology import MARGIN
+from ros_pad.control.policies import PREFIX
+from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
+from ros_pad.control.policies import IsWet
+from ros_pad.control.policies import Policy
+from ros_pad.control.stage import Decision
+from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
-from ros_pad.estimation import trouble_in
 from ros_pad.nodes import topics
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
@@ -40,13 +55,14 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.simulation.scene import Scene
 
 
-def _set_margin(node: ControllerNode, margin: float) -> None:
-    """Let the domes of steps to come have another margin."""
-    node.controller.margin = margin
+def _set(name: str) -> Callable[[ControllerNode, float], None]:
+    """Return a function that sets an attribute of the controller to a new value."""
+    return lambda node, value: setattr(node.controller, name, value)
 
 
 PARAMETERS = (
@@ -54,134 +70,216 @@ PARAMETERS = (
     FOOT,
     EXPECTED_LOAD,
     AMBIENT_PRESSURE,
-    Parameter('policy', 'adaptive', 'How shapes are chosen.', choices=POLICIES),
-    Parameter(
-        'margin', 1.2, 'Factor on the load, for the pressure of a dome.', '', 1.0, 5.0,
-        live=True, change=_set_margin,
+    Parameter('policy', 'adaptive', 'Policy that decides the morphology.', choices=POLICIES),
+    *(
+        Parameter(**vars(setting), live=True, change=lambda node, _: node.update_policy())
+        for setting in POLICY_SETTINGS
     ),
+    Parameter(**vars(MARGIN), live=True, change=_set('margin')),
     Parameter(
-        'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
+        'dome_pressure', 0.0,
+        'Gauge pressure of every dome, at least 1000 Pa; 0: it is chosen from the load.',
         'Pa', 0.0, 1e6,
     ),
+    Parameter(**vars(LIFT_OFF)),
+    Parameter(**vars(COMMAND_TIMEOUT), live=True, change=_set('command_timeout')),
     Parameter(
-        'scene', '', 'Scene whose ground the oracle sees; other policies need none.',
+        'scene', '',
+        'Name or path of the scene whose ground policy oracle reads; other policies need none.',
         read=lambda name: Scene.load(name) if name else None,
     ),
-    dataclasses.replace(SEED, description='Seed of that ground.'),
+    dataclasses.replace(SEED, description='Seed of the floor in parameter scene.'),
 )  # fmt: skip
 
 
-class _Leg:
-    """What the node hears of one leg, and what it says of it."""
+def policy_of(values: Mapping[str, Any], is_wet: IsWet | None = None) -> Policy:
+    """Return the policy that the parameters of a node describe; policy oracle needs ``is_wet``.
+
+    Raises
+    ------
+    InvalidInput
+        When parameters of the policy are not allowed together.
+    """
+    name = values['policy']
+    parameters = {each.name.removeprefix(PREFIX): values[each.name] for each in POLICY_SETTINGS}
+    return policy_named(name, is_wet, parameters if name == 'adaptive' else None)
+
+
+def _check_policy(values: Mapping[str, Any]) -> None:
+    if values['policy'] == 'adaptive':
+        policy_of(values)
+
+
+class _LegTopics:
+    """Connect the topics of one leg to its decision stage."""
 
     def __init__(self, node: ControllerNode, leg: int) -> None:
         self._node, self.leg = node, leg
-        # Wrenches and positions come at the rate of the sensors, and are read as they travel.
-        self.heard = LegListener(node.controller, leg, position_in)
+        # Wrenches and positions come at the rate of the sensors: only the values that decisions
+        # use are decoded.
+        self.stage = DecisionStage(node.controller, leg, self._warn, codec.horizontal_position)
         self._setpoints = topics.PRESSURE_SETPOINT.publisher(node, leg)
-        self._shapes = topics.MORPHOLOGY.publisher(node, leg)
+        self._morphologies = topics.MORPHOLOGY.publisher(node, leg)
         self._message = FluidPressure()
         self._message.header.frame_id = f'leg_{leg}_pad'
         topics.WRENCH.subscription(node, self._on_wrench, leg, raw=True)
-        topics.POSITION.subscription(node, self.heard.position, leg, raw=True)
+        topics.POSITION.subscription(node, self.stage.position, leg, raw=True)
         topics.PRESSURE.subscription(node, self._on_pressure, leg)
         topics.DOUBT.subscription(node, self._on_doubt, leg)
         topics.WETNESS.subscription(node, self._on_wetness, leg)
 
     def _on_wrench(self, data: bytes) -> None:
-        self.heard.wrench(normal_force(data))
+        self.stage.load(codec.normal_force(data))
         self._node.wrenches += 1
 
     def _on_pressure(self, message: FluidPressure) -> None:
-        self.heard.pressure(message.fluid_pressure - self._node.ambient)
+        self.stage.pressure(message.fluid_pressure - self._node.ambient)
 
     def _on_doubt(self, message: String) -> None:
-        self.heard.trouble = trouble_in(message.data)
+        self.stage.doubt(message.data)
 
     def _on_wetness(self, message: Float64) -> None:
-        node, controller = self._node, self._node.controller
-        stamp = node.get_clock().now()
-        try:
-            gauge = self.heard.estimate(stamp.nanoseconds * 1e-9, message.data)
-        except InvalidInput as error:  # no probability, and no set-point follows from it
-            node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
-            gauge = None
-        if self.leg in controller.refusals:
-            node.get_logger().warning(
-                f'leg {self.leg} stays flat: {controller.refusals[self.leg]}',
-                throttle_duration_sec=10.0,
+        stamp = self._node.get_clock().now()
+        decision = self.stage.estimate(stamp.nanoseconds * 1e-9, message.data)
+        refusal = self._node.controller.refusals.get(self.leg)
+        if refusal:
+            self._node.get_logger().warning(
+                f'leg {self.leg} stays flat: {refusal}', throttle_duration_sec=10.0
             )
-        self.tell_shape()
-        if gauge is None:
-            return
-        self._message.header.stamp = stamp.to_msg()
-        self._message.fluid_pressure = gauge + node.ambient
-        self._setpoints.publish(self._message)
+        self.publish(decision, stamp)
 
-    def tell_shape(self) -> None:
-        """Publish the shape if it is another one."""
-        shape = self.heard.new_shape()
-        if shape is not None:
-            self._shapes.publish(String(data=shape))
+    def _warn(self, error: InvalidInput) -> None:
+        self._node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
+
+    def publish(self, decision: Decision, stamp: Time) -> None:
+        """Publish the morphology if it has changed, and the set-point if there is one."""
+        if decision.morphology is not None:
+            self._morphologies.publish(String(data=decision.morphology))
+        if decision.setpoint is not None:
+            self._message.header.stamp = stamp.to_msg()
+            self._message.fluid_pressure = decision.setpoint + self._node.ambient
+            self._setpoints.publish(self._message)
 
 
 class ControllerNode(Node):
-    """Decides at each lift-off, and sends a set-point with every estimate of wetness.
+    """Choose the morphology of a foot at each lift-off; publish a set-point with every estimate.
 
-    Where the estimates stop, so do the set-points, and the regulators vent. What is wrong with a
-    leg is said on ``/diagnostics``, once a second and as soon as it is found. Parameters are in
-    :data:`PARAMETERS`.
+    When estimates stop, set-points stop too, and the regulators vent. The state of each leg is
+    published on ``/diagnostics`` once a second, and as soon as its faults change. Parameters are
+    in :data:`PARAMETERS`.
+
+    Attributes
+    ----------
+    controller : MorphologyController
+        Controller of all legs.
+    ambient : float
+        Ambient pressure, absolute Pa.
+    wrenches : int
+        Number of wrenches received so far, of all legs.
+
+    Raises
+    ------
+    ConfigError
+        When a parameter is not allowed, alone or together with others.
     """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(
             'controller', automatically_declare_parameters_from_overrides=True, **kwargs
         )
-        values = declare(self, PARAMETERS)
+        self._values = values = declare(self, PARAMETERS, _check_policy)
         legs = values['legs']
-        is_wet = None
+        self._is_wet = None
         if values['scene']:
-            is_wet = values['scene'].floor.build(values['seed']).wet
+            self._is_wet = values['scene'].floor.build(values['seed']).wet
         elif values['policy'] == 'oracle':
             raise ConfigError(
                 f"node {self.get_name()}: parameter scene = '' is not allowed:"
-                ' policy oracle needs the scene whose ground it sees'
+                ' policy oracle needs the name or path of a scene, whose ground it reads'
             )
         try:
             self.controller = MorphologyController(
                 values['foot'],
                 legs,
-                policy_named(values['policy'], is_wet),
+                policy_of(values, self._is_wet),
                 values['expected_load'],
-                start=first_shapes(values['policy'], legs),
+                start=first_morphologies(values['policy'], legs),
                 margin=values['margin'],
                 fixed_pressure=values['dome_pressure'] or None,
+                lift_off_share=values[LIFT_OFF.name],
+                command_timeout=values[COMMAND_TIMEOUT.name],
             )
         except (InvalidInput, LimitError) as error:
-            # What ranges of single parameters cannot say: how they go together.
+            # dome_pressure is in its range, but too low for a dome or above the foot's ceiling.
             raise ConfigError(
                 f'node {self.get_name()}: {error} (parameter dome_pressure)'
             ) from error
         self.ambient: float = values['ambient_pressure']
         self.wrenches = 0
         self._diagnostics = topics.DIAGNOSTICS.publisher(self)
-        self._said: list[str] = []
-        self._look_pace = Pace(LOOK_PERIOD_NS)
+        self._reported_faults: list[str] = []
+        self._tick_pace = Pace(TICK_PERIOD_NS)
         self._diagnostics_pace = Pace(1_000_000_000)
-        self._legs = [_Leg(self, leg) for leg in legs]
-        on_tick(self, LOOK_PERIOD_NS * 1e-9, self._tick)
+        self._legs = [_LegTopics(self, leg) for leg in legs]
+        regulator = f'{self.get_namespace().rstrip("/")}/regulator'
+        self.create_subscription(
+            ParameterEvent,
+            '/parameter_events',
+            partial(self._follow_timeout, regulator),
+            qos_profile_parameter_events,
+        )
+        # Events report only later changes: the present value is requested, if SROS 2 allows it.
+        self._regulator = None
+        with suppress(RuntimeError):
+            self._regulator = self.create_client(GetParameters, f'{regulator}/get_parameters')
+        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick)
+
+    def update_policy(self) -> None:
+        """Decide with the present parameters from the next lift-off on."""
+        self.controller.policy = policy_of(self._values, self._is_wet)
+
+    def _follow_timeout(self, regulator: str, event: ParameterEvent) -> None:
+        """Take the command timeout from the regulator node of the same namespace."""
+        if event.node != regulator:
+            return
+        for each in (*event.new_parameters, *event.changed_parameters):
+            if each.name == COMMAND_TIMEOUT.name:
+                self._take_timeout(each.value)
+
+    def _take_timeout(self, value: ParameterValue) -> None:
+        # Any node may publish events: values of other types, even unknown ones, are ignored.
+        if value.type != ParameterType.PARAMETER_DOUBLE:
+            return
+        seconds = value.double_value
+        if seconds != self.controller.command_timeout:
+            self.set_parameters([RosParameter(COMMAND_TIMEOUT.name, value=seconds)])
+
+    def _ask_for_timeout(self) -> None:
+        """Ask the regulator for its command timeout as soon as it is there, once."""
+        if self._regulator is None or not self._regulator.service_is_ready():
+            return
+        request = GetParameters.Request(names=[COMMAND_TIMEOUT.name])
+
+        def take(answer: Future) -> None:
+            if answer.exception() is None:
+                for value in answer.result().values:
+                    self._take_timeout(value)
+
+        self._regulator.call_async(request).add_done_callback(take)
+        self._regulator = None
 
     def _tick(self, now_ns: int) -> None:
-        """Look after legs of which no estimates come, and publish what is to be said."""
-        if not self._look_pace.due(now_ns):
+        """Observe legs without estimates, and publish diagnostics."""
+        if not self._tick_pace.due(now_ns):
             return
-        now = now_ns * 1e-9
+        self._ask_for_timeout()
         for each in self._legs:
-            if each.heard.look(now):
-                each.tell_shape()
+            decision = each.stage.tick(now_ns * 1e-9)
+            if decision:
+                each.publish(decision, Time(nanoseconds=now_ns))
         faults = [self.controller.fault(each.leg) for each in self._legs]
-        if self._diagnostics_pace.due(now_ns) or faults != self._said:
-            self._said = faults
+        if self._diagnostics_pace.due(now_ns) or faults != self._reported_faults:
+            self._reported_faults = faults
             self._diagnose(now_ns)
 
     def _diagnose(self, now_ns: int) -> None:
@@ -189,13 +287,13 @@ class ControllerNode(Node):
         set_stamp(array.header.stamp, now_ns)
         controller = self.controller
         for leg in (each.leg for each in self._legs):
-            shape, watch = controller.morphology(leg), controller.watch(leg)
+            morphology, monitor = controller.morphology(leg), controller.monitor(leg)
             fault, remark = controller.fault(leg), controller.remark(leg)
             status = DiagnosticStatus(
                 name=f'{self.get_name()}: leg {leg} pad',
                 hardware_id=f'leg {leg}',
                 level=DiagnosticStatus.OK,
-                message=shape,
+                message=morphology,
             )
             if remark:
                 status.level, status.message = DiagnosticStatus.WARN, remark
@@ -203,11 +301,11 @@ class ControllerNode(Node):
                 status.level = DiagnosticStatus.ERROR
                 status.message = '; '.join(filter(None, (fault, remark)))
             status.values = [
-                KeyValue(key='pressure (Pa gauge)', value=f'{watch.pressure:.0f}'),
+                KeyValue(key='pressure (Pa gauge)', value=f'{monitor.pressure:.0f}'),
                 KeyValue(key='set-point (Pa gauge)', value=f'{controller.setpoint(leg):.0f}'),
-                KeyValue(key='shape', value=shape),
-                KeyValue(key='time to fill (s)', value=f'{watch.fill_time:.2f}'),
-                KeyValue(key='time to vent (s)', value=f'{watch.vent_time:.2f}'),
+                KeyValue(key='shape', value=morphology),
+                KeyValue(key='time to fill (s)', value=f'{monitor.fill_time:.2f}'),
+                KeyValue(key='time to vent (s)', value=f'{monitor.vent_time:.2f}'),
                 KeyValue(key='steps decided ahead', value=str(controller.lead(leg))),
                 KeyValue(
                     key='touch-downs with too little pressure',
@@ -216,35 +314,6 @@ class ControllerNode(Node):
             ]
             array.status.append(status)
         self._diagnostics.publish(array)
-
-
-def normal_force(data: bytes) -> float:
-    """Return force.z, N, of a WrenchStamped as it travels: twenty times as fast as reading all.
-
-    CDR: four bytes of encapsulation, a stamp of eight, the frame's length and text, and then,
-    aligned to eight, six doubles. NaN where the bytes are too few: anybody can publish any.
-    """
-    try:
-        return _normal_force(data)
-    except (IndexError, struct.error):
-        return math.nan
-
-
-def _normal_force(data: bytes) -> float:
-    order = '<' if data[1] & 1 else '>'
-    (length,) = struct.unpack_from(order + 'I', data, 12)
-    force: float
-    (force,) = struct.unpack_from(order + 'd', data, 4 + (12 + length + 7) // 8 * 8 + 16)
-    return force
-
-
-def position_in(data: bytes) -> tuple[float, float]:
-    """Return x and y, m, of a PointStamped as it travels; NaN where the bytes are none."""
-    try:
-        point = deserialize_message(data, PointStamped).point
-    except Exception:  # whatever the middleware says: anybody can publish any bytes
-        return math.nan, math.nan
-    return point.x, point.y
 
 
 def main(args: list[str] | None = None) -> int:

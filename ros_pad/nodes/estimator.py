@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator node: what each foot feels, from its wrench, position and pressure.
+"""The estimator node: slip, wetness and friction of each foot, from wrench, position, pressure.
 
-Why a foot cannot know what is below it is on ``leg_i/doubt``, and on ``/diagnostics`` with the
-health of its sensors.
+The reason why the ground is unobservable is published on ``leg_i/doubt`` and, with the health of
+the sensors, on ``/diagnostics``.
 """
 
 from __future__ import annotations
 
-import math
 import sys
 from typing import Any
 
@@ -25,11 +24,13 @@ from std_msgs.msg import String
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.listening import LISTEN_PERIOD_NS
-from ros_pad.estimation.listening import FootListener
+from ros_pad.estimation.stage import PUBLISH_RATE
+from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -42,47 +43,23 @@ from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 
-_TUNING = Tuning()
 PARAMETERS = (
     LEGS,
     FOOT,
     EXPECTED_LOAD,
     AMBIENT_PRESSURE,
-    Parameter(
-        'position_noise', _TUNING.position_noise,
-        'Standard deviation of a marker coordinate; 0: it may repeat itself.', 'm', 0.0, 0.1,
-    ),
-    Parameter(
-        'force_noise', _TUNING.force_noise,
-        'Standard deviation of a force component; 0: it may repeat itself.', 'N', 0.0, 100.0,
-    ),
-    Parameter(
-        'moment_noise', 0.0,
-        'Standard deviation of the torque z of a wrench; 0: the sensors measure none.',
-        'N m', 0.0, 10.0,
-    ),
-    Parameter(
-        'force_range', 0.0,
-        'Largest force that a sensor shows in any direction; 0: not known.', 'N', 0.0, 1e5,
-    ),
-    Parameter(
-        'patch_length', _TUNING.patch_length,
-        'Way over which wet and dry ground change.', 'm', 0.01, 100.0,
-    ),
-    Parameter(
-        'wet_prior', _TUNING.wet_prior,
-        'Probability of wet ground where nothing is known.', '', 0.01, 0.99,
-    ),
-    Parameter('publish_rate', 50.0, 'Estimates a second.', 'Hz', 5.0, 1000.0),
+    *(Parameter(**vars(setting)) for setting in SETTINGS),
+    Parameter(**vars(PUBLISH_RATE)),
 )  # fmt: skip
 
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
 
-class _Leg(FootListener):
-    """Estimator of one leg, the messages it waits for, and those it sends."""
+class _LegTopics:
+    """Connect the topics of one leg to its estimation stage."""
 
     def __init__(
         self,
@@ -91,10 +68,9 @@ class _Leg(FootListener):
         estimator: FootEstimator,
         period_ns: int,
         ambient: float,
-        moments: bool,
     ) -> None:
-        super().__init__(
-            estimator, period_ns, moments, self._publish, self._publish_doubt, self._warn
+        self.stage = EstimationStage(
+            estimator, period_ns, self._publish, self._publish_doubt, self._warn
         )
         self._node = node
         self._leg = leg
@@ -112,23 +88,23 @@ class _Leg(FootListener):
         topics.POSITION.subscription(node, self._on_position, leg)
 
     def _is_ours(self, frame: str) -> bool:
-        """Whether a frame is not that of another leg; if it is, say so."""
+        """Return whether a frame is allowed for this leg; otherwise reject the sample."""
         try:
             check_frame(frame, self._leg)
         except InvalidInput as error:
-            self.refused(error)
+            self.stage.reject(error)
             return False
         return True
 
     def _on_pressure(self, message: FluidPressure) -> None:
         if self._is_ours(message.header.frame_id):
-            self.pressure(message.fluid_pressure - self._ambient)
+            self.stage.pressure(message.fluid_pressure - self._ambient)
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         if not self._is_ours(message.header.frame_id):
             return
         force = message.wrench.force
-        self.wrench(
+        self.stage.wrench(
             nanoseconds(message.header.stamp),
             (force.x, force.y, force.z),
             message.wrench.torque.z,
@@ -138,27 +114,30 @@ class _Leg(FootListener):
         if not self._is_ours(message.header.frame_id):
             return
         point = message.point
-        self.position(nanoseconds(message.header.stamp), (point.x, point.y, point.z))
+        self.stage.position(nanoseconds(message.header.stamp), (point.x, point.y, point.z))
 
     def _warn(self, error: InvalidInput) -> None:
-        self._node.get_logger().warning(f'sample ignored: {error}', throttle_duration_sec=1.0)
+        self._node.get_logger().warning(
+            f'leg {self._leg}: sample ignored: {error}', throttle_duration_sec=1.0
+        )
 
     def _publish_doubt(self, doubt: str) -> None:
         self._doubts.publish(String(data=doubt))
 
     def status(self) -> DiagnosticStatus:
-        """Return how the foot is doing, for ``/diagnostics``."""
-        estimate = self._estimator.estimate
+        """Return the health of the sensors and the estimate, for ``/diagnostics``."""
+        stage = self.stage
+        estimate = stage.estimator.estimate
         return DiagnosticStatus(
             name=f'{self._node.get_name()}: leg {self._leg} sensing',
             hardware_id=f'foot {self._leg}',
-            level=_LEVELS[self.sound],
-            message=self.doubt or 'knows the ground',
+            level=_LEVELS[stage.sound],
+            message=stage.doubt or 'the ground is observable',
             values=[
                 KeyValue(key='P(wet)', value=f'{estimate.wet_probability:.3f}'),
                 KeyValue(key='friction', value=f'{estimate.friction_mean:.3f}'),
                 KeyValue(key='friction sd', value=f'{estimate.friction_sd:.3f}'),
-                KeyValue(key='samples', value=str(self.samples)),
+                KeyValue(key='samples', value=str(stage.samples)),
             ],
         )
 
@@ -172,12 +151,18 @@ class _Leg(FootListener):
         self._slipping.publish(Bool(data=estimate.slipping))
         self._friction.publish(Float64(data=estimate.friction_mean))
         self._margin.publish(Float64(data=estimate.margin))
-        # Last: it is what the controller acts on.
+        # Published last, because it triggers the controller.
         self._wetness.publish(Float64(data=estimate.wet_probability))
 
 
 class EstimatorNode(Node):
-    """Serves the legs in the parameter ``legs``; parameters are in :data:`PARAMETERS`."""
+    """Estimate slip, friction and wetness under each foot; parameters are in :data:`PARAMETERS`.
+
+    Attributes
+    ----------
+    legs : dict
+        For each leg, its topics and its estimation stage.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(
@@ -185,37 +170,29 @@ class EstimatorNode(Node):
         )
         values = declare(self, PARAMETERS)
         foot: Foot = values['foot']
-        tuning = Tuning(
-            position_noise=values['position_noise'],
-            force_noise=values['force_noise'],
-            moment_noise=values['moment_noise'],
-            force_range=values['force_range'] or math.inf,
-            patch_length=values['patch_length'],
-            wet_prior=values['wet_prior'],
-        )
+        tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.legs = {
-            leg: _Leg(
+            leg: _LegTopics(
                 self,
                 leg,
                 FootEstimator(foot, values['expected_load'], tuning),
                 round(1e9 / values['publish_rate']),
                 values['ambient_pressure'],
-                moments=values['moment_noise'] > 0.0,
             )
             for leg in values['legs']
         }
         self._diagnostics = topics.DIAGNOSTICS.publisher(self)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
-        self._health_pace = Pace(LISTEN_PERIOD_NS)
-        on_tick(self, LISTEN_PERIOD_NS * 1e-9, self._tick)
+        self._health_pace = Pace(TICK_PERIOD_NS)
+        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick)
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):
             return
         for leg in self.legs.values():
-            leg.listen(now_ns)
-        sound = [leg.sound for leg in self.legs.values()]
+            leg.stage.tick(now_ns)
+        sound = [leg.stage.sound for leg in self.legs.values()]
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
@@ -224,8 +201,8 @@ class EstimatorNode(Node):
 
     @property
     def samples(self) -> int:
-        """Number of samples taken so far, of all legs."""
-        return sum(leg.samples for leg in self.legs.values())
+        """Number of samples accepted so far, of all legs."""
+        return sum(leg.stage.samples for leg in self.legs.values())
 
 
 def main(args: list[str] | None = None) -> int:

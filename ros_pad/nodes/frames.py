@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of messages: whose leg they say they are of."""
+"""Check the leg that the frame of a message names."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ _OF_A_LEG = re.compile(r'(?:.*/)?leg_(\d+)_', re.DOTALL)
 
 
 def check_frame(frame: str, leg: int) -> None:
-    """Refuse a frame that names another leg: somebody has crossed two cables, or two topics.
+    """Refuse a frame that names another leg, because two cables or topics may be swapped.
 
     Parameters
     ----------
     frame : str
-        ``header.frame_id``. One that names no leg, such as an empty one, ``world`` or a driver's
-        own, is allowed; so is a prefix, as in ``robot_2/leg_1_pad``.
+        ``header.frame_id``. A frame that names no leg, for instance an empty one or ``world``, is
+        allowed; so is a prefix, as in ``robot_2/leg_1_pad``.
     leg : int
-        The leg whose topic it came on.
+        The leg of the topic.
 
     Raises
     ------
     InvalidInput
-        When it names another leg.
+        When the frame names another leg.
     """
-    if 'leg_' not in frame:  # most frames, at a tenth of the time
+    if 'leg_' not in frame:  # in the usual case this is ten times faster than the pattern
         return
     named = _OF_A_LEG.match(frame)
     if named and named[1] != str(leg):
         raise InvalidInput(
-            f'frame_id = {frame[:80]!r} is not allowed on a topic of leg {leg}: empty, or the'
-            " frame of this leg's own is needed"
+            f'frame_id = {frame[:80]!r} is not allowed on a topic of leg {leg}: a frame of this'
+            ' leg is needed, or one that names no leg'
         )

@@ -15,26 +15,26 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 from visualization_msgs.msg import MarkerArray
 
+from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.scene import HexapodBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
-from ros_pad.trials.trial import DOME_PRESSURE
 
 FORCE_SCALE = 0.01
-"""m of arrow in a newton."""
+"""Length of an arrow for one newton, m."""
 
 TILE = 1.0
 """Edge of the square of floor in one marker, m."""
 
-_CELLS = 20  # a side of a tile
-_SIGHT = 1.5  # m before and behind the body in which floor is shown
-_BREADTH = 0.6  # m to either side
-_SLOW_NS = 1_000_000_000  # floor and path come once a second: they are long
-_PATH_STEP = 0.02  # m between points of the path
+_CELLS = 20  # cells along one side of a tile
+_SIGHT = 1.5  # distance ahead of and behind the body up to which floor is shown, m
+_BREADTH = 0.6  # the same to the left and to the right, m
+_SLOW_NS = 1_000_000_000  # floor and path are large messages: once a second is enough
+_PATH_STEP = 0.02  # smallest distance between points of the path, m
 
-# Okabe and Ito's colours, as in the report.
+# Okabe and Ito's colours, as in reports.
 _WET = (0.337, 0.706, 0.914)
 _DRY = (0.902, 0.624, 0.0)
 _SWING = (0.6, 0.6, 0.6)
@@ -43,17 +43,19 @@ _BLACK = (0.0, 0.0, 0.0)
 
 
 class WalkMarkers:
-    """Makes the markers of one walk.
+    """Make the markers of one walk.
 
-    Soles are discs, thin when flat and thick when domed, blue on wet ground, yellow on dry, grey
-    in the air; arrows are the forces of the ground, red where the foot slips. All are in the
-    frame ``world``, and each keeps its name and number, so that a new one takes the old one's
-    place.
+    Soles are discs: thin when flat, thick when domed; blue on wet ground, yellow on dry ground,
+    grey in swing. Arrows are ground forces, red where the foot slips faster than 5 mm/s. All are
+    in the frame ``world``; each keeps its namespace and id, so that a new one replaces the old
+    one.
 
     Parameters
     ----------
     scene : Scene
+        Scene of the walk.
     floor : Floor
+        Floor of the scene, built with the seed of the walk.
     """
 
     def __init__(self, scene: Scene, floor: Floor) -> None:
@@ -65,21 +67,21 @@ class WalkMarkers:
         outline: Sequence[tuple[float, float]] = ()
         if isinstance(scene.body, HexapodBody):
             outline = (*scene.body.homes, scene.body.homes[0])
-        # Half way in to the feet: the body that carries the legs.
+        # The outline of the body is drawn halfway to the home positions of the feet.
         self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
-        list(self._ground(0.0, 0.0))  # making them takes its time, and a walk has none
+        list(self._ground(0.0, 0.0))  # in advance, because it would delay the walk
 
     def message(self, robot: Robot, pressures: Sequence[float], time_ns: int) -> MarkerArray:
-        """Return what is to be drawn now.
+        """Return the markers of this moment.
 
         Parameters
         ----------
         robot : Robot
-            As it is now.
+            The robot in its present state.
         pressures : sequence of float
-            Of the pads, gauge Pa, in the order of the robot's legs.
+            Pressures of the pads, gauge Pa, in the order of the robot's legs.
         time_ns : int
-            Stamp, ns.
+            Time stamp of the markers, ns.
         """
         seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
@@ -119,7 +121,7 @@ class WalkMarkers:
             return marker
         z = self._floor.height(x, y)
         marker.points = [Point(x=x, y=y, z=z), Point(x=x + fx, y=y + fy, z=z + fz)]
-        marker.scale = Vector3(x=0.006, y=0.012, z=0.015)  # shaft, head, head's length
+        marker.scale = Vector3(x=0.006, y=0.012, z=0.015)  # shaft, head, length of head
         marker.color = _colour(_SLIPPING if foot.slip_speed > 0.005 else _BLACK)
         return marker
 
@@ -139,7 +141,7 @@ class WalkMarkers:
         self, name: str, points: list[Point], colour: tuple[float, float, float], width: float
     ) -> Marker:
         marker = _marker(name, 0, Marker.LINE_STRIP)
-        # One point is no line, and RViz says so again and again.
+        # RViz warns about a line of one point.
         marker.points = points if len(points) > 1 else points * 2
         marker.scale = Vector3(x=width)
         marker.color = _colour(colour)
@@ -157,7 +159,7 @@ class WalkMarkers:
                     yield self._tiles[column, row]
 
     def _tile(self, column: int, row: int) -> Marker:
-        number = column * 1000 + row  # of its own over a kilometre of floor
+        number = column * 1000 + row  # unique over a kilometre of floor
         marker = _marker('wet ground', number, Marker.TRIANGLE_LIST)
         cell = TILE / _CELLS
         centres = (np.arange(_CELLS) + 0.5) * cell
@@ -175,10 +177,10 @@ class WalkMarkers:
 def _rectangles(wet: np.ndarray) -> Iterator[tuple[int, int, int, int]]:
     """Yield rectangles (left, right, bottom, top) that together are the wet cells.
 
-    Runs of cells in a row, and runs that are alike in the rows above taken together: a tenth of
+    Runs of wet cells in a row are merged with equal runs in the next rows, which gives a tenth of
     the corners of single cells.
     """
-    growing: dict[tuple[int, int], int] = {}  # from which row on there is such a run
+    growing: dict[tuple[int, int], int] = {}  # first row of each run
     for row in range(len(wet) + 1):
         cells = wet[row].astype(int) if row < len(wet) else []
         edges = np.flatnonzero(np.diff(cells, prepend=0, append=0)).tolist()

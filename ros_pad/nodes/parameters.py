@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of nodes: one table each, from which descriptors, YAML and documentation follow."""
+"""Parameters of nodes: a table for each node, from which descriptors, YAML and docs are made."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import difflib
 import math
 from array import array
 from collections.abc import Callable
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,104 +19,48 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
+from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.estimation import tuning
 from ros_pad.nodes import topics
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials import label
 
 BACKEND_OPTIONS = 'backend_options'
-"""Prefix of the regulator's parameters that are options of its backend, whatever they are."""
+"""Prefix of the regulator's parameters that are options of its backend."""
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One parameter of a node.
+class Parameter(Setting):
+    """One parameter of a node: a setting, and what the node does with its value.
 
     Attributes
     ----------
-    name : str
-    default : bool, int, float, str or list of int
-        Its type is the parameter's type.
-    description : str
-        One sentence.
-    unit : str
-        Empty for text and counts.
-    low, high : float
-        Allowed range of a number.
-    choices : tuple of str
-        Allowed words; empty for any.
     read : callable or None
-        Makes of the value what the node works with; raises `PadError` where it cannot.
+        Converts the value to what the node works with; raises `PadError` if it cannot.
     live : bool
-        Whether it may be changed while the node runs; all others are read-only.
+        Whether it can be changed while the node runs; all others are read-only.
     change : callable or None
-        What besides is to be done then, with the node and the new value.
+        Called after a change with the node and the new value.
     """
 
-    name: str
-    default: Any
-    description: str
-    unit: str = ''
-    low: float = -math.inf
-    high: float = math.inf
-    choices: tuple[str, ...] = ()
     read: Callable[[Any], Any] | None = None
     live: bool = False
     change: Callable[[Any, Any], None] | None = None
 
     @property
     def kind(self) -> str:
-        """The type as ROS tools call it."""
+        """The name of the type in ROS tools."""
         kinds = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
-        return kinds.get(type(self.default), 'integer array')
-
-    @property
-    def allowed(self) -> str:
-        """The allowed values in words."""
-        if self.choices:
-            return f'one of {", ".join(self.choices)}'
-        if isinstance(self.default, list):
-            return f'a list of different whole numbers from {self.low:g} to {self.high:g}'
-        if isinstance(self.default, (int, float)) and not isinstance(self.default, bool):
-            whole = 'a whole number' if isinstance(self.default, int) else 'a number'
-            return f'{whole} from {self.low:.10g} to {self.high:.10g} {self.unit}'.rstrip()
-        return 'true or false' if isinstance(self.default, bool) else 'text'
-
-    def accept(self, value: Any) -> Any:
-        """Return a value as this parameter's type; a whole number is taken for a double too.
-
-        Raises
-        ------
-        ValueError
-            When it has another type, or is not among what is allowed.
-        """
-
-        def whole(number: Any) -> bool:
-            integer = isinstance(number, int) and not isinstance(number, bool)
-            return integer and self.low <= number <= self.high
-
-        match self.default:
-            case bool():
-                good = isinstance(value, bool)
-            case int():
-                good = whole(value)
-            case float():
-                good = isinstance(value, float) and self.low <= value <= self.high
-                good = good or whole(value)
-            case str():
-                good = isinstance(value, str) and (not self.choices or value in self.choices)
-            case _:
-                value = list(value) if isinstance(value, (array, list)) else []
-                good = all(map(whole, value)) and len(set(value)) == len(value) > 0
-        if not good:
-            raise ValueError
-        return float(value) if isinstance(self.default, float) else value
+        return kinds.get(self.value_type, 'integer array')
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return what ROS tools show of it."""
+        """Return the descriptor that ROS tools show."""
         descriptor = ParameterDescriptor(
             description=f'{self.description} [{self.unit}]' if self.unit else self.description,
             additional_constraints=self.allowed,
@@ -133,90 +78,117 @@ class Parameter:
         return descriptor
 
 
-LEGS = Parameter('legs', list(topics.LEGS), 'Legs that are served.', '', 1, 6)
+LEGS = Parameter('legs', list(topics.LEGS), 'Numbers of the legs of this node.', '', 1, 6)
 FOOT = Parameter(
     'foot', 'large37', 'Name of a foot in config/feet, or path of a YAML file.', read=Foot.load
 )
 SCENE = Parameter(
-    'scene', 'hexapod_patches', 'Name of a scene, or path of a YAML file.', read=Scene.load
+    'scene',
+    'hexapod_patches',
+    'Name of a scene in config/scenes, or path of a YAML file.',
+    read=Scene.load,
 )
 SEED = Parameter('seed', 0, 'Seed of the floor and of the sensor noise.', '', 0, 2**31 - 1)
-EXPECTED_LOAD = Parameter(
-    'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',
-    'N', 0.01, 1000.0,
-)  # fmt: skip
-AMBIENT_PRESSURE = Parameter(
-    'ambient_pressure', 101325.0, 'Pressure around the robot: messages are absolute, pads gauge.',
-    'Pa', 30000.0, 120000.0,
-)  # fmt: skip
+EXPECTED_LOAD = Parameter(**vars(tuning.EXPECTED_LOAD))
+AMBIENT_PRESSURE = Parameter(**vars(label.AMBIENT_PRESSURE))
 
 
-def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
+def declare(
+    node: Node,
+    table: Sequence[Parameter],
+    together: Callable[[Mapping[str, Any]], object] | None = None,
+) -> dict[str, Any]:
     """Declare a table of parameters and return their values by name.
 
-    A node that is made with ``automatically_declare_parameters_from_overrides`` also refuses what
-    looks like a misspelt parameter, and warns of others that it does not have.
+    A node made with ``automatically_declare_parameters_from_overrides`` also refuses a name that
+    looks misspelt, and warns of other unknown names.
 
-    Later changes are judged here too: those of live parameters are in what was returned as soon
-    as they are accepted, and all others are refused with the reason, ``use_sim_time`` among them.
+    Later changes of live parameters are checked, and update the returned mapping when they are
+    accepted. Changes of the other parameters of the table and of ``use_sim_time`` are refused with
+    the reason.
+
+    Parameters
+    ----------
+    node : Node
+        Node to declare them on.
+    table : sequence of Parameter
+        Parameters of the node.
+    together : callable or None
+        Called with the values, now and before each change; raises `PadError` if values are not
+        allowed together.
 
     Raises
     ------
     ConfigError
-        Naming node, parameter, value and what is allowed.
+        When a value is not allowed, or a name looks misspelt. The message names node, parameter,
+        value and what is allowed.
     """
     values = {}
     for parameter in table:
         name = parameter.name
-        # ROS's own words for a wrong type or range name neither node nor unit: take whatever
-        # was given, and judge it here.
+        # ROS's own messages for a wrong type or range name neither node nor unit: accept any
+        # value here, and check it below.
         if not node.has_parameter(name):
             node.declare_parameter(
                 name, parameter.default, ParameterDescriptor(dynamic_typing=True)
             )
         given = node.get_parameter(name).value
         node.undeclare_parameter(name)
-        value, values[name] = _judged(node, parameter, given)
+        value, values[name] = _checked(node, parameter, given)
         node.declare_parameter(name, value, parameter.descriptor(), ignore_override=True)
-    known = [parameter.name for parameter in table]
-    for name in node.get_parameters_by_prefix(''):
-        head = name.split('.')[0]
-        if head in (*known, *_OF_ROS, BACKEND_OPTIONS):
-            continue
-        near = difflib.get_close_matches(head, [*known, BACKEND_OPTIONS], n=1, cutoff=0.75)
-        if near:
-            # A limit that is not heard of because of a slip of the pen must not pass.
-            raise ConfigError(
-                f'node {node.get_name()}: parameter {name!r} is not known here.'
-                f' Did you mean {near[0]!r}?'
-            )
-        if '.' not in name:
-            node.get_logger().warning(f'parameter {name!r} is not known here')
-    _follow(node, {parameter.name: parameter for parameter in table if parameter.live}, values)
+    _refuse_misspelt(node, [parameter.name for parameter in table])
+    live = {parameter.name: parameter for parameter in table if parameter.live}
+    if together:
+        try:
+            together(values)
+        except PadError as error:
+            raise ConfigError(f'node {node.get_name()}: {error}') from error
+    _follow(node, live, values, together)
     return values
 
 
-def _judged(node: Node, parameter: Parameter, given: Any) -> tuple[Any, Any]:
-    """Return a value as the parameter's type, and what the node works with."""
-    where = f'node {node.get_name()}: parameter {parameter.name} = '
+def _refuse_misspelt(node: Node, known: Sequence[str]) -> None:
+    """Refuse a parameter whose name is near to a known one; warn of others."""
+    for name in node.get_parameters_by_prefix(''):
+        head = name.split('.')[0]
+        if name in known or head in (*_OF_ROS, BACKEND_OPTIONS):
+            continue
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
+        near = near or difflib.get_close_matches(head, [*known, BACKEND_OPTIONS], n=1, cutoff=0.75)
+        if near:
+            # A misspelt limit must not be ignored.
+            raise ConfigError(
+                f'node {node.get_name()}: there is no parameter {name!r}.'
+                f' Did you mean {near[0]!r}?'
+            )
+        if '.' not in name:
+            node.get_logger().warning(f'there is no parameter {name!r}: it is ignored')
+
+
+def _checked(node: Node, parameter: Parameter, given: Any) -> tuple[Any, Any]:
+    """Return a value as the parameter's type, and the value that the node works with."""
+    where = f'node {node.get_name()}: parameter '
     try:
-        value = parameter.accept(given)
-    except ValueError:
-        shown = given.tolist() if isinstance(given, array) else given
-        raise ConfigError(
-            f'{where}{shown!r} is not allowed: {parameter.allowed} is needed'
-        ) from None
+        value = parameter.accept(given.tolist() if isinstance(given, array) else given)
+    except InvalidInput as error:
+        raise ConfigError(f'{where}{error}') from None
     try:
         return value, parameter.read(value) if parameter.read else value
     except PadError as error:
-        raise ConfigError(f'{where}{value!r} is not allowed: {error}') from error
+        where += f'{parameter.name} = {value!r}'
+        raise ConfigError(f'{where} is not allowed: {error}') from error
 
 
-def _follow(node: Node, live: dict[str, Parameter], values: dict[str, Any]) -> None:
-    """Let live parameters be changed; ROS itself refuses to change those that are read-only."""
+def _follow(
+    node: Node,
+    live: dict[str, Parameter],
+    values: dict[str, Any],
+    together: Callable[[Mapping[str, Any]], object] | None,
+) -> None:
+    """Accept changes of live parameters; ROS itself refuses changes of read-only ones."""
 
     def prepare(changes: list[RosParameter]) -> list[RosParameter]:
-        # As at the start, a whole number will do for a double.
+        # A whole number is accepted for a double, as at the start.
         return [
             RosParameter(each.name, value=float(each.value))
             if each.name in live and type(each.value) is int and live[each.name].kind == 'double'
@@ -224,35 +196,43 @@ def _follow(node: Node, live: dict[str, Parameter], values: dict[str, Any]) -> N
             for each in changes
         ]
 
-    def judge(changes: list[RosParameter]) -> SetParametersResult:
+    def check(changes: list[RosParameter]) -> SetParametersResult:
+        changed = dict(values)
         for each in changes:
             if each.name == 'use_sim_time' and each.value != node.get_parameter(each.name).value:
-                # A node that waits for a /clock that nobody publishes would not vent.
+                # A node that waits for a missing /clock would not vent.
                 return SetParametersResult(
-                    reason=f'node {node.get_name()}: parameter use_sim_time is read at the start'
+                    reason=f'node {node.get_name()}: parameter use_sim_time is read only at the'
+                    ' start of the node'
                 )
             if each.name in live:
                 try:
-                    _judged(node, live[each.name], each.value)
+                    _, changed[each.name] = _checked(node, live[each.name], each.value)
                 except ConfigError as error:
                     return SetParametersResult(reason=str(error))
+        try:
+            if together:
+                together(changed)
+        except PadError as error:
+            return SetParametersResult(reason=f'node {node.get_name()}: {error}')
         return SetParametersResult(successful=True)
 
-    def take(changes: list[RosParameter]) -> None:
-        for each in changes:
-            if each.name in live:
-                parameter = live[each.name]
-                _, values[each.name] = _judged(node, parameter, each.value)
-                if parameter.change:
-                    parameter.change(node, values[each.name])
+    def apply(changes: list[RosParameter]) -> None:
+        changed = [each for each in changes if each.name in live]
+        for each in changed:
+            _, values[each.name] = _checked(node, live[each.name], each.value)
+        for each in changed:  # only now: some values are allowed only together
+            change = live[each.name].change
+            if change:
+                change(node, values[each.name])
 
     node.add_pre_set_parameters_callback(prepare)
-    node.add_on_set_parameters_callback(judge)
-    node.add_post_set_parameters_callback(take)
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(apply)
 
 
 def plain(value: Any) -> Any:
-    """Return the value of a parameter as JSON has it."""
+    """Return the value of a parameter in a form that JSON can express."""
     if isinstance(value, array):
         return value.tolist()
     if isinstance(value, list) and value and isinstance(value[0], bytes):
@@ -261,7 +241,7 @@ def plain(value: Any) -> Any:
 
 
 def values_of(node: Node) -> dict[str, Any]:
-    """Return every parameter of a node as JSON has it, by name."""
+    """Return every parameter of a node by name, in a form that JSON can express."""
     names = sorted(node.get_parameters_by_prefix(''))
     values = [each.value for each in node.get_parameters(names)]
     return {name: plain(value) for name, value in zip(names, values, strict=True)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs one node in a process of its own, and ends it well."""
+"""Run one node in this process, and shut it down cleanly after a signal or an error."""
 
 from __future__ import annotations
 
@@ -32,33 +32,32 @@ def run(
     make : callable
         Makes the node, once ROS is initialised.
     args : list of str or None
-        Command line; None takes the process's.
+        Command line; None takes the command line of the process.
     executor_type : callable
-        Makes the executor. The default one takes a third of the time of the others, and is safe
-        where nothing in the process publishes from another thread.
+        Makes the executor. The default one needs a third of the CPU time of the others, and is
+        safe where nothing in the process publishes from another thread.
 
     Returns
     -------
     int
-        0 after a signal, 1 after a failure, 2 when parameters or files are not as they must be.
+        0 after a signal, 1 after a failure, 2 for an invalid parameter, file or command line.
     """
     stopped = False
 
     def stop(number: int, frame: Any) -> None:
         nonlocal stopped
         stopped = True
-        signal.signal(number, before[signal.Signals(number)])  # a second signal is not waited for
+        signal.signal(number, before[signal.Signals(number)])  # a second signal ends at once
 
-    # Signals end the spin, not the context: what a node does in destroy_node, such as venting or
-    # closing a bag, is done whole and can be heard of. rclpy's own handlers would take the
-    # context away.
+    # Signals end the spin, not the context: destroy_node, which vents pads or closes a bag, must
+    # be able to publish. rclpy's own handlers would shut the context down.
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         try:
             node = make()
-        except _ros.RCLError as error:  # such as keys that SROS 2 asks for and does not find
-            raise PadError(f'ROS 2 refuses the node: {error}') from error
+        except _ros.RCLError as error:  # for instance keys that SROS 2 needs are missing
+            raise PadError(f'ROS 2 cannot create the node: {error}') from error
         try:
             executor = executor_type()
             executor.add_node(node)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The QoS profiles of ros_pad by name, and how a bag writes one down."""
+"""The QoS profiles of ros_pad by name, and their form in a bag."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
 SENSOR = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Subscribe to measurements: the latest count, and any driver's publisher matches."""
+"""Subscribe to measurements: only recent ones are kept, and any driver's publisher matches."""
 
 SENSOR_PUBLISH = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-"""Publish measurements and estimates: reliable serves both kinds of subscriber."""
+"""Publish measurements and estimates: reliable and best-effort subscribers both match."""
 
 COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-"""Set-points: only the newest counts, and it must arrive."""
+"""Publish set-points, or subscribe to them: only the newest is kept, and it must arrive."""
 
 STATE = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-"""Latched state such as the morphology: whoever comes late gets the last one."""
+"""Latched state such as the morphology: a late subscriber receives the last one."""
 
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Subscribe to ``/clock``, as rclpy itself does."""
@@ -42,19 +42,19 @@ DIAGNOSTICS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 RECORD = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 """Record a topic whose publishers are reliable.
 
-A queue of fixed depth overflows without a word; with this one every message waits until it is
-written, and what is lost on the way all the same is told by the middleware.
+A queue of fixed depth drops messages silently; with this profile every message waits until it is
+written, and the middleware reports any that were lost.
 """
 
 
 def recording(offered: Sequence[QoSProfile]) -> QoSProfile:
-    """Return the strictest profile with which a recorder hears every publisher of a topic.
+    """Return the strictest profile that matches every publisher of a topic.
 
     Parameters
     ----------
     offered : sequence of QoSProfile
-        What the publishers offer. A single best-effort one makes the subscription best effort,
-        a single volatile one makes it volatile. With none, it is :data:`RECORD`.
+        Profiles of the publishers. A single best-effort one makes the subscription best effort,
+        a single volatile one makes it volatile. Without publishers, it is :data:`RECORD`.
     """
     reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
     latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
@@ -86,7 +86,7 @@ _INFINITE_NS = 2**63 - 1  # RMW_DURATION_INFINITE
 
 @dataclasses.dataclass(frozen=True)
 class Mismatch:
-    """A policy for which DDS keeps a publisher and a subscription apart, and both its values."""
+    """A policy for which DDS does not match a publisher and a subscription, with both values."""
 
     policy: str
     offered: str
@@ -94,10 +94,10 @@ class Mismatch:
 
 
 def mismatches(offered: QoSProfile, asked: QoSProfile) -> list[Mismatch]:
-    """Return where a publisher offers less than a subscription asks for; empty if they match.
+    """Return the policies in which a publisher offers less than a subscription requests.
 
-    rclpy's ``qos_check_compatible`` takes a duration that was left unspecified for a very short
-    one, and so finds fault where there is none.
+    rclpy's ``qos_check_compatible`` treats an unspecified duration as a very short one, and
+    reports mismatches that do not exist.
     """
     found = []
     for policy, words, strict in (
@@ -116,7 +116,7 @@ def mismatches(offered: QoSProfile, asked: QoSProfile) -> list[Mismatch]:
 
 
 def _bound(duration: Duration) -> int:
-    """Return a duration in ns; one of zero means unspecified, and that is infinite."""
+    """Return a duration in ns; zero means unspecified, which is infinite."""
     return duration.nanoseconds or _INFINITE_NS
 
 
@@ -125,10 +125,10 @@ def _seconds(bound_ns: int) -> str:
 
 
 def offered_profiles(*profiles: QoSProfile) -> str:
-    """Return profiles as the YAML text that a bag of ROS 2 Jazzy keeps with a topic.
+    """Return profiles as YAML text, in the form that bags of ROS 2 Jazzy have.
 
-    A policy left to the middleware is ``unknown`` there, and a duration of zero, which means
-    unspecified, is infinite.
+    A policy left to the middleware becomes ``unknown``, and a duration of zero, which means
+    unspecified, becomes infinite.
     """
 
     def duration(value: Duration) -> dict[str, int]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder node: writes every topic of every leg into a bag."""
+"""The recorder node: writes all topics of a robot into a bag."""
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import json
 import sys
@@ -10,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
@@ -26,6 +28,9 @@ from rclpy.qos import qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from ros_pad.bags import BagWriter
+from ros_pad.bags.codec import clock_time
+from ros_pad.bags.writer import FLUSH_PERIOD
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
@@ -34,48 +39,62 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.parameters import plain
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import clock_time
 from ros_pad.trials import label
-from ros_pad.trials.bag import FLUSH_PERIOD
-from ros_pad.trials.bag import BagWriter
 
 PARAMETERS = (
     LEGS,
     Parameter(
-        'folder', '', 'Folder of the bag, which must not exist; empty: named after the time.'
+        'folder',
+        '',
+        'Folder of the bag, which must not exist; empty: a new one, named after the time.',
     ),
 )
 
 
+@dataclasses.dataclass
+class _Peer:
+    """A node of the robot, and the state of the requests for its parameters."""
+
+    clients: tuple[Client, Client] | None  # list and get parameters; None where that is forbidden
+    publishers: set[bytes] = dataclasses.field(default_factory=set)  # of its parameter events
+    looks: int = 0  # calls of due() since the node appeared or restarted
+    answered: bool = False
+
+    def due(self) -> bool:
+        """Count a call; return True at calls 1, 2, 4, 8 and so on, to spare a slow node."""
+        self.looks += 1
+        return self.looks & (self.looks - 1) == 0
+
+
 class RecorderNode(Node):
-    """Writes every topic of `ros_pad.nodes.topics`, latched ones too, into a new bag.
+    """Write every topic of `ros_pad.nodes.topics`, latched ones too, into a new bag.
 
-    Messages are taken and written as the bytes they travel in, so that tens of thousands a
-    second pass. Their log time is the node's clock: with ``use_sim_time`` that of the last
-    ``/clock`` message, and 0 for what comes before the first one.
+    Messages are written without decoding, so that tens of thousands a second can be recorded.
+    Their log time is the node's clock: with ``use_sim_time`` the time in the last ``/clock``
+    message, and 0 before the first one.
 
-    What is recorded reaches the disk within about a second. Messages that were lost on the way
-    here are counted by the middleware; the log tells of them as it happens, and the bag at its
-    end, under `ros_pad.trials.label.LOST`.
+    Messages reach the disk within about a second. The middleware counts messages that were lost
+    before they arrived; the node logs these counts, and writes them into the bag under
+    `ros_pad.trials.label.LOST`.
 
     Its ROS parameters are in :data:`PARAMETERS`; ``use_sim_time`` is read at the start only.
 
     Parameters
     ----------
     custom_data : mapping of str to str, optional
-        What the bag is to say about the trial. Without it, it says the versions of ros_pad and
-        its libraries, and the parameters of all nodes in the namespace of this one, which are
-        asked as they appear, with their changes since.
+        Texts about the trial, for the bag. Without it, the bag has the versions of ros_pad and its
+        libraries, the parameters of all nodes in the namespace of this one, requested as the
+        nodes appear, and later changes of these parameters.
     **kwargs
         Passed on to `rclpy.node.Node`.
 
     Raises
     ------
     BagError
-        When the folder exists or cannot be written. Once recording, a full disk raises it out
-        of the executor.
+        When the folder exists or cannot be written. While the node records, the executor raises
+        it when the disk is full.
     ConfigError
-        When a parameter is not as it must be.
+        When the value of a parameter is not allowed.
     """
 
     def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
@@ -85,7 +104,7 @@ class RecorderNode(Node):
             folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
             recorded = topics.names(values['legs'])
             self._simulated = self.get_parameter('use_sim_time').value
-            # Called for every message; replaced when the first /clock message is there.
+            # Called for every message; replaced when the first /clock message arrives.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
             self._clock_ns = 0
             self._bag = BagWriter(
@@ -96,23 +115,20 @@ class RecorderNode(Node):
             raise
         self._recordings: dict[str, Subscription] = {}
         self._lost: Counter[str] = Counter()
-        self._failed = False  # whether the bag takes no more
-        # The clock comes first: an executor that finds several messages waiting takes them in
-        # the order of their subscriptions.
+        self._failed = False  # whether writing has failed
+        # The subscription to /clock is made first: an executor that finds several messages
+        # waiting takes them in the order of their subscriptions.
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             self._record(full_name, topic, qos.recording([topic.publish]))
-        self._said: dict[str, dict[str, Any]] = {}
-        # By which each node of the robot is asked; none where that is forbidden.
-        self._askers: dict[str, tuple[Client, Client] | None] = {}
-        self._answered: set[str] = set()
-        self._lives: dict[str, set[bytes]] = {}  # of each node: who publishes its changes
-        # Of wall time, whatever the clock of the trial does.
+        self._peers: dict[str, _Peer] = {}
+        self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
+        # In wall time, independent of the clock of the trial.
         self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._asks = custom_data is None
+        self._collects_parameters = custom_data is None
         self._changes: list[tuple[int, str, str, Any]] = []
-        if self._asks:
+        if self._collects_parameters:
             self.create_subscription(
                 ParameterEvent, '/parameter_events', self._on_change, qos_profile_parameter_events
             )
@@ -125,11 +141,11 @@ class RecorderNode(Node):
 
     @property
     def lost(self) -> dict[str, int]:
-        """Number of messages that did not come, by topic; only topics that miss some."""
+        """Number of messages that were lost before they arrived, by topic, where there are any."""
         return dict(self._lost)
 
     def describe(self, custom_data: Mapping[str, str]) -> None:
-        """Add to what the bag says about the trial."""
+        """Add custom data about the trial to the bag."""
         self._bag.describe(custom_data)
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
@@ -138,12 +154,12 @@ class RecorderNode(Node):
         Parameters
         ----------
         custom_data : mapping of str to str, optional
-            Added to what the bag says about the trial.
+            Added to the custom data of the bag.
 
         Raises
         ------
         BagError
-            When the disk is full: says how many messages are saved.
+            When the disk is full; it says how many messages are saved.
         """
         for subscription in self._recordings.values():
             self.destroy_subscription(subscription)
@@ -151,7 +167,7 @@ class RecorderNode(Node):
         self._bag.close({label.LOST: json.dumps(self.lost)} | dict(custom_data or {}))
 
     def destroy_node(self) -> None:
-        """Close the bag, if nobody has, and the node; raises as :meth:`close` does."""
+        """Close the bag, if it is open, and the node; raise the same errors as :meth:`close`."""
         try:
             self.close()
         finally:
@@ -161,7 +177,7 @@ class RecorderNode(Node):
         """Subscribe to a topic so that each message goes into the bag."""
 
         def adapt(_event: object) -> None:
-            # A publisher offers less than we ask for, as drivers of sensors do: ask for less.
+            # Drivers of sensors may offer less than is requested: request less.
             offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
             self.destroy_subscription(self._recordings.pop(name))
             self._record(name, topic, qos.recording([topic.publish, *offered]))
@@ -182,35 +198,35 @@ class RecorderNode(Node):
 
         def callback(event: Any) -> None:
             nonlocal known
-            # The change that an event names may have been told by the one before.
+            # The previous event may have reported this change already.
             more, known = event.total_count - known, event.total_count
             self._lost[name] += more
             if more:
                 self.get_logger().warning(
                     f'{self._lost.total()} messages lost so far, {self._lost[name]} of them on'
-                    f' {name}: this machine or network does not keep up',
+                    f' {name}: this machine or network is too slow',
                     throttle_duration_sec=1.0,
                 )
 
         return callback
 
     def _look(self) -> None:
-        """Write down what has come, also when nothing comes any more, and who has appeared."""
+        """Flush the bag, also when no messages arrive, and request parameters of new nodes."""
         if self._failed:
             return
-        if self._asks:
-            self._ask_nodes()
+        if self._collects_parameters:
+            self._look_for_nodes()
         try:
             self._bag.flush()
         except BagError:
             self._failed = True
             raise
 
-    def _ask_nodes(self) -> None:
-        """Ask every node of the robot for its parameters, once its services are there.
+    def _look_for_nodes(self) -> None:
+        """Request the parameters of every node of the robot when its services are there.
 
-        One that does not answer is asked again, and so is one that went and came back. One that
-        was killed stays on the graph for a while: when it comes back before its name is dropped,
+        A request without a response is repeated, and a node that restarts gets a new request. A
+        killed node stays on the graph for a while: when it restarts before its name is removed,
         only its publishers are new.
         """
         here = {
@@ -218,80 +234,81 @@ class RecorderNode(Node):
             for name, namespace in self.get_node_names_and_namespaces()
             if namespace == self.get_namespace() and not name.startswith('_')
         }
-        for node in self._askers.keys() - here:
-            for client in self._askers.pop(node) or ():
+        for node in self._peers.keys() - here:
+            for client in self._peers.pop(node).clients or ():
                 self.destroy_client(client)
-            self._answered.discard(node)
-        for node in here - self._askers.keys():
-            self._askers[node] = self._asker(node)
-        lives: dict[str, set[bytes]] = {}
+        publishers: dict[str, set[bytes]] = {}
         for each in self.get_publishers_info_by_topic('/parameter_events'):
             node = f'{each.node_namespace.rstrip("/")}/{each.node_name}'
-            lives.setdefault(node, set()).add(bytes(each.endpoint_gid))
-        self._answered -= {
-            node for node, publishers in lives.items() if publishers - self._lives.get(node, set())
-        }
-        self._lives = lives
-        for node, clients in self._askers.items():
-            if clients and node not in self._answered:
-                lister, getter = clients
-                if lister.service_is_ready() and getter.service_is_ready():
-                    self._ask(node, lister, getter)
+            publishers.setdefault(node, set()).add(bytes(each.endpoint_gid))
+        for node in here:
+            peer = self._peers.get(node)
+            if peer is None:
+                peer = self._peers[node] = _Peer(self._parameter_clients(node))
+            found = publishers.get(node, set())
+            if found - peer.publishers:
+                peer.answered, peer.looks = False, 0
+            peer.publishers = found
+            if peer.clients and not peer.answered:
+                ready = all(client.service_is_ready() for client in peer.clients)
+                if ready and peer.due():
+                    self._request_names(node, peer, *peer.clients)
 
-    def _asker(self, node: str) -> tuple[Client, Client] | None:
+    def _parameter_clients(self, node: str) -> tuple[Client, Client] | None:
         try:
             lister = self.create_client(ListParameters, f'{node}/list_parameters')
             return lister, self.create_client(GetParameters, f'{node}/get_parameters')
-        except RuntimeError as error:  # SROS 2 may forbid it
+        except RuntimeError as error:  # SROS 2 may forbid these clients
             self.get_logger().warning(f'the bag will lack the parameters of {node}: {error}')
             return None
 
-    def _ask(self, node: str, lister: Client, getter: Client) -> None:
-        def named(future: Future) -> None:
-            self._said.setdefault(node, {})  # from now on its changes count
-            self._ask_for(list(future.result().result.names), node, getter, {})
+    def _request_names(self, node: str, peer: _Peer, lister: Client, getter: Client) -> None:
+        def on_response(future: Future) -> None:
+            self._node_parameters.setdefault(node, {})  # changes from now on are recorded
+            self._request_values(list(future.result().result.names), node, peer, getter, {})
 
-        lister.call_async(ListParameters.Request()).add_done_callback(named)
+        lister.call_async(ListParameters.Request()).add_done_callback(on_response)
 
-    def _ask_for(
-        self, names: list[str], node: str, getter: Client, answers: dict[str, Any]
+    def _request_values(
+        self, names: list[str], node: str, peer: _Peer, getter: Client, known: dict[str, Any]
     ) -> None:
-        """Ask a node for the values of parameters, and let the bag say them with its others."""
+        """Request values of a node's parameters, and add them to the known ones in the bag."""
 
-        def told(future: Future) -> None:
-            # Only now: of a node that comes back, this service may be seen after the other.
-            self._answered.add(node)
+        def on_response(future: Future) -> None:
+            # Not before: after a restart, get_parameters may be discovered after list_parameters.
+            peer.answered = True
             values = future.result().values
             if len(values) == len(names):
                 try:
-                    said = {
-                        name: plain(parameter_value_to_python(value))
+                    known.update(
+                        (name, plain(parameter_value_to_python(value)))
                         for name, value in zip(names, values, strict=True)
-                    }
-                except RuntimeError as error:  # of a type that ROS does not have
+                    )
+                except RuntimeError as error:  # the parameter type is unknown to ROS
                     self.get_logger().warning(
                         f'the bag will lack parameters of {node}: {error}', once=True
                     )
                     return
-                answers.update(said)
-                self._said[node] = answers
-                self._bag.describe({label.PARAMETERS: json.dumps(self._said)})
+                self._node_parameters[node] = known
+                self._bag.describe({label.PARAMETERS: json.dumps(self._node_parameters)})
             elif len(names) > 1:
-                # One that is declared without a value keeps a node from telling all others.
+                # If one requested parameter has no value, the response has no values at all:
+                # request each parameter alone.
                 for name in names:
-                    self._ask_for([name], node, getter, answers)
+                    self._request_values([name], node, peer, getter, known)
 
         request = GetParameters.Request(names=names)
-        getter.call_async(request).add_done_callback(told)
+        getter.call_async(request).add_done_callback(on_response)
 
     def _on_change(self, event: ParameterEvent) -> None:
-        """Note which parameters changed of nodes that told theirs."""
-        if event.node not in self._said:
+        """Record changed parameters of the nodes whose parameters are in the bag."""
+        if event.node not in self._node_parameters:
             return
         now_ns = self._now()
         for each in event.changed_parameters:
-            value = plain(parameter_value_to_python(each.value))
-            self._changes.append((now_ns, event.node, each.name, value))
+            with suppress(RuntimeError):  # skip a parameter of a type that ROS does not have
+                value = plain(parameter_value_to_python(each.value))
+                self._changes.append((now_ns, event.node, each.name, value))
         self._bag.describe({label.CHANGES: json.dumps(self._changes)})
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
@@ -301,7 +318,7 @@ class RecorderNode(Node):
             try:
                 write(name, data, self._now())
             except BagError:
-                # Once is enough: what has been on its way since finds the bag closed.
+                # Raise once only: later messages fail because the bag is closed.
                 if not self._failed:
                     self._failed = True
                     raise
@@ -313,7 +330,7 @@ class RecorderNode(Node):
 
         def callback(data: bytes) -> None:
             now_ns = clock_time(data)
-            # A bag knows no time before 0.
+            # A bag cannot have times before 0.
             if now_ns is not None and now_ns >= 0:
                 self._clock_ns = now_ns
                 if self._simulated:
@@ -327,7 +344,8 @@ class RecorderNode(Node):
 
     def _before_clock(self) -> int:
         self.get_logger().warning(
-            'use_sim_time is on and no /clock has come yet: messages are recorded at time 0',
+            'use_sim_time is true and no /clock message has arrived: messages get the log time 0'
+            ' until one arrives',
             once=True,
         )
         return 0

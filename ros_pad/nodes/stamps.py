@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Time stamps of messages as whole nanoseconds, and a clock tick that works in both times."""
+"""Time stamps of messages in ns, and a timer that follows real or simulated time."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
@@ -11,6 +10,7 @@ from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
 
+from ros_pad.bags.codec import clock_time
 from ros_pad.nodes import topics
 
 
@@ -24,25 +24,12 @@ def set_stamp(stamp: Time, time_ns: int) -> None:
     stamp.sec, stamp.nanosec = divmod(time_ns, 1_000_000_000)
 
 
-def clock_time(data: bytes) -> int | None:
-    """Return the time in ns in a ``/clock`` message as it travels; None where the bytes are none.
-
-    It comes with every sample, and most nodes only glance at it. CDR: four bytes of
-    encapsulation, seconds, nanoseconds.
-    """
-    if len(data) < 12:  # anybody can publish any bytes
-        return None
-    order = '<' if data[1] & 1 else '>'
-    seconds, nanoseconds = struct.unpack_from(order + 'iI', data, 4)
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
-
-
 def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
-    """Call back with the node's time in ns, every ``period`` seconds or faster.
+    """Call a function again and again with the node's time, ns.
 
-    In simulated time that is at each ``/clock`` message, with the message's own time, so that
-    what a node does at a time depends on that time alone; otherwise a timer does it, which goes
-    on whatever happens to the time of day.
+    In simulated time it is called at each ``/clock`` message with the time in that message, so
+    that a run can be repeated exactly. Otherwise a timer calls it every ``period`` seconds; the
+    timer uses the steady clock, which keeps running when the time of day is changed.
     """
     if node.get_parameter('use_sim_time').value:
 

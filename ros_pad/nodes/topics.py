@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every topic of ros_pad: its name, message type and QoS, for all nodes in one place.
+"""Publishers and subscriptions of every topic: message class and QoS for `ros_pad.bags.topics`.
 
 Names are relative, so that a namespace moves the whole robot; ``/clock`` and ``/diagnostics``
 are global, as everywhere in ROS.
@@ -32,6 +32,7 @@ from std_msgs.msg import Float64
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from ros_pad.bags import topics as schemas
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
 
@@ -41,37 +42,42 @@ LEGS = (1, 2, 3, 4, 5, 6)
 
 @dataclasses.dataclass(frozen=True)
 class Topic:
-    """A topic, or one per leg.
+    """A topic, or one per leg, with its message class and QoS.
 
     Attributes
     ----------
-    pattern : str
-        The name, with ``{leg}`` where the number of the leg goes.
+    schema : ros_pad.bags.topics.Topic
+        Name and message type.
     message : type
         Message class.
     publish, subscribe : QoSProfile
-        What the publisher offers, and what a node that works with the messages asks for.
+        QoS that publishers offer, and QoS that subscriptions request.
     """
 
-    pattern: str
+    schema: schemas.Topic
     message: type
     publish: QoSProfile
     subscribe: QoSProfile
 
     @property
+    def pattern(self) -> str:
+        """The name, with ``{leg}`` in place of the leg's number."""
+        return self.schema.pattern
+
+    @property
     def type_name(self) -> str:
         """The message type as ROS names it, such as ``std_msgs/msg/Float64``."""
-        package = self.message.__module__.split('.')[0]
-        return f'{package}/msg/{self.message.__name__}'
+        return self.schema.type_name
 
     def name(self, leg: int | None = None) -> str:
-        """Return the name, for a topic of a leg that of one leg."""
-        return self.pattern.format(leg=leg)
+        """Return the name; a topic of each leg needs the number of the leg."""
+        return self.schema.name(leg)
 
     def publisher(self, node: Node, leg: int | None = None) -> Publisher:
-        """Create a publisher of this topic in a node, which warns of subscriptions that it misses.
+        """Create a publisher in a node.
 
-        Those ask for more than is offered, and DDS keeps them apart.
+        DDS does not connect it to subscriptions that request more than it offers. The node warns
+        of them.
         """
         name = node.resolve_topic_name(self.name(leg))
 
@@ -79,9 +85,9 @@ class Topic:
             for peer in node.get_subscriptions_info_by_topic(name):
                 for each in qos.mismatches(self.publish, peer.qos_profile):
                     node.get_logger().warning(
-                        f'{name}: {_owner(peer, name)} hears nothing from here: its subscription'
-                        f' asks for {each.policy} {each.asked}, and {each.offered} is offered;'
-                        f' let it ask for {each.policy} {each.offered}'
+                        f'{name}: {_owner(peer, name)} receives nothing: its subscription'
+                        f' requests {each.policy} {each.asked}, and {each.offered} is offered;'
+                        f' change the subscription to {each.policy} {each.offered}'
                     )
 
         return node.create_publisher(
@@ -97,26 +103,26 @@ class Topic:
         callback: Callable[[Any], None],
         leg: int | None = None,
         raw: bool = False,
-        unheard: Callable[[str], None] | None = None,
+        on_mismatch: Callable[[str], None] | None = None,
     ) -> Subscription:
-        """Create a subscription to this topic in a node; a raw one hands over bytes (CDR).
+        """Create a subscription in a node; a raw one hands over messages as bytes.
 
-        Of publishers that offer less than is asked for nothing is heard. The node warns of them,
-        and passes the words on to `unheard`.
+        DDS does not connect it to publishers that offer less than it requests. The node warns of
+        them, and calls `on_mismatch` with the text of the warning.
         """
         name = node.resolve_topic_name(self.name(leg))
 
         def warn(event: Any) -> None:
             for peer in node.get_publishers_info_by_topic(name):
                 for each in qos.mismatches(peer.qos_profile, self.subscribe):
-                    words = (
-                        f'{name}: nothing of {_owner(peer, name)} is heard: its publisher offers'
-                        f' {each.policy} {each.offered}, and {each.asked} is asked for;'
-                        f' let it offer {each.policy} {each.asked}'
+                    text = (
+                        f'{name}: no message of {_owner(peer, name)} arrives: its publisher offers'
+                        f' {each.policy} {each.offered}, and {each.asked} is requested;'
+                        f' change the publisher to {each.policy} {each.asked}'
                     )
-                    node.get_logger().warning(words)
-                    if unheard:
-                        unheard(words)
+                    node.get_logger().warning(text)
+                    if on_mismatch:
+                        on_mismatch(text)
 
         return node.create_subscription(
             self.message,
@@ -129,33 +135,33 @@ class Topic:
 
 
 def _owner(peer: TopicEndpointInfo, topic: str) -> str:
-    """Return which node one end of a topic belongs to."""
-    # The ends of a process that has just come are known before its nodes are.
+    """Return words for the node that owns a publisher or subscription of a topic."""
+    # Publishers of a new process appear on the graph before the names of its nodes.
     if 'UNKNOWN' in peer.node_name:
         return f'a node that `ros2 topic info --verbose {topic}` names'
     return f'node {peer.node_namespace.rstrip("/")}/{peer.node_name}'
 
 
-def _measured(pattern: str, message: type) -> Topic:
-    return Topic(pattern, message, qos.SENSOR_PUBLISH, qos.SENSOR)
+def _measured(topic: schemas.Topic, message: type) -> Topic:
+    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR)
 
 
-PRESSURE = _measured('leg_{leg}/pressure', FluidPressure)
-PRESSURE_SETPOINT = Topic('leg_{leg}/pressure_setpoint', FluidPressure, qos.COMMAND, qos.COMMAND)
-WRENCH = _measured('leg_{leg}/wrench', WrenchStamped)
-POSITION = _measured('leg_{leg}/position', PointStamped)
-SLIP = _measured('leg_{leg}/slip', TwistWithCovarianceStamped)
-WETNESS = _measured('leg_{leg}/wetness', Float64)
-FRICTION = _measured('leg_{leg}/friction', Float64)
-FRICTION_MARGIN = _measured('leg_{leg}/friction_margin', Float64)
-SLIPPING = _measured('leg_{leg}/slipping', Bool)
-DOUBT = Topic('leg_{leg}/doubt', String, qos.STATE, qos.STATE)
-MORPHOLOGY = Topic('leg_{leg}/morphology', String, qos.STATE, qos.STATE)
-BODY_POSE = _measured('body/pose', PoseStamped)
-JOINT_STATES = _measured('joint_states', JointState)
-MARKERS = Topic('markers', MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
-CLOCK = Topic('/clock', Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
-DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
+PRESSURE = _measured(schemas.PRESSURE, FluidPressure)
+PRESSURE_SETPOINT = Topic(schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND)
+WRENCH = _measured(schemas.WRENCH, WrenchStamped)
+POSITION = _measured(schemas.POSITION, PointStamped)
+SLIP = _measured(schemas.SLIP, TwistWithCovarianceStamped)
+WETNESS = _measured(schemas.WETNESS, Float64)
+FRICTION = _measured(schemas.FRICTION, Float64)
+FRICTION_MARGIN = _measured(schemas.FRICTION_MARGIN, Float64)
+SLIPPING = _measured(schemas.SLIPPING, Bool)
+DOUBT = Topic(schemas.DOUBT, String, qos.STATE, qos.STATE)
+MORPHOLOGY = Topic(schemas.MORPHOLOGY, String, qos.STATE, qos.STATE)
+BODY_POSE = _measured(schemas.BODY_POSE, PoseStamped)
+JOINT_STATES = _measured(schemas.JOINT_STATES, JointState)
+MARKERS = Topic(schemas.MARKERS, MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
+CLOCK = Topic(schemas.CLOCK, Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
+DIAGNOSTICS = Topic(schemas.DIAGNOSTICS, DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
 
 LEG_TOPICS = (
     PRESSURE,
@@ -173,11 +179,11 @@ LEG_TOPICS = (
 """The topics that every leg has."""
 
 COMMON_TOPICS = (CLOCK, BODY_POSE, JOINT_STATES, MARKERS, DIAGNOSTICS)
-"""The topics that there is one of."""
+"""The topics that a robot has only once."""
 
 
 def names(legs: Sequence[int]) -> dict[str, Topic]:
-    """Return every topic by name: those that all legs share, ``/clock`` first, then each leg's.
+    """Return every topic by name: ``/clock``, other common topics, then those of each leg.
 
     Raises
     ------
@@ -186,7 +192,8 @@ def names(legs: Sequence[int]) -> dict[str, Topic]:
     """
     if not legs or len(set(legs)) < len(legs) or not set(legs) <= set(LEGS):
         raise ConfigError(
-            f'legs = {list(legs)} is not allowed: different numbers from 1 to 6 are needed'
+            f'legs = {list(legs)} is not allowed: a list of different whole numbers from 1 to 6 is'
+            ' needed'
         )
     common = {topic.name(): topic for topic in COMMON_TOPICS}
     return common | {topic.name(leg): topic for leg in legs for topic in LEG_TOPICS}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pressure regulators: the protocol that every backend meets, and the backends by name."""
+"""Pressure regulators: their interface, the backends by name, and the supervision of a pad."""
 
 from __future__ import annotations
 
@@ -26,28 +26,29 @@ BACKENDS: dict[str, Callable[..., Regulator]] = {
     'smc_itv': SmcItvRegulator,
     'serial_text': SerialTextRegulator,
 }
-"""What ``create`` can make: a class or function for each name, its arguments the options."""
+"""Classes or functions that make a regulator, by backend; their arguments are the options."""
 
 
 def create(backend: str, **options: Any) -> Regulator:
-    """Make a regulator, not yet open.
+    """Make a regulator of a backend.
 
     Parameters
     ----------
     backend : str
         A key of ``BACKENDS``.
     **options
-        The arguments of that backend.
+        Arguments of that backend.
 
     Returns
     -------
     Regulator
+        The regulator, not yet open.
 
     Raises
     ------
     ConfigError
         When there is no such backend or option, or the value of an option is not allowed; the
-        message says what is.
+        message names what is allowed.
 
     Examples
     --------
@@ -57,8 +58,8 @@ def create(backend: str, **options: Any) -> Regulator:
     """
     if backend not in BACKENDS:
         raise ConfigError(
-            f'no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: '
-            f'there are {", ".join(sorted(BACKENDS))}'
+            f'there is no regulator backend {backend!r}{_nearest(backend, BACKENDS)}: '
+            f'the backends are {", ".join(sorted(BACKENDS))}'
         )
     make = BACKENDS[backend]
     allowed = inspect.signature(make).parameters
@@ -66,7 +67,7 @@ def create(backend: str, **options: Any) -> Regulator:
         if name not in allowed:
             raise ConfigError(
                 f'regulator backend {backend!r} has no option {name!r} (= {value!r})'
-                f'{_nearest(name, allowed)}: there are {", ".join(allowed)}'
+                f'{_nearest(name, allowed)}: its options are {", ".join(allowed)}'
             )
     missing = [name for name, p in allowed.items() if p.default is p.empty and name not in options]
     if missing:

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Alicat pressure controllers (PC, PCD) on their ASCII protocol."""
+"""Alicat pressure controllers (PC, PCD) with their ASCII protocol."""
 
 from __future__ import annotations
 
 import math
 import re
 
-from ros_pad.contact.pad import choice
+from ros_pad.configuration import choice
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
-from ros_pad.regulators.channel import Frame
-from ros_pad.regulators.channel import SerialRegulator
-from ros_pad.regulators.channel import unit
-from ros_pad.regulators.transport import Ask
-from ros_pad.regulators.transport import Line
+from ros_pad.regulators.protocol import CEILING
+from ros_pad.regulators.serial_device import Frame
+from ros_pad.regulators.serial_device import SerialRegulator
+from ros_pad.regulators.serial_device import unit
+from ros_pad.regulators.transport import Query
+from ros_pad.regulators.transport import SerialLine
 
 STATUS = {
     'ADC': 'ADC (analogue converter failed)',
@@ -28,55 +29,56 @@ STATUS = {
     'TOV': 'TOV (temperature out of range)',
     'VOV': 'VOV (volume flow out of range)',
 }
-"""What the letters after a frame mean, from the maker's manuals."""
+"""Status letters after a frame, with their meaning in the maker's manuals."""
 
 HARMLESS = ('LCK',)
-"""A locked front panel keeps fingers off, and is no fault."""
+"""Status letters that are no fault: a locked front panel may be intended."""
 
-KNOWS_UNITS = (9, 0)  # firmware from which LS sets and answers with a unit
-KNOWS_SOURCE = (10, 5)  # firmware from which LSS exists
+UNITS_SINCE = (9, 0)  # first firmware whose LS has a unit in command and answer
+SOURCE_SINCE = (10, 5)  # first firmware with LSS
 _NUMBER = re.compile(r'[+-]?\d+(?:\.(\d*))?')
 
 
 class AlicatRegulator(SerialRegulator):
-    """One Alicat pressure controller; several with other unit IDs may share the port.
+    """One Alicat pressure controller; several with different unit IDs may share a port.
 
     Parameters
     ----------
     port : str
         Serial port, e.g. ``/dev/ttyUSB0``.
     unit_id : str
-        A to Z.
+        One letter from A to Z.
     units : str
-        Engineering units that the device is set to, gauge: a key of ``channel.UNITS``. Where
-        its firmware can be asked (9v00 and later), another one is an error.
+        Engineering units of the device, gauge: a key of ``serial_device.UNITS``. With firmware
+        9v00 or later they are compared with those of the device; a difference is an error.
     baudrate : int
-        1/s. 19200 as delivered, 38400 in the BC series.
+        1/s, 300 to 4,000,000. Delivered devices have 19200, those of the BC series 38400.
     set_command : str
-        ``'LS'``, ``'S'``, or ``'auto'``: LS where the firmware knows it (9v00 and later).
+        ``'LS'``, ``'S'``, or ``'auto'``: LS with firmware 9v00 or later, S with an older one.
     ceiling : float
-        Highest set-point, gauge Pa.
+        Highest set-point, gauge Pa, 1 to 1e7.
     reply_timeout, poll_period, silence : float
-        s; see :class:`~ros_pad.regulators.channel.SerialRegulator`.
+        s; see :class:`~ros_pad.regulators.serial_device.SerialRegulator`.
 
     Notes
     -----
-    Frames have a unit ID, the pressure, the set-point and status letters. Other columns are
-    refused rather than guessed at: take them out of the data frame on the device.
+    A frame has a unit ID, the pressure, the set-point and status letters. Frames with other
+    columns are refused: remove these from the data frame on the device.
 
-    ``LS value unit`` sets in the unit that the device was met with, and its answer names value
-    and unit: a device that was set to another one meanwhile is told zero, and is lost until it
-    is back. ``S``, which every firmware knows, is answered by a frame. Both carry the decimals
-    of the live frame. ``LS`` is never sent to a firmware below 9v00: that would take ``L`` for
-    the lock of the front panel. Nothing is ever told to save: the device's memory wears. An
-    analogue set-point source ignores this line without a word; ``LSS`` tells of it from 10v05
-    on, and for all others the echo does.
+    ``LS value unit`` sets a pressure in the units found at identification; the reply contains
+    value and units. A device whose units were changed since then is set to zero, and is lost until
+    its units are as before. The reply to ``S``, which every firmware has, is a frame. Values sent
+    with ``LS`` and ``S`` have the decimals of the last frame. With ``auto``, ``LS`` is never sent
+    to firmware below 9v00, which reads ``L`` as the lock of the front panel. No command saves
+    settings, because that wears the device's memory. A device with an analogue set-point source
+    ignores set-points without an error; ``LSS`` detects that from 10v05 on, and the echo of the
+    set-point on older firmware.
 
-    A vent is the set-point zero; a device that holds its valves (HLD) is then told to let go.
-    The exhaust command is not used: no manual at hand says how it is left again.
+    A vent is the set-point zero; the valves of a device that holds them (HLD) are then released.
+    The exhaust command is not used: no manual at hand describes how to end it.
 
-    Source: Alicat's manuals (frame, status, ``S``, ``C``) and what two independent drivers say
-    of firmware (``LS``, ``LSS``, ``VE``); see docs/regulators.md.
+    Source: Alicat's manuals (frame, status, ``S``, ``C``) and two independent drivers for the
+    firmware (``LS``, ``LSS``, ``VE``); see docs/regulators.md.
     """
 
     def __init__(
@@ -86,77 +88,87 @@ class AlicatRegulator(SerialRegulator):
         units: str = 'kPa',
         baudrate: int = 19200,
         set_command: str = 'auto',
-        ceiling: float = 90e3,
+        ceiling: float = CEILING,
         reply_timeout: float = 0.1,
         poll_period: float = 0.02,
         silence: float = 0.5,
     ) -> None:
         if not isinstance(unit_id, str) or not re.fullmatch('[A-Z]', unit_id):
-            raise InvalidInput(f'unit_id = {unit_id!r} is not allowed: A to Z is needed')
+            raise InvalidInput(
+                f'unit_id = {unit_id!r} is not allowed: one letter from A to Z is needed'
+            )
         self._unit = unit(units)
         self._units = units
         self._set_command = choice('set_command', set_command, ('auto', 'LS', 'S'))
-        self._unit_code = ''  # of the device for its units; empty where it is set by S
+        self._unit_code = ''  # code of the device's units; empty when S sets the pressure
         self._decimals = 0
         self._held = False
-        line = Line(port, baudrate, '\r', reply_timeout)
+        line = SerialLine(port, baudrate, '\r', reply_timeout)
         super().__init__(line, unit_id, ceiling, poll_period, silence)
 
-    def _meet(self, ask: Ask) -> Frame:
-        frame = self._poll(ask)
+    def identify(self, query: Query) -> Frame:
+        """Check units and set-point source as far as the firmware reports them; return a frame."""
+        frame = self.poll(query)
         command = f'{self.address}VE'
-        version = re.search(r'\b(\d+)v(\d+)', ask(command))
+        version = re.search(r'\b(\d+)v(\d+)', query(command))
         firmware = (int(version[1]), int(version[2])) if version else (0, 0)
         self._unit_code = ''
-        if self._set_command == 'LS' or firmware >= KNOWS_UNITS:
+        if self._set_command == 'LS' or firmware >= UNITS_SINCE:
             command = f'{self.address}LS'
-            _, code = self._set_in(command, self._ask(ask, command))
+            _, code = self._setpoint_in(command, self._accepted(query, command))
             if self._set_command != 'S':
                 self._unit_code = code
-        if firmware >= KNOWS_SOURCE:
-            self._check_source(ask)
+        if firmware >= SOURCE_SINCE:
+            self._check_source(query)
         return frame
 
-    def _poll(self, ask: Ask) -> Frame:
-        return self._frame_in(self.address, ask(self.address))
+    def poll(self, query: Query) -> Frame:
+        """Request a frame and return it."""
+        return self._frame_in(self.address, query(self.address))
 
-    def _set(self, ask: Ask, setpoint: float) -> Frame | None:
+    def send(self, query: Query, setpoint: float) -> Frame | None:
+        """Send a set-point, gauge Pa; for a vent, also release valves that are held."""
         release = self._held and setpoint == 0.0
-        frame = self._send(ask, f'{setpoint / self._unit:.{self._decimals}f}')
-        if release:  # after zero is in force, or what was held would go on at the old set-point
+        frame = self._send_value(query, f'{setpoint / self._unit:.{self._decimals}f}')
+        if release:  # after the set-point, because released valves follow the one in force
             command = f'{self.address}C'
-            frame = self._frame_in(command, self._ask(ask, command))
+            frame = self._frame_in(command, self._accepted(query, command))
         return frame
 
-    def _send(self, ask: Ask, value: str) -> Frame | None:
+    def _send_value(self, query: Query, value: str) -> Frame | None:
         if not self._unit_code:
             command = f'{self.address}S{value}'
-            return self._frame_in(command, self._ask(ask, command))
+            return self._frame_in(command, self._accepted(query, command))
         command = f'{self.address}LS {value} {self._unit_code}'
-        reply = self._ask(ask, command)
+        reply = self._accepted(query, command)
         try:
-            requested, _ = self._set_in(command, reply)
+            requested, _ = self._setpoint_in(command, reply)
         except ConfigError:
-            self._ask(ask, f'{self.address}S0')  # no pressure whatever the units
+            self._accepted(query, f'{self.address}S0')  # zero is the same in all units
             raise
         if requested != float(value):
-            raise self._refuses(f'{value} was sent, {requested:g} is in force', command, reply)
+            raise self.device_fault(
+                f'set-point {value} was sent, {requested:g} is in force', command, reply
+            )
         return None
 
-    def _obeys(self, frame: Frame, setpoint: float) -> bool:
+    def in_force(self, frame: Frame, setpoint: float) -> bool:
+        """Return whether a frame shows a set-point; False for a vent while valves are held."""
         held = self._held and setpoint == 0.0
-        return super()._obeys(frame, setpoint) and not held
+        return super().in_force(frame, setpoint) and not held
 
-    def _ask(self, ask: Ask, command: str) -> str:
-        reply = ask(command)
+    def _accepted(self, query: Query, command: str) -> str:
+        """Send a command and return its reply; raise if the device rejects it."""
+        reply = query(command)
         if reply == '?' or reply.split() == [self.address, '?']:
-            raise self._refuses('rejected', command, reply)
+            raise self.device_fault('the device rejected the command', command, reply)
         return reply
 
     def _words(self, command: str, reply: str) -> list[str]:
+        """Return the words of a reply after the unit ID."""
         words = reply.split()
         if words[:1] != [self.address]:
-            raise self._fails(f'not a reply of unit {self.address}', command, reply)
+            raise self.protocol_error(f'the reply is not of unit {self.address}', command, reply)
         return words[1:]
 
     def _frame_in(self, command: str, reply: str) -> Frame:
@@ -164,8 +176,10 @@ class AlicatRegulator(SerialRegulator):
         numbers = [match for word in words if (match := _NUMBER.fullmatch(word))]
         status = words[len(numbers) :]
         if len(numbers) != 2 or not set(status) <= set(STATUS):
-            raise self._fails(
-                f'not a frame of pressure, set-point and status: {len(numbers)} numbers',
+            raise self.protocol_error(
+                'the reply is not a frame of pressure, set-point and known status letters'
+                f' (numbers found: {len(numbers)}); remove other columns from the data frame on'
+                ' the device',
                 command,
                 reply,
             )
@@ -176,27 +190,30 @@ class AlicatRegulator(SerialRegulator):
         faults = tuple(STATUS[each] for each in status if each not in HARMLESS)
         return Frame(pressure, setpoint, resolution, faults)
 
-    def _set_in(self, command: str, reply: str) -> tuple[float, str]:
-        """Return the set-point and the code of the units in an answer to ``LS``."""
+    def _setpoint_in(self, command: str, reply: str) -> tuple[float, str]:
+        """Return set-point and code of the units in an answer to ``LS``."""
         words = self._words(command, reply)
         if len(words) != 4 or not all(map(_NUMBER.fullmatch, words[:2])) or not words[2].isdigit():
-            raise self._fails('not two numbers, a code and a unit', command, reply)
+            raise self.protocol_error(
+                'the reply does not have two numbers, a code and a unit', command, reply
+            )
         _, requested, code, label = words
-        # G stands for gauge. Without it a device may mean differential, A or D are no gauge.
+        # G means gauge; a device without a letter may be differential. A and D are never gauge.
         if label.lower() not in (self._units.lower(), f'{self._units}g'.lower()):
             raise ConfigError(
-                f'units = {self._units!r} is not allowed: the device is set to {label}: port'
-                f' {self._line.port}, command {command!r}, reply {reply!r}'
+                f'units = {self._units!r} is not allowed: the device is set to {label}; change'
+                f' this option or the device: port {self._line.port}, command {command!r},'
+                f' reply {reply!r}'
             )
         return float(requested), code
 
-    def _check_source(self, ask: Ask) -> None:
+    def _check_source(self, query: Query) -> None:
         command = f'{self.address}LSS'
-        reply = self._ask(ask, command)
+        reply = self._accepted(query, command)
         if self._words(command, reply)[-1:] == ['A']:
-            raise self._refuses(
-                'the set-point source is analogue, set-points on this line are ignored; set it'
-                ' to serial on the device',
+            raise self.device_fault(
+                'the set-point source of the device is analogue, so that it ignores set-points on'
+                ' this line; set the source to serial on the device',
                 command,
                 reply,
             )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Regulators that are not there, on pseudo-terminals: the far end of every serial backend."""
+"""Emulated regulators on pseudo-terminals, one for every serial backend."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ import tty
 from collections.abc import Sequence
 from typing import Protocol
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
-from ros_pad.regulators.channel import unit
+from ros_pad.regulators.serial_device import unit
 
 LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')
-"""Faults of any line; each device has more of its own."""
-
+"""Faults of any line; each device has further ones."""
 
 UNIT_CODE = '10'
-"""What the emulated Alicat calls its units; every device has codes of its own."""
+"""Code by which the emulated Alicat names its units."""
 
 
-class Faults:
-    """What is wrong now. Kinds as text; ``kind@address`` for one device of several on a bus.
+class FaultSchedule:
+    """Faults, and the times at which they are active.
+
+    A kind of fault applies to all devices, or to one device if it is written ``kind@address``.
 
     Parameters
     ----------
     allowed : sequence of str
-        Kinds that this emulator knows.
+        Kinds of faults that this emulator has.
     schedule : sequence of str
-        ``kind``, ``kind:start`` or ``kind:start:end``, s from the making of this object.
+        ``kind``, ``kind:start`` or ``kind:start:end``; times are s since this object was made.
 
     Raises
     ------
     InvalidInput
-        When a kind is not known, or a time is none.
+        When a kind is unknown, or a time is not valid.
     """
 
     def __init__(self, allowed: Sequence[str], schedule: Sequence[str] = ()) -> None:
@@ -54,13 +55,13 @@ class Faults:
                 start, end = math.nan, math.nan
             if not 0.0 <= start < end:
                 raise InvalidInput(
-                    f'fault {text!r} is not allowed: KIND, KIND:START or KIND:START:END, s, is'
-                    ' needed'
+                    f'fault {text!r} is not allowed: KIND, KIND:START or KIND:START:END is needed,'
+                    ' with times in s, from 0, and START before END'
                 )
             self.add(kind, start, end)
 
     def add(self, kind: str, start: float = 0.0, end: float = math.inf) -> None:
-        """Let a fault act from one time to another, s."""
+        """Add a fault that is active from one time to another, s."""
         if kind.partition('@')[0] not in self._allowed:
             raise InvalidInput(
                 f'fault {kind!r} is not allowed: one of {", ".join(self._allowed)} is needed'
@@ -68,23 +69,28 @@ class Faults:
         self._acting[kind] = (start, end)
 
     def clear(self) -> None:
-        """Repair everything."""
+        """Remove all faults."""
         self._acting.clear()
 
     def act(self, kind: str, address: str = '') -> bool:
-        """Return whether a fault acts now on a device."""
+        """Return whether a fault is active now on a device."""
         now = time.monotonic() - self._started
         times = [self._acting.get(kind), self._acting.get(f'{kind}@{address}')]
         return any(each and each[0] <= now < each[1] for each in times)
 
 
-class Pneumatics:
-    """Pressure behind a valve that follows its set-point with one time constant.
+class Valve:
+    """A valve whose outlet pressure follows its set-point with one time constant.
 
     Parameters
     ----------
     time_constant : float
         s, above 0.
+
+    Attributes
+    ----------
+    held : bool
+        Whether the pressure stays as it is, whatever the set-point.
     """
 
     def __init__(self, time_constant: float) -> None:
@@ -96,17 +102,17 @@ class Pneumatics:
 
     @property
     def setpoint(self) -> float:
-        """Gauge Pa."""
+        """Set-point, gauge Pa."""
         return self._setpoint
 
     @setpoint.setter
     def setpoint(self, value: float) -> None:
-        self.pressure  # noqa: B018 brings it to the present with the old set-point
+        self.pressure  # noqa: B018 advances to the present with the old set-point
         self._setpoint = value
 
     @property
     def pressure(self) -> float:
-        """Gauge Pa, now."""
+        """Present pressure, gauge Pa."""
         now = time.monotonic()
         elapsed, self._time = now - self._time, now
         if not self.held:
@@ -115,52 +121,55 @@ class Pneumatics:
         return self._pressure
 
 
-class Device(Protocol):
-    """What answers on an emulated line."""
+class EmulatedDevice(Protocol):
+    """A device, or several on one bus, that answers commands."""
 
     terminator: str
-    faults: Faults
+    faults: FaultSchedule
 
     def answer(self, command: str) -> tuple[str, str] | None:
-        """Return the address that answers, and its reply; None for no reply."""
+        """Return the answering address and its reply; None for no reply."""
 
 
 class Emulator:
-    """A device at the far end of a pseudo-terminal, until it is closed.
+    """Connect an emulated device to a pseudo-terminal until it is closed.
 
     Parameters
     ----------
-    device : Device
+    device : EmulatedDevice
     link : str, optional
-        A name that stays when the device is unplugged and comes back, as a port of udev's
-        ``/dev/serial/by-id`` does. Nothing may be there yet. What takes its place later stays as
-        it is: then the device cannot be plugged in again, and the emulator ends.
+        Path of a symbolic link to the port. It stays the same when the device is plugged in again,
+        as in udev's ``/dev/serial/by-id``. Nothing may exist there. A file that takes this path
+        while the device is unplugged is not replaced; the emulator then ends.
 
     Raises
     ------
     InvalidInput
-        When something is where the link is to be, or there is no such folder.
+        When the path of the link exists, or its folder does not.
     TransportError
-        From :meth:`wait` and :meth:`close`, when the device could not be plugged in again.
+        When the link cannot be made. If the device cannot be plugged in again later,
+        :meth:`wait` and :meth:`close` raise it.
 
     Attributes
     ----------
     path : str
-        The port to open.
+        Port to open.
     commands : list of str
-        The last commands that were heard, oldest first, at most 1000.
+        Last received commands, oldest first, at most 1000.
+    ended : threading.Event
+        Set when the emulator has ended.
     """
 
-    def __init__(self, device: Device, link: str | None = None) -> None:
+    def __init__(self, device: EmulatedDevice, link: str | None = None) -> None:
         if link and os.path.lexists(link):
-            raise InvalidInput(f'link = {link!r} is not allowed: something is there already')
+            raise InvalidInput(f'link = {link!r} is not allowed: this path exists already')
         if link and not os.path.isdir(os.path.dirname(link) or '.'):
-            raise InvalidInput(f'link = {link!r} is not allowed: there is no such folder')
+            raise InvalidInput(f'link = {link!r} is not allowed: its folder does not exist')
         self._device = device
         self._link = link
         self._closing = threading.Event()
-        self._ended = threading.Event()
-        self._trouble: Exception | None = None
+        self.ended = threading.Event()
+        self._error: Exception | None = None
         self._ends: tuple[int, int] | None = None
         self._buffer = b''
         self.commands: list[str] = []
@@ -173,31 +182,31 @@ class Emulator:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind:  # which is to be heard, and nothing else
-            self._trouble = None
+        if kind:  # the error of the with block is raised, not that of the emulator
+            self._error = None
         self.close()
 
     def wait(self) -> None:
-        """Wait until the emulator ends by itself, which it does when something is wrong."""
-        self._ended.wait()
-        self._tell()
+        """Wait until the emulator ends because of an error, and raise it."""
+        self.ended.wait()
+        self._raise_error()
 
     def close(self) -> None:
-        """Take the device and its port away; raise what ended it before, unless it was told."""
+        """Remove the device and its port; raise the error that ended it, if not raised before."""
         self._closing.set()
         self._thread.join()
         self._unplug()
-        self._tell()
+        self._raise_error()
 
-    def _tell(self) -> None:
-        trouble, self._trouble = self._trouble, None
-        if trouble:
-            raise trouble
+    def _raise_error(self) -> None:
+        error, self._error = self._error, None
+        if error:
+            raise error
 
     def _plug(self) -> None:
         near, far = os.openpty()
-        # As a real port: no echo, no line editing. The far end stays open here too, so that
-        # the near one survives when nobody else has it open.
+        # A real port has no echo and no line editing. The far end stays open here; otherwise the
+        # near end would be closed with the last program that uses the port.
         tty.setraw(far)
         self._ends = near, far
         self._buffer = b''
@@ -209,7 +218,7 @@ class Emulator:
         except OSError as error:
             self._unplug()
             what = (
-                'something else has taken this name, and keeps it'
+                'another file has this path now'
                 if isinstance(error, FileExistsError)
                 else str(error.strerror)
             )
@@ -229,14 +238,13 @@ class Emulator:
     def _run(self) -> None:
         try:
             self._serve()
-        except Exception as error:  # a thread has nobody to tell: wait() and close() do
-            self._trouble = error
-        self._ended.set()
+        except Exception as error:  # raised by wait() and close()
+            self._error = error
+        self.ended.set()
 
     def _serve(self) -> None:
         while not self._closing.is_set():
-            gone = self._device.faults.act('unplugged')
-            if gone:
+            if self._device.faults.act('unplugged'):
                 self._unplug()
                 self._closing.wait(0.005)
                 continue
@@ -275,20 +283,20 @@ class AlicatEmulator:
     Parameters
     ----------
     unit_ids : str
-        One letter for each, e.g. ``'ABCDEF'``.
+        Unit ID of each device, one letter from A to Z, e.g. ``'ABCDEF'``.
     units : str
-        Engineering units, a key of ``channel.UNITS``.
+        Engineering units, a key of ``serial_device.UNITS``.
     decimals : int
-        Of frames.
+        Decimals of the numbers in a frame.
     firmware : str
-        ``'10v20'``: from 9v00 on it knows LS, from 10v05 on LSS. Older ones take everything
-        that begins with L for the lock of the front panel.
+        Version, such as ``'10v20'``. Firmware has LS from 9v00 on and LSS from 10v05 on. Before
+        9v00 it reads every command that begins with L as the lock of the front panel.
     full_scale : float
-        Highest set-point, gauge Pa; above it ``?``.
+        Highest set-point, gauge Pa, above 0; the reply to a higher one is ``?``.
     time_constant : float
-        s, of the pressure.
+        Time constant of the pressure, s, above 0.
     schedule : sequence of str
-        See :class:`Faults`.
+        See :class:`FaultSchedule`.
     """
 
     STATUS = ('ADC', 'EXH', 'HLD', 'LCK', 'MOV', 'OPL', 'OVR', 'POV', 'TMF', 'TOV', 'VOV')
@@ -310,21 +318,26 @@ class AlicatEmulator:
         schedule: Sequence[str] = (),
     ) -> None:
         if not unit_ids or not unit_ids.isalpha() or not unit_ids.isupper():
-            raise InvalidInput(f'unit_ids = {unit_ids!r} is not allowed: letters A to Z')
+            raise InvalidInput(
+                f'unit_ids = {unit_ids!r} is not allowed: one or more letters from A to Z are'
+                ' needed'
+            )
         if not re.fullmatch(r'\d+v\d+', firmware):
-            raise InvalidInput(f'firmware = {firmware!r} is not allowed: such as 10v20 is needed')
+            raise InvalidInput(
+                f'firmware = {firmware!r} is not allowed: a version such as 10v20 is needed'
+            )
         self._units = units
         self._unit = unit(units)
         self._decimals = decimals
         self._firmware = firmware
         self._version = tuple(int(each) for each in firmware.split('v'))
         self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {each: Pneumatics(time_constant) for each in unit_ids}
-        self._locked: set[str] = set()
-        self.faults = Faults(self.FAULTS, schedule)
+        self.valves = {each: Valve(time_constant) for each in unit_ids}
+        self.locked: set[str] = set()
+        self.faults = FaultSchedule(self.FAULTS, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
-        """Answer as one of the units."""
+        """Return the ID of the unit that answers and its reply; None if there is no such unit."""
         address, order = command[:1].upper(), command[1:].strip().upper()
         if address not in self.valves:
             return None
@@ -341,7 +354,7 @@ class AlicatEmulator:
         if order == 'VE':
             return f'{address}   {self._firmware}.0-R24 Jan  2 2024,10:20:30'
         if order.startswith('L') and self._version < (9, 0):
-            self._locked.add(address)
+            self.locked.add(address)
             return self._frame(address)
         if order == 'LSS' and self._version >= (10, 5):
             return f'{address} {"A" if has("analog_source", address) else "S"}'
@@ -353,7 +366,7 @@ class AlicatEmulator:
             shown = self._shown(valve.setpoint)
             return f'{address} {shown} {shown} {UNIT_CODE} {label}'
         if order in ('HP', 'C'):
-            valve.pressure  # noqa: B018 up to now as before
+            valve.pressure  # noqa: B018 advances to the present with the old value of held
             valve.held = order == 'HP'
             return self._frame(address)
         if order.startswith('S'):
@@ -377,7 +390,7 @@ class AlicatEmulator:
     def _frame(self, address: str) -> str:
         valve = self.valves[address]
         status = [each for each in self.STATUS if self.faults.act(f'status={each}', address)]
-        status += ['HLD'] * valve.held + ['LCK'] * (address in self._locked)
+        status += ['HLD'] * valve.held + ['LCK'] * (address in self.locked)
         numbers = f'{self._shown(valve.pressure)} {self._shown(valve.setpoint)}'
         return ' '.join([address, numbers, *status])
 
@@ -386,16 +399,16 @@ class AlicatEmulator:
 
 
 class SmcItvEmulator:
-    """An SMC ITV on RS-232C, as field programs know it.
+    """An SMC ITV on RS-232C, with the commands that two field programs use.
 
     Parameters
     ----------
     full_scale : float
-        Gauge Pa of the setting 1023.
+        Gauge Pa at the setting 1023, above 0.
     time_constant : float
-        s, of the pressure.
+        Time constant of the pressure, s, above 0.
     schedule : sequence of str
-        See :class:`Faults`.
+        See :class:`FaultSchedule`.
     """
 
     FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
@@ -408,11 +421,11 @@ class SmcItvEmulator:
         schedule: Sequence[str] = (),
     ) -> None:
         self._count = number('full_scale', full_scale, 'Pa', above=True) / 1023.0
-        self.valve = Pneumatics(time_constant)
-        self.faults = Faults(self.FAULTS, schedule)
+        self.valve = Valve(time_constant)
+        self.faults = FaultSchedule(self.FAULTS, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
-        """Answer one command."""
+        """Return an empty address and the reply to one command."""
         order, *words = command.split() or ['']
         setting = round(self.valve.setpoint / self._count)
         rejected = self.faults.act('rejection')
@@ -434,21 +447,22 @@ class SmcItvEmulator:
 
 
 class SerialTextEmulator:
-    """A microcontroller board whose DACs drive SMC ITV, in the lines that are the default.
+    """A microcontroller board whose DACs drive SMC ITV, with the default lines of text.
 
-    ``SET 1 2.500`` is answered by ``OK 1 2.500``, ``READ 1`` by ``1 3.000``: volts of the
-    command, 0 to 5 V, and of the monitor, 1 to 5 V.
+    The reply to ``SET 1 2.500`` is ``OK 1 2.500``; the last number is the command voltage, 0 to
+    5 V. The reply to ``READ 1`` is such as ``1 3.000``; the last number is the monitor voltage, 1
+    to 5 V.
 
     Parameters
     ----------
     channels : int
-        Number of regulators, from 1.
+        Number of regulators, 1 to 99.
     full_scale : float
-        Gauge Pa at 5 V.
+        Gauge Pa at 5 V, above 0.
     time_constant : float
-        s, of the pressures.
+        Time constant of the pressures, s, above 0.
     schedule : sequence of str
-        See :class:`Faults`.
+        See :class:`FaultSchedule`.
     """
 
     FAULTS = (*LINE_FAULTS, 'rejection', 'analog_source', 'echo')
@@ -462,13 +476,15 @@ class SerialTextEmulator:
         schedule: Sequence[str] = (),
     ) -> None:
         if not 1 <= channels <= 99:
-            raise InvalidInput(f'channels = {channels!r} is not allowed: 1 to 99 is needed')
+            raise InvalidInput(
+                f'channels = {channels!r} is not allowed: a number from 1 to 99 is needed'
+            )
         self._full_scale = number('full_scale', full_scale, 'Pa', above=True)
-        self.valves = {str(each + 1): Pneumatics(time_constant) for each in range(channels)}
-        self.faults = Faults(self.FAULTS, schedule)
+        self.valves = {str(each + 1): Valve(time_constant) for each in range(channels)}
+        self.faults = FaultSchedule(self.FAULTS, schedule)
 
     def answer(self, command: str) -> tuple[str, str] | None:
-        """Answer one command."""
+        """Return the channel that a command names, and the reply to it."""
         words = command.split()
         order, channel = [*words, '', ''][:2]
         valve = self.valves.get(channel)
@@ -492,4 +508,4 @@ EMULATORS: dict[str, type[AlicatEmulator | SmcItvEmulator | SerialTextEmulator]]
     'smc_itv': SmcItvEmulator,
     'serial_text': SerialTextEmulator,
 }
-"""The emulator of each backend."""
+"""Emulated devices by backend."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every pressure regulator does, real or simulated."""
+"""The interface of all pressure regulators, real or simulated."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from typing import runtime_checkable
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 
+CEILING = 90e3
+"""Highest set-point of a regulator unless its options give another one, gauge Pa."""
+
 
 @dataclass(frozen=True)
 class Reading:
-    """What a regulator says about itself at one moment.
+    """State of a regulator at one moment.
 
     Parameters
     ----------
     pressure : float
-        Measured, gauge Pa.
+        Measured pressure, gauge Pa.
     setpoint : float
-        The command in force, gauge Pa.
+        Set-point in force, gauge Pa.
     faults : tuple of str
-        Faults that the device reports, in its own words; empty when all is well.
+        Faults that the device reports, as the device names them; empty when there are none.
     time : float
         s, on the clock of the backend.
     """
@@ -39,17 +42,23 @@ class Reading:
 class Regulator(Protocol):
     """One channel of a pressure regulator.
 
-    All pressures are gauge Pa. A regulator is opened, commanded and read, vented, and closed;
-    between ``close`` and ``open`` only ``open`` and ``close`` are allowed, everything else
-    raises ``TransportError``. Both may be repeated.
+    All pressures are gauge Pa. Open a regulator, command and read it, vent it, and close it. While
+    it is closed, all methods but ``open`` and ``close`` raise ``TransportError``. To open an open
+    regulator or to close a closed one does nothing.
     """
 
     @property
     def ceiling(self) -> float:
-        """The highest set-point that is accepted, gauge Pa."""
+        """Highest accepted set-point, gauge Pa."""
 
     def open(self) -> None:
-        """Start the conversation with the device. The set-point stays what the device has."""
+        """Connect to the device. Its set-point does not change.
+
+        Raises
+        ------
+        TransportError, ProtocolError, DeviceFault, ConfigError
+            When the device does not answer, or is not as the options say.
+        """
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Command a pressure.
@@ -64,25 +73,33 @@ class Regulator(Protocol):
         InvalidInput
             When it is not a finite number, or negative.
         LimitError
-            When it is above the ceiling. In both cases the old set-point stays.
+            When it is above the ceiling. In both cases the old set-point stays in force.
+        TransportError, ProtocolError, DeviceFault, ConfigError
+            When the device cannot be reached.
         """
 
     def read(self) -> Reading:
-        """Return the present state of the device."""
+        """Return the present state of the device; raise as :meth:`vent` does."""
 
     def vent(self) -> None:
-        """Command zero gauge pressure at once, whatever the set-point was."""
+        """Command zero gauge pressure at once.
+
+        Raises
+        ------
+        TransportError, ProtocolError, DeviceFault, ConfigError
+            When the device cannot be reached.
+        """
 
     def close(self) -> None:
-        """End the conversation.
+        """Disconnect from the device.
 
-        Call ``vent`` first: a backend may vent here too, as those on a serial line do, which
-        raise where they cannot; the simulated one does not.
+        Call ``vent`` before. Backends on a serial line vent here too, and raise if that fails; the
+        simulated one does not.
         """
 
 
 def permitted(gauge_pa: float, ceiling: float) -> float:
-    """Return a set-point as a float if a regulator with this ceiling may take it.
+    """Return a set-point as a float if a regulator with this ceiling accepts it.
 
     Raises
     ------
@@ -94,11 +111,12 @@ def permitted(gauge_pa: float, ceiling: float) -> float:
     number = isinstance(gauge_pa, Real) and not isinstance(gauge_pa, bool)
     if not number or not math.isfinite(gauge_pa) or gauge_pa < 0.0:
         raise InvalidInput(
-            f'set-point {gauge_pa!r} Pa is not allowed: 0 to {ceiling:g} Pa gauge is needed'
+            f'set-point {gauge_pa!r} Pa is not allowed: a number from 0 to {ceiling:g} Pa gauge is'
+            ' needed'
         )
     if gauge_pa > ceiling:
         raise LimitError(
-            f'set-point {gauge_pa:g} Pa is above the ceiling of {ceiling:g} Pa gauge: refused, '
-            'the old set-point stays'
+            f'set-point {gauge_pa:g} Pa is refused: it is above the ceiling of {ceiling:g} Pa'
+            ' gauge; the old set-point stays in force'
         )
     return float(gauge_pa)

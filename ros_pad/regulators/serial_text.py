@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Boards that drive regulators and speak in lines of text: what they say is set by options."""
+"""Boards that drive regulators and receive lines of text, whose format the options set."""
 
 from __future__ import annotations
 
 import math
 import re
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
+from ros_pad.configuration import text
 from ros_pad.errors import InvalidInput
-from ros_pad.regulators.channel import Frame
-from ros_pad.regulators.channel import SerialRegulator
-from ros_pad.regulators.transport import Ask
-from ros_pad.regulators.transport import Line
+from ros_pad.regulators.protocol import CEILING
+from ros_pad.regulators.serial_device import Frame
+from ros_pad.regulators.serial_device import SerialRegulator
+from ros_pad.regulators.transport import Query
+from ros_pad.regulators.transport import SerialLine
 
 _VALUE = r'[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?'
 _FIELD = re.compile(r'\{(channel|value(?::(?:\.(\d)f|d))?)\}')
 
 
 class SerialTextRegulator(SerialRegulator):
-    """One channel of a board, for instance of DACs that drive SMC ITV; others may share its port.
+    """One channel of a board, for instance one with DACs that drive SMC ITV.
+
+    Several channels of a board share its port.
 
     Parameters
     ----------
@@ -27,37 +32,38 @@ class SerialTextRegulator(SerialRegulator):
     channel : int
         0 to 99.
     set_template : str
-        Line that sets; ``{channel}`` stands for the channel, ``{value:.3f}`` for the value with 3
-        decimals (0 to 9), ``{value:d}`` for a whole number.
+        Command that sets a pressure. ``{channel}`` stands for the channel, ``{value:.3f}`` for
+        the value with 3 decimals (0 to 9), ``{value:d}`` for a whole number.
     set_reply : str
-        What the board answers then, with the same fields; ``{value}`` is compared with what
-        was sent. Empty when it answers nothing.
+        Reply to ``set_template``, with the same fields; its ``{value}`` is compared with the value
+        that was sent. Empty when the board sends no reply.
     read_template, read_reply : str
-        Line that asks for the measured value, and its answer; ``{value}`` is any number.
+        Command that requests the measured value, and the reply to it, in which ``{value}`` is any
+        number.
     terminator : str
-        What ends a line, both ways: 1 to 4 ASCII characters.
+        End of a line, in both directions: 1 to 4 ASCII characters.
     command_zero, command_full : float
-        Value that sets 0 Pa, and the one that sets ``full_scale``: volts, counts, kPa, whatever
-        the board speaks. Different ones.
+        Values that set 0 Pa and ``full_scale``, in the unit of the board (V, counts, kPa); they
+        must differ.
     monitor_zero, monitor_full : float
-        Value that is read at 0 Pa, and the one at ``full_scale``. Different ones.
+        Values that are read at 0 Pa and at ``full_scale``; they must differ.
     full_scale : float
-        Gauge Pa, 1e3 to 1e7.
+        Pressure at full scale, gauge Pa, 1e3 to 1e7.
     baudrate : int
-        1/s.
+        1/s, 300 to 4,000,000.
     ceiling : float
-        Highest set-point, gauge Pa, up to ``full_scale``.
+        Highest set-point, gauge Pa, 1 to ``full_scale``.
     reply_timeout, poll_period, silence : float
-        s; see :class:`~ros_pad.regulators.channel.SerialRegulator`.
+        s; see :class:`~ros_pad.regulators.serial_device.SerialRegulator`.
 
     Notes
     -----
-    Between the two points of a calibration values are linear in the pressure. The board is not
-    asked for its set-point: what is in force is what was last sent and not refused, and NaN
-    before. A reply other than ``set_reply`` is a refusal.
+    Values are linear in the pressure. The board does not report its set-point: the last one that
+    was sent and not refused counts as in force; before the first one it is NaN. A reply other than
+    ``set_reply`` is a refusal.
 
-    A board that restarts has forgotten its set-point, and nobody is told while the line stays
-    up; one that restarts because its port is opened is told at the first set-point.
+    A board that restarts loses its set-point, which is not detected while its port stays open. If
+    opening the port restarts the board, it receives its first set-point after that.
     """
 
     def __init__(
@@ -75,22 +81,13 @@ class SerialTextRegulator(SerialRegulator):
         monitor_full: float = 5.0,
         full_scale: float = 100e3,
         baudrate: int = 115200,
-        ceiling: float = 90e3,
+        ceiling: float = CEILING,
         reply_timeout: float = 0.1,
         poll_period: float = 0.02,
         silence: float = 0.5,
     ) -> None:
-        if not isinstance(channel, int) or isinstance(channel, bool) or not 0 <= channel <= 99:
-            raise InvalidInput(f'channel = {channel!r} is not allowed: 0 to 99 is needed')
-        text = isinstance(terminator, str) and terminator.isascii()
-        if not text or not 1 <= len(terminator) <= 4:
-            raise InvalidInput(
-                f'terminator = {terminator!r} is not allowed: 1 to 4 ASCII characters are needed'
-            )
-        self._full_scale = number('full_scale', full_scale, 'Pa', 1e3, 1e7)
-        number('ceiling', ceiling, 'Pa', 1.0, full_scale)
-        self._command = _scale('command', command_zero, command_full)
-        self._monitor = _scale('monitor', monitor_zero, monitor_full)
+        integer('channel', channel, 0, 99)
+        _check_terminator(terminator)
         for name, template, values in [
             ('set_template', set_template, (1,)),
             ('set_reply', set_reply, (0, 1)),
@@ -98,17 +95,17 @@ class SerialTextRegulator(SerialRegulator):
             ('read_reply', read_reply, (1,)),
         ]:
             _check(name, template, values)
-        found = [each for each in _FIELD.finditer(set_template) if each[1] != 'channel']
-        if found[0][1] == 'value':
+        self._full_scale = number('full_scale', full_scale, 'Pa', 1e3, 1e7)
+        number('ceiling', ceiling, 'Pa', 1.0, full_scale)
+        self._command = _scale('command', command_zero, command_full)
+        self._monitor = _scale('monitor', monitor_zero, monitor_full)
+        self._decimals = _decimals(set_template, command_zero)
+        self._resolution = 10.0**-self._decimals * full_scale / abs(self._command[1])
+        if self._resolution > full_scale / 10.0:
             raise InvalidInput(
-                f'set_template = {set_template!r} is not allowed: how many decimals? {{value:.3f}}'
-                ' or {value:d} is needed'
-            )
-        self._decimals = int(found[0][2] or 0)
-        if round(self._command[0], self._decimals) != self._command[0]:
-            raise InvalidInput(
-                f'command_zero = {command_zero!r} is not allowed: set_template has'
-                f' {self._decimals} decimals, and a vent must be exact'
+                f'set_template = {set_template!r} is not allowed: its step is'
+                f' {self._resolution:g} Pa, and at most a tenth of full_scale ='
+                f' {full_scale:g} Pa is allowed; use more decimals'
             )
         self._set_template = set_template
         self._read_command = _filled(read_template, channel, '')
@@ -116,60 +113,84 @@ class SerialTextRegulator(SerialRegulator):
         self._read_reply = _pattern(read_reply, channel)
         self._channel = channel
         self._in_force = math.nan
-        step = 10.0**-self._decimals * full_scale / abs(self._command[1])
-        if step > full_scale / 10.0:
-            raise InvalidInput(
-                f'set_template = {set_template!r} is not allowed: its step is {step:g} Pa, too'
-                f' coarse for a full_scale of {full_scale:g} Pa'
-            )
-        self._resolution = step
-        line = Line(port, baudrate, terminator, reply_timeout)
+        line = SerialLine(port, baudrate, terminator, reply_timeout)
         super().__init__(line, f'channel {channel}', ceiling, poll_period, silence)
 
-    def _meet(self, ask: Ask) -> Frame:
+    def identify(self, query: Query) -> Frame:
+        """Return a frame without a set-point; the board has no identity to check."""
         self._in_force = math.nan
-        return self._poll(ask)
+        return self.poll(query)
 
-    def _poll(self, ask: Ask) -> Frame:
-        reply = ask(self._read_command)
+    def poll(self, query: Query) -> Frame:
+        """Request the measured value; return a frame."""
+        reply = query(self._read_command)
         found = self._read_reply.fullmatch(reply)
         if not found:
-            raise self._fails('not a reply as read_reply has it', self._read_command, reply)
+            raise self.protocol_error(
+                'the reply does not match read_reply', self._read_command, reply
+            )
         zero, span = self._monitor
         pressure = (float(found['value']) - zero) / span * self._full_scale
-        if not math.isfinite(pressure):  # 1e999 is a number to the pattern, and infinite here
-            raise self._fails('not a pressure', self._read_command, reply)
+        if not math.isfinite(pressure):  # the pattern accepts 1e999, which is infinite
+            raise self.protocol_error('the value is not finite', self._read_command, reply)
         return Frame(pressure, self._in_force, self._resolution)
 
-    def _set(self, ask: Ask, setpoint: float) -> None:
+    def send(self, query: Query, setpoint: float) -> None:
+        """Send a set-point, gauge Pa, and check the reply if there is one."""
         zero, span = self._command
         value = f'{zero + setpoint / self._full_scale * span:.{self._decimals}f}'
         command = _filled(self._set_template, self._channel, value)
         self._in_force = math.nan
-        reply = ask(command, reply=self._set_reply is not None)
+        reply = query(command, reply=self._set_reply is not None)
         if self._set_reply:
             found = self._set_reply.fullmatch(reply)
             if not found:
-                raise self._refuses('not a reply as set_reply has it', command, reply)
+                raise self.device_fault('the reply does not match set_reply', command, reply)
             echo = float(found.groupdict().get('value', value))
             if not abs(echo - float(value)) < 0.5 * 10.0**-self._decimals:
-                raise self._refuses(f'{value} was sent, {echo:g} is in force', command, reply)
+                raise self.device_fault(
+                    f'value {value} was sent, {echo:g} is in force', command, reply
+                )
         self._in_force = setpoint
 
 
+def _decimals(set_template: str, command_zero: float) -> int:
+    """Return the decimals of the value in a template, which must express a vent exactly."""
+    values = [each[2] for each in _FIELD.finditer(set_template) if each[1] != 'channel']
+    decimals = int(values[0] or 0)
+    if '{value}' in set_template:
+        raise InvalidInput(
+            f'set_template = {set_template!r} is not allowed: the number of decimals is missing,'
+            ' {value:.3f} or {value:d} is needed'
+        )
+    if round(command_zero, decimals) != command_zero:
+        raise InvalidInput(
+            f'command_zero = {command_zero!r} is not allowed: set_template has {decimals}'
+            ' decimals, which must express the value of a vent exactly'
+        )
+    return decimals
+
+
 def _scale(name: str, zero: float, full: float) -> tuple[float, float]:
-    """Return the value at 0 Pa and the span to the one at full scale."""
+    """Return the value at 0 Pa, and the value at full scale minus that at 0 Pa."""
     low = number(f'{name}_zero', zero, '', -math.inf)
     high = number(f'{name}_full', full, '', -math.inf)
     if low == high:
         raise InvalidInput(
-            f'{name}_full = {full!r} is not allowed: another value than {name}_zero is needed'
+            f'{name}_full = {full!r} is not allowed: it must differ from {name}_zero'
         )
     return low, high - low
 
 
+def _check_terminator(terminator: str) -> None:
+    if not text('terminator', terminator).isascii() or not 1 <= len(terminator) <= 4:
+        raise InvalidInput(
+            f'terminator = {terminator!r} is not allowed: 1 to 4 ASCII characters are needed'
+        )
+
+
 def _check(name: str, template: str, values: tuple[int, ...]) -> None:
-    """Refuse what is no template, or has not as many values as it may."""
+    """Refuse a text that is not a template, or has another number of values than allowed."""
     if isinstance(template, str) and template.isascii():
         fields = [each[1] for each in _FIELD.finditer(template)]
         known = not re.search('[{}]', _FIELD.sub('', template))
@@ -178,7 +199,7 @@ def _check(name: str, template: str, values: tuple[int, ...]) -> None:
     needed = ' or '.join(map(str, values))
     raise InvalidInput(
         f'{name} = {template!r} is not allowed: ASCII text with {needed} {{value}} is needed, and'
-        ' {channel} where the board has several'
+        ' with {channel} if the board has several channels'
     )
 
 
@@ -187,7 +208,7 @@ def _filled(template: str, channel: int, value: str) -> str:
 
 
 def _pattern(template: str, channel: int) -> re.Pattern[str]:
-    """Return what matches a reply; group ``value`` is the value."""
+    """Return the pattern of a reply; its group ``value`` is the value."""
     parts = []
     end = 0
     for each in _FIELD.finditer(template):

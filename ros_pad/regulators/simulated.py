@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A regulator that is not there: the simulated pneumatics behind the regulator protocol."""
+"""A simulated regulator: the pneumatics of the simulation with the interface of a regulator."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import random
 import time
 from collections.abc import Callable
 from collections.abc import Sequence
-from numbers import Real
 
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
+from ros_pad.regulators.protocol import CEILING
 from ros_pad.regulators.protocol import Reading
 from ros_pad.regulators.protocol import permitted
 from ros_pad.simulation.faults import Fault
@@ -23,64 +25,62 @@ from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
 
 STEP = 0.004
-"""Internal step, s."""
+"""Internal time step, s."""
 
-_ROUNDING = 1e-6  # of a step: a clock that counts in steps is a hair early or late
+_ROUNDING = 1e-6  # share of a step: largest rounding error of a clock that advances by steps
 
 
 class SimulatedRegulator:
-    """Regulator, hose and pad, advanced to the present whenever they are spoken to.
+    """Simulate regulator, hose and pad, advanced to the present time at each call.
 
     Parameters
     ----------
     clock : callable
-        Returns the time in s: ``time.monotonic``, or the clock of a simulation.
+        Function that returns the time, s: ``time.monotonic``, or the clock of a simulation.
     ceiling : float
-        Highest set-point, gauge Pa, above 0 up to ``full_scale``.
+        Highest set-point, gauge Pa, 1 to ``full_scale``.
     hose_diameter, hose_length : float
         m; see :class:`~ros_pad.simulation.pneumatics.Hose`.
     hose_conductance : float, optional
-        Measured sonic conductance of the whole line, m³/(s Pa), in place of the hose formula.
+        Measured sonic conductance of the whole line, m³/(s Pa), instead of the hose formula.
     pad_volume : float or callable
-        Air volume of the pads and the chamber that feeds them, m³, or a function that gives it
-        for a gauge pressure in Pa.
+        Air volume of the pads and their chamber, m³, or a function of the gauge pressure, Pa.
     natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit : float
         See :class:`~ros_pad.simulation.pneumatics.RegulatorModel`.
     sensor_resolution : float
-        Pa, 0.1 to 1000. With whole Pa an ambient pressure of 101325 Pa can be added to a
-        reading and subtracted again without a rounding error.
+        Smallest step of readings, Pa, 0.1 to 1000. With whole Pa an ambient pressure of
+        101325 Pa can be added to a reading and subtracted again without a rounding error.
     sensor_noise : float
-        Standard deviation of a reading, Pa, 0 to 1e4. It never acts on the pneumatics.
+        Standard deviation of a reading, Pa, 0 to 1e4. It does not change the pneumatics.
     seed : int
-        Of the noise.
+        Seed of the noise.
     faults : sequence of Fault or str
-        What this device suffers, whatever legs are named: faults, or texts as
-        :meth:`~ros_pad.simulation.faults.Fault.parse` reads them. Their times are those of the
-        clock, and are kept exactly.
+        Faults of this device, or texts for :meth:`~ros_pad.simulation.faults.Fault.parse`. Their
+        times are those of the clock; their legs are ignored.
 
     Raises
     ------
     InvalidInput
-        When a value is outside its range, or the clock goes back while the regulator is open.
+        When a value is outside its range, or the clock goes back or is not finite while the
+        regulator is open.
     ConfigError
-        When a text is no fault.
+        When a text is not a fault.
     TransportError
-        From every method but ``close`` while a fault of kind ``silence`` acts, as from a real
-        device that does not answer in time. The set-point stays then.
+        From every method but ``close`` during a fault of kind ``silence``, as from a real device
+        that does not answer in time. The set-point does not change then.
 
     Notes
     -----
-    The pressure is measured at the pad. Time is divided into internal steps of ``STEP`` that
-    start anew at every change of the set-point, so what the pad does depends on the commands
-    and their times alone. A reading between two internal steps runs a copy up to its moment and
-    drops it: how often and when one reads changes nothing. Noise is drawn once for each instant
-    that is read. Once nothing moves, a step costs nothing, so long gaps are quick.
+    The pressure is measured at the pad. Internal steps of ``STEP`` restart at every change of
+    the set-point, so the pressure depends only on the commands and their times. A reading
+    between two internal steps is computed on a copy, so readings do not change the result. Noise
+    is drawn once for each time that is read. Long times at rest are computed in one step.
     """
 
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
-        ceiling: float = 90e3,
+        ceiling: float = CEILING,
         hose_diameter: float = 0.004,
         hose_length: float = 1.0,
         hose_conductance: float | None = None,
@@ -100,59 +100,47 @@ class SimulatedRegulator:
         model = RegulatorModel(
             natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit
         )
-        for name, value, low, high in [
-            ('ceiling', ceiling, 1.0, full_scale),
-            ('sensor_resolution', sensor_resolution, 0.1, 1000.0),
-            ('sensor_noise', sensor_noise, 0.0, 1e4),
-        ]:
-            if not isinstance(value, Real) or isinstance(value, bool) or not low <= value <= high:
-                raise InvalidInput(
-                    f'{name} = {value!r} is not allowed: '
-                    f'a number from {low:g} to {high:g} Pa is needed'
-                )
-        if not isinstance(seed, int) or isinstance(seed, bool):
-            raise InvalidInput(f'seed = {seed!r} is not allowed: a whole number is needed')
+        self._ceiling = number('ceiling', ceiling, 'Pa', 1.0, full_scale)
+        self._resolution = number('sensor_resolution', sensor_resolution, 'Pa', 0.1, 1000.0)
+        self._noise = number('sensor_noise', sensor_noise, 'Pa', 0.0, 1e4)
+        self._random = random.Random(integer('seed', seed, -math.inf))
         if not callable(clock):
             raise InvalidInput(f'clock = {clock!r} is not allowed: a function is needed')
         self._clock = clock
-        self._ceiling = float(ceiling)
         hose = Hose(hose_diameter, hose_length, hose_conductance)
         self._faults = parsed(faults)
         self._channel = PneumaticChannel(model, hose, pad_volume, faults=self._faults)
-        self._resolution = sensor_resolution
-        self._noise = sensor_noise
-        self._random = random.Random(seed)
         self._disturbance = 0.0
         self._disturbance_time = -math.inf
         self._is_open = False
-        self._now = 0.0  # the latest moment seen
-        self._epoch = 0.0  # the last change of the set-point, where the internal steps start
-        self._steps = 0  # internal steps done since
+        self._now = 0.0  # time of the last call
+        self._epoch = 0.0  # time of the last change of the set-point
+        self._steps = 0  # internal steps since that change
 
     @property
     def ceiling(self) -> float:
-        """The highest set-point that is accepted, gauge Pa."""
+        """Highest accepted set-point, gauge Pa."""
         return self._ceiling
 
     @property
     def air_used(self) -> float:
-        """Air drawn since the start, kg, up to the last internal step."""
+        """Mass of air drawn from the regulator since the start, kg, up to the last step."""
         return self._channel.air_used
 
     @property
     def pad_pressure(self) -> float:
         """True pressure in the pad now, gauge Pa, in steps of the sensor's resolution.
 
-        It is what a robot stands on, also where the device is silent or its sensor has drifted;
-        for a sound device without noise it is what :meth:`read` says.
+        This pressure acts on the robot, also while the device is silent or its sensor drifts;
+        :meth:`read` returns the same for a device without faults and noise.
         """
         return self._shown(self._present().pad_pressure)
 
     def open(self) -> None:
-        """Start the clock. After ``close`` the air is found as it was left."""
+        """Follow the clock from now on. After ``close``, the pressures are as it left them."""
         if not self._is_open:
             now = self._clock()
-            self._listen(now)
+            self._check_answer(now)
             self._is_open = True
             self._now = self._epoch = self._channel.time = now
             self._steps = 0
@@ -161,7 +149,7 @@ class SimulatedRegulator:
         """Command a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``."""
         setpoint = permitted(gauge_pa, self._ceiling)
         rest = self._advance()
-        self._listen(self._now)
+        self._check_answer(self._now)
         if setpoint != self._channel.setpoint:
             self._channel.step(self._channel.setpoint, rest)
             self._channel.step(setpoint, 0.0)
@@ -169,9 +157,9 @@ class SimulatedRegulator:
             self._steps = 0
 
     def read(self) -> Reading:
-        """Return pad pressure and set-point at the present moment of the clock."""
+        """Return pad pressure and set-point at the present time of the clock."""
         channel = self._present()
-        self._listen(self._now)
+        self._check_answer(self._now)
         pressure = channel.pad_pressure + self._drift()
         if self._noise:
             if self._now != self._disturbance_time:
@@ -185,7 +173,7 @@ class SimulatedRegulator:
         self.set_pressure(0.0)
 
     def close(self) -> None:
-        """Stop the clock. The pad keeps what it holds: ``vent`` first."""
+        """Stop following the clock. The pad keeps its pressure: call ``vent`` before."""
         if self._is_open:
             self._channel.step(self._channel.setpoint, self._advance())
             self._is_open = False
@@ -194,12 +182,12 @@ class SimulatedRegulator:
         return round(pressure / self._resolution) * self._resolution
 
     def _drift(self) -> float:
-        """Return what the device's sensor reads too much now, Pa."""
+        """Return the present offset of the sensor of the device, Pa."""
         acting = [each for each in self._faults if each.acts_at(self._now)]
         return condition(acting, self._now, self._channel.regulator.full_scale).offset
 
-    def _listen(self, now: float) -> None:
-        """Raise what a driver raises when its device does not answer."""
+    def _check_answer(self, now: float) -> None:
+        """Raise the error of a device that does not answer, during such a fault."""
         for fault in self._faults:
             if fault.kind == 'silence' and fault.acts_at(now):
                 raise TransportError(
@@ -208,7 +196,7 @@ class SimulatedRegulator:
                 )
 
     def _present(self) -> PneumaticChannel:
-        """Return the channel at the present moment of the clock: a copy between two steps."""
+        """Return the channel at the present time of the clock; between two steps, a copy."""
         rest = self._advance()
         if not rest:
             return self._channel
@@ -217,14 +205,14 @@ class SimulatedRegulator:
         return channel
 
     def _advance(self) -> float:
-        """Do the internal steps up to now, and return the rest of time in s, below ``STEP``."""
+        """Advance by whole internal steps; return the remaining time, s, below ``STEP``."""
         if not self._is_open:
             raise TransportError('the simulated regulator is not open: call open() first')
         now = self._clock()
         if not self._now <= now < math.inf:
             raise InvalidInput(
-                f'the clock went from {self._now!r} s to {now!r} s: it must not go back; '
-                'close() and open() again to start another time'
+                f'the clock went from {self._now!r} s to {now!r} s: it must be finite and must not'
+                ' go back; call close() and open() to start at another time'
             )
         self._now = now
         elapsed = now - self._epoch

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SMC ITV electro-pneumatic regulators with RS-232C, as field programs talk to them."""
+"""SMC ITV electro-pneumatic regulators on RS-232C, with the commands of two field programs."""
 
 from __future__ import annotations
 
-from ros_pad.contact.pad import number
-from ros_pad.regulators.channel import Frame
-from ros_pad.regulators.channel import SerialRegulator
-from ros_pad.regulators.transport import Ask
-from ros_pad.regulators.transport import Line
+from ros_pad.configuration import number
+from ros_pad.regulators.protocol import CEILING
+from ros_pad.regulators.serial_device import Frame
+from ros_pad.regulators.serial_device import SerialRegulator
+from ros_pad.regulators.transport import Query
+from ros_pad.regulators.transport import SerialLine
 
 FULL_COUNT = 1023
-"""The setting that is the full scale: 10 bit."""
+"""Setting at full scale: 10 bits."""
 
 
 class SmcItvRegulator(SerialRegulator):
@@ -21,20 +22,21 @@ class SmcItvRegulator(SerialRegulator):
     port : str
         Serial port, e.g. ``/dev/ttyUSB0``.
     full_scale : float
-        Gauge Pa of the setting 1023, from the type plate, 1e3 to 1e7. The device cannot be
-        asked.
+        Gauge Pa at the setting 1023, from the type plate, 1e3 to 1e7. The device does not
+        report it.
     baudrate : int
-        1/s.
+        1/s, 300 to 4,000,000.
     ceiling : float
-        Highest set-point, gauge Pa, up to ``full_scale``.
+        Highest set-point, gauge Pa, 1 to ``full_scale``.
     reply_timeout, poll_period, silence : float
-        s; see :class:`~ros_pad.regulators.channel.SerialRegulator`.
+        s; see :class:`~ros_pad.regulators.serial_device.SerialRegulator`.
 
     Notes
     -----
-    ``SET n`` is echoed by n, ``REQ`` answers the setting and ``MON`` the output, all from 0 to
-    1023, and ``UNKNOWN COMMAND`` is a rejection. All this is taken from two independent field
-    programs; the maker's manual was not found. The device reports no faults.
+    The reply to ``SET n`` is n, to ``REQ`` the setting and to ``MON`` the output, all from 0 to
+    1023; ``UNKNOWN COMMAND`` is a rejection. The device reports no faults.
+
+    Source: two independent field programs; the maker's manual was not found.
     """
 
     def __init__(
@@ -42,7 +44,7 @@ class SmcItvRegulator(SerialRegulator):
         port: str,
         full_scale: float,
         baudrate: int = 9600,
-        ceiling: float = 90e3,
+        ceiling: float = CEILING,
         reply_timeout: float = 0.1,
         poll_period: float = 0.02,
         silence: float = 0.5,
@@ -50,27 +52,34 @@ class SmcItvRegulator(SerialRegulator):
         full_scale = number('full_scale', full_scale, 'Pa', 1e3, 1e7)
         number('ceiling', ceiling, 'Pa', 1.0, full_scale)
         self._count = full_scale / FULL_COUNT
-        line = Line(port, baudrate, '\r\n', reply_timeout)
+        line = SerialLine(port, baudrate, '\r\n', reply_timeout)
         super().__init__(line, 'ITV', ceiling, poll_period, silence)
 
-    def _meet(self, ask: Ask) -> Frame:
-        return self._poll(ask)
+    def identify(self, query: Query) -> Frame:
+        """Return a frame; the device has no identity to check."""
+        return self.poll(query)
 
-    def _poll(self, ask: Ask) -> Frame:
-        setting, output = (self._asked(ask, command) for command in ('REQ', 'MON'))
+    def poll(self, query: Query) -> Frame:
+        """Request setting and output; return a frame."""
+        setting, output = (self._query_count(query, command) for command in ('REQ', 'MON'))
         return Frame(output * self._count, setting * self._count, self._count)
 
-    def _set(self, ask: Ask, setpoint: float) -> None:
+    def send(self, query: Query, setpoint: float) -> None:
+        """Send a set-point, gauge Pa, and check the echo."""
         setting = round(setpoint / self._count)
         command = f'SET {setting}'
-        echo = self._asked(ask, command)
+        echo = self._query_count(query, command)
         if echo != setting:
-            raise self._refuses(f'{setting} was sent, {echo} is in force', command, str(echo))
+            raise self.device_fault(
+                f'setting {setting} was sent, {echo} is in force', command, str(echo)
+            )
 
-    def _asked(self, ask: Ask, command: str) -> int:
-        reply = ask(command)
+    def _query_count(self, query: Query, command: str) -> int:
+        reply = query(command)
         if reply == 'UNKNOWN COMMAND':
-            raise self._refuses('rejected', command, reply)
+            raise self.device_fault('the device rejected the command', command, reply)
         if not reply.isdecimal() or int(reply) > FULL_COUNT:
-            raise self._fails(f'not a number from 0 to {FULL_COUNT}', command, reply)
+            raise self.protocol_error(
+                f'the reply is not a whole number from 0 to {FULL_COUNT}', command, reply
+            )
         return int(reply)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A serial port with its own thread, shared by the devices on one bus."""
+"""Serial ports, each with one thread that serves the devices on its bus."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
 
 LONGEST_REPLY = 256
-"""Bytes after which a reply without an end is given up."""
+"""Longest reply, bytes; a longer one without a terminator is an error."""
 
 FIRST_PAUSE = 0.05
 LONGEST_PAUSE = 1.0
-"""s between two attempts to open a port that is gone; each pause is twice the one before."""
+"""First and longest pause between attempts to reach a missing port or a lost device, s; each
+pause is twice as long as the one before."""
 
 QUIET = 0.02
-"""s that the line is left alone after a failure, so that a late reply answers nothing else."""
+"""Pause after a failure, s, so that a late reply is not read as the next one."""
 
 
 @dataclass(frozen=True)
-class Line:
-    """How one talks on a port: 8 data bits, no parity, 1 stop bit, lines of ASCII.
+class SerialLine:
+    """A port and its settings: 8 data bits, no parity, 1 stop bit, lines of ASCII.
 
     Parameters
     ----------
@@ -39,9 +40,9 @@ class Line:
     baudrate : int
         1/s.
     terminator : str
-        What ends a line, both ways.
+        End of a line, in both directions.
     reply_timeout : float
-        s from the command to the end of its reply.
+        Longest time from the command to the end of its reply, s.
     """
 
     port: str
@@ -50,57 +51,61 @@ class Line:
     reply_timeout: float
 
 
-class Unplugged(TransportError):
-    """The port itself is gone or cannot be opened, and with it every device on it."""
+class PortLost(TransportError):
+    """The port is missing or cannot be opened; no device on it can be reached."""
 
 
-class Ask(Protocol):
-    """Sends one command and returns its reply, both without terminator."""
+class Query(Protocol):
+    """Function that sends one command and returns its reply, both without terminator."""
 
     def __call__(self, command: str, reply: bool = True) -> str:
-        """Send a command; with ``reply=False`` nothing is waited for, and '' returned."""
+        """Send a command; with ``reply=False`` return '' at once."""
 
 
-class Device(Protocol):
-    """What a :class:`Bus` serves. Both methods are called by the thread of the bus."""
+class BusDevice(Protocol):
+    """A device on a :class:`Bus`. The thread of the bus calls both methods."""
 
     @property
     def address(self) -> str:
-        """What tells this device from the others on the bus."""
+        """Name of the device, unique on its bus."""
 
-    def turn(self, ask: Ask) -> float:
-        """Say what there is to say; return when the next turn is due, s, monotonic clock.
+    def take_turn(self, query: Query) -> float:
+        """Exchange commands and replies; return the time of the next turn, s, monotonic clock.
 
-        It may raise :class:`Unplugged` and nothing else.
+        Raises
+        ------
+        PortLost
+            When the port is missing; no other error is allowed.
         """
 
-    def unplugged(self, error: TransportError) -> None:
-        """Note that the port is gone."""
+    def lose_port(self, error: TransportError) -> None:
+        """Receive the notice that the port is missing."""
 
 
 def failure(
-    kind: type[DeviceError], what: str, line: Line, command: str, reply: str | bytes
+    kind: type[DeviceError], what: str, line: SerialLine, command: str, reply: str | bytes
 ) -> DeviceError:
-    """Return an error that says what went wrong on which port after which command."""
+    """Return an error that names the problem, the port, the command and the reply."""
     words = f'{what}: port {line.port}, command {command!r}, reply {reply!r}'
     return kind(words, line.port, command, reply)
 
 
 class Bus:
-    """One open port. Its thread gives each device its turn, one command in flight.
+    """One port and its thread, which gives each device its turn, one command at a time.
 
-    Devices that share a port share its bus: :meth:`join` and :meth:`leave` open and close it.
-    Turns go to the device that has been due for longest, so that no device starves another.
-    A port that cannot be opened, or goes away, is tried again with growing pauses.
+    Devices that share a port share its bus, which the first :meth:`join` opens and the last
+    :meth:`leave` closes. The next turn goes to the device with the earliest due time; a vent is
+    due at once and goes first. A port that is missing or cannot be opened is tried again, with
+    growing pauses.
     """
 
-    _all: dict[str, Bus] = {}  # noqa: RUF012 one registry for the process, on purpose
+    _all: dict[str, Bus] = {}  # noqa: RUF012 all instances share this registry on purpose
     _registry = threading.Lock()
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: SerialLine) -> None:
         self.line = line
         self._changed = threading.Condition()
-        self._due: dict[Device, float] = {}
+        self._due: dict[BusDevice, float] = {}
         self._closing = False
         self._port: Any = None
         self._thread = threading.Thread(
@@ -108,8 +113,8 @@ class Bus:
         )
 
     @classmethod
-    def join(cls, line: Line, device: Device) -> Bus:
-        """Return the bus of a port, with one more device on it.
+    def join(cls, line: SerialLine, device: BusDevice) -> Bus:
+        """Add a device to the bus of a port, and return the bus.
 
         Raises
         ------
@@ -119,7 +124,7 @@ class Bus:
             When pyserial is not installed.
         """
         try:
-            import serial  # noqa: F401 only here is it known that a port is needed
+            import serial  # noqa: F401 only serial devices need pyserial
         except ModuleNotFoundError as error:
             raise TransportError(
                 f'port {line.port} cannot be opened without pyserial: pip install pyserial, or'
@@ -131,7 +136,8 @@ class Bus:
                 bus = cls(line)
             elif bus.line != line:
                 raise ConfigError(
-                    f'port {line.port} is open with {bus.line}: {line} is not allowed beside it'
+                    f'port {line.port} is open with {bus.line}: a regulator with {line} cannot'
+                    ' share it; give both the same settings'
                 )
             with bus._changed:
                 for other in bus._due:
@@ -147,8 +153,8 @@ class Bus:
                 bus._thread.start()
         return bus
 
-    def leave(self, device: Device) -> None:
-        """Take a device off; with the last one the port is closed."""
+    def leave(self, device: BusDevice) -> None:
+        """Remove a device; close the port after the last one."""
         with self._registry:
             with self._changed:
                 self._due.pop(device, None)
@@ -156,56 +162,62 @@ class Bus:
                 self._changed.notify_all()
             if self._closing:
                 del self._all[self.line.port]
-                # A turn under way ends by its timeouts.
+                # A turn in progress ends at its timeouts at the latest.
                 self._thread.join()
 
-    def call(self, device: Device, at: float) -> None:
-        """Give a device its next turn at a time, if it is not due earlier; -inf jumps the queue.
+    def schedule(self, device: BusDevice, at: float) -> None:
+        """Schedule the next turn of a device, unless it is due earlier.
 
-        The time is that of the monotonic clock, s.
+        Parameters
+        ----------
+        device : BusDevice
+            On this bus; any other one is ignored.
+        at : float
+            s, monotonic clock; ``-inf`` for a turn before all other devices.
         """
         with self._changed:
             if device in self._due:
                 self._due[device] = min(self._due[device], at)
                 self._changed.notify_all()
 
-    def ask(self, command: str, reply: bool = True) -> str:
-        """Send a command and return its reply; see :class:`Ask`. For the bus' thread alone.
+    def query(self, command: str, reply: bool = True) -> str:
+        """Send a command and return its reply; only the thread of the bus may call it.
 
         Raises
         ------
         TransportError
-            When no reply came in time, or only a part of one.
+            When there is no reply in time, or only a part of one.
         ProtocolError
-            When it is no ASCII, or has no end.
-        Unplugged
-            When the port is gone.
+            When bytes were received before the command, or the reply is not ASCII or has no
+            terminator.
+        PortLost
+            When the port is missing.
         """
         line = self.line
         end = line.terminator.encode()
         try:
-            unasked: bytes = self._port.read(self._port.in_waiting)
-            if unasked:
-                what = 'something nobody asked for, before the command'
-                raise failure(ProtocolError, what, line, command, unasked)
+            unexpected: bytes = self._port.read(self._port.in_waiting)
+            if unexpected:
+                what = 'bytes were received before the command was sent'
+                raise failure(ProtocolError, what, line, command, unexpected)
             self._port.write(command.encode() + end)
             answer: bytes = self._port.read_until(end, LONGEST_REPLY) if reply else end
             if answer.endswith(end) and answer.isascii():
                 return answer.removesuffix(end).decode().strip()
             if answer.endswith(end):
-                raise failure(ProtocolError, 'garbage', line, command, answer)
+                raise failure(ProtocolError, 'the reply is not ASCII', line, command, answer)
             if len(answer) >= LONGEST_REPLY:
-                raise failure(ProtocolError, 'a reply without an end', line, command, answer)
-            what = f'{"half a line" if answer else "no reply"} in {line.reply_timeout:g} s'
+                raise failure(ProtocolError, 'the reply has no terminator', line, command, answer)
+            what = f'{"half a line" if answer else "no reply"} within {line.reply_timeout:g} s'
             raise failure(TransportError, what, line, command, answer)
         except PadError:
             time.sleep(QUIET)
             self._port.read(self._port.in_waiting)
             raise
         except Exception as error:
-            # With the device also goes what pyserial expects of it: termios.error, TypeError.
-            raise Unplugged(
-                f'port {line.port} is gone: {error}: command {command!r}, reply none'
+            # pyserial raises errors of many types when a device disappears.
+            raise PortLost(
+                f'port {line.port} is missing: {error}: command {command!r}, reply none'
             ) from error
 
     def _open(self) -> None:
@@ -218,19 +230,19 @@ class Bus:
                 line.baudrate,
                 timeout=line.reply_timeout,
                 write_timeout=line.reply_timeout,
-                exclusive=True,  # a second program on the line would take half of the replies
+                exclusive=True,  # a second program would take some of the replies
             )
-        except Exception as error:  # as above: a device that goes while it is opened
-            raise Unplugged(f'port {line.port} cannot be opened: {error}') from error
+        except Exception as error:  # pyserial raises errors of many types here, too
+            raise PortLost(f'port {line.port} cannot be opened: {error}') from error
 
     def _close(self) -> None:
         if self._port is not None:
-            with contextlib.suppress(OSError):  # it may be gone
+            with contextlib.suppress(OSError):  # the port may be missing
                 self._port.close()
             self._port = None
 
-    def _next(self) -> Device | None:
-        """Wait for the device that is due next; None ends the thread."""
+    def _next(self) -> BusDevice | None:
+        """Wait until a device is due and return it; None when the bus is closed."""
         with self._changed:
             while not self._closing:
                 device, due = min(
@@ -250,17 +262,17 @@ class Bus:
             try:
                 if self._port is None:
                     self._open()
-                due = device.turn(self.ask)
+                due = device.take_turn(self.query)
                 pause = FIRST_PAUSE
-            except Unplugged as error:
+            except PortLost as error:
                 self._close()
                 with self._changed:
                     devices = list(self._due)
                 for each in devices:
-                    each.unplugged(error)
+                    each.lose_port(error)
                 with self._changed:
                     self._changed.wait_for(lambda: self._closing, pause)
                 pause = min(2.0 * pause, LONGEST_PAUSE)
                 due = -math.inf
-            self.call(device, due)
+            self.schedule(device, due)
         self._close()

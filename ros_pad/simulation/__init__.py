@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Leg, hexapod, floor, sensors and pneumatics, simulated; and the scenes made of them."""
+"""Simulated robots on three fidelity levels, floor, sensors, pneumatics, faults, and scenes."""
 
 from ros_pad.simulation.planar_hexapod import PlanarHexapod
 from ros_pad.simulation.pneumatics import Hose

@@ -11,39 +11,44 @@ from typing import Any
 from ros_pad.errors import ConfigError
 from ros_pad.simulation import planar_step
 
-# Steps that take as long in plain Python as compiling does (4 s; a copy kept on disk loads in
-# 0.3 s): a trial that compiles is never slower for it, not even the first.
+# So many steps take as long in plain Python as compiling does (4 s; a copy on disk loads in
+# 0.3 s). For fewer steps, compiling would make a trial slower.
 WORTH_LOADING = 150_000
 
 Walk = Callable[..., bool]
 
 
 def worth_loading(steps: float) -> bool:
-    """Whether to compile for so many steps: numba is there, and loaded or soon paid for."""
-    return _dispatcher.cache_info().currsize > 0 or (
+    """Return whether compiled steps save time in a trial of so many steps.
+
+    They do if they were compiled or loaded before in this process, or from ``WORTH_LOADING``
+    steps on if numba is installed.
+    """
+    return dispatcher.cache_info().currsize > 0 or (
         steps >= WORTH_LOADING and importlib.util.find_spec('numba') is not None
     )
 
 
 def walk(*arguments: Any) -> Walk:
-    """Return :func:`ros_pad.simulation.planar_step.walk`, compiled for arguments like these.
+    """Return :func:`ros_pad.simulation.planar_step.walk`, compiled for the types of the arguments.
 
-    The compiled copy is kept on disk beside the source, or where numba finds room: making it takes
-    seconds, loading it a tenth of one. What is returned takes arguments of these types only, which
-    it does not look at: that would cost more than the step.
+    The compiled copy is kept on disk beside the source, or where numba can write: making it takes
+    4 s, loading it 0.3 s. The returned function takes only arguments of these types
+    and does not check them: a check would take longer than the step.
 
     Raises
     ------
     ConfigError
-        Without numba, naming the extra that brings it.
+        Without numba; the message names the extra that installs it.
     """
-    dispatcher, typeof = _dispatcher()
-    compiled: Walk = dispatcher.compile(tuple(map(typeof, arguments)))
+    made, typeof = dispatcher()
+    compiled: Walk = made.compile(tuple(map(typeof, arguments)))
     return compiled
 
 
 @cache
-def _dispatcher() -> tuple[Any, Callable[[Any], Any]]:
+def dispatcher() -> tuple[Any, Callable[[Any], Any]]:
+    """Return numba's dispatcher of the walk, and numba's ``typeof``; both are made only once."""
     try:
         import numba
     except ImportError as error:
@@ -52,6 +57,6 @@ def _dispatcher() -> tuple[Any, Callable[[Any], Any]]:
         numba.extending.register_jitable(error_model='numpy')(function)
     try:
         made = numba.njit(cache=True, error_model='numpy')(planar_step.walk)
-    except RuntimeError:  # there is nowhere to keep a copy
+    except RuntimeError:  # numba finds no folder that is writable
         made = numba.njit(error_model='numpy')(planar_step.walk)
     return made, numba.typeof

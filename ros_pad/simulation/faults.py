@@ -1,44 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of regulators, their lines, and the sensors of feet, on a schedule.
+"""Faults of regulators, of their air lines, and of the sensors of feet, on a schedule.
 
-A fault is one line of a scene, or one text of the regulator node's parameter
-``backend_options.faults``, in the same words::
+A fault is one line of a scene. The regulator node's parameter ``backend_options.faults`` has the
+same lines as texts::
 
     faults:
       - {kind: leak, legs: [2], start: 5.0, end: 20.0, conductance: 1.0e-10}
 
-What each kind does is physics, and no more than that: nothing announces a fault, and what a
-device reads is what a sound device would read in its place.
+A fault changes the physics only: no message announces it, and the device's own readings follow
+from the changed physics.
 
 ``stuck_valve``
-    The pilot valves stick closed. The pilot pressure stays, and with it the outlet's, whatever the
-    set-point; air still flows through the main valve to hold it.
+    The pilot valves stick closed. Pilot and outlet pressure stay constant for every set-point;
+    air still flows through the main valve to hold these pressures.
 ``supply_loss``
-    The supply falls from full scale to ``pressure`` with a ``time_constant``, and the outlets of
-    all its feet with it: an open valve lets air back. At the end it is there again at once.
+    The supply falls from full scale to ``pressure`` with a ``time_constant``. The outlets of the
+    fault's legs fall with the supply, because air flows back through open valves. At the end of
+    the fault the supply is at full scale at once.
 ``leak``
-    A hole at the pad, by its sonic conductance C (ISO 6358, b = 0.5). What the line cannot supply
-    is missing at the pad, the more the higher the pressure.
+    The pad has a hole of sonic conductance C (ISO 6358, b = 0.5). The leaking air flows
+    through the line and lowers the pad's pressure, by more at a higher pressure.
 ``sensor_drift``
-    The device's sensor reads ``offset`` too much, after a linear ``rise``. The device closes its
-    loop on that, so reading and set-point agree and the pad is off by ``-offset``. A set-point of
-    zero opens the exhaust whatever the sensor says. The pad can thus be ``-offset`` above the
+    The device's sensor reads ``offset`` too high, after a linear ``rise``. The device controls
+    that reading, so reading and set-point agree and the pad's error is ``-offset``. A set-point of
+    zero opens the exhaust at any reading. The pad can thus be ``-offset`` above the
     set-point, and above the ceiling of set-points, but never above full scale.
 ``silence``
-    The device does not answer; it holds what it was told last.
+    The device does not answer; it holds its last set-point.
 
-Those of sensors are of the foot, not of its regulator:
+Faults of the sensors of a foot:
 
 ``force_dead``
     The force sensor reads exactly zero.
 ``force_frozen``
-    It repeats what it read last.
+    The force sensor repeats its last reading.
 ``force_offset``
-    It reads ``load`` too much of the normal force.
+    The force sensor reads the normal force ``load`` too high.
 ``force_range``
-    It shows no component beyond ``load``.
+    The force sensor limits each component to ``load``.
 ``marker_frozen``
-    The position repeats what it was last.
+    The position repeats its last reading.
 """
 
 from __future__ import annotations
@@ -50,10 +51,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
+from ros_pad.configuration import choice
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.configuration import shown
-from ros_pad.contact.pad import choice
-from ros_pad.contact.pad import number
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 
@@ -61,9 +64,9 @@ LATEST = 1e9
 """Latest start or end of a fault, s."""
 
 LEAK_CRITICAL_RATIO = 0.5
-"""Critical pressure ratio b of a hole: a nozzle has 0.53, a knife edge less."""
+"""Critical pressure ratio b of a hole: that of a nozzle is 0.53, that of a knife edge lower."""
 
-# What each kind takes besides its time: unit, lowest, highest, default (None: must be given).
+# Keys of each kind besides its time and legs: unit, lowest, highest, default (None: required).
 _QUANTITIES: dict[str, dict[str, tuple[str, float, float, float | None]]] = {
     'stuck_valve': {},
     'supply_loss': {
@@ -82,11 +85,12 @@ _QUANTITIES: dict[str, dict[str, tuple[str, float, float, float | None]]] = {
     'force_range': {'load': ('N', 1e-3, 1e5, None)},
     'marker_frozen': {},
 }
+_LEGS = Setting('legs', list, 'Legs that have the fault.', low=1, high=6)
 KINDS = tuple(_QUANTITIES)
 """Kinds of fault."""
 
 SENSOR_KINDS = tuple(kind for kind in KINDS if kind.startswith(('force', 'marker')))
-"""Those of a foot's sensors."""
+"""Kinds of fault of a foot's sensors."""
 
 
 @dataclass(frozen=True)
@@ -98,26 +102,27 @@ class Fault:
     kind : str
         One of ``KINDS``.
     start, end : float
-        Simulated time, s, 0 <= start < end; it acts at times start <= t < end. ``end`` may be
-        infinite.
+        Simulated time, s, 0 <= start < end: the fault acts at times start <= t < end. ``end`` may
+        be infinite.
     legs : tuple of int
-        Whose regulators have it, 1 to 6; empty for all.
+        Legs whose regulators or sensors have the fault, 1 to 6; empty for all.
     pressure, time_constant : float
-        Of a supply loss: gauge Pa that remain, 0 to 1e6, and s, 0 to 3600.
+        Of a supply loss: remaining pressure, gauge Pa, 0 to 1e6, and time constant of the fall,
+        s, 0 to 3600.
     conductance : float
         Of a leak: sonic conductance C, m³/(s Pa), 1e-14 to 1e-6. A hole of area A has about
-        C = 1.6e-3 m/(s Pa) A: 1e-10 for 0.3 mm.
+        C = 1.6e-3 m/(s Pa) A: 1e-10 for a diameter of 0.3 mm.
     offset, rise : float
-        Of a sensor drift: Pa, -1e5 to 1e5, positive where the sensor reads too much; and the time
-        it takes to get there, s, 0 to 1e6.
+        Of a sensor drift: offset, Pa, -1e5 to 1e5, positive where the sensor reads too high; and
+        the time until the offset is reached, s, 0 to 1e6.
     load : float
-        Of a force sensor, N: what it reads too much of the normal force, -1e4 to 1e4, or the
-        largest component that it shows, 1e-3 to 1e5.
+        Of a force sensor: for ``force_offset`` the offset of the normal force, N, -1e4 to 1e4; for
+        ``force_range`` the limit of each component, N, 1e-3 to 1e5.
 
     Raises
     ------
     InvalidInput
-        When a value is outside its range, or is given to a kind that has no use for it.
+        When a value is outside its range, or is given for a kind that does not have it.
     """
 
     kind: str
@@ -137,10 +142,7 @@ class Fault:
         if self.end != math.inf:
             number('end', self.end, 's', self.start, LATEST, above=True)
         for leg in self.legs:
-            if not isinstance(leg, int) or isinstance(leg, bool) or not 1 <= leg <= 6:
-                raise InvalidInput(
-                    f'legs = {self.legs!r} is not allowed: whole numbers from 1 to 6 are needed'
-                )
+            integer('legs', leg, 1, 6)
         own = _QUANTITIES[self.kind]
         for quantities in _QUANTITIES.values():
             for name in quantities:
@@ -150,17 +152,18 @@ class Fault:
                     number(name, value, unit, low, high)
                 elif value:
                     raise InvalidInput(
-                        f'{name} = {value!r} is not allowed: a fault of kind {self.kind} has none'
+                        f'{name} = {value!r} is not allowed: a fault of kind {self.kind} has no'
+                        f' {name}'
                     )
 
     @classmethod
     def read(cls, table: Table) -> Fault:
-        """Read a fault from a table; the whole table must be used up.
+        """Read a fault from a table.
 
         Raises
         ------
         ConfigError
-            Naming file, key, value and allowed range.
+            When a key is missing or unknown, or a value is not allowed.
         """
         kind = table.choice('kind', KINDS)
         start = table.number('start', 's', 0.0, LATEST, default=0.0)
@@ -171,7 +174,7 @@ class Fault:
             kind=kind,
             start=start,
             end=end,
-            legs=_legs(table),
+            legs=tuple(table.value(_LEGS)) if 'legs' in table else (),
             **{
                 name: table.number(
                     name, unit, low, high, **({} if default is None else {'default': default})
@@ -184,12 +187,13 @@ class Fault:
 
     @classmethod
     def parse(cls, text: str) -> Fault:
-        """Read a fault from YAML in a text, as a parameter of ROS has it.
+        """Read a fault from YAML in a text, as in a ROS parameter.
 
         Raises
         ------
         ConfigError
-            Naming the text, key, value and allowed range.
+            When the text is not valid YAML, a key is missing or unknown, or a value is not
+            allowed.
 
         Examples
         --------
@@ -199,33 +203,33 @@ class Fault:
         return cls.read(Table.parse(text, f'fault {shown(text)}'))
 
     def __str__(self) -> str:
-        """Return the text that :meth:`parse` makes the same fault of."""
-        said: dict[str, Any] = {'kind': self.kind, 'start': self.start}
+        """Return the text from which :meth:`parse` makes the same fault."""
+        values: dict[str, Any] = {'kind': self.kind, 'start': self.start}
         if self.end != math.inf:
-            said['end'] = self.end
+            values['end'] = self.end
         if self.legs:
-            said['legs'] = self.legs
-        return json.dumps(said | {name: getattr(self, name) for name in _QUANTITIES[self.kind]})
+            values['legs'] = self.legs
+        return json.dumps(values | {name: getattr(self, name) for name in _QUANTITIES[self.kind]})
 
     def acts_at(self, time: float) -> bool:
-        """Whether the fault is there at a time, s."""
+        """Return whether the fault acts at a time, s."""
         return self.start <= time < self.end
 
 
 @dataclass(frozen=True)
 class Condition:
-    """The state of regulator and line at a moment.
+    """The condition of regulator, air line and pad at one time.
 
     Attributes
     ----------
     stuck : bool
-        The outlet does not follow.
+        Whether the outlet does not follow the set-point.
     supply : float
-        Gauge Pa above which the outlet cannot be; infinite while the supply is there.
+        Largest outlet pressure, gauge Pa; infinite for a supply without fault.
     leak : float
         Sonic conductance of holes at the pad, m³/(s Pa).
     offset : float
-        What the device's sensor reads too much, Pa.
+        Offset of the device's pressure sensor, Pa, positive where the sensor reads too high.
     """
 
     stuck: bool = False
@@ -235,7 +239,7 @@ class Condition:
 
     @property
     def sound(self) -> bool:
-        """Whether air and sensor are as they should be; those of a silent device are."""
+        """Whether air and pressure sensor have no fault; a device that is only silent is sound."""
         return not (self.stuck or self.leak or self.offset) and self.supply == math.inf
 
 
@@ -243,17 +247,16 @@ SOUND = Condition()
 
 
 def condition(acting: Iterable[Fault], time: float, full_scale: float) -> Condition:
-    """Return what faults make of a regulator.
+    """Return the condition of a regulator with these faults.
 
     Parameters
     ----------
     acting : iterable of Fault
-        Those of this device that are there. Leaks and offsets add up; of supplies the lowest
-        counts.
+        Faults of this device that act now. Leaks and offsets add up; the lowest supply counts.
     time : float
-        s.
+        Simulated time, s.
     full_scale : float
-        From which a supply begins to fall, gauge Pa.
+        Pressure of the supply before a loss, gauge Pa.
     """
     stuck = False
     supply, leak, offset = math.inf, 0.0, 0.0
@@ -271,24 +274,13 @@ def condition(acting: Iterable[Fault], time: float, full_scale: float) -> Condit
     return Condition(stuck, supply, leak, offset)
 
 
-def _legs(table: Table) -> tuple[int, ...]:
-    legs = table._take('legs', [])
-    whole = isinstance(legs, list) and all(type(leg) is int and 1 <= leg <= 6 for leg in legs)
-    if not whole or len(set(legs)) < len(legs) or ('legs' in table and not legs):
-        raise ConfigError(
-            f'{table.origin}: legs = {shown(legs)} is not allowed: '
-            'a list of different whole numbers from 1 to 6 is needed'
-        )
-    return tuple(legs)
-
-
 def listed(table: Table) -> tuple[Fault, ...]:
-    """Take the list ``faults`` of a scene; it may be missing.
+    """Read the list ``faults`` of a scene; a scene without one has no faults.
 
     Raises
     ------
     ConfigError
-        Naming file, fault, key, value and allowed range.
+        When ``faults`` is not a list, or one of them is not a valid fault.
     """
     entries = table._take('faults', [])
     if not isinstance(entries, list):
@@ -302,7 +294,7 @@ def listed(table: Table) -> tuple[Fault, ...]:
 
 
 def faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
-    """Return the faults that the regulator of a leg has."""
+    """Return those of the faults that are of the regulator, line or pad of a leg."""
     return tuple(
         fault
         for fault in faults
@@ -311,7 +303,7 @@ def faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
 
 
 def sensor_faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
-    """Return the faults that the sensors of a leg's foot have."""
+    """Return those of the faults that are of the sensors of a leg's foot."""
     return tuple(
         fault
         for fault in faults
@@ -320,14 +312,14 @@ def sensor_faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
 
 
 def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
-    """Return faults that were given as such or as text; see :meth:`Fault.parse`.
+    """Return faults given as objects or as texts; see :meth:`Fault.parse`.
 
     Raises
     ------
     ConfigError
-        When a text is no fault.
+        When a text does not describe a fault.
     InvalidInput
-        When this is no list of faults, or one is not a regulator's.
+        When ``faults`` is not a list, or one of them is a fault of a foot's sensors.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
         raise InvalidInput(f'faults = {faults!r} is not allowed: a list of faults is needed')
@@ -335,6 +327,7 @@ def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
     for fault in found:
         if fault.kind in SENSOR_KINDS:
             raise InvalidInput(
-                f'faults: kind = {fault.kind!r} is not allowed: a regulator has no such sensor'
+                f'faults: kind = {fault.kind!r} is not allowed: it is a fault of the sensors of a'
+                ' foot, not of a regulator'
             )
     return found

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which rung of the simulation ladder a scene is run on, and what that leaves out.
+"""Choose the fidelity level for a scene, and list the physics that the level leaves out.
 
-How far the rungs are from the top one was measured on random scenes (``bench/fidelity.py``) and is
-kept in ``config/fidelity.yaml``. What decides is a scene's *reserve*: the grip of its feet on the
-ground where they hold least, over what the walk asks of them. Well above one, feet stick and all
-rungs agree; near one they slip on some rungs and not on others.
+The errors of the levels against the top one were measured on random scenes (``python -m studies
+fidelity``) and are in ``config/fidelity.yaml``. They depend on a scene's grip margin (*reserve*):
+capacity over demand of tangential force, on the ground where the capacity is least. Well above
+one, feet stick and all levels agree; near one, feet slip on some levels and not on others.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from dataclasses import replace
 import yaml
 
 from ros_pad import configuration
+from ros_pad.configuration import choice
 from ros_pad.contact import WATER
 from ros_pad.contact import pressure_for
 from ros_pad.contact.film import Film
@@ -39,29 +40,30 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
-_RUNGS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
-_MARGIN = 1.2  # of the pads' force limit over the load: a dome that a controller would choose
+_LEVELS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
+_MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A rung for a scene, and what it promises.
+class ChosenLevel:
+    """A fidelity level for a scene, and the bound on its error.
 
     Attributes
     ----------
-    rung : str
+    level : str
         ``L0``, ``L1`` or ``L2``.
     bound : float
-        Largest error of the distance that was measured on scenes with such a reserve, with a
-        margin: relative to the way on the top rung, or to half of the full way where that is
-        less. Infinite where the rung cannot be trusted, and for scenes unlike those measured.
+        Largest error of the distance that was measured on scenes with a similar grip margin, with
+        an allowance. It is relative to the distance on the top level, or to half of the distance
+        without slip if that is more. Infinite where the error has no bound, and for scenes outside
+        the range of the measured ones.
     reserve : float
-        See :func:`reserve`.
+        Grip margin of the scene, see :func:`reserve`.
     note : str
-        The same in words, and whether the scene asks for more.
+        Bound and grip margin in words, and whether the scene requires a smaller error.
     """
 
-    rung: str
+    level: str
     bound: float
     reserve: float
     note: str
@@ -74,11 +76,11 @@ class Omission:
     Attributes
     ----------
     term : str
-        What it is.
+        Name of the term.
     bound : float or None
-        How large its effect can be, relative; None where nobody knows.
+        Bound on the relative effect of the term; None if no bound is known.
     reason : str
-        Relative to what, and where the bound comes from.
+        To what the bound is relative, and its source.
     """
 
     term: str
@@ -87,17 +89,18 @@ class Omission:
 
 
 @dataclass(frozen=True)
-class Ladder:
-    """Errors of the rungs by reserve, as ``bench/fidelity.py`` measured them.
+class ErrorTable:
+    """Errors of the levels by grip margin, measured by ``python -m studies fidelity``.
 
     Attributes
     ----------
     reserves : tuple of float
-        Lower ends of the classes of reserve, rising from 0.
+        Lower ends of the classes of grip margin, rising from 0.
     bounds : dict of tuple
-        For each rung its bound in each class.
+        For each level, the bound on its error in each class.
     ranges : dict of dict
-        For each robot, by dotted name, the ends between which the measured scenes were drawn.
+        For each robot and each value of a scene (dotted name), lowest and highest value of the
+        measured scenes.
     """
 
     reserves: tuple[float, ...]
@@ -106,41 +109,44 @@ class Ladder:
 
     @classmethod
     @functools.cache
-    def load(cls) -> Ladder:
-        """Read ``config/fidelity.yaml``.
+    def load(cls) -> ErrorTable:
+        """Read the table in ``config/fidelity.yaml``.
 
         Raises
         ------
         ConfigError
-            When the file is missing or has not the shape that the bench gives it.
+            When the file is missing or is not as ``python -m studies fidelity`` writes it.
         """
         path = configuration.shared_folder() / 'fidelity.yaml'
         try:
             values = yaml.safe_load(path.read_text(encoding='utf-8'))
             reserves = tuple(float(value) for value in values['reserves'])
             bounds = {
-                rung: tuple(float(value) for value in values['bounds'][rung])
-                for rung in FIDELITIES[1:]
+                level: tuple(float(value) for value in values['bounds'][level])
+                for level in FIDELITIES[1:]
             }
             ranges = {
                 robot: {
                     name: (float(low), float(high))
                     for name, (low, high) in values['ranges'][robot].items()
                 }
-                for robot in _RUNGS
+                for robot in _LEVELS
             }
             assert reserves[0] == 0.0 and list(reserves) == sorted(reserves)
             assert all(len(row) == len(reserves) for row in bounds.values())
         except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
-            raise ConfigError(f'{path}: no table of rungs ({e!r}): run bench/fidelity.py') from e
+            raise ConfigError(
+                f'{path}: the errors of the fidelity levels cannot be read ({e!r}): write the file'
+                ' again with python -m studies fidelity'
+            ) from e
         return cls(reserves, bounds, ranges)
 
-    def bound(self, rung: str, reserve: float) -> float:
-        """Return what a rung promises for a reserve."""
-        return self.bounds[rung][bisect.bisect_right(self.reserves, reserve) - 1]
+    def bound(self, level: str, reserve: float) -> float:
+        """Return the bound on the error of a level for a grip margin from 0."""
+        return self.bounds[level][bisect.bisect_right(self.reserves, reserve) - 1]
 
     def beyond(self, scene: Scene) -> str:
-        """Return what of a scene is outside of what was measured; empty if nothing is."""
+        """Return as text the values of a scene outside the measured ranges; empty if none are."""
         return ', '.join(
             f'{name} = {value:g}, measured from {low:g} to {high:g}'
             for name, (low, high) in self.ranges.get(scene.robot, {}).items()
@@ -148,70 +154,70 @@ class Ladder:
         )
 
 
-def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> Choice:
-    """Return the rung for a scene, and what it promises.
+def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> ChosenLevel:
+    """Return the level for a scene, and the bound on its error.
 
-    ``auto`` takes the cheapest rung whose bound is within ``scene.accuracy``, else the best one
-    that there is; without MuJoCo that is L1.
+    ``auto`` takes the cheapest level whose bound is within ``scene.accuracy``, else the best
+    available one; for a hexapod without MuJoCo that is L1.
 
     Parameters
     ----------
     scene : Scene
-        What to walk on, with what.
+        Scene to be walked.
     fidelity : str
-        ``auto`` or a rung.
+        ``auto`` or a level.
     policy : str or None
-        Which shapes the feet take; None takes the scene's own policy.
+        Policy of the feet; None takes the scene's own.
 
     Raises
     ------
     InvalidInput
-        When the rung does not exist, or does not know the scene's robot.
+        When the level does not exist, or does not model the scene's robot.
     """
-    known = _rungs(scene, fidelity)
-    own, ladder = reserve(scene, policy), Ladder.load()
-    beyond = ladder.beyond(scene)
-    bounds = {rung: math.inf if beyond else ladder.bound(rung, own) for rung in known}
+    known = _levels(scene, fidelity)
+    own, table = reserve(scene, policy), ErrorTable.load()
+    beyond = table.beyond(scene)
+    bounds = {level: math.inf if beyond else table.bound(level, own) for level in known}
     missing = 'L2' in known and importlib.util.find_spec('mujoco') is None
-    if fidelity != 'auto':
-        rung = fidelity
-    else:
-        there = known[:1] if missing else known
-        enough = [each for each in there if bounds[each] <= scene.accuracy]
-        rung = (enough or there[-1:])[0]
-    known_bound = bounds[rung] < math.inf
-    within = (
-        f'within {100.0 * bounds[rung]:.0f} % of the top rung'
-        if known_bound
-        else 'not to be trusted'
-    )
+    level = fidelity
+    if fidelity == 'auto':
+        available = known[:1] if missing else known
+        enough = [each for each in available if bounds[each] <= scene.accuracy]
+        level = (enough or available[-1:])[0]
+    bound = bounds[level]
     if beyond:
         within = f'of unknown error ({beyond})'
-    note = f'feet hold {own:.2g} times what the walk asks; then the distance on {rung} is {within}'
-    if bounds[rung] > scene.accuracy:
-        note += f', and the scene asks for {100.0 * scene.accuracy:.0f} %'
-        if missing and rung == 'L1':
-            note += '; pip install "ros_pad[mujoco]" brings L2'
-    return Choice(rung, bounds[rung], own, note)
+    elif bound == math.inf:
+        within = 'of unbounded error'
+    else:
+        within = f'within {100.0 * bound:.0f} % of the top level'
+    note = f'grip capacity {own:.2g} times the demand: the distance on {level} is {within}'
+    if bound > scene.accuracy:
+        note += f', but the scene requires {100.0 * scene.accuracy:.0f} %'
+        if missing and level == 'L1':
+            note += '; pip install "ros_pad[mujoco]" adds L2'
+    return ChosenLevel(level, bound, own, note)
 
 
-def rung(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> str:
-    """Return the rung of :func:`choose`."""
+def level(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> str:
+    """Return the name of the level that :func:`choose` returns, with the same errors."""
     if fidelity == 'auto':
-        return choose(scene, fidelity, policy).rung
-    _rungs(scene, fidelity)
+        return choose(scene, fidelity, policy).level
+    _levels(scene, fidelity)
     return fidelity
 
 
-def _rungs(scene: Scene, fidelity: str) -> tuple[str, ...]:
-    """Return the rungs that know a scene's robot; InvalidInput if the one asked for does not."""
-    if fidelity not in FIDELITIES:
-        raise InvalidInput(f'fidelity = {fidelity!r}: one of {", ".join(FIDELITIES)} is needed')
-    known = _RUNGS[scene.robot]
+def _levels(scene: Scene, fidelity: str) -> tuple[str, ...]:
+    """Return the levels that model a scene's robot.
+
+    Raise `InvalidInput` if ``fidelity`` is neither ``auto`` nor one of them.
+    """
+    choice('fidelity', fidelity, FIDELITIES)
+    known = _LEVELS[scene.robot]
     if fidelity not in ('auto', *known):
         raise InvalidInput(
-            f'fidelity = {fidelity!r}: scene {scene.name!r} has a {scene.robot},'
-            f' which {" and ".join(known)} model{"s" if len(known) == 1 else ""}'
+            f'fidelity = {fidelity!r} is not allowed: scene {scene.name!r} has a {scene.robot},'
+            f' which only {" and ".join(known)} model{"s" if len(known) == 1 else ""}'
         )
     return known
 
@@ -222,11 +228,11 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
     Raises
     ------
     InvalidInput
-        As :func:`choose`.
+        As by :func:`choose`, and when the period is not finite and above 0.
     ConfigError
-        For L2 without MuJoCo, or with legs that cannot do what the scene wants of them.
+        For L2 when MuJoCo is missing, or the scene cannot be built as :class:`FullHexapod`.
     """
-    name = rung(scene, fidelity)
+    name = level(scene, fidelity)
     if name == 'L0':
         return RailLeg(scene, floor, period)
     if name == 'L1':
@@ -235,31 +241,32 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
 
 
 def reserve(scene: Scene, policy: str | None = None) -> float:
-    """Return the grip of the feet over what the walk asks of them, where that is least.
+    """Return the grip margin: capacity over demand, on the ground with the least capacity.
 
     Parameters
     ----------
     scene : Scene
-        What to walk on, with what.
+        Scene to be walked.
     policy : str or None
-        ``flat``, ``dome``, or one that makes feet domes on wet ground alone; None takes the
+        ``flat``, ``dome``, or a policy that makes feet domes only on wet ground; None takes the
         scene's own.
 
     Returns
     -------
     float
-        From 0. Grip is that of a foot with its expected load in mid-stance, when its film has
-        drained for half of it. Asked for are the gait's peak acceleration of body and load, the
-        drag of the load or of the wheels, and the slope. Feet and load may stand on different
-        ground. With faults on its schedule a foot may have the other shape as well.
+        Grip margin, from 0. The capacity is that of a foot with its expected load in mid-stance,
+        when its film has drained for half of the stance. The demand has three parts: the gait's
+        peak acceleration of body and towed load, the drag of that load or of the wheels, and the
+        slope. Feet and load may stand on different ground. In a scene with faults each foot may
+        also have the morphology that the policy does not choose.
     """
     policy = scene.policy if policy is None else policy
     wets = {'dry': (False,), 'wet': (True,)}.get(scene.floor.kind, (False, True))
     grip = math.inf
     for wet in wets:
         dome = policy == 'dome' or (policy != 'flat' and wet)
-        shapes = (False, True) if scene.faults else (dome,)
-        grip = min(grip, *(_grip(scene, shape, wet) for shape in shapes))
+        morphologies = (False, True) if scene.faults else (dome,)
+        grip = min(grip, *(mid_stance_grip(scene, each, wet) for each in morphologies))
     body, gait, slope = scene.body, scene.gait, scene.floor.slope
     if isinstance(gait, RailGait) or not isinstance(body, HexapodBody):
         assert isinstance(gait, RailGait) and not isinstance(body, HexapodBody)
@@ -275,8 +282,8 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
     return grip * weight / demand
 
 
-def _grip(scene: Scene, dome: bool, wet: bool) -> float:
-    """Return the resistance of a foot in mid-stance over its load."""
+def mid_stance_grip(scene: Scene, dome: bool, wet: bool) -> float:
+    """Return the tangential resistance of a foot in mid-stance over its load."""
     foot, load = scene.foot.on_rough(scene.floor.roughness), scene.expected_load
     pressure = _dome_pressure(scene) if dome else 0.0
     on_domes = foot.dome_load(load, pressure)
@@ -292,7 +299,7 @@ def _grip(scene: Scene, dome: bool, wet: bool) -> float:
 
 
 def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> list[Omission]:
-    """Return what a trial of this scene leaves out on a rung, with bounds on its effect.
+    """Return what a trial of this scene leaves out on a level, with bounds on its effect.
 
     Parameters
     ----------
@@ -302,63 +309,13 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
     Raises
     ------
     InvalidInput
-        When the rung does not exist, or does not know the scene's robot.
+        When the level does not exist, or does not model the scene's robot.
     """
-    foot, load, gait = scene.foot, scene.expected_load, scene.gait
-    name, terms = rung(scene, fidelity, policy), []
-    if scene.floor.kind != 'dry':
-        # A meniscus resists sliding by hysteresis at most: γ w (cos θ_rec - cos θ_adv) <= 2 γ w,
-        # with w = 2 r0 a pad; only domes have one.
-        capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
-        if not foot.capillary_force:
-            terms.append(
-                Omission(
-                    'capillary force of the pads',
-                    capillary / (foot.friction * load),
-                    'of the friction of a loaded foot: full hysteresis of the contact angle (180'
-                    ' to 0 degrees) on every pad',
-                )
-            )
-        terms.append(
-            Omission(
-                'liquid dragged under a slipping foot',
-                None,
-                'the film is taken to travel with the foot; at 10 mm/s a plane wedge drags at most'
-                f' {1e6 * _dragged_film(scene, 0.01):.2g} um under a dome, where'
-                f' {1e6 * foot.critical_film:.2g} um leave 1/e of dry contact',
-            )
-        )
-        if scene.floor.roughness:
-            terms.append(
-                Omission(
-                    'liquid held in the valleys of a rough floor',
-                    None,
-                    'roughness enters as one composite height of pad and floor',
-                )
-            )
+    name = level(scene, fidelity, policy)
+    terms = [] if scene.floor.kind == 'dry' else _omitted_of_liquid(scene)
     if name == 'L0':
-        terms.append(_doubt_of_the_rail(scene, policy))
-    if name == 'L1':
-        bound = choose(scene, name, policy).bound
-        terms.append(
-            Omission(
-                'joints, servos, scuffing at touch-down, swinging legs, pitch and roll',
-                bound if bound < math.inf else None,
-                'of the distance: L1 against L2 on random scenes with such a reserve; on dry flat'
-                ' ground feet slip 3 to 4 mm a cycle on L2, 0.1 mm here',
-            )
-        )
-    else:
-        grip = max(_grip(scene, False, False), _grip(scene, True, False))
-        steps, length = (1.0, gait.stroke) if isinstance(gait, RailGait) else (2.0, gait.stride)
-        terms.append(
-            Omission(
-                'what soft pads do to the motion of the body',
-                steps * grip * load / foot.shear_stiffness / length,
-                'of the distance: at each step the feet give way by their whole grip over the'
-                ' shear stiffness of their pads, and get nothing back',
-            )
-        )
+        terms.append(_friction_of_the_rail(scene, policy))
+    terms.append(_omitted_joints(scene, policy) if name == 'L1' else _soft_pads(scene))
     if name == 'L2':
         terms.append(
             Omission('size of the sole', None, 'the foot is a point on an ankle that tilts freely')
@@ -366,8 +323,64 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
     return terms
 
 
-def _dragged_film(scene: Scene, speed: float) -> float:
-    """Return the thickest film, m, that a plane wedge can drag under sliding domes.
+def _omitted_of_liquid(scene: Scene) -> list[Omission]:
+    foot, terms = scene.foot, []
+    # A meniscus resists sliding at most by its hysteresis, γ w (cos θ_rec - cos θ_adv) <= 2 γ w,
+    # with w = 2 r0 for each pad. Only domes have a meniscus.
+    capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
+    if not foot.capillary_force:
+        terms.append(
+            Omission(
+                'capillary force of the pads',
+                capillary / (foot.friction * scene.expected_load),
+                'of the friction of a loaded foot: full hysteresis of the contact angle (180'
+                ' to 0 degrees) on every pad',
+            )
+        )
+    terms.append(
+        Omission(
+            'liquid dragged under a slipping foot',
+            None,
+            'the film is assumed to move with the foot; at 10 mm/s a plane wedge drags at most'
+            f' {1e6 * dragged_film(scene, 0.01):.2g} um under a dome; a film of'
+            f' {1e6 * foot.critical_film:.2g} um leaves 1/e of dry contact',
+        )
+    )
+    if scene.floor.roughness:
+        terms.append(
+            Omission(
+                'liquid held in the valleys of a rough floor',
+                None,
+                'roughness enters as one composite height of pad and floor',
+            )
+        )
+    return terms
+
+
+def _omitted_joints(scene: Scene, policy: str | None) -> Omission:
+    bound = choose(scene, 'L1', policy).bound
+    return Omission(
+        'joints, servos, scuffing at touch-down, swinging legs, pitch and roll',
+        bound if bound < math.inf else None,
+        'of the distance: L1 against L2 on random scenes with a similar grip margin; on dry flat'
+        ' ground feet slip 3 to 4 mm a cycle on L2, 0.1 mm on L1',
+    )
+
+
+def _soft_pads(scene: Scene) -> Omission:
+    gait, foot = scene.gait, scene.foot
+    grip = max(mid_stance_grip(scene, False, False), mid_stance_grip(scene, True, False))
+    steps, length = (1.0, gait.stroke) if isinstance(gait, RailGait) else (2.0, gait.stride)
+    return Omission(
+        'effect of soft pads on the motion of the body',
+        steps * grip * scene.expected_load / foot.shear_stiffness / length,
+        'of the distance: at each step the pads shear by the whole grip over their stiffness, and'
+        ' nothing of this shear is recovered',
+    )
+
+
+def dragged_film(scene: Scene, speed: float) -> float:
+    """Return the thickest film, m, that a plane wedge can drag under domes at a slip speed, m/s.
 
     The optimum slider of Reynolds' equation (Rayleigh 1918; Hamrock, Fundamentals of Fluid Film
     Lubrication, ch. 8) carries a mean pressure of 0.160 η U L / h².
@@ -377,8 +390,11 @@ def _dragged_film(scene: Scene, speed: float) -> float:
     return math.sqrt(0.160 * scene.floor.viscosity * speed * 2.0 * width / pressure)
 
 
-def _doubt_of_the_rail(scene: Scene, policy: str | None) -> Omission:
-    """Return what one per cent of friction is worth on the rail, which is ill-conditioned."""
+def _friction_of_the_rail(scene: Scene, policy: str | None) -> Omission:
+    """Return how much one per cent of friction changes the distance on the rail.
+
+    The effect is large near the drag of the wheels, where the distance is ill-conditioned.
+    """
     foot, policy = scene.foot, scene.policy if policy is None else policy
     scenes = [
         replace(

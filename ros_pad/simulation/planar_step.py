@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The step of a planar body on frictional feet, written on flat sequences of numbers.
+"""One step of a planar body on frictional feet, written on flat sequences of numbers.
 
-What stands here is plain Python that also compiles: with lists it runs as it is, with arrays it is
-the source of :mod:`ros_pad.simulation.compiled`. Both give the same numbers to the last bit, so
-that a seed gives the same walk with and without a compiler. It therefore keeps to what both round
-alike: sums, products and ``sqrt``, no ``hypot``; and it must stay in one file, for a compiled copy
-on disk is made anew only when the file of its outermost function has changed.
+The same source runs as plain Python, on lists, and as machine code, on arrays (see
+:mod:`ros_pad.simulation.compiled`). Plain and compiled code give the same numbers to the last bit,
+so that a seed gives the same walk with and without a compiler. Therefore the code uses only
+operations that plain and compiled code round in the same way (``sqrt``, but no ``hypot``). All
+functions are in one file because numba renews its copy on disk only when the file of the outermost
+function has changed.
 
 Gait, film and resistance are those of :class:`ros_pad.simulation.gait.TripodGait`,
-:class:`ros_pad.contact.film.Film` and :class:`ros_pad.contact.Foot`, which tests hold them to.
+:class:`ros_pad.contact.film.Film` and :class:`ros_pad.contact.Foot`; tests compare them.
 """
 
 from __future__ import annotations
@@ -23,46 +24,47 @@ from math import sqrt
 from typing import Any
 from typing import NamedTuple
 
-# A contact in a step: lever arm x, y, m; velocity x, y, m/s, and turning rate, rad/s, at which its
-# pad would slide if the body stood still; turning radius, m; cap, N; gain up to the cap, N s/m.
+# A contact in a step: lever arm x, y, m; velocity x, y, m/s, and yaw rate, rad/s, at which the
+# contact would slide if the body stood still; turning radius, m; cap of its force, N; force over
+# velocity up to the cap, N s/m.
 Pushed = tuple[float, float, float, float, float, float, float, float]
 
-# Rows of the table of feet; a column is a foot. World axes where not said otherwise.
+# Rows of the table of feet; a column is a foot. Values are in world axes unless noted.
 FEET = 28
 (
-    PHASE,  # since touch-down, as a share of the cycle
+    PHASE,  # time since touch-down, as a share of the cycle
     OFFSET_X, OFFSET_Y,  # from home, in the body, m
-    LIFTED_X, LIFTED_Y,  # where it left the ground, likewise
-    GROUND,  # height of what it stands on, m
-    HEIGHT,  # above the ground, m
-    FRESH, DOME_FILM, SOLE_FILM,  # 1/h² of the liquid met, under domes, under the sole, 1/m²
-    DOME_AREA,  # touched by domes, m²
-    LOAD, CAP,  # N
-    SHEAR_X, SHEAR_Y, TWIST,  # of the pads, m and rad
-    FORCE_X, FORCE_Y, MOMENT,  # of the ground on the foot, N and N m
+    LIFTED_X, LIFTED_Y,  # place of the lift-off, from home, in the body, m
+    GROUND,  # height of the ground below the foot, m
+    HEIGHT,  # height of the foot above the ground, m
+    FRESH, DOME_FILM, SOLE_FILM,  # 1/h² of the film at touch-down, under domes, under sole, 1/m²
+    DOME_AREA,  # contact area of the domes, m²
+    LOAD, CAP,  # load and tangential capacity, N
+    SHEAR_X, SHEAR_Y, SHEAR_TURN,  # shear of the pads, m and rad
+    FORCE_X, FORCE_Y, MOMENT,  # force of the ground on the foot, N, and yaw moment, N m
     SLIP_SPEED,  # m/s
     SLIP_PATH,  # m
-    OVERLOAD,  # time, s
-    WET,  # 1 or 0
-    MARKER_X, MARKER_Y,  # m
-    STEP_X, STEP_Y, STEP_TURN,  # what the gait moved the foot in the body in this step, m and rad
+    OVERLOAD,  # time with a load above the force limit of the domes, s
+    WET,  # 1 on wet ground, 0 on dry
+    MARKER_X, MARKER_Y,  # position of the marker, m
+    STEP_X, STEP_Y, STEP_TURN,  # motion of the foot in the body in this step, m and rad
 ) = range(FEET)  # fmt: skip
 
-# Entries of the body.
+# Entries of the body, in SI units.
 BODY = 17
 (
-    STEPS, X, Y, HEADING, SPEED_X, SPEED_Y, TURN,
-    PULL_X, PULL_Y,  # of the towed load on the body, N
-    SLED_X, SLED_Y,  # shear of its line, m
-    LOST,  # in slip, J
-    TIPPED, TIPPED_AT,  # foot that would have to pull, from 1, or 0; s
+    STEPS, X, Y, HEADING, SPEED_X, SPEED_Y, YAW_RATE,
+    PULL_X, PULL_Y,  # force of the towed load on the body, N
+    SLED_X, SLED_Y,  # stretch of the line to the towed load, m
+    LOST,  # work lost in slip, J
+    TIPPED, TIPPED_AT,  # 1 to 6: foot that would have to pull, 7: no balance, 0: upright; time, s
     PUSH_X, PUSH_Y,  # force of all feet, N
-    SLED_CAP,  # N
+    SLED_CAP,  # friction of the towed load, N
 ) = range(BODY)  # fmt: skip
 
 
-class Setting(NamedTuple):
-    """What does not change in a walk; SI units. Flat, for a compiler to take it."""
+class PlanarModel(NamedTuple):
+    """Constants of a walk in SI units, without nested objects, which numba does not accept."""
 
     period: float
     settle: float
@@ -72,7 +74,7 @@ class Setting(NamedTuple):
     lift: float
     reach: float
     heading_gain: float
-    middle: tuple[float, ...]  # of a leg's push, share of the cycle
+    middle: tuple[float, ...]  # time of the middle of each leg's push, as a share of the cycle
     home_x: tuple[float, ...]
     home_y: tuple[float, ...]
     soles_turn: bool
@@ -81,12 +83,12 @@ class Setting(NamedTuple):
     mass: float
     inertia: float
     height: float
-    weight: float  # on the floor: its part across the slope, N
+    weight: float  # component of the weight normal to the floor, N
     downhill: float  # acceleration along -x, m/s²
     leg_stiffness: float
     towed: float  # mass, kg
-    tow_dry: float  # drag, N
-    tow_wet: float
+    tow_dry: float  # drag of the towed load on dry ground, N
+    tow_wet: float  # drag of the towed load on wet ground, N
     tow_distance: float
     tow_height: float
     tow_stiffness: float
@@ -94,7 +96,7 @@ class Setting(NamedTuple):
     shear_strength: float
     conforming_pressure: float
     boundary_friction: float
-    capillary: float  # of the liquid round all domes, N
+    capillary: float  # tangential force of the liquid around all domes, N
     critical_film: float
     film_exponent: float
     shear_stiffness: float
@@ -105,112 +107,113 @@ class Setting(NamedTuple):
     limit_cell: float
     limits: Any  # sequence of force limits, N, every limit_cell from 0 Pa
     puddle: float  # 1/h² of standing liquid, 1/m²
-    wet: Any  # rows along y of booleans along x
+    wet: Any  # [row along y][column along x], True where wet
     wet_cell: float
     wet_x: float
     wet_y: float
-    heights: Any  # rows along y of heights along x, m
+    heights: Any  # [row along y][column along x], m
     height_cell: float
     height_x: float
     height_y: float
 
 
-def walk(
-    setting: Setting, body: Any, feet: Any, pressures: Sequence[float], count: int, upright: bool
-) -> bool:
-    """Make up to ``count`` steps with the same gauge pressures, Pa; False if one did not settle.
+def step(model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
+    """Advance by a period; return False if the friction step did not converge."""
+    dt = model.period
+    before = body[STEPS] * dt - model.settle
+    body[STEPS] += 1.0
+    # The gait has its own clock, which starts when the robot has settled.
+    time = body[STEPS] * dt - model.settle
+    before = before if before > 0.0 else 0.0
+    time = time if time > 0.0 else 0.0
+    move_feet(model, body, feet, before, time)
+    share_loads(model, body, feet)
+    # Lever arms and motions are turned into world axes with the heading in mid-step.
+    middle = body[HEADING] + 0.5 * body[YAW_RATE] * dt
+    cosine, sine = cos(middle), sin(middle)
+    contacts = grip(model, body, feet, pressures, cosine, sine)
+    towed = model.towed
+    cap = 0.0
+    if towed > 0.0:
+        behind_x = body[X] - model.tow_distance * cosine
+        behind_y = body[Y] - model.tow_distance * sine
+        cap = model.tow_wet if is_wet(model, behind_x, behind_y) else model.tow_dry
+    body[SLED_CAP] = cap
+    stiffness = model.tow_stiffness
+    if cap > 0.0:
+        contacts.append((
+            0.0, 0.0, body[SLED_X] / dt, body[SLED_Y] / dt, 0.0, 0.0, cap, stiffness * dt
+        ))  # fmt: skip
+    mass = model.mass + towed
+    last_x, last_y = body[SPEED_X], body[SPEED_Y]
+    free_x = last_x - model.downhill * dt
+    vx, vy, yaw_rate, converged = newton(
+        (free_x, last_y, body[YAW_RATE]), mass, model.inertia, contacts, dt,
+        (last_x, last_y, body[YAW_RATE]), 0.0,
+    )  # fmt: skip
+    if not converged:
+        return False
+    drag_x = drag_y = 0.0
+    if cap > 0.0:
+        drag_x, drag_y, _, _, _ = push(vx, vy, yaw_rate, contacts[-1], dt)
+    body[SLED_X], body[SLED_Y] = -drag_x / stiffness, -drag_y / stiffness
+    # The line pulls the body by the load's friction, its inertia and its weight downhill.
+    body[PULL_X] = drag_x - towed * ((vx - last_x) / dt + model.downhill)
+    body[PULL_Y] = drag_y - towed * (vy - last_y) / dt
+    body[SPEED_X], body[SPEED_Y], body[YAW_RATE] = vx, vy, yaw_rate
+    body[X] += vx * dt
+    body[Y] += vy * dt
+    body[HEADING] += yaw_rate * dt
+    report(model, body, feet, pressures, contacts)
+    return True
 
-    ``upright`` ends the walk after the step in which the robot tips over.
+
+def walk(
+    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], count: int, upright: bool
+) -> bool:
+    """Make ``count`` steps with the same gauge pressures, Pa, or fewer if the walk ends.
+
+    The walk ends at a step that does not converge, and then the result is False. With ``upright``
+    it also ends after the step in which the robot tips over.
     """
     for _ in range(count):
-        if not step(setting, body, feet, pressures):
+        if not step(model, body, feet, pressures):
             return False
         if upright and body[TIPPED] > 0.0:
             break
     return True
 
 
-def step(setting: Setting, body: Any, feet: Any, pressures: Sequence[float]) -> bool:
-    """Advance by a period; False where the friction step did not settle."""
-    dt = setting.period
-    before = body[STEPS] * dt - setting.settle
-    body[STEPS] += 1.0
-    # The gait has its own clock, which starts when the robot has settled.
-    time = body[STEPS] * dt - setting.settle
-    before = before if before > 0.0 else 0.0
-    time = time if time > 0.0 else 0.0
-    move_feet(setting, body, feet, before, time)
-    share_loads(setting, body, feet)
-    # Lever arms and motions are turned into world axes with the heading half-way.
-    middle = body[HEADING] + 0.5 * body[TURN] * dt
-    cosine, sine = cos(middle), sin(middle)
-    contacts = grip(setting, body, feet, pressures, cosine, sine)
-    towed = setting.towed
-    cap = 0.0
-    if towed > 0.0:
-        behind_x = body[X] - setting.tow_distance * cosine
-        behind_y = body[Y] - setting.tow_distance * sine
-        cap = setting.tow_wet if is_wet(setting, behind_x, behind_y) else setting.tow_dry
-    body[SLED_CAP] = cap
-    stiffness = setting.tow_stiffness
-    if cap > 0.0:
-        contacts.append((
-            0.0, 0.0, body[SLED_X] / dt, body[SLED_Y] / dt, 0.0, 0.0, cap, stiffness * dt
-        ))  # fmt: skip
-    mass = setting.mass + towed
-    last_x, last_y = body[SPEED_X], body[SPEED_Y]
-    free_x = last_x - setting.downhill * dt
-    vx, vy, turn, settled = newton(
-        (free_x, last_y, body[TURN]), mass, setting.inertia, contacts, dt,
-        (last_x, last_y, body[TURN]), 0.0,
-    )  # fmt: skip
-    if not settled:
-        return False
-    drag_x = drag_y = 0.0
-    if cap > 0.0:
-        drag_x, drag_y, _, _, _ = push(vx, vy, turn, contacts[-1], dt)
-    body[SLED_X], body[SLED_Y] = -drag_x / stiffness, -drag_y / stiffness
-    # What the line does to the body: the load's friction, its inertia and its weight downhill.
-    body[PULL_X] = drag_x - towed * ((vx - last_x) / dt + setting.downhill)
-    body[PULL_Y] = drag_y - towed * (vy - last_y) / dt
-    body[SPEED_X], body[SPEED_Y], body[TURN] = vx, vy, turn
-    body[X] += vx * dt
-    body[Y] += vy * dt
-    body[HEADING] += turn * dt
-    report(setting, body, feet, pressures, contacts)
-    return True
-
-
 # --- gait -------------------------------------------------------------------------------------
 
 
-def move_feet(setting: Setting, body: Any, feet: Any, before: float, time: float) -> None:
-    """Move the feet in the body as the gait wants."""
-    cycle, duty, reach = setting.cycle, setting.duty, setting.reach
-    advance = body_advance(setting, time) - body_advance(setting, before)
-    turn = -setting.heading_gain * body[HEADING] * setting.period
+def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: float) -> None:
+    """Move the feet in the body as the gait prescribes, between two times of the gait, s."""
+    cycle, duty, reach = model.cycle, model.duty, model.reach
+    advance = body_advance(model, time) - body_advance(model, before)
+    turn = -model.heading_gain * body[HEADING] * model.period
     phases, offset_x, offset_y = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y]
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
     heights, step_x, step_y = feet[HEIGHT], feet[STEP_X], feet[STEP_Y]
     share = time / cycle
     for index in range(6):
-        phase = (share - setting.middle[index] + duty / 2.0) % 1.0
+        phase = (share - model.middle[index] + duty / 2.0) % 1.0
         x, y = offset_x[index], offset_y[index]
         stood = phases[index] < duty
         phases[index] = phase
         if phase < duty:
             if not stood:
-                touch_down(setting, body, feet, index)
-            # Walking ahead and turning: the foot goes back and round the other way.
+                touch_down(model, body, feet, index)
+            # The foot moves in the body against the motion of the body.
             heights[index] = 0.0
-            step_x[index] = turn * (setting.home_y[index] + y) - advance
-            step_y[index] = -turn * (setting.home_x[index] + x)
+            step_x[index] = turn * (model.home_y[index] + y) - advance
+            step_y[index] = -turn * (model.home_x[index] + x)
             offset_x[index] = x + step_x[index]
             offset_y[index] = y + step_y[index]
-            if setting.soles_turn:
-                # With the leg about its hip: the angle that the step is seen under from there.
-                arm_x = setting.home_x[index] - setting.hip_x[index] + x + 0.5 * step_x[index]
-                arm_y = setting.home_y[index] - setting.hip_y[index] + y + 0.5 * step_y[index]
+            if model.soles_turn:
+                # The sole turns with its leg, by the angle of the foot's motion seen from the hip.
+                arm_x = model.home_x[index] - model.hip_x[index] + x + 0.5 * step_x[index]
+                arm_y = model.home_y[index] - model.hip_y[index] + y + 0.5 * step_y[index]
                 across = arm_x * step_y[index] - arm_y * step_x[index]
                 feet[STEP_TURN][index] = across / (arm_x * arm_x + arm_y * arm_y)
         else:
@@ -219,19 +222,19 @@ def move_feet(setting: Setting, body: Any, feet: Any, before: float, time: float
             swing = (phase - duty) / (1.0 - duty)
             progress = 0.5 - 0.5 * cos(pi * swing)
             rise = sin(pi * swing)
-            heights[index] = setting.lift * rise * rise
+            heights[index] = model.lift * rise * rise
             offset_x[index] = lifted_x[index] + progress * (reach - lifted_x[index])
             offset_y[index] = lifted_y[index] * (1.0 - progress)
 
 
-def body_advance(setting: Setting, time: float) -> float:
-    """Intended advance of the body since time zero, m."""
-    angle = 4.0 * pi * time / setting.cycle
-    return setting.stride / setting.cycle * (time - setting.cycle / (4.0 * pi) * sin(angle))
+def body_advance(model: PlanarModel, time: float) -> float:
+    """Return the intended advance of the body since time zero, m."""
+    angle = 4.0 * pi * time / model.cycle
+    return model.stride / model.cycle * (time - model.cycle / (4.0 * pi) * sin(angle))
 
 
 def load_share(duty: float, phase: float) -> float:
-    """How much of a full share of the body's weight a foot takes, 0 in swing to 1."""
+    """Return the factor, 0 in swing to 1, with which a foot takes part in carrying the body."""
     overlap = duty - 0.5
     if phase >= duty:
         return 0.0
@@ -242,45 +245,45 @@ def load_share(duty: float, phase: float) -> float:
     return ramp * ramp * (3.0 - 2.0 * ramp)
 
 
-def touch_down(setting: Setting, body: Any, feet: Any, index: int) -> None:
-    """Start a stance where the foot is: on its liquid, and on its height."""
+def touch_down(model: PlanarModel, body: Any, feet: Any, index: int) -> None:
+    """Start a stance: read the depth of the liquid and the height of the ground at the foot."""
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    home_x = setting.home_x[index] + feet[OFFSET_X][index]
-    home_y = setting.home_y[index] + feet[OFFSET_Y][index]
+    home_x = model.home_x[index] + feet[OFFSET_X][index]
+    home_y = model.home_y[index] + feet[OFFSET_Y][index]
     x = body[X] + cosine * home_x - sine * home_y
     y = body[Y] + sine * home_x + cosine * home_y
-    fresh = setting.puddle if is_wet(setting, x, y) else inf
+    fresh = model.puddle if is_wet(model, x, y) else inf
     feet[FRESH][index] = feet[DOME_FILM][index] = feet[SOLE_FILM][index] = fresh
     feet[DOME_AREA][index] = 0.0
-    heights, cell = setting.heights, setting.height_cell
-    row = heights[int((y - setting.height_y) // cell) % len(heights)]
-    feet[GROUND][index] = row[int((x - setting.height_x) // cell) % len(row)]
+    heights, cell = model.heights, model.height_cell
+    row = heights[int((y - model.height_y) // cell) % len(heights)]
+    feet[GROUND][index] = row[int((x - model.height_x) // cell) % len(row)]
 
 
-def is_wet(setting: Setting, x: float, y: float) -> bool:
-    """Whether there is liquid at a world position, m."""
-    row = setting.wet[int((y - setting.wet_y) // setting.wet_cell) % len(setting.wet)]
-    return row[int((x - setting.wet_x) // setting.wet_cell) % len(row)]
+def is_wet(model: PlanarModel, x: float, y: float) -> bool:
+    """Return whether there is liquid at a world position, m."""
+    row = model.wet[int((y - model.wet_y) // model.wet_cell) % len(model.wet)]
+    return row[int((x - model.wet_x) // model.wet_cell) % len(row)]
 
 
 # --- loads ------------------------------------------------------------------------------------
 
 
-def share_loads(setting: Setting, body: Any, feet: Any) -> None:
-    """Share the weight: weighted least squares in balance, where no foot can pull.
+def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
+    """Set the normal loads: weighted least squares in balance, in which no foot can pull.
 
-    N_i = w_i max(0, λ0 + λ1 x_i + λ2 y_i + k z_i) with w_i the gait's share and z_i the height of
-    what foot i stands on, such that ΣN = W, ΣN x = W x_p, ΣN y = W y_p; the pressure point
-    (x_p, y_p) lags behind the centre of mass when the body speeds up. The horizontal forces are
-    those of the step before. Feet that would pull are let go, and called back when they would
-    press. Where no loads balance the weight, a foot would have to pull: the robot tips over.
+    N_i = w_i max(0, λ0 + λ1 x_i + λ2 y_i + k z_i), with w_i the factor from :func:`load_share` and
+    z_i the height of the ground below foot i, such that ΣN = W, ΣN x = W x_p, ΣN y = W y_p. The
+    centre of pressure (x_p, y_p) lags behind the centre of mass when the body speeds up. The
+    horizontal forces are those of the step before. Feet that would pull are left out, and included
+    again when they would press. If no loads balance the weight, the robot tips over.
     """
-    duty = setting.duty
+    duty = model.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
-    lift = setting.tow_height - setting.height
-    lean_x = lift * body[PULL_X] - setting.height * body[PUSH_X]
-    lean_y = lift * body[PULL_Y] - setting.height * body[PUSH_Y]
-    wanted = setting.weight, cosine * lean_x + sine * lean_y, cosine * lean_y - sine * lean_x
+    lift = model.tow_height - model.height
+    lean_x = lift * body[PULL_X] - model.height * body[PUSH_X]
+    lean_y = lift * body[PULL_Y] - model.height * body[PUSH_Y]
+    wanted = model.weight, cosine * lean_x + sine * lean_y, cosine * lean_y - sine * lean_x
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
@@ -288,13 +291,13 @@ def share_loads(setting: Setting, body: Any, feet: Any) -> None:
         loads[index] = 0.0
         share = load_share(duty, phases[index])
         if share > 0.0:
-            x = setting.home_x[index] + offset_x[index]
-            y = setting.home_y[index] + offset_y[index]
-            legs.append((index, share, x, y, setting.leg_stiffness * ground[index]))
-    presses = 63  # a bit for each foot
+            x = model.home_x[index] + offset_x[index]
+            y = model.home_y[index] + offset_y[index]
+            legs.append((index, share, x, y, model.leg_stiffness * ground[index]))
+    presses = 63  # set of feet that press, with a bit for each foot
     pulling = 0
-    # One foot after another is let go or called back, the worst first; it nearly always gets
-    # there. Else every set of feet is tried.
+    # Feet are removed or added one after another, the worst first, which nearly always ends in
+    # balance. If not, every set of feet is tried.
     for attempt in range(12 + 64):
         if attempt >= 12:
             presses = attempt - 12
@@ -307,7 +310,7 @@ def share_loads(setting: Setting, body: Any, feet: Any) -> None:
             presses ^= 1 << (wrong - 1)
     if body[TIPPED] == 0.0:
         body[TIPPED] = pulling
-        body[TIPPED_AT] = body[STEPS] * setting.period
+        body[TIPPED_AT] = body[STEPS] * model.period
 
 
 def balance(
@@ -316,9 +319,13 @@ def balance(
     wanted: tuple[float, float, float],
     loads: Any,
 ) -> int:
-    """Set the loads in balance of the feet that press; return the foot that most belies that.
+    """Set the loads with which the feet in the set ``presses`` balance the robot, 0 for others.
 
-    From 1, or 0 where each foot that presses does and no other would; 7 without a balance.
+    Returns
+    -------
+    int
+        Number, from 1, of the foot in the set that pulls most. If none pulls, number of the foot
+        outside the set that would press most; 0 if there is none. 7 if the set has no balance.
     """
     total, mx, my = wanted
     s = sx = sy = sxx = sxy = syy = 0.0
@@ -364,34 +371,37 @@ def balance(
 
 
 def grip(
-    setting: Setting,
+    model: PlanarModel,
     body: Any,
     feet: Any,
     pressures: Sequence[float],
     cosine: float,
     sine: float,
 ) -> list[Pushed]:
-    """Find what each loaded foot can hold now; return the contacts of the step, in their order."""
-    dt = setting.period
-    stiffness, radius = setting.shear_stiffness, setting.turning_radius
+    """Set the tangential capacity of each foot, N; return the contacts of feet that have one.
+
+    The contacts are in the order of the feet.
+    """
+    dt = model.period
+    stiffness, radius = model.shear_stiffness, model.turning_radius
     contacts = []
     for index in range(6):
         load = feet[LOAD][index]
         if load <= 0.0:
             feet[CAP][index] = 0.0
             continue
-        home_x = setting.home_x[index] + feet[OFFSET_X][index]
-        home_y = setting.home_y[index] + feet[OFFSET_Y][index]
+        home_x = model.home_x[index] + feet[OFFSET_X][index]
+        home_y = model.home_y[index] + feet[OFFSET_Y][index]
         x, y = cosine * home_x - sine * home_y, sine * home_x + cosine * home_y
         pressure = pressures[index]
-        on_domes = dome_load(setting, load, pressure)
+        on_domes = dome_load(model, load, pressure)
         dome_film = sole_film = 0.0
         feet[WET][index] = 0.0
-        if is_wet(setting, body[X] + x, body[Y] + y):
+        if is_wet(model, body[X] + x, body[Y] + y):
             feet[WET][index] = 1.0
-            drain(setting, feet, index, on_domes, load - on_domes, pressure)
+            drain(model, feet, index, on_domes, load - on_domes, pressure)
             dome_film, sole_film = feet[DOME_FILM][index] ** -0.5, feet[SOLE_FILM][index] ** -0.5
-        cap = resistance(setting, on_domes, load - on_domes, pressure, dome_film, sole_film)
+        cap = resistance(model, on_domes, load - on_domes, pressure, dome_film, sole_film)
         feet[CAP][index] = cap
         if pressure > 0.0 and on_domes < load:
             feet[OVERLOAD][index] += dt
@@ -401,18 +411,18 @@ def grip(
                 x, y,
                 (cosine * step_x - sine * step_y + feet[SHEAR_X][index]) / dt,
                 (sine * step_x + cosine * step_y + feet[SHEAR_Y][index]) / dt,
-                (feet[STEP_TURN][index] + feet[TWIST][index]) / dt,
+                (feet[STEP_TURN][index] + feet[SHEAR_TURN][index]) / dt,
                 radius, cap, stiffness * dt,
             ))  # fmt: skip
     return contacts
 
 
-def dome_load(setting: Setting, load: float, pressure: float) -> float:
-    """Part of the load, N, that the domes carry at a gauge pressure, Pa: up to their limit."""
+def dome_load(model: PlanarModel, load: float, pressure: float) -> float:
+    """Return the part of a load, N, that domes carry at a gauge pressure, Pa."""
     if pressure <= 0.0:
         return 0.0
-    place = pressure / setting.limit_cell
-    table = setting.limits
+    place = pressure / model.limit_cell
+    table = model.limits
     last = len(table) - 1
     if place >= last:
         limit = table[last]
@@ -423,57 +433,57 @@ def dome_load(setting: Setting, load: float, pressure: float) -> float:
 
 
 def drain(
-    setting: Setting, feet: Any, index: int, on_domes: float, on_sole: float, pressure: float
+    model: PlanarModel, feet: Any, index: int, on_domes: float, on_sole: float, pressure: float
 ) -> None:
-    """Squeeze the film under a foot for a period."""
-    dt = setting.period
+    """Drain the film under a foot for a period."""
+    dt = model.period
     if on_domes > 0.0:
         area = on_domes / pressure
         fresh = feet[FRESH][index]
         if area > feet[DOME_AREA][index] and fresh < inf:
-            # What domes touch anew has not drained yet.
+            # Under the area that is new in this step, the film has not drained yet.
             old = feet[DOME_AREA][index] / area
             feet[DOME_FILM][index] = fresh + old * (feet[DOME_FILM][index] - fresh)
         feet[DOME_AREA][index] = area
-        feet[DOME_FILM][index] += setting.dome_drain * pressure / area * dt
+        feet[DOME_FILM][index] += model.dome_drain * pressure / area * dt
     else:
         feet[DOME_AREA][index] = 0.0
     if on_sole > 0.0:
-        feet[SOLE_FILM][index] += setting.sole_drain * on_sole / setting.sole_area * dt
+        feet[SOLE_FILM][index] += model.sole_drain * on_sole / model.sole_area * dt
 
 
 def resistance(
-    setting: Setting,
+    model: PlanarModel,
     on_domes: float,
     on_sole: float,
     pressure: float,
     dome_film: float,
     sole_film: float,
 ) -> float:
-    """Tangential force, N, that a foot can hold."""
+    """Return the tangential capacity of a foot, N."""
     total = under_domes = 0.0
-    conforming = setting.conforming_pressure
+    conforming = model.conforming_pressure
     if on_domes > 0.0:
         under_domes = on_domes / (pressure if pressure > conforming else conforming)
-        dry = setting.friction * on_domes + setting.shear_strength * under_domes
-        total += on_film(setting, dry, on_domes, dome_film)
+        dry = model.friction * on_domes + model.shear_strength * under_domes
+        total += on_film(model, dry, on_domes, dome_film)
         if dome_film > 0.0:
-            total += setting.capillary
+            total += model.capillary
     if on_sole > 0.0:
-        free, touched = setting.sole_area - under_domes, on_sole / conforming
-        dry = setting.friction * on_sole + setting.shear_strength * (
+        free, touched = model.sole_area - under_domes, on_sole / conforming
+        dry = model.friction * on_sole + model.shear_strength * (
             touched if touched < free else free
         )
-        total += on_film(setting, dry, on_sole, sole_film)
+        total += on_film(model, dry, on_sole, sole_film)
     return total
 
 
-def on_film(setting: Setting, dry: float, load: float, film: float) -> float:
-    """Resistance, N, of what holds ``dry`` without a film."""
+def on_film(model: PlanarModel, dry: float, load: float, film: float) -> float:
+    """Return the resistance of a contact on a film, N; ``dry`` is its resistance without one."""
     if film <= 0.0:
         return dry
-    touching = exp(-((film / setting.critical_film) ** setting.film_exponent))
-    return touching * dry + (1.0 - touching) * setting.boundary_friction * load
+    touching = exp(-((film / model.critical_film) ** model.film_exponent))
+    return touching * dry + (1.0 - touching) * model.boundary_friction * load
 
 
 def newton(
@@ -485,62 +495,30 @@ def newton(
     start: tuple[float, float, float],
     creep: float,
 ) -> tuple[float, float, float, bool]:
-    """Newton on the convex step, shortened where it overshoots: twist, and whether it settled.
+    """Minimise the convex energy of a step by Newton's method, with a line search by halving.
 
-    Contacts shear elastically up to their caps, or, where ``creep`` is above zero, creep at about
-    that speed, m/s (pseudo-Huber).
+    If ``creep`` is zero, contacts shear elastically up to their caps. If it is above zero, they
+    creep at about this speed, m/s (pseudo-Huber).
+
+    Returns
+    -------
+    tuple
+        Velocity x, y, m/s, yaw rate, rad/s, and whether the method converged.
     """
-    bx, by, bw = free
     vx, vy, w = start
-    # What the largest gains make of the rounding of a speed is no reason to go on.
+    # Stop where the gradient is within its rounding error: that of a speed times largest gains.
     scale = mass
     for contact in contacts:
         scale += 0.01 * dt * contact[7]
-    scale *= 1e-13 + 1e-12 * (abs(bx) + abs(by))
+    scale *= 1e-13 + 1e-12 * (abs(free[0]) + abs(free[1]))
     step_x = step_y = step_w = slope = 0.0
     length = 1.0
     for _ in range(200):
-        gx, gy, gw = mass * (vx - bx), mass * (vy - by), inertia * (w - bw)
-        hxx = hyy = mass
-        hww = inertia
-        hxy = hxw = hyw = 0.0
-        for rx, ry, ox, oy, ot, radius, cap, rate in contacts:
-            zx = vx - w * ry + ox
-            zy = vy + w * rx + oy
-            zt = radius * (w + ot)
-            square = zx * zx + zy * zy + zt * zt
-            # Force over slip, and by how much its slope along the slip differs from it, over
-            # the square of the slip.
-            bend = 0.0
-            if creep > 0.0:
-                square += creep * creep
-                gain = dt * cap / sqrt(square)
-                bend = gain / square
-            elif rate * rate * square <= cap * cap:
-                gain = dt * rate
-            else:
-                gain = dt * cap / sqrt(square)
-                bend = gain / square
-            fx, fy = gain * zx, gain * zy
-            gx += fx
-            gy += fy
-            gw += rx * fy - ry * fx
-            if radius > 0.0:
-                gw += radius * gain * zt
-                kxt, kyt, ktt = -bend * zx * zt, -bend * zy * zt, gain - bend * zt * zt
-            else:
-                kxt = kyt = ktt = 0.0
-            kxx, kxy, kyy = gain - bend * zx * zx, -bend * zx * zy, gain - bend * zy * zy
-            kxw = rx * kxy - ry * kxx + radius * kxt
-            kyw = rx * kyy - ry * kxy + radius * kyt
-            hxx += kxx
-            hxy += kxy
-            hyy += kyy
-            hxw += kxw
-            hyw += kyw
-            hww += rx * kyw - ry * kxw + radius * (rx * kyt - ry * kxt + radius * ktt)
-        # The function is convex: its slope along the step has grown since. Where it has turned
-        # to rise nearly as steeply as it fell, the step was too long: take half of it back.
+        gx, gy, gw, hxx, hxy, hyy, hxw, hyw, hww = derivatives(
+            (vx, vy, w), free, mass, inertia, contacts, dt, creep
+        )
+        # The slope of a convex function grows along the step. If it rises at the end nearly as
+        # steeply as it fell at the start, the step was too long and is halved.
         rise = -(gx * step_x + gy * step_y + gw * step_w)
         if rise > 0.9 * slope and length > 1e-9:
             length *= 0.5
@@ -550,7 +528,8 @@ def newton(
             continue
         if abs(gx) + abs(gy) + 10.0 * abs(gw) < scale:
             return vx, vy, w, True
-        # Cholesky of the 3 x 3 Hessian, which the masses keep positive definite.
+        # Cholesky decomposition of the 3 x 3 Hessian, which is positive definite because of the
+        # masses.
         lyx, lwx = hxy / hxx, hxw / hxx
         dy = hyy - lyx * hxy
         lower = hyw - lyx * hxw
@@ -567,12 +546,67 @@ def newton(
     return vx, vy, w, False
 
 
+def derivatives(
+    velocity: tuple[float, float, float],
+    free: tuple[float, float, float],
+    mass: float,
+    inertia: float,
+    contacts: Sequence[Pushed],
+    dt: float,
+    creep: float,
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return gradient x, y, w and Hessian xx, xy, yy, xw, yw, ww of the energy of a step."""
+    vx, vy, w = velocity
+    bx, by, bw = free
+    gx, gy, gw = mass * (vx - bx), mass * (vy - by), inertia * (w - bw)
+    hxx = hyy = mass
+    hww = inertia
+    hxy = hxw = hyw = 0.0
+    for rx, ry, ox, oy, ot, radius, cap, rate in contacts:
+        zx = vx - w * ry + ox
+        zy = vy + w * rx + oy
+        zt = radius * (w + ot)
+        square = zx * zx + zy * zy + zt * zt
+        # gain: impulse over slip velocity; bend: fall of the gain along the slip, over the square
+        # of the slip velocity
+        bend = 0.0
+        if creep > 0.0:
+            square += creep * creep
+            gain = dt * cap / sqrt(square)
+            bend = gain / square
+        elif rate * rate * square <= cap * cap:
+            gain = dt * rate
+        else:
+            gain = dt * cap / sqrt(square)
+            bend = gain / square
+        fx, fy = gain * zx, gain * zy
+        gx += fx
+        gy += fy
+        gw += rx * fy - ry * fx
+        if radius > 0.0:
+            gw += radius * gain * zt
+            kxt, kyt, ktt = -bend * zx * zt, -bend * zy * zt, gain - bend * zt * zt
+        else:
+            kxt = kyt = ktt = 0.0
+        kxx, kxy, kyy = gain - bend * zx * zx, -bend * zx * zy, gain - bend * zy * zy
+        kxw = rx * kxy - ry * kxx + radius * kxt
+        kyw = rx * kyy - ry * kxy + radius * kyt
+        hxx += kxx
+        hxy += kxy
+        hyy += kyy
+        hxw += kxw
+        hyw += kyw
+        hww += rx * kyw - ry * kxw + radius * (rx * kyt - ry * kxt + radius * ktt)
+    return gx, gy, gw, hxx, hxy, hyy, hxw, hyw, hww
+
+
 def push(
-    vx: float, vy: float, turn: float, contact: Pushed, dt: float
+    vx: float, vy: float, yaw_rate: float, contact: Pushed, dt: float
 ) -> tuple[float, float, float, float, float]:
-    """Force x, y and moment of an elastic contact on the body, way it slid, work it lost."""
+    """Return force x and y, N, yaw moment, N m, slip, m, and lost work, J, of a contact."""
     rx, ry, ox, oy, ot, radius, cap, rate = contact
-    zx, zy, zt = vx - turn * ry + ox, vy + turn * rx + oy, radius * (turn + ot)
+    zx, zy = vx - yaw_rate * ry + ox, vy + yaw_rate * rx + oy
+    zt = radius * (yaw_rate + ot)
     along = zx * zx + zy * zy
     size = sqrt(along + zt * zt)
     if rate * size <= cap:
@@ -583,20 +617,20 @@ def push(
 
 
 def report(
-    setting: Setting, body: Any, feet: Any, pressures: Sequence[float], contacts: list[Pushed]
+    model: PlanarModel, body: Any, feet: Any, pressures: Sequence[float], contacts: list[Pushed]
 ) -> None:
-    """Set forces and shear of the feet, and what they slid."""
-    dt = setting.period
-    stiffness, radius = setting.shear_stiffness, setting.turning_radius
-    twisting = stiffness * radius * radius
-    vx, vy, turn = body[SPEED_X], body[SPEED_Y], body[TURN]
+    """Set forces, shear, slip and markers of the feet, and add the work lost in slip."""
+    dt = model.period
+    stiffness, radius = model.shear_stiffness, model.turning_radius
+    torsional = stiffness * radius * radius
+    vx, vy, yaw_rate = body[SPEED_X], body[SPEED_Y], body[YAW_RATE]
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     total_x = total_y = 0.0
     place = 0
     for index in range(6):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
-            fx, fy, moment, slid, lost = push(vx, vy, turn, contacts[place], dt)
+            fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)
             place += 1
             total_x += fx
             total_y += fy
@@ -604,17 +638,17 @@ def report(
             feet[SLIP_PATH][index] += slid
         feet[FORCE_X][index], feet[FORCE_Y][index], feet[MOMENT][index] = fx, fy, moment
         feet[SHEAR_X][index], feet[SHEAR_Y][index] = -fx / stiffness, -fy / stiffness
-        feet[TWIST][index] = -moment / twisting if radius > 0.0 else 0.0
+        feet[SHEAR_TURN][index] = -moment / torsional if radius > 0.0 else 0.0
         feet[SLIP_SPEED][index] = slid / dt
-        home_x = setting.home_x[index] + feet[OFFSET_X][index]
-        home_y = setting.home_y[index] + feet[OFFSET_Y][index]
+        home_x = model.home_x[index] + feet[OFFSET_X][index]
+        home_y = model.home_y[index] + feet[OFFSET_Y][index]
         feet[MARKER_X][index] = body[X] + cosine * home_x - sine * home_y
         feet[MARKER_Y][index] = body[Y] + sine * home_x + cosine * home_y
     body[PUSH_X], body[PUSH_Y] = total_x, total_y
 
 
-# What `walk` calls, for a compiler.
+# Functions that `walk` calls; the compiler needs a list of them.
 PARTS = (
     step, move_feet, body_advance, load_share, touch_down, is_wet, share_loads, balance, grip,
-    dome_load, drain, resistance, on_film, newton, push, report,
+    dome_load, drain, resistance, on_film, newton, derivatives, push, report,
 )  # fmt: skip

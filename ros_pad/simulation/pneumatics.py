@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A pressure regulator, the hose behind it, and the pad at the end of the hose.
 
-Pressures are gauge Pa unless a name says absolute. Steps are plain Python on floats: a robot
-takes some thousand of them a second.
+Pressures are gauge Pa unless marked as absolute. Steps are plain Python on floats, which is faster
+than NumPy for single values.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from numbers import Real
 
+from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.faults import LEAK_CRITICAL_RATIO
 from ros_pad.simulation.faults import SOUND
@@ -32,51 +32,44 @@ REFERENCE_DENSITY = 1.185
 """Density of the reference air (ANR) of ISO 6358, at 20 °C and 65 % humidity, kg/m³."""
 
 LINEAR_RATIO = 0.999
-"""Above this pressure ratio the flow is taken as linear in the pressure difference (ISO 6358)."""
+"""Pressure ratio above which the flow is linear in the pressure difference (ISO 6358)."""
 
 AIR_VISCOSITY = 1.82e-5
-"""Of air at 20 °C, Pa s."""
+"""Dynamic viscosity of air at 20 °C, Pa s."""
 
 MAX_STEP = 0.005
-"""Longest internal step, s. The pad is then within 1 % of a full step at every moment."""
+"""Longest internal step, s. After a full step of the set-point, the error of the pad's pressure is
+then below 1 % of that step at every time."""
 
-_SETTLED = 0.1  # Pa: a hundredth of what the sensor resolves, and then the rest is skipped
-_INSTANT = 1e-9  # s: shorter times are rounding of the caller's clock
-_CELLS = 100  # of the table of the pad's volume, from zero to full scale
-
-
-def _check(name: str, value: float, unit: str, low: float, high: float) -> None:
-    if not isinstance(value, Real) or isinstance(value, bool) or not low <= value <= high:
-        raise InvalidInput(
-            f'{name} = {value!r} is not allowed: '
-            f'a number from {low:g} to {high:g} {unit} is needed'
-        )
+_SETTLED = 0.1  # Pa from the target at which a pad has settled: 1/100 of the sensor's resolution
+_INSTANT = 1e-9  # s: shorter times are rounding errors of the caller's clock
+_CELLS = 100  # number of cells of the table of the pad's volume, from zero to full scale
 
 
 @dataclass(frozen=True)
 class RegulatorModel:
-    """An electro-pneumatic regulator as it looks from its outlet.
+    """An electro-pneumatic regulator, modelled by the pressure at its outlet.
 
-    A set-point is rounded to the quantum, ignored when it lies within the dead band of the one
-    last accepted (zero never is: it opens the exhaust), delayed by the dead time, limited in
-    slew, and followed as a second-order system. The outlet stays between zero and full scale.
+    A set-point is rounded to the quantum, ignored when it is within the dead band of the last
+    accepted one (except zero, which opens the exhaust), delayed by the dead time, limited in slew,
+    and followed as a second-order system. The outlet stays between zero and full scale.
 
     Parameters
     ----------
     natural_frequency : float
-        rad/s, 1 to 1000.
+        Natural frequency of the second-order system, rad/s, 1 to 1000.
     damping : float
-        Damping ratio, 0.1 to 10.
+        Damping ratio of that system, 0.1 to 10.
     dead_time : float
-        s, 0 to 1.
+        Delay, s, 0 to 1.
     dead_band : float
-        Fraction of full scale, 0 to 0.1.
+        Smallest change that is followed, as a fraction of full scale, 0 to 0.1.
     full_scale : float
-        Pa, 1e3 to 1e6.
+        Highest outlet pressure, Pa, 1e3 to 1e6.
     quantum : float
         Resolution of the set-point, Pa, 0 (none) to 1e4.
     slew_limit : float
-        Pa/s, from 1e3; infinite for none.
+        Largest rate of change, Pa/s, from 1e3; infinite for no limit.
 
     Raises
     ------
@@ -93,13 +86,14 @@ class RegulatorModel:
     slew_limit: float = math.inf
 
     def __post_init__(self) -> None:
-        _check('natural_frequency', self.natural_frequency, 'rad/s', 1.0, 1000.0)
-        _check('damping', self.damping, '(ratio)', 0.1, 10.0)
-        _check('dead_time', self.dead_time, 's', 0.0, 1.0)
-        _check('dead_band', self.dead_band, 'of full scale', 0.0, 0.1)
-        _check('full_scale', self.full_scale, 'Pa', 1e3, 1e6)
-        _check('quantum', self.quantum, 'Pa', 0.0, 1e4)
-        _check('slew_limit', self.slew_limit, 'Pa/s', 1e3, math.inf)
+        number('natural_frequency', self.natural_frequency, 'rad/s', 1.0, 1000.0)
+        number('damping', self.damping, '(ratio)', 0.1, 10.0)
+        number('dead_time', self.dead_time, 's', 0.0, 1.0)
+        number('dead_band', self.dead_band, 'of full scale', 0.0, 0.1)
+        number('full_scale', self.full_scale, 'Pa', 1e3, 1e6)
+        number('quantum', self.quantum, 'Pa', 0.0, 1e4)
+        if self.slew_limit != math.inf:
+            number('slew_limit', self.slew_limit, 'Pa/s', 1e3)
 
     def transition(self, time: float) -> tuple[float, float, float, float]:
         """Return the exact transition matrix of (error, error rate) over a time in s, by rows."""
@@ -124,15 +118,15 @@ def conductance(sonic: float, critical_ratio: float, first: float, second: float
     sonic : float
         Sonic conductance C, m³/(s Pa).
     critical_ratio : float
-        b, the pressure ratio below which it chokes.
+        b, the pressure ratio below which the flow is choked.
     first, second : float
-        Pressures before and behind it, absolute Pa, in any order.
+        Pressures before and behind the restriction, absolute Pa, in any order.
 
     Returns
     -------
     float
-        Finite and positive also where the pressures meet: the square root of the law has an
-        infinite slope there, and is replaced by a straight line above ``LINEAR_RATIO``.
+        Finite and positive also where the pressures are equal: above ``LINEAR_RATIO`` a straight
+        line replaces the square root of the law, whose slope is infinite at equal pressures.
     """
     up, down = (first, second) if first > second else (second, first)
     b = critical_ratio
@@ -148,7 +142,7 @@ def conductance(sonic: float, critical_ratio: float, first: float, second: float
 
 @dataclass(frozen=True)
 class Hose:
-    """A hose: ISO 6358 where its flow is turbulent or choked, Poiseuille where it creeps.
+    """A hose: ISO 6358 where its flow is turbulent or choked, Poiseuille where it is laminar.
 
     Parameters
     ----------
@@ -157,12 +151,11 @@ class Hose:
     length : float
         L, m, 0 to 50.
     measured_conductance : float, optional
-        C of the whole line, m³/(s Pa), if it is known better than by the formula: for instance
-        when a fitting or the regulator's own valve is narrower than the hose. All of the hose
-        then lies behind the resistance.
+        C of the whole line, m³/(s Pa), in place of the formula: for instance when a fitting or the
+        regulator's valve is narrower than the hose. All of the hose is then behind the resistance.
         1e-8 m³/(s Pa) = 1 dm³/(s bar).
     measured_critical_ratio : float, optional
-        b, 0 to 0.9, likewise.
+        b of the whole line, 0 to 0.9, in place of the formula.
 
     Raises
     ------
@@ -172,13 +165,14 @@ class Hose:
     Notes
     -----
     ``C = 0.029 D²/√(L/D^1.25 + 510)`` and ``b = 474 C/D²`` hold for D and L in **metres** and
-    give C in **m³/(s Pa)**. With millimetres C comes out some sixty times too small.
+    give C in **m³/(s Pa)**. With millimetres C would be about sixty times too small.
 
     They are fitted to turbulent flow. In bores of 1 mm and less the flow is laminar for most of
-    the time that a pad fills, and ISO 6358 promises several times too much; the hose passes no
-    more than isothermal Poiseuille flow, ``π D⁴ (p₁² - p₂²)/(256 η L R T)``. Against pipe flow
-    with Churchill's friction factor, in bores of 0.5 to 6 mm, 0.1 to 10 m, under 0.1 to 75 kPa,
-    the mass flow is then 7 % too small to 50 % too large, and worst below 2 kPa in thick hoses.
+    the time in which a pad fills, and ISO 6358 gives a flow several times too large; therefore the
+    flow is limited to isothermal Poiseuille flow, ``π D⁴ (p₁² - p₂²)/(256 η L R T)``. Compared
+    with pipe flow by Churchill's friction factor, for bores of 0.5 to 6 mm, lengths of 0.1 to
+    10 m and 0.1 to 75 kPa, the mass flow has an error of -7 % to +50 %, largest below 2 kPa in
+    thick hoses.
     """
 
     inner_diameter: float
@@ -187,12 +181,12 @@ class Hose:
     measured_critical_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        _check('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
-        _check('hose_length', self.length, 'm', 0.0, 50.0)
+        number('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
+        number('hose_length', self.length, 'm', 0.0, 50.0)
         if self.measured_conductance is not None:
-            _check('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
+            number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
         if self.measured_critical_ratio is not None:
-            _check('hose_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
+            number('hose_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
 
     @cached_property
     def volume(self) -> float:
@@ -201,12 +195,12 @@ class Hose:
 
     @property
     def volume_behind(self) -> float:
-        """Part of the bore that lies behind the resistance, m³."""
+        """Part of the bore behind the resistance, m³."""
         return self.volume if self.measured_conductance is not None else 0.5 * self.volume
 
     @cached_property
     def sonic_conductance(self) -> float:
-        """C, m³/(s Pa)."""
+        """Sonic conductance C, m³/(s Pa)."""
         if self.measured_conductance is not None:
             return self.measured_conductance
         d = self.inner_diameter
@@ -214,13 +208,13 @@ class Hose:
 
     @cached_property
     def critical_ratio(self) -> float:
-        """b, the pressure ratio (absolute, downstream over upstream) below which it chokes."""
+        """b, the ratio of absolute pressures, downstream over upstream, where choking begins."""
         if self.measured_critical_ratio is not None:
             return self.measured_critical_ratio
         return 474.0 * self.sonic_conductance / self.inner_diameter**2
 
     @cached_property
-    def _creeping(self) -> float:
+    def _laminar(self) -> float:
         """Laminar mass flow over the difference of squared pressures, kg/(s Pa²)."""
         if not self.length:
             return math.inf
@@ -230,15 +224,11 @@ class Hose:
     def conductance(self, first: float, second: float) -> float:
         """Return mass flow over pressure difference between two absolute pressures, kg/(s Pa).
 
-        It is finite and positive also where the pressures meet.
+        The result is finite and positive also where the pressures are equal.
         """
         turbulent = conductance(self.sonic_conductance, self.critical_ratio, first, second)
-        laminar = self._creeping * (first + second)
+        laminar = self._laminar * (first + second)
         return laminar if laminar < turbulent else turbulent
-
-    def mass_flow(self, first: float, second: float) -> float:
-        """Return the mass flow from the first to the second absolute pressure, kg/s."""
-        return self.conductance(first, second) * (first - second)
 
 
 class PneumaticChannel:
@@ -249,40 +239,42 @@ class PneumaticChannel:
     regulator : RegulatorModel
     hose : Hose
     pad_volume : float or callable
-        Air volume of all pads of the foot and the chamber that feeds them, m³: a constant, or a
+        Air volume of all pads of the foot and their chamber, m³, 1e-9 to 1e-2: a constant, or a
         function of gauge pressure in Pa. A function is tabulated once, from 0 to full scale.
     ambient : float
-        Absolute Pa, 1e3 to 2e5.
+        Ambient pressure, absolute Pa, 1e3 to 2e5.
     faults : sequence of Fault
-        That this channel has, see :mod:`ros_pad.simulation.faults`.
+        Faults of this channel, see :mod:`ros_pad.simulation.faults`.
 
     Attributes
     ----------
     outlet_pressure, pad_pressure : float
-        Gauge Pa, in [0, full scale], whatever the faults.
+        Pressures at the outlet of the regulator and in the pad, gauge Pa, in [0, full scale], also
+        with faults.
     setpoint : float
-        The last set-point given, gauge Pa.
+        The last set-point commanded, gauge Pa.
     settled : bool
-        Nothing moves any more: further steps with the same set-point return at once. Never while
-        a fault acts on the air.
+        Whether the pressures are constant, so that further steps with the same set-point return at
+        once; False while a fault acts on the air.
 
     Raises
     ------
     InvalidInput
-        When a value is outside its range, or the gas content does not grow with pressure.
+        When a value is outside its range, or the volume falls so fast that the gas content does
+        not grow with pressure.
 
     Notes
     -----
-    Air is an isothermal ideal gas. Half of the hose's volume is added to the pad's behind the
-    whole resistance, half lies before it, as in a π-section of a line. Against a hose of many
-    cells with Churchill's friction, 0.5 to 4 mm by 0.5 to 10 m, the time to 90 % is then between
-    8 % too long (1 mm x 10 m) and 18 % too short (4 mm x 10 m, 0.14 s instead of 0.17). The delay
-    of sound, 3 ms for each metre, is left out.
+    Air is an isothermal ideal gas. Half of the hose's volume is behind the whole resistance, with
+    the pad, and half before it, as in a π-section of a line. Compared with a hose of many cells
+    with Churchill's friction, for bores of 0.5 to 4 mm and lengths of 0.5 to 10 m, the time to
+    90 % of a step is between 8 % too long (1 mm x 10 m) and 18 % too short (4 mm x 10 m, 0.14 s
+    instead of 0.17). The delay of sound, 3 ms per metre, is left out.
 
-    Over a step the regulator is solved exactly; conductances are frozen at their values at
-    mid-step, and the pad then relaxes exactly towards an outlet that moves linearly. That never
-    overshoots the outlet, however small the volume or steep the law of the flow, and its error
-    falls with the square of the step. Steps end where a fault starts or ends.
+    Over a step the regulator is solved exactly; conductances have their values at mid-step, and
+    the pad relaxes exactly towards an outlet that moves linearly. So the pad never overshoots the
+    outlet, however small the volume or steep the law of the flow, and the error falls with the
+    square of the step. Steps end where a fault starts or ends.
     """
 
     def __init__(
@@ -293,23 +285,23 @@ class PneumaticChannel:
         ambient: float = ATMOSPHERE,
         faults: Sequence[Fault] = (),
     ) -> None:
-        _check('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
+        number('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
         self.regulator = regulator
         self.hose = hose
         self.outlet_pressure = 0.0
         self.pad_pressure = 0.0
         self.setpoint = 0.0
-        self.settled = not faults  # one may be there from the beginning
+        self.settled = not faults  # a fault may act from the beginning
         self._ambient = ambient
         self._faults = tuple(faults)
         self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
         self._outlet_rate = 0.0
         self._time = 0.0
-        self._origin = 0.0  # of the time of the schedule of faults
+        self._origin = 0.0  # time on the schedule of faults at which this channel started, s
         self._accepted = 0.0  # the set-point that the dead band compares with
         self._pending: tuple[tuple[float, float], ...] = ()  # (due time, target), dead time
         self._target = 0.0
-        self._reference = 0.0  # the target behind the slew limit
+        self._reference = 0.0  # the target after the slew limit, Pa
         self._transition_time = 0.0
         self._transition = regulator.transition(0.0)
         self._tabulate(pad_volume)
@@ -327,7 +319,7 @@ class PneumaticChannel:
             pressures = [0.0, self._cell]
             volumes = [pad_volume, pad_volume]
         for pressure, volume in zip(pressures, volumes, strict=True):
-            _check(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
+            number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
         hose = self.hose
         self._before = hose.volume - hose.volume_behind
         self._contents = [
@@ -336,17 +328,20 @@ class PneumaticChannel:
         ]
         self._capacities = [(high - low) / self._cell for low, high in pairwise(self._contents)]
         if min(self._capacities) <= 0.0:
-            raise InvalidInput('pad_volume falls so fast with pressure that air would be expelled')
+            raise InvalidInput(
+                'pad_volume falls too fast with the pressure: pressure (absolute) times volume'
+                ' must grow with the pressure'
+            )
         self._last_cell = len(self._capacities) - 1
 
     @property
     def air_used(self) -> float:
-        """Air drawn from the regulator since the start, kg. What is exhausted is not returned."""
+        """Air drawn from the regulator since the start, kg; exhausted air is not subtracted."""
         return self._drawn * REFERENCE_DENSITY / REFERENCE_PRESSURE
 
     @property
     def time(self) -> float:
-        """Where this channel is in the schedule of its faults, s; set it to start elsewhere."""
+        """Time on the schedule of the faults, s; it can be set to another time."""
         return self._origin + self._time
 
     @time.setter
@@ -356,7 +351,7 @@ class PneumaticChannel:
 
     @property
     def quiet_time(self) -> float:
-        """Time until the next fault starts or ends, s."""
+        """Time until the next fault starts or ends, s; infinite if none does."""
         time = self.time + _INSTANT
         return min((edge for edge in self._edges if edge > time), default=math.inf) - self.time
 
@@ -368,7 +363,7 @@ class PneumaticChannel:
         setpoint : float
             Gauge Pa, 0 to full scale.
         dt : float
-            s, finite and not negative. Longer times than ``MAX_STEP`` are divided.
+            Time, s, finite and not negative. Longer times than ``MAX_STEP`` are divided.
 
         Returns
         -------
@@ -378,7 +373,7 @@ class PneumaticChannel:
         Raises
         ------
         InvalidInput
-            When the set-point or the time is outside its range; nothing has moved then.
+            When the set-point or the time is outside its range; the state is then unchanged.
         """
         if not 0.0 <= dt < math.inf:
             raise InvalidInput(f'dt = {dt!r} s is not allowed: it must be finite and not negative')
@@ -415,12 +410,12 @@ class PneumaticChannel:
         return self.pad_pressure
 
     def _command(self, setpoint: float) -> None:
-        """Round a new set-point, compare it with the dead band, and send it on its way."""
+        """Round a new set-point and, outside the dead band, queue it for the dead time."""
         model = self.regulator
-        _check('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
+        number('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
         self.setpoint = setpoint
         target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
-        target = min(target, model.full_scale)  # where full scale is no multiple of the quantum
+        target = min(target, model.full_scale)  # full scale need not be a multiple of the quantum
         moved = abs(target - self._accepted)
         if moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0):
             self._accepted = target
@@ -428,17 +423,25 @@ class PneumaticChannel:
             self.settled = False
 
     def _advance(self, h: float, slope: float) -> None:
-        """Move regulator and pad by a time h, the reference rising at a constant slope."""
+        """Move regulator and pad by a time h, s, with a reference that rises at a slope, Pa/s."""
+        # Steps end where a fault starts or ends: a fault at mid-step acts during the whole step.
+        now = self.time
+        hardware = self._hardware(now + 0.5 * h, now + h) if self._faults else SOUND
+        start = self.outlet_pressure
+        self._move_outlet(h, slope, hardware)
+        self._move_pad(h, start, hardware.leak)
+        self._time += h
+        self._settle()
+
+    def _move_outlet(self, h: float, slope: float, hardware: Condition) -> None:
+        """Move the outlet by the exact response of the regulator, within its limits."""
         model = self.regulator
         if h != self._transition_time:
             self._transition_time, self._transition = h, model.transition(h)
         ff, fr, rf, rr = self._transition
-        # Steps end at the edges but for rounding: what acts at mid-step acts all the time.
-        now = self.time
-        hardware = self._hardware(now + 0.5 * h, now + h) if self._faults else SOUND
-        # The loop is closed on what the sensor reads, but for an open exhaust.
+        # The regulator controls the reading of its sensor, except with an open exhaust.
         aim = self._reference - hardware.offset if self._reference else 0.0
-        # A second-order system follows a ramp with a constant lag, and forgets the rest.
+        # A second-order system follows a ramp with a constant lag; the rest of its motion decays.
         start = self.outlet_pressure
         lag = 2.0 * model.damping * slope / model.natural_frequency
         error = start - aim + lag
@@ -450,34 +453,40 @@ class PneumaticChannel:
             outlet, self._outlet_rate = start, 0.0
         highest = min(model.full_scale, hardware.supply)
         if not 0.0 <= outlet <= highest:
-            # Neither the exhaust nor the supply can carry it further.
+            # Neither the exhaust nor the supply can move the outlet pressure further.
             outlet = 0.0 if outlet < 0.0 else highest
             self._outlet_rate = 0.0
         self.outlet_pressure = outlet
 
-        # The pad is drawn to the outlet by the hose, and to ambient by a leak: to a fixed share of
-        # the outlet's pressure. gap = pad - share outlet obeys gap' = -relaxation gap - ramp.
-        relaxation, share = self._relaxation(start, self.pad_pressure, hardware.leak)
+    def _move_pad(self, h: float, start: float, leak: float) -> None:
+        """Move the pad by a time h, s, in which the outlet moved linearly from ``start``, Pa.
+
+        The hose draws the pad's pressure to that of the outlet, and a leak draws it to ambient.
+        Together they draw it to a share of the outlet's pressure. gap = pad - share outlet obeys
+        gap' = -relaxation gap - ramp.
+        """
+        outlet = self.outlet_pressure
+        relaxation, share = self._relaxation(start, self.pad_pressure, leak)
         gap = self.pad_pressure - share * start
         ramp = share * (outlet - start) / h
         done = -math.expm1(-0.5 * relaxation * h)
         middle = 0.5 * (start + outlet)
         pad = share * middle + gap - (gap + ramp / relaxation) * done
-        relaxation, share = self._relaxation(middle, pad, hardware.leak)
+        relaxation, share = self._relaxation(middle, pad, leak)
         gap = self.pad_pressure - share * start
         ramp = share * (outlet - start) / h
         done = -math.expm1(-relaxation * h)
         lost = 0.0
-        if hardware.leak:
-            flow = self._leaking(pad, hardware.leak) * pad
-            lost = flow * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
+        if leak:
+            lost = self._leaking(pad, leak) * pad * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
         self._fill(share * outlet + gap - (gap + ramp / relaxation) * done, lost)
 
-        self._time += h
+    def _settle(self) -> None:
+        """End the motion where pad and outlet are at the target and nothing is pending."""
         if (
             abs(self.pad_pressure - self._target) < _SETTLED
-            and abs(outlet - self._target) < _SETTLED
-            and abs(self._outlet_rate) < _SETTLED * model.natural_frequency
+            and abs(self.outlet_pressure - self._target) < _SETTLED
+            and abs(self._outlet_rate) < _SETTLED * self.regulator.natural_frequency
             and self._reference == self._target
             and not self._pending
             and (not self._faults or self._sound_for_now())
@@ -488,17 +497,20 @@ class PneumaticChannel:
             self.settled = True
 
     def _hardware(self, during: float, time: float) -> Condition:
-        """Return what the faults that act at one time make of the hardware at another."""
+        """Return the condition at a time, s, by the faults that act at the time ``during``, s."""
         acting = [each for each in self._faults if each.acts_at(during)]
         return condition(acting, time, self.regulator.full_scale)
 
     def _sound_for_now(self) -> bool:
-        """Whether no fault acts on the air, nor begins within the rounding of the clock."""
+        """Return whether no fault acts on the air, now or within the rounding of the clock."""
         soon = self.time + 2.0 * _INSTANT
         return self._hardware(soon, soon).sound
 
     def _relaxation(self, outlet: float, pad: float, leak: float) -> tuple[float, float]:
-        """Return at what rate in 1/s the pad approaches what share of the outlet's pressure."""
+        """Return the rate, 1/s, at which the pad approaches a share of the outlet's pressure.
+
+        Return this share, too.
+        """
         capacity = self._capacities[min(int(pad / self._cell), self._last_cell)]
         inflow = self.hose.conductance(outlet + self._ambient, pad + self._ambient)
         scale = REFERENCE_PRESSURE / (REFERENCE_DENSITY * capacity)
@@ -512,7 +524,7 @@ class PneumaticChannel:
         return conductance(leak, LEAK_CRITICAL_RATIO, pad + self._ambient, self._ambient)
 
     def _fill(self, pressure: float, lost: float = 0.0) -> None:
-        """Set the pad's pressure and book the air, in Pa m³, that hose and pad took or lost."""
+        """Set the pad's pressure, Pa, and add the air drawn; ``lost`` is the air leaked, Pa m³."""
         cell = min(int(pressure / self._cell), self._last_cell)
         content = self._contents[cell] + self._capacities[cell] * (pressure - cell * self._cell)
         content += self._before * (self.outlet_pressure + self._ambient)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every simulated robot shows to the rest: the one interface of all rungs of the ladder."""
+"""The interface of a simulated robot, the same on all fidelity levels."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ class FootState:
     Attributes
     ----------
     position : tuple of float
-        Marker on the foot, above its soft pads, m.
+        Position of the marker on the foot, above its soft pads, m.
     force : tuple of float
         Force of the ground on the foot, N; z up out of the floor.
     moment : float
-        Of the ground on the foot about the vertical, N m.
+        Yaw moment of the ground on the foot, N m.
     standing : bool
         Whether the foot carries load.
     wet : bool
-        Whether the ground below it is wet; in swing, on rungs without joints, what it was last.
+        Whether the ground below the foot is wet; on L0 and L1, in swing, the value of the last
+        stance.
     grip : float
-        Tangential force that the foot could hold now, N.
+        Present tangential capacity of the foot, N.
     slip_speed : float
-        Speed of its contact over the floor, m/s.
+        Speed of the foot's contact over the floor, m/s, from 0.
     slip_path : float
-        Way its contact has slid under load since the start, m.
+        Distance that the contact has slipped under load since the start, m.
     overload_time : float
-        Time that its domes were past their force limit, s.
+        Time for which the load was above the force limit of the domes, s.
     """
 
     __slots__ = (
@@ -60,25 +61,22 @@ class Robot(Protocol):
     Attributes
     ----------
     legs : tuple of int
-        Numbers of the legs, thesis numbering.
+        Numbers of the legs, as in the thesis.
     period : float
-        Step, s.
+        Length of a step, s.
     time : float
         Simulated time, s.
-    feet : sequence of FootState
-        One for each leg, in the order of ``legs``.
     dissipation : float
         Work lost in feet that slip or turn, J.
     verdict : str or None
-        Why the walk is no longer valid, for instance a tip-over; None while it is.
+        Why the walk is no longer valid, for instance a tip-over; None while it is valid.
     joint_names : tuple of str
-        Of the robot's joints; empty on rungs that have none.
+        Names of the robot's joints; empty on fidelity levels without joints.
     """
 
     legs: tuple[int, ...]
     period: float
     time: float
-    feet: list[FootState]
     dissipation: float
     verdict: str | None
     joint_names: tuple[str, ...]
@@ -86,13 +84,18 @@ class Robot(Protocol):
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
 
-        A pad at zero or below is flat. Above the foot's ceiling domes carry what they carry there.
+        A pad at zero or below is flat. Above the foot's ceiling, domes have the same force limit
+        as at the ceiling.
 
         Raises
         ------
         InvalidInput
             When there is not one finite pressure for each leg.
         """
+
+    @property
+    def feet(self) -> list[FootState]:
+        """State of each foot, in the order of ``legs``; the objects stay the same."""
 
     @property
     def body(self) -> Vector:
@@ -105,7 +108,7 @@ class Robot(Protocol):
 
 def check_pressures(pressures: Sequence[float], legs: int) -> None:
     """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg, 1 or 6."""
-    # What is not finite makes the sum so, too.
+    # If one value is not finite, the sum is not finite either.
     if len(pressures) != legs or not math.isfinite(sum(pressures)):
         needed = 'six finite numbers are' if legs == 6 else 'one finite number is'
         raise InvalidInput(f'pressures = {pressures!r} Pa: {needed} needed, one for each leg')

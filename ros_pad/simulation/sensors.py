@@ -14,7 +14,7 @@ from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
 
-_BLOCK = 1000  # samples drawn at once: NumPy is slow to ask for a few numbers
+_BLOCK = 1000  # samples drawn at once, because a call of NumPy costs more than the numbers
 
 
 Reading = tuple[Vector, Vector]
@@ -22,18 +22,18 @@ Reading = tuple[Vector, Vector]
 
 
 class Sensors:
-    """Reads the feet of a robot as its sensors would.
+    """Force sensors and markers of the feet of a robot.
 
     Parameters
     ----------
     noise : SensorNoise
-        Standard deviations.
+        Standard deviations of the readings.
     legs : int
         Number of feet.
     seed : int
-        The same seed gives the same noise.
+        Whole number from 0; the same seed gives the same noise.
     faults : sequence of sequences of Fault
-        Of the sensors of each foot; none by default.
+        Faults of the sensors of each foot; none by default.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Sensors:
         return cls(scene.sensors, len(scene.legs), seed, faults)
 
     def read(self, robot: Robot) -> list[Reading]:
-        """Return (force, position) of each foot, N and m."""
+        """Return the next reading of each foot: force, N, and position, m, with their noise."""
         if self._next == len(self._block):
             drawn = self._generator.normal(size=(_BLOCK, self._legs, 6)) * self._scale
             self._block = drawn.tolist()
@@ -82,7 +82,7 @@ class Sensors:
         return readings
 
     def read_moments(self, robot: Robot) -> list[float | None]:
-        """Return the moment about the vertical of each foot, N m; None where it is not measured.
+        """Return the yaw moment of each foot, N m, with noise; None where it is not measured.
 
         Call it once for each :meth:`read`.
         """
@@ -105,7 +105,7 @@ class Sensors:
 
 
 def _faulty(reading: Reading, before: Reading, faults: Sequence[Fault], time: float) -> Reading:
-    """Return what sensors with faults say, which said `before` at the last sample."""
+    """Return the reading of sensors with faults; ``before`` is the reading before this one."""
     force, position = reading
     for fault in faults:
         if not fault.acts_at(time):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The floor: where it is wet, how deep, and how uneven."""
+"""Floor with a map of liquid and a map of heights."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 from scipy import ndimage
 from scipy import special
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import integer
+from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 
 FLOORS = ('dry', 'wet', 'patches', 'drawn')
@@ -21,26 +22,27 @@ FLOORS = ('dry', 'wet', 'patches', 'drawn')
 # Period of a patchy floor along x and y, and edge of its cells, m.
 LENGTH, WIDTH, CELL = 16.0, 8.0, 0.02
 
-# Heights of an uneven floor lose their likeness (to 1/e) over this distance, m: more than a foot,
-# less than a step.
+# Correlation length (to 1/e) of the heights of an uneven floor, m: more than a foot, less than a
+# step.
 UNEVEN_LENGTH = 0.05
 
 
 def patch_lengths(wet_fraction: float) -> tuple[float, float]:
-    """Return the range of mean patch lengths, m, that a floor can show at this wet fraction.
+    """Return the range of mean patch lengths, m, that a floor can have at this wet fraction.
 
-    The field's smoothing must be no finer than a cell, or patches come out too long, and no
-    coarser than an eighth of the floor's width, or too few fit in to be random.
+    The shortest patches need a smoothing of one cell; finer smoothing is lost in the cells. The
+    longest need a smoothing of an eighth of the floor's width; with more, a random floor would
+    have too few patches.
     """
     per_smoothing = 1.0 / _smoothing(wet_fraction, 1.0)
     return CELL * per_smoothing, WIDTH / 8.0 * per_smoothing
 
 
 def _smoothing(wet_fraction: float, patch_length: float) -> float:
-    """Return the smoothing of the field, m.
+    """Return the standard deviation of the smoothing kernel that gives these patches, m.
 
     A Gaussian field smoothed with a kernel of standard deviation s crosses the level z upwards
-    exp(-z²/2)/(2 π √2 s) times a metre (Rice 1944), and wet_fraction/patch_length is that rate.
+    exp(-z²/2)/(2 π √2 s) times a metre (Rice 1944). This rate must be wet_fraction/patch_length.
     """
     level = float(special.ndtri(wet_fraction))
     rate = wet_fraction / patch_length
@@ -48,9 +50,8 @@ def _smoothing(wet_fraction: float, patch_length: float) -> float:
 
 
 def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
-    """Return smoothed noise on the cells of a floor; ``smoothing`` in m."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
+    """Return smoothed noise on the cells of a floor; ``smoothing`` is in m."""
+    integer('seed', seed)
     shape = (round(WIDTH / CELL), round(LENGTH / CELL))
     noise = np.random.default_rng([seed, stream]).normal(size=shape)
     smooth: np.ndarray = ndimage.gaussian_filter(noise, smoothing / CELL, mode='wrap')
@@ -59,12 +60,12 @@ def _field(smoothing: float, seed: int, stream: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Floor:
-    """A floor with a map of wet ground, and one of heights, repeated in both directions.
+    """A floor with a map of liquid and one of heights, both repeated in x and y.
 
     Attributes
     ----------
     wet_map : ndarray of bool, (rows along y, columns along x)
-        True where liquid stands.
+        True where there is liquid.
     cell : float
         Edge of one cell of the map, m.
     origin : tuple of float
@@ -72,13 +73,13 @@ class Floor:
     film_thickness : float
         Depth of the liquid on wet ground, m.
     heights : ndarray of float, (rows along y, columns along x), or None
-        Height of the ground where a foot may stand, m, about zero; None for an even floor. Its
-        cells have an edge of ``CELL``, its corner is at (-1 m, -WIDTH/2).
+        Height of the ground, m, of mean zero; None for an even floor. The cells of this map have
+        an edge of ``CELL``; the corner of cell [0, 0] is at (-1 m, -WIDTH/2).
 
     Raises
     ------
     InvalidInput
-        When the cell is not above zero, or the depth below it or not finite.
+        When the cell is not finite and above 0, or the depth is negative or not finite.
     """
 
     wet_map: np.ndarray
@@ -95,7 +96,7 @@ class Floor:
 
     @classmethod
     def uniform(cls, wet: bool, film_thickness: float) -> Floor:
-        """Return a floor that is wet, or dry, everywhere."""
+        """Return a floor that is wet, or dry, everywhere; the film thickness is in m."""
         return cls(np.array([[wet]]), 1.0, (0.0, 0.0), film_thickness)
 
     @classmethod
@@ -125,48 +126,48 @@ class Floor:
             When wet fraction, patch length, depth or seed is out of its range.
         """
         if not 0.0 < wet_fraction < 1.0:
-            raise InvalidInput(f'wet_fraction = {wet_fraction!r}: must be between 0 and 1')
-        shortest, longest = patch_lengths(wet_fraction)
-        if not shortest <= patch_length <= longest:
             raise InvalidInput(
-                f'patch_length = {patch_length!r} m: with a wet fraction of {wet_fraction:g} the'
-                f' floor has room for {shortest:.3g} to {longest:.3g} m'
+                f'wet_fraction = {wet_fraction!r} is not allowed: a number above 0 and below 1 is'
+                ' needed'
             )
+        number('patch_length', patch_length, 'm', *patch_lengths(wet_fraction))
         level = _field(_smoothing(wet_fraction, patch_length), seed, 1)
         wet = level > np.quantile(level, 1.0 - wet_fraction)
         return cls(wet, CELL, (-1.0, -WIDTH / 2.0), film_thickness)
 
     @classmethod
     def drawn(cls, drawing: Sequence[str], cell: float, film_thickness: float) -> Floor:
-        """Return a floor that is wet where a drawing says so.
+        """Return a floor that is wet where a drawing shows it.
 
         Parameters
         ----------
         drawing : sequence of str
-            Rows of equal length, from left (+y) to right of the robot; along a row goes +x, the
-            way the robot walks. ``#`` is wet, ``.`` is dry. The robot starts in the middle of the
-            first column, and the drawing begins again where it ends.
+            Rows of equal length, from left (+y) to right of the robot; a row goes along +x, the
+            direction of walking. ``#`` is wet, ``.`` is dry. The robot starts in the middle of the
+            first column. The drawing is repeated in both directions.
         cell : float
-            Edge of what one character covers, m, > 0.
+            Edge of the square that one character stands for, m, above 0.
         film_thickness : float
             Depth of the liquid, m.
 
         Raises
         ------
         InvalidInput
-            When rows differ in length or there are other characters, or no rows at all; or when
-            cell or depth is out of its range.
+            When rows differ in length, are missing or have other characters, or when ``cell`` or
+            ``film_thickness`` is out of its range.
         """
         if not drawing or not drawing[0]:
             raise InvalidInput('drawing is empty: rows of # (wet) and . (dry) are needed')
         for place, row in enumerate(drawing, 1):
             if len(row) != len(drawing[0]):
                 raise InvalidInput(
-                    f'drawing: row {place} has {len(row)} characters, the first {len(drawing[0])}'
+                    f'drawing: row {place} has {len(row)} characters and row 1 has'
+                    f' {len(drawing[0])}: all rows must be of the same length'
                 )
             if odd := set(row) - set('#.'):
                 raise InvalidInput(
-                    f'drawing: row {place} has {min(odd)!r}: # (wet) and . (dry) are known'
+                    f'drawing: row {place} contains {min(odd)!r}: only # (wet) and . (dry) are'
+                    ' allowed'
                 )
         # Rows of the map go along +y, those of a drawing against it.
         wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
@@ -178,25 +179,25 @@ class Floor:
         Parameters
         ----------
         unevenness : float
-            Root mean square of the heights, m, >= 0.
+            Root mean square of the heights, m, 0 or more.
         seed : int
             Whole number from 0; the same seed gives the same heights.
 
         Raises
         ------
         InvalidInput
-            When one of them is out of its range.
+            When the unevenness or the seed is out of its range.
         """
         number('unevenness', unevenness, 'm')
         if not unevenness:
             return self
-        # Smoothing noise with a Gaussian of s.d. s makes it correlated as exp(-d²/4s²).
+        # Noise smoothed with a Gaussian of standard deviation s has the correlation exp(-d²/4s²).
         heights = _field(UNEVEN_LENGTH / 2.0, seed, 3)
         heights -= heights.mean()
         return replace(self, heights=heights * (unevenness / heights.std()))
 
     def height(self, x: float, y: float) -> float:
-        """Height of the ground at a world position, m."""
+        """Return the height of the ground at a world position, m."""
         heights = self.heights
         if heights is None:
             return 0.0
@@ -205,19 +206,20 @@ class Floor:
         return float(heights[row, column])
 
     def wet(self, x: float, y: float) -> bool:
-        """Whether there is liquid at a world position, m."""
+        """Return whether there is liquid at a world position, m."""
         rows = self._rows
         row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
         return row[int((x - self.origin[0]) // self.cell) % len(row)]
 
     def depth(self, x: float, y: float) -> float:
-        """Depth of the liquid at a world position, m; 0 on dry ground."""
+        """Return the depth of the liquid at a world position, m; 0 on dry ground."""
         return self.film_thickness if self.wet(x, y) else 0.0
 
     def wet_along(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return :meth:`wet` for arrays of positions, as booleans of their shape."""
         rows, columns = self.wet_map.shape
-        # floor_divide is exact, as // is: a rounded quotient takes cell edges for the next cell.
+        # floor_divide is as exact as //; a rounded quotient could put a position just before the
+        # edge of a cell in the next cell.
         row = np.floor_divide(np.asarray(y) - self.origin[1], self.cell).astype(int) % rows
         column = np.floor_divide(np.asarray(x) - self.origin[0], self.cell).astype(int) % columns
         return self.wet_map[row, column]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trials: the closed loop without ROS, its metrics, bags and reports."""
+"""Trials: run them without ROS, read them from bags, replay and sweep them."""
 
 from ros_pad.trials.loop import run
 from ros_pad.trials.trial import Trial

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was recorded on a topic against what a replay has on it, message by message."""
+"""Compare the recorded messages of a topic, one by one, with those of its replay."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from dataclasses import field
 import numpy as np
 
 ROUNDING = 1e-12
-"""Difference, of the larger of the number and 1, that another processor may make: NumPy has an
-exponential of its own for each, and they differ in the last bit."""
+"""Largest difference that counts as rounding, relative to the recorded number (below 1: to 1).
+
+NumPy's exponential differs between processors in the last bit."""
 
 
 @dataclass
@@ -24,13 +25,15 @@ class Track:
     Attributes
     ----------
     width : int
-        Numbers in a message; 0 for a text.
+        Number of values in a message; 0 for a text.
     times : array of int
-        When they were recorded, or when the last message that they follow from was, ns.
+        Log time of each message, ns; in a replay, the log time of the last input before it.
     keys : array of int
-        What tells them apart, ns: their stamp, or the time.
+        Time by which each message is matched, ns: its stamp, or ``times`` where it has none.
     numbers : array of float
+        Values of all messages, one message after the other; empty for texts.
     texts : list of str
+        Texts of all messages; empty for numbers.
     """
 
     width: int
@@ -40,13 +43,13 @@ class Track:
     texts: list[str] = field(default_factory=list)
 
     def add(self, time_ns: int, numbers: tuple[float, ...], key_ns: int | None = None) -> None:
-        """Append a message of numbers."""
+        """Append a message of numbers: its log time and, if it has one, its stamp, ns."""
         self.times.append(time_ns)
         self.keys.append(time_ns if key_ns is None else key_ns)
         self.numbers.extend(numbers)
 
-    def say(self, time_ns: int, text: str) -> None:
-        """Append a message of text."""
+    def add_text(self, time_ns: int, text: str) -> None:
+        """Append a message of text with its log time, ns."""
         self.times.append(time_ns)
         self.keys.append(time_ns)
         self.texts.append(text)
@@ -55,53 +58,56 @@ class Track:
         return len(self.times)
 
     def since(self, time_ns: int) -> Track:
-        """Return the texts from a time on."""
+        """Return a track of the texts from a log time, ns, on."""
         made = Track(self.width)
         for at_ns, text in zip(self.times, self.texts, strict=True):
             if at_ns >= time_ns:
-                made.say(at_ns, text)
+                made.add_text(at_ns, text)
         return made
 
     @property
     def values(self) -> np.ndarray:
-        """The numbers: (messages, width)."""
+        """Values of the messages, shape (messages, width)."""
         return np.array(self.numbers).reshape(len(self), self.width)
 
     def at(self, time_ns: int) -> float | None:
-        """Return the first number of the last message until then."""
+        """Return the first value of the last message up to a log time, ns, or None."""
         place = bisect.bisect_right(self.times, time_ns)
         return self.numbers[(place - 1) * self.width] if place else None
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a topic that was recorded compares with its replay.
+    """Result of comparing a recorded topic with its replay.
 
     Attributes
     ----------
     topic : str
-        As it is called in the bag.
+        Name in the bag.
     leg : int
     kind : str
-        Such as ``wetness``.
+        Kind of the topic, such as ``wetness``.
     recorded, replayed : int
-        Messages.
+        Numbers of messages.
     compared, equal : int
-        Messages of one moment that both have, and those of them that are equal to the bit.
+        Number of messages that are in the bag and in the replay, and how many of these are equal
+        to the bit.
     missing : int
-        Messages that were recorded and that the replay does not have.
+        Number of recorded messages that the replay does not have.
     not_recorded : int
-        Messages of the replay that were not recorded. Where they are text, which is sent only
-        when it changes, this is a difference; otherwise they were lost.
+        Number of messages of the replay that were not recorded. Texts among them count as
+        differences, because a text is published only when it changes; numbers count as lost by
+        the recorder.
     largest_difference : float or None
-        In the unit of the message; None for text.
+        Largest difference of two numbers, in the unit of the message, inf if only one of them is
+        NaN; None for text.
     first_difference_s : float or None
-        When they part, s since the bag begins.
+        Time of the first message that differs or is missing, s after the beginning of the bag.
     rounded : bool
-        Whether no difference is larger than :data:`ROUNDING`.
+        Whether no message is missing, and no difference is larger than :data:`ROUNDING`.
     excused : bool
-        Whether all differences come after a gap in what the nodes heard: what was not recorded
-        cannot be replayed, so nobody knows whether they would be there without it.
+        Whether all larger differences and missing messages come after a gap in the recorded
+        inputs: lost inputs cannot be replayed, and may be the cause.
     """
 
     topic: str
@@ -120,7 +126,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """One of ``equal``, ``rounding``, ``different`` and, if excused, ``gap``."""
+        """``equal``, ``rounding``, ``gap`` (an excused difference) or ``different``."""
         if self.first_difference_s is None:
             return 'equal'
         if self.rounded:
@@ -141,31 +147,33 @@ def compare(
 ) -> Comparison:
     """Compare a topic with its replay, message by message.
 
-    Messages belong together when the recorded one came at most nine tenths of a period after
-    what the replayed one follows from, and not more than one tenth before it: topics may
-    overtake one another on their way into a bag.
+    Two messages match when the key of the recorded one is at most 0.9 periods after that of the
+    replayed one, and at most 0.1 periods before it: topics may be recorded in another order than
+    they were published.
 
     Parameters
     ----------
     topic, leg, kind
         See :class:`Comparison`.
     recorded, replayed : Track
-        What was recorded on the topic, and what the replay has.
+        Messages on the topic, recorded and replayed.
     start_ns : int
-        When the bag begins.
+        Beginning of the bag, ns.
     period_ns : int
-        Between messages.
+        Period of the messages, ns.
     gap_ns : int or None
-        Since when what was not recorded may tell.
+        Time of the first gap in the recorded inputs, ns, after which differences are excused; -1
+        if an input is missing altogether, None if nothing is missing.
     look_ns : int
-        Where texts are told when somebody looks, and nobody knows when that was: how far they
-        may be apart. How long a silence lasted by then is not compared.
+        Largest time between matching texts, ns, for a bag without ``/clock``, which does not show
+        when the nodes published them; the duration of a silence, which depends on that time, is
+        then not compared. 0 matches texts like numbers.
     """
-    said = _without_length if look_ns else str
+    content = _without_length if look_ns else str
     early_ns, late_ns = period_ns // 10, 9 * period_ns // 10
     if look_ns and not recorded.width:
         early_ns = late_ns = look_ns
-    pairs = _pairs(recorded, replayed, early_ns, late_ns, said)
+    pairs = _pairs(recorded, replayed, early_ns, late_ns, content)
     own = np.zeros(len(recorded), dtype=bool)
     own[[i for i, _ in pairs]] = True
     theirs = np.array([j for _, j in sorted(pairs)], dtype=int)
@@ -173,22 +181,14 @@ def compare(
     lost = np.empty(0, dtype=np.int64)
     largest: float | None = None
     if recorded.width:
-        before, after = recorded.values[own], replayed.values[theirs]
-        both_nan = np.isnan(before) & np.isnan(after)
-        same = (before == after) | both_nan
-        with np.errstate(invalid='ignore'):
-            apart = np.nan_to_num(np.abs(before - after), nan=math.inf, posinf=math.inf)
-        apart[same] = 0.0
-        largest = float(apart.max(initial=0.0))
-        far = (apart > ROUNDING * np.maximum(1.0, np.abs(np.nan_to_num(before)))).any(axis=1)
-        same = same.all(axis=1)
+        same, far, largest = _differences(recorded.values[own], replayed.values[theirs])
     else:
         same = np.array(
-            [said(recorded.texts[i]) == said(replayed.texts[j]) for i, j in sorted(pairs)],
+            [content(recorded.texts[i]) == content(replayed.texts[j]) for i, j in sorted(pairs)],
             dtype=bool,
         )
         far = ~same
-        # Text is sent when it changes: one more is a difference.
+        # A text is published only when it changes, so an additional one is a difference.
         lost = np.delete(np.array(replayed.times, dtype=np.int64), theirs)
     parting = np.concatenate([times[own][~same], times[~own], lost])
     grave = np.concatenate([times[own][far], times[~own], lost])
@@ -209,12 +209,23 @@ def compare(
     )
 
 
-def _pairs(
-    recorded: Track, replayed: Track, early_ns: int, late_ns: int, said: Callable[[str], str]
-) -> list[tuple[int, int]]:
-    """Return the places of messages that belong together, in order: each is used once.
+def _differences(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return which messages are equal, which differ by more than rounding, and by how much."""
+    same = (before == after) | (np.isnan(before) & np.isnan(after))
+    with np.errstate(invalid='ignore'):
+        apart = np.nan_to_num(np.abs(before - after), nan=math.inf, posinf=math.inf)
+    apart[same] = 0.0
+    far = apart > ROUNDING * np.maximum(1.0, np.abs(np.nan_to_num(before)))
+    return same.all(axis=1), far.any(axis=1), float(apart.max(initial=0.0))
 
-    Of several that fit, the nearest one is taken, or of texts the first that says the same.
+
+def _pairs(
+    recorded: Track, replayed: Track, early_ns: int, late_ns: int, content: Callable[[str], str]
+) -> list[tuple[int, int]]:
+    """Return the indices of matched messages, in order; each message is used once.
+
+    Of several numbers that match, the nearest is taken; of several texts, the first that is equal
+    or, if none is equal, the first.
     """
     rows = sorted(range(len(recorded)), key=recorded.keys.__getitem__)
     theirs = sorted(range(len(replayed)), key=replayed.keys.__getitem__)
@@ -234,8 +245,8 @@ def _pairs(
             ):
                 best += 1
         else:
-            text = said(recorded.texts[row])
-            while fits(best, key) and said(replayed.texts[theirs[best]]) != text:
+            text = content(recorded.texts[row])
+            while fits(best, key) and content(replayed.texts[theirs[best]]) != text:
                 best += 1
             best = best if fits(best, key) else at
         if fits(best, key):

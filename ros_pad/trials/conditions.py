@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Under what conditions a trial was walked: all that a reader needs to walk it again."""
+"""The conditions of a trial: everything that is needed to repeat it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import described
 from ros_pad.trials.trial import Trial
 
-# Units of what a scene and a foot are described by, by name; what has none is not listed.
+# Units of the values of a scene and a foot, by name; a value that is not listed has no unit.
 _UNITS = {
     'mass': 'kg', 'inertia': 'kg m²', 'height': 'm', 'homes': 'm', 'coxa': 'm', 'femur': 'm',
     'tibia': 'm', 'leg_stiffness': 'N/m', 'rolling_drag': 'N', 'load': 'N', 'goal': 'm',
@@ -29,7 +29,7 @@ _UNITS = {
     'pressure': 'Pa', 'ambient_pressure': 'Pa', 'capillary_force': 'N',
 }  # fmt: skip
 
-# What is told in a row of its own; all else of a scene goes into one row.
+# Parts of a scene that have a row of their own, with the name of this row.
 _PARTS = {
     'body': 'robot', 'gait': 'gait', 'foot': 'foot', 'floor': 'floor', 'tow': 'towed load',
     'sensors': 'sensors: rate, noise (standard deviation)', 'regulator': 'regulator and hose',
@@ -37,42 +37,44 @@ _PARTS = {
 
 
 def rows(trial: Trial) -> list[tuple[str, str]]:
-    """Return the conditions of a trial: what, and its values with units as text.
+    """Return the conditions of a trial: names, and values with units, as text.
 
-    ``settings['conditions']``, where a bag has it, is what `ros_pad.trials.label.described` said
-    when the trial was walked. Without it the shipped scene of the same name is told, if it agrees
-    with what the bag does say; the first row says so.
+    The values come from ``settings['conditions']``, which `ros_pad.trials.label.described` made
+    when the trial ran or, without it, from the shipped scene of the same name if that scene agrees
+    with the bag. The first row names the source.
     """
     settings = trial.settings
-    said, source = settings.get('conditions'), 'as recorded with the trial'
-    if not isinstance(said, Mapping):
-        said, source = _shipped(trial)
+    recorded, source = settings.get('conditions'), 'as recorded with the trial'
+    if not isinstance(recorded, Mapping):
+        recorded, source = _shipped(trial)
     found = [('conditions', source)]
     if trial.scene:
-        found.append(('scene', _scene_words(trial, said)))
+        found.append(('scene', _scene_words(trial, recorded)))
     found.append(('policy', trial.policy or 'not on record'))
     if trial.scene:
         found.append(('seed of floor and noise', str(trial.seed)))
     if trial.fidelity:
         found.append(('simulation', trial.fidelity))
     for key, name in _PARTS.items():
-        if key in said:
-            text = _listed(said[key])
+        if key in recorded:
+            text = _listed(recorded[key])
             if key == 'body':
-                text = f'{said.get("robot", "robot")}: {text}'
-                text += f', steering {said.get("heading_gain", 0.0):g} 1/s'
+                text = f'{recorded.get("robot", "robot")}: {text}'
+                text += f', steering {recorded.get("heading_gain", 0.0):g} 1/s'
             found.append((name, text))
         elif key == 'foot' and settings.get('foot'):
             found.append((name, str(settings['foot'])))
-    if said.get('dome_pressure'):
-        found.append(('pressure of a dome', f'{said["dome_pressure"]:g} Pa gauge, fixed'))
-    elif said:
+    if recorded.get('dome_pressure'):
+        found.append(('pressure of a dome', f'{recorded["dome_pressure"]:g} Pa gauge, fixed'))
+    elif recorded:
         found.append(('pressure of a dome', 'from the load and the measured force limit'))
-    # Simulated trials have the one that their bags are written with.
-    ambient = settings.get('ambient_pressure', AMBIENT_PRESSURE if trial.fidelity else None)
+    # Simulated trials run at the default ambient pressure.
+    ambient = settings.get(
+        'ambient_pressure', AMBIENT_PRESSURE.default if trial.fidelity else None
+    )
     if ambient is not None:
         found.append(('ambient pressure', f'{ambient:g} Pa'))
-    found.append(('faults on the schedule', '; '.join(settings.get('faults', ())) or 'none'))
+    found.append(('scheduled faults', '; '.join(settings.get('faults', ())) or 'none'))
     if 'recorded' in settings:
         found.append(('recorded', str(settings['recorded'])))
     versions = {'ros_pad': settings['version']} if 'version' in settings else {}
@@ -85,12 +87,12 @@ def rows(trial: Trial) -> list[tuple[str, str]]:
     )
     found.append(('git', str(settings.get('git') or 'not on record')))
     if again := repeated_by(trial):
-        found.append(('walked again by', again))
+        found.append(('command to repeat it', again))
     return found
 
 
 def repeated_by(trial: Trial) -> str | None:
-    """Return the command that walks a trial of a simulation again; None for a robot's."""
+    """Return the command that repeats a simulated trial; None without simulation or metrics."""
     own = trial.metrics
     if not trial.scene or not trial.fidelity or own is None:
         return None
@@ -105,13 +107,13 @@ def repeated_by(trial: Trial) -> str | None:
 
 
 def _shipped(trial: Trial) -> tuple[Mapping[str, Any], str]:
-    """Return the shipped scene of a trial's name, and where that comes from."""
+    """Return the values of the shipped scene of a trial, and a text that names their source."""
     if not trial.scene:
-        return {}, 'no scene is on record: what follows is all that the bag says'
+        return {}, 'no scene is on record: only the following conditions are known'
     try:
         scene = Scene.load(trial.scene)
     except ConfigError:
-        return {}, 'of the scene only its name is on record'
+        return {}, 'only the name of the scene is on record'
     recorded = trial.settings
     known = {
         'foot': scene.foot.source,
@@ -121,20 +123,20 @@ def _shipped(trial: Trial) -> tuple[Mapping[str, Any], str]:
         'settle_s': scene.settle,
     }
     if any(name in recorded and recorded[name] != each for name, each in known.items()):
-        return {}, 'of the scene only its name is on record; the shipped scene has changed since'
+        return {}, 'only the name of the scene is on record; the shipped scene has changed since'
     values = described(scene)
-    # Cycles may have been asked for at the command line.
+    # The command line may have set the cycles.
     del values['cycles']
     return (
         values,
-        'of the shipped scene of this name, which agrees with what the bag has on record',
+        'of the shipped scene of this name, which agrees with the settings in the bag',
     )
 
 
-def _scene_words(trial: Trial, said: Mapping[str, Any]) -> str:
+def _scene_words(trial: Trial, values: Mapping[str, Any]) -> str:
     words = [trial.scene]
-    if said.get('description'):
-        words.append(str(said['description']))
+    if values.get('description'):
+        words.append(str(values['description']))
     if trial.metrics is not None:
         words.append(f'{trial.metrics.cycles:.4g} gait cycles')
     return '; '.join(words)
@@ -149,7 +151,7 @@ def _items(values: Mapping[str, Any], of: str = '') -> Iterator[str]:
         words = f'{of}{name.replace("_", " ")}'
         if each is None or each == () or each == [] or name == 'homes':
             continue
-        if name in ('cell', 'wet_fraction', 'patch_length') and not each:  # of other floors
+        if name in ('cell', 'wet_fraction', 'patch_length') and not each:  # not used by this floor
             continue
         if isinstance(each, Mapping):
             yield from _items(each, f'{words} ')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag says of the trial in it, under one key of its ``custom_data``."""
+"""Write and read the custom data that describe a trial in its bag."""
 
 from __future__ import annotations
 
@@ -17,27 +17,32 @@ from importlib import metadata
 from typing import Any
 
 import ros_pad
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.configuration import Setting
+from ros_pad.simulation import fidelity as levels
+from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
 KEY = 'ros_pad'
-"""Of what a simulated trial was, and what came out."""
+"""Key of the conditions and results of a trial."""
 
 MADE_WITH = 'ros_pad_made_with'
-"""Of the versions of what made the bag."""
+"""Key of the versions of the software that made the bag."""
 
 PARAMETERS = 'ros_pad_parameters'
-"""Of the parameters of the nodes on the graph, by full name of the node."""
+"""Key of the parameters of all nodes on the ROS graph, by full name of the node."""
 
 CHANGES = 'ros_pad_parameter_changes'
-"""Of parameters that changed while it was recorded: log time in ns, node, name, new value."""
+"""Key of the parameters that changed while recording: log time in ns, node, name, new value."""
 
 LOST = 'ros_pad_lost'
-"""Of the numbers of messages that were lost on the way to the recorder, by topic."""
+"""Key of the number of messages on each topic that were lost before the recorder received them."""
 
-AMBIENT_PRESSURE = 101325.0  # Pa, that simulated trials add to gauge pressures
+AMBIENT_PRESSURE = Setting(
+    'ambient_pressure', ATMOSPHERE, 'Absolute pressure of the air around the robot.',
+    'Pa', 30000.0, 120000.0,
+)  # fmt: skip
 
 
 def label(
@@ -51,16 +56,16 @@ def label(
     real_time_factor: float | None = None,
     comparison: Sequence[dict[str, Any]] = (),
 ) -> dict[str, str]:
-    """Return the custom data of a trial's bag.
+    """Return the custom data of a trial's bag: JSON texts by key.
 
     Parameters
     ----------
     scene, policy, seed, fidelity
-        What was run.
+        The conditions of the trial.
     interrupted : bool
-        Whether it was cut short.
+        Whether the trial was stopped before its end.
     metrics, real_time_factor
-        What came out, once it is known.
+        Results of the trial; None before its end.
     comparison : sequence of dict
         Metrics of other policies on the same ground, each with its ``policy``.
     """
@@ -72,7 +77,7 @@ def label(
                 'seed': seed,
                 'fidelity': fidelity,
                 'floor': asdict(scene.floor),
-                'ambient_pressure': AMBIENT_PRESSURE,
+                'ambient_pressure': AMBIENT_PRESSURE.default,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,
                 'settings': settings(scene, policy, fidelity)
@@ -88,13 +93,13 @@ def label(
 
 @functools.cache
 def made_with() -> dict[str, str]:
-    """Return the versions of ros_pad and of what its numbers hang on, with the git description.
+    """Return the versions of ros_pad and of the libraries that its numbers depend on.
 
-    The latter, ``git``, is there only where ros_pad runs from a checkout of its repository.
+    The key ``git``, the description of the commit, exists only in a checkout of the repository.
     """
     versions = {'ros_pad': ros_pad.__version__}
     folder = pathlib.Path(ros_pad.__file__).parent
-    # Elsewhere, as in a venv inside somebody's repository, git would describe that one.
+    # In a venv inside another repository, git would describe that repository.
     ours = _git(folder, 'ls-files', '--error-unmatch', '__init__.py')
     if ours and (description := _git(folder, 'describe', '--always', '--dirty', '--tags')):
         versions['git'] = description
@@ -108,26 +113,26 @@ def made_with() -> dict[str, str]:
 
 
 def _git(folder: pathlib.Path, *words: str) -> str:
-    """Return what git says there; empty where it does not know, or is not there."""
+    """Return the output of git in a folder; empty where git fails or is not installed."""
     try:
-        said = subprocess.run(
+        done = subprocess.run(
             ['git', '-C', str(folder), *words], capture_output=True, text=True, timeout=5.0
         )
     except (OSError, subprocess.TimeoutExpired):
         return ''
-    return said.stdout.strip() if said.returncode == 0 else ''
+    return done.stdout.strip() if done.returncode == 0 else ''
 
 
 def promise(trial: Trial) -> str:
-    """Return in words how far the distance of a trial can be trusted."""
+    """Return a sentence about the accuracy of the distance of a trial."""
     if trial.metrics is not None and trial.metrics.verdict:
-        return f'the walk on {trial.fidelity} ended early, and nothing is promised for such walks'
+        return f'the walk on {trial.fidelity} ended early: its accuracy is unknown'
     return str(trial.settings['fidelity_note'])
 
 
 def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
-    """Return what a reader of a trial needs to know of its scene, and of the rung it ran on."""
-    choice = ladder.choose(scene, fidelity, policy)
+    """Return what pages and replays show of a trial's settings: scene, level and versions."""
+    choice = levels.choose(scene, fidelity, policy)
     return {
         'foot': scene.foot.source,
         'expected_load': scene.expected_load,
@@ -135,10 +140,10 @@ def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
         'cycle_s': scene.gait.cycle,
         'settle_s': scene.settle,
         'faults': [str(fault) for fault in scene.faults],
-        # JSON knows no infinity.
+        # JSON has no infinity.
         'fidelity_bound': choice.bound if choice.bound < math.inf else None,
         'fidelity_note': choice.note,
-        'omitted': [asdict(each) for each in ladder.omitted(scene, choice.rung, policy)],
+        'omitted': [asdict(each) for each in levels.omitted(scene, choice.level, policy)],
         'version': ros_pad.__version__,
         'versions': {name: each for name, each in made_with().items() if name != 'git'},
         'git': made_with().get('git'),
@@ -147,9 +152,9 @@ def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
 
 
 def described(scene: Scene) -> dict[str, Any]:
-    """Return a scene as plain values for JSON: nested as its YAML is, in SI units."""
+    """Return a scene as plain values for JSON, nested like its YAML, in SI units."""
     values: dict[str, Any] = asdict(scene)
-    # Tables that a foot keeps for speed follow from the rest.
+    # Leave out the tables of a foot, which are computed from its other values.
     values['foot'] = {
         name: each for name, each in values['foot'].items() if not name.startswith('_')
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collects the series of a trial as it runs."""
+"""Collect the series of a trial while it runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ros_pad.trials.trial import Trial
 
 
 class TrialLog:
-    """Appends rows while the loop runs; :meth:`finish` makes arrays of them.
+    """Collect rows while the loop runs; :meth:`finish` returns them as the arrays of a trial.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class TrialLog:
     policy : str
     seed : int
     fidelity : str
-        Rung that the trial runs on.
+        Fidelity level of the trial.
     """
 
     def __init__(self, scene: Scene, policy: str, seed: int, fidelity: str) -> None:
@@ -45,7 +45,7 @@ class TrialLog:
         self._rows: list[list[tuple[float, ...]]] = []
 
     def sample(self, time: float, body: Vector, readings: Sequence[tuple[Vector, Vector]]) -> None:
-        """Add what the sensors said at a time, s."""
+        """Add a sensor sample: time, s, body, and force, N, and position, m, of each foot."""
         self._time.append(time)
         self._body.append(body)
         for force, position in readings:
@@ -59,7 +59,7 @@ class TrialLog:
         estimates: Sequence[Estimate],
         controller: MorphologyController,
     ) -> None:
-        """Add what was known and commanded at a control step."""
+        """Add a control step: time, s, gauge pressures, Pa, estimates, and set-points."""
         self._slow_time.append(time)
         self._rows.append([
             (
@@ -85,7 +85,7 @@ class TrialLog:
         floor: Floor,
         real_time_factor: float | None,
     ) -> Trial:
-        """Return the trial."""
+        """Return the trial with its series, settings and metrics."""
         readings = np.array(self._readings).reshape(len(self._time), -1, 2, 3)
         slow = np.array(self._rows, dtype=float)
         trial = Trial(

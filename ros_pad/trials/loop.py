@@ -1,105 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed loop of a trial without ROS: robot, estimators, controller, regulators.
+"""The closed loop of a trial without ROS: a robot, and the three stages of each of its legs.
 
-The composed nodes make the same calls on the same objects in the same order; the order is written
-here once, in :meth:`ClosedLoop.tick`.
+The stages are estimation, decision and regulator. The loop only passes samples, pressures and
+set-points between them, in the same order as the composed nodes.
 """
 
 from __future__ import annotations
 
-import difflib
-import inspect
-import math
 import os
 import time
 from collections.abc import Callable
 from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Sequence
 from typing import Any
 
 from ros_pad.control import MorphologyController
-from ros_pad.control import adaptive
-from ros_pad.control import first_shapes
+from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
-from ros_pad.control.morphology import Policy
+from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
+from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import trouble_in
+from ros_pad.estimation.stage import EstimationStage
+from ros_pad.pace import CONTROL_PERIOD_NS
+from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
+from ros_pad.pace import Progress
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
-from ros_pad.simulation import fidelity as ladder
+from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
+from ros_pad.regulators.supervisor import SupervisedChannel
+from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
-from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.log import TrialLog
+from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.trial import Trial
-
-CONTROL_PERIOD_NS = 20_000_000  # 50 Hz: what a regulator on a serial line manages
-
-COMMAND_TIMEOUT_NS = 500_000_000  # without a command for so long, the regulator node vents a pad
-
-POLICY_PARAMETERS = tuple(inspect.signature(adaptive).parameters)
-"""Names of the parameters of the adaptive policy."""
-
-Progress = Callable[[float], None]
-
-
-def sample_period_ns(scene: Scene) -> int:
-    """Return the period of the sensors, ns."""
-    return round(1e9 / scene.sensors.rate)
-
-
-def tuning_for(scene: Scene) -> Tuning:
-    """Return what an estimator is told of a scene: its sensors, not its ground."""
-    sensors = scene.sensors
-    return Tuning(
-        position_noise=sensors.position, force_noise=sensors.force, moment_noise=sensors.moment
-    )
-
-
-def adaptive_with(parameters: Mapping[str, Any]) -> Policy:
-    """Return the adaptive policy with parameters by name, see :func:`ros_pad.control.adaptive`.
-
-    Raises
-    ------
-    InvalidInput
-        For a parameter that it has not, or that is outside its range.
-    """
-    for name in parameters:
-        if name not in POLICY_PARAMETERS:
-            near = difflib.get_close_matches(name, POLICY_PARAMETERS, n=1)
-            hint = f' Did you mean {near[0]!r}?' if near else ''
-            raise InvalidInput(
-                f'the adaptive policy has no parameter {name!r}.{hint}'
-                f' Allowed: {", ".join(POLICY_PARAMETERS)}'
-            )
-    return adaptive(**parameters)
-
-
-def policy_for(policy: str, floor: Floor, parameters: Mapping[str, Any] | None = None) -> Policy:
-    """Return a policy on a floor, which an oracle sees; parameters are for ``adaptive`` alone.
-
-    Raises
-    ------
-    InvalidInput
-        For an unknown policy, or a parameter that is unknown or outside its range.
-    """
-    if not parameters:
-        return policy_named(policy, floor.wet)
-    if policy != 'adaptive':
-        raise InvalidInput(
-            f'policy = {policy!r} has no parameters, and {", ".join(parameters)} was given:'
-            ' only adaptive has'
-        )
-    return adaptive_with(parameters)
 
 
 def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:
-    """Return the simulated regulator of one foot of a scene, with its faults."""
+    """Return the simulated regulator of one foot of a scene, with the faults of its leg."""
     foot = scene.foot
     regulator = create(
         'simulated',
@@ -113,28 +57,106 @@ def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> S
     return regulator
 
 
+class LegStages:
+    """The stages of one leg, connected.
+
+    Attributes
+    ----------
+    estimation : EstimationStage
+    decision : DecisionStage
+    channel : SupervisedChannel
+    pressure : float
+        Gauge pressure that the regulator reported last, Pa.
+    """
+
+    def __init__(
+        self,
+        leg: int,
+        estimator: FootEstimator,
+        controller: MorphologyController,
+        channel: SupervisedChannel,
+        period_ns: int,
+    ) -> None:
+        self.channel = channel
+        self.decision = DecisionStage(controller, leg)
+        self.estimation = EstimationStage(
+            estimator, period_ns, self._take_estimate, self.decision.doubt, _ignore
+        )
+        self.pressure = 0.0
+        self._wetness: float | None = None  # P(wet) of the estimate that waits for a decision
+
+    def _take_estimate(self, stamp_ns: int, estimate: Estimate) -> None:
+        self._wetness = estimate.wet_probability
+
+    def tick(self, now_ns: int) -> None:
+        """Detect missing inputs; the loop calls this every ``pace.TICK_PERIOD_NS``."""
+        self.estimation.tick(now_ns)
+        self.decision.tick(now_ns * 1e-9)
+
+    def sample(self, stamp_ns: int, reading: Reading, moment: float | None) -> None:
+        """Pass a sample of the sensors to the stages."""
+        force, position = reading
+        self.estimation.wrench(stamp_ns, force, moment)
+        self.estimation.position(stamp_ns, position)
+        self.decision.load(force[2])
+        self.decision.position(position)
+
+    def report(self, now_ns: int) -> None:
+        """Read the pressure from the regulator, and pass it to estimation and decision."""
+        pressure = self.channel.read(now_ns)
+        if pressure is not None:
+            self.pressure = pressure
+            self.estimation.pressure(pressure)
+            self.decision.pressure(pressure)
+
+    def decide(self, now_ns: int) -> None:
+        """Pass a new estimate to the decision, and its set-point to the regulator."""
+        if self._wetness is None:
+            return
+        setpoint = self.decision.estimate(now_ns * 1e-9, self._wetness).setpoint
+        self._wetness = None
+        if setpoint is not None:
+            self.channel.command(setpoint, 0.0, now_ns)
+
+
+def _ignore(error: InvalidInput) -> None:
+    """Ignore a rejected sample: the stage reports repeated rejections as a doubt."""
+
+
 class ClosedLoop:
-    """Everything of a trial in one process, advanced sample by sample.
+    """Run everything of a trial in one process, sample by sample.
 
     Parameters
     ----------
     scene : Scene
-        What to walk on, with what.
+        Robot, floor, gait, sensors and faults.
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
     seed : int
-        Of floor and noise, 0 or more.
+        Seed of floor and noise, 0 or more.
     fidelity : str
-        ``auto`` or a rung of the ladder.
+        ``auto`` or a fidelity level.
     tuning : Tuning or None
-        Of the estimators; None is :func:`tuning_for` the scene.
+        Tuning of the estimators; None takes that of
+        :func:`ros_pad.trials.node_settings.tuning_for`.
     policy_parameters : mapping or None
-        See :func:`policy_for`.
+        See :func:`ros_pad.control.policy_named`.
+
+    Attributes
+    ----------
+    estimators : list of FootEstimator
+        One for each leg; see :meth:`connect`.
+    controller : MorphologyController
+    legs : list of LegStages
+    pads : list of float
+        True gauge pressures of the pads at the last control step, Pa.
 
     Raises
     ------
     InvalidInput
-        For an unknown policy or parameter, or a seed that is no whole number from 0.
+        For an unknown policy or parameter, or a seed that is not a whole number of at least 0.
+    TransportError
+        When a fault of the scene keeps a regulator from opening.
     """
 
     def __init__(
@@ -148,109 +170,107 @@ class ClosedLoop:
     ) -> None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
-        self.period_ns = sample_period_ns(scene)
+        self.period_ns = round(1e9 / scene.sensors.rate)
         self.floor = scene.floor.build(seed)
-        self.robot = ladder.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
+        self.robot = levels.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
         self.sensors = Sensors.of(scene, seed)
+        self._stamp_ns = 0
         tuning = tuning or tuning_for(scene)
-        self.estimators = [
-            FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs
-        ]
-        self.controller = MorphologyController(
+        estimators = [FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs]
+        controller = MorphologyController(
             scene.foot,
             scene.legs,
-            policy_for(policy, self.floor, policy_parameters),
+            policy_named(policy, self.floor.wet, policy_parameters),
             scene.expected_load,
-            start=first_shapes(policy, scene.legs),
+            start=first_morphologies(policy, scene.legs),
             fixed_pressure=scene.dome_pressure,
+            command_timeout=SUPERVISION.command_timeout,
         )
-        self._now = 0.0
-        self.regulators = [simulated_regulator(scene, leg, self._clock) for leg in scene.legs]
-        for leg, regulator in zip(scene.legs, self.regulators, strict=True):
+        self._regulators = [simulated_regulator(scene, leg, self._clock) for leg in scene.legs]
+        self._channels = [
+            SupervisedChannel(leg, regulator, SUPERVISION)
+            for leg, regulator in zip(scene.legs, self._regulators, strict=True)
+        ]
+        for channel in self._channels:
             try:
-                regulator.open()
+                channel.open()
             except TransportError as error:
-                raise TransportError(f'scene {scene.name!r}, leg {leg}: {error}') from error
-        self.pressures = [0.0] * len(scene.legs)  # as reported last
-        self.pads = [0.0] * len(scene.legs)  # as they are
-        self._commanded = [0] * len(scene.legs)  # when each last took a command, ns
-        self._unheard: set[int] = set()  # that took no command of late
-        self._legs = scene.legs
-        # Since the last control step: feet that bounce as the other tripod lands have not stepped.
-        self._heaviest = [-math.inf] * len(scene.legs)
-        self._pace = Pace(CONTROL_PERIOD_NS)
-        self._stamp_ns = 0
+                raise TransportError(
+                    f'scene {scene.name!r}, leg {channel.leg}: {error}'
+                ) from error
+            channel.activate(0)
+        self.pads = [0.0] * len(scene.legs)
+        self._tick_pace = Pace(TICK_PERIOD_NS)
+        self.connect(estimators, controller)
+
+    def connect(
+        self,
+        estimators: Sequence[FootEstimator] | None = None,
+        controller: MorphologyController | None = None,
+        period_ns: int = CONTROL_PERIOD_NS,
+    ) -> None:
+        """Build the stages of all legs, before the first :meth:`tick`.
+
+        Parameters
+        ----------
+        estimators : sequence of FootEstimator or None
+            One for each leg; None keeps the present ones.
+        controller : MorphologyController or None
+            None keeps the present one.
+        period_ns : int
+            Period of estimates, decisions and readings of the regulators, ns.
+        """
+        if estimators is not None:
+            self.estimators = list(estimators)
+        if controller is not None:
+            self.controller = controller
+        self._pace = Pace(period_ns)
+        self.legs = [
+            LegStages(channel.leg, estimator, self.controller, channel, period_ns)
+            for channel, estimator in zip(self._channels, self.estimators, strict=True)
+        ]
 
     def _clock(self) -> float:
-        return self._now
+        return self._stamp_ns * 1e-9
+
+    @property
+    def pressures(self) -> list[float]:
+        """Gauge pressures that the regulators reported last, Pa."""
+        return [leg.pressure for leg in self.legs]
 
     def tick(self, log: TrialLog) -> None:
-        """Advance by one sample.
+        """Advance by one sample, and log it.
 
-        The robot moves; each foot is estimated with the pressure it last reported; at control
-        steps the regulators report, the controller decides, and the regulators get its set-points.
-        A regulator that does not answer leaves its last report in force.
+        First the robot moves, and each foot is estimated with the last reported pressure. At
+        control steps the regulators then report, the controller decides, and the regulators
+        receive its set-points.
         """
         self._stamp_ns += self.period_ns
-        now = self._now = self._stamp_ns * 1e-9
-        self._vent_unheard()
+        now_ns, legs = self._stamp_ns, self.legs
+        for leg in legs:
+            leg.channel.tick(now_ns)
+        if self._tick_pace.due(now_ns):
+            for leg in legs:
+                leg.tick(now_ns)
         self.robot.step(self.pads)
         readings = self.sensors.read(self.robot)
         moments = self.sensors.read_moments(self.robot)
-        controller = self.controller
-        due = self._pace.due(self._stamp_ns)
-        estimates, heaviest = [], self._heaviest
-        for index in range(len(self._legs)):
-            force, position = readings[index]
-            heaviest[index] = max(heaviest[index], force[2])
-            estimates.append(
-                self.estimators[index].update(
-                    now, force, position, self.pressures[index], moments[index]
-                )
-            )
-        log.sample(now, self.robot.body, readings)
-        if due:
-            heard: list[float | None] = [None] * len(self.regulators)
-            for index, regulator in enumerate(self.regulators):
-                with suppress(TransportError):
-                    heard[index] = self.pressures[index] = regulator.read().pressure
-            self.pads = [regulator.pad_pressure for regulator in self.regulators]
-            for index, leg in enumerate(self._legs):
-                controller.doubt(leg, trouble_in(estimates[index].doubt))
-                controller.observe(leg, now, heard[index])
-                (_, _, load), position = readings[index]
-                wet = estimates[index].wet_probability
-                if not math.isfinite(load + wet + position[0] + position[1]):
-                    # No set-point follows from what is no number; the pad is vented in time.
-                    self._unheard.add(index)
-                    continue
-                self._command(index, controller.update(leg, heaviest[index], wet, position))
-            log.control(now, self.pressures, estimates, controller)
-            self._heaviest = [-math.inf] * len(heaviest)
-
-    def _command(self, index: int, setpoint: float) -> None:
-        try:
-            self.regulators[index].set_pressure(setpoint)
-        except TransportError:
-            self._unheard.add(index)
-        else:
-            self._unheard.discard(index)
-            self._commanded[index] = self._stamp_ns
-
-    def _vent_unheard(self) -> None:
-        """Vent, as soon as they answer again, pads that took no command for too long."""
-        for index in sorted(self._unheard):
-            if self._stamp_ns - self._commanded[index] > COMMAND_TIMEOUT_NS:
-                with suppress(TransportError):
-                    self.regulators[index].vent()
-                    self._unheard.discard(index)
+        for leg, reading, moment in zip(legs, readings, moments, strict=True):
+            leg.sample(now_ns, reading, moment)
+        log.sample(now_ns * 1e-9, self.robot.body, readings)
+        if self._pace.due(now_ns):
+            for leg in legs:
+                leg.report(now_ns)
+            self.pads = [regulator.pad_pressure for regulator in self._regulators]
+            for leg in legs:
+                leg.decide(now_ns)
+            estimates = [each.estimate for each in self.estimators]
+            log.control(now_ns * 1e-9, self.pressures, estimates, self.controller)
 
     def close(self) -> None:
         """Vent and close the regulators."""
-        for regulator in self.regulators:
-            with suppress(TransportError):
-                regulator.vent()
-            regulator.close()
+        for channel in self._channels:
+            channel.close('the trial ends')
 
 
 def run(
@@ -267,17 +287,17 @@ def run(
     Parameters
     ----------
     scene : Scene, str or path
-        A scene, the name of one, or a YAML file.
+        A scene, the name of a shipped scene, or the path of a YAML file.
     policy : str or None
-        ``flat``, ``dome``, ``adaptive`` or ``oracle``; None takes the scene's own.
+        ``flat``, ``dome``, ``adaptive`` or ``oracle``; None takes the policy of the scene.
     seed : int
-        Of floor and noise, 0 or more; the same seed gives the same trial.
+        Seed of floor and noise, 0 or more; the same seed gives the same trial.
     fidelity : str
-        ``auto`` or a rung of the ladder.
+        ``auto`` or a fidelity level.
     progress : callable or None
         Called now and then with the simulated time, s.
     tuning : Tuning or None
-        Of the estimators; None is :func:`tuning_for` the scene, what they are told of its sensors.
+        Tuning of the estimators; None takes that for the scene's sensors.
     policy_parameters : mapping or None
         Parameters of :func:`ros_pad.control.adaptive`, by name.
 
@@ -289,14 +309,16 @@ def run(
     Raises
     ------
     ConfigError, InvalidInput
-        Naming what is wrong with scene, policy, seed or fidelity.
+        When scene, policy, its parameters, seed or fidelity is not allowed.
+    TransportError
+        When a fault of the scene keeps a regulator from opening.
     """
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
-    rung = ladder.rung(scene, fidelity, policy)
-    loop = ClosedLoop(scene, policy, seed, rung, tuning, policy_parameters)
-    log = TrialLog(scene, policy, seed, rung)
+    level = levels.level(scene, fidelity, policy)
+    loop = ClosedLoop(scene, policy, seed, level, tuning, policy_parameters)
+    log = TrialLog(scene, policy, seed, level)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures that sum up a trial."""
+"""Metrics of a trial."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import asdict
 
 import numpy as np
 
+from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.control import MorphologyController
 from ros_pad.simulation.robot import Robot
 from ros_pad.simulation.scene import RailBody
@@ -14,7 +15,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
-LOAD_GATE = 0.3  # share of the expected load above which a foot counts as standing
+LOAD_GATE = 0.3  # share of the expected load above which a foot stands
 
 
 def summarise(
@@ -45,24 +46,27 @@ def summarise(
     )
 
 
-def time_to(trial: Trial, way: float, start: float) -> float | None:
-    """Return how long after ``start``, s, the body was ``way`` metres ahead; None if it never was.
+def time_to(trial: Trial, distance: float, start: float) -> float | None:
+    """Return the time, s, from ``start``, s, until x of the body reaches ``distance``, m.
 
-    Between samples the body is taken to move evenly.
+    The position is interpolated linearly between samples. None if the body does not get there.
     """
     ahead = trial.body[:, 0]
-    there = np.flatnonzero(ahead >= way)
+    there = np.flatnonzero(ahead >= distance)
     if not len(there):
         return None
     row = int(there[0])
     if row == 0:
         return 0.0
-    since = np.interp(way, ahead[row - 1 : row + 1], trial.time[row - 1 : row + 1])
+    since = np.interp(distance, ahead[row - 1 : row + 1], trial.time[row - 1 : row + 1])
     return float(since) - start
 
 
 def stance_ends(trial: Trial, load_gate: float) -> list[np.ndarray]:
-    """Return for each leg the rows of the slow series at which a stance has just ended."""
+    """Return for each leg the first row of the slow series after the end of each stance.
+
+    A foot stands with more than ``load_gate`` newtons.
+    """
     standing = trial.standing(load_gate)
     ends = []
     for column in range(len(trial.legs)):
@@ -73,16 +77,17 @@ def stance_ends(trial: Trial, load_gate: float) -> list[np.ndarray]:
 
 
 def wet_accuracy(trial: Trial, load_gate: float) -> float | None:
-    """Share of flat stances at whose end P(wet) is on the right side of one half.
+    """Return the share of flat stances at whose end P(wet) is on the correct side of 0.5.
 
-    Domed stances do not count: a dome cannot feel the difference. None without flat stances.
+    Domed stances do not count: the ground is unobservable there. None without flat stances, or
+    where the true floor is unknown.
     """
     if trial.floor is None:
         return None
     wet = trial.wet()
     right = total = 0
     for column, rows in enumerate(stance_ends(trial, load_gate)):
-        flat = rows[trial.pressure[np.maximum(rows - 1, 0), column] < 1000.0]
+        flat = rows[trial.pressure[np.maximum(rows - 1, 0), column] < DOME_PRESSURE]
         total += len(flat)
         before = np.maximum(flat - 1, 0)
         right += int(np.sum((trial.wet_probability[flat, column] > 0.5) == wet[before, column]))

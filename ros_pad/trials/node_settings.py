@@ -1,82 +1,115 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes of a bag were told, and what else they might have been told."""
+"""Settings of the nodes: take them from a scene or a bag, and change them."""
 
 from __future__ import annotations
 
 import difflib
 import json
-import math
 import os
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
-from dataclasses import fields
 from dataclasses import replace
+from typing import TYPE_CHECKING
 from typing import Any
 from typing import TypeAlias
 
-from ros_pad.contact.pad import number
+from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
+from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.control import MorphologyController
-from ros_pad.control import first_shapes
+from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
-from ros_pad.control.morphology import Policy
+from ros_pad.control.morphology import LIFT_OFF
+from ros_pad.control.morphology import MARGIN
+from ros_pad.control.policies import PREFIX
+from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
+from ros_pad.control.policies import Policy
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
+from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import Tuning
+from ros_pad.estimation.stage import PUBLISH_RATE
+from ros_pad.estimation.tuning import EXPECTED_LOAD
+from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
-from ros_pad.trials import loop
-from ros_pad.trials.bag import BagReader
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
 from ros_pad.trials.label import PARAMETERS
 
-SETTABLE = ('expected_load', 'dome_pressure', 'margin', 'ambient_pressure', 'publish_rate')
-"""What may be set by its own name: parameters of the estimator and controller nodes."""
+if TYPE_CHECKING:
+    from ros_pad.bags import BagReader
 
-ESTIMATOR, POLICY = 'estimator.', 'policy.'  # as in sweeps
+OWN = (
+    EXPECTED_LOAD,
+    Setting(
+        'dome_pressure', 0.0, 'Gauge pressure of every dome; 0 chooses it from the load.',
+        'Pa', 0.0, 1e6,
+    ),
+    MARGIN,
+    LIFT_OFF,
+    COMMAND_TIMEOUT,
+    AMBIENT_PRESSURE,
+    PUBLISH_RATE,
+)  # fmt: skip
+"""Settings that are single numbers in :class:`NodeSettings`."""
+
+_ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 
 Value: TypeAlias = 'float | int | bool | str'
 
 
+def tuning_for(scene: Scene) -> Tuning:
+    """Return the tuning of the estimators for the sensors of a scene, whatever its ground is."""
+    sensors = scene.sensors
+    return Tuning(
+        position_noise=sensors.position, force_noise=sensors.force, moment_noise=sensors.moment
+    )
+
+
 @dataclass(frozen=True)
-class Settings:
-    """What estimators and controller are told.
+class NodeSettings:
+    """Settings of estimators and controller.
 
     Attributes
     ----------
     foot : Foot
     expected_load : float
-        Normal force in stance, N.
+        Load of a foot in stance, N.
     tuning : Tuning
-        Of the estimators; a moment is used if its noise is above 0.
+        Tuning of the estimators; a yaw moment is used if its noise is above 0.
     policy : str
         ``flat``, ``dome``, ``adaptive`` or ``oracle``.
     policy_parameters : dict
-        Of the adaptive policy.
+        Parameters of the adaptive policy. Other policies have none, but the values are kept for a
+        later change to adaptive.
     dome_pressure : float
         Gauge pressure of every dome, Pa; 0 chooses it from the load.
     margin : float
-        Factor on the load, for the pressure of a dome.
+        Pressure margin: factor on the load when the pressure of a dome is chosen.
+    lift_off_share : float
+        Share of the expected load below which a foot has lifted off.
+    command_timeout : float
+        Time without a set-point after which a regulator vents its pad, s.
     ambient_pressure : float
-        Pa.
+        Absolute pressure around the robot, Pa.
     publish_rate : float
-        Estimates a second, Hz.
+        Rate of the estimates, Hz.
     floor : Floor or None
-        That an oracle sees.
+        True ground, which an oracle needs.
     scene : str
-        That was walked; empty where the bag does not say.
+        Name or path of the scene; empty where it is unknown.
     seed : int
-        Of floor and noise.
+        Seed of floor and noise.
     legs : tuple of int
-        That the robot had; empty where the bag does not say.
+        Numbers of the legs of the robot; empty where they are unknown.
     assumed : tuple of str
-        What the bag does not say, in words.
+        Assumptions in place of settings that the bag lacks, one sentence each.
     """
 
     foot: Foot
@@ -85,9 +118,11 @@ class Settings:
     policy: str
     policy_parameters: dict[str, Any] = field(default_factory=dict)
     dome_pressure: float = 0.0
-    margin: float = 1.2
-    ambient_pressure: float = AMBIENT_PRESSURE
-    publish_rate: float = 50.0
+    margin: float = MARGIN.default
+    lift_off_share: float = LIFT_OFF.default
+    command_timeout: float = COMMAND_TIMEOUT.default
+    ambient_pressure: float = AMBIENT_PRESSURE.default
+    publish_rate: float = PUBLISH_RATE.default
     floor: Floor | None = None
     scene: str = ''
     seed: int = 0
@@ -95,74 +130,47 @@ class Settings:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        number('expected_load', self.expected_load, 'N', above=True)
-        number('dome_pressure', self.dome_pressure, 'Pa')
-        number('ambient_pressure', self.ambient_pressure, 'Pa', 30000.0, 120000.0)
-        number('publish_rate', self.publish_rate, 'Hz', 5.0, 1000.0)
+        for setting in OWN:
+            setting.accept(getattr(self, setting.name))
 
     @classmethod
-    def of(cls, bag: BagReader) -> Settings:
-        """Return what the nodes of a bag were told, and the nodes' defaults where it is silent.
+    def of(cls, bag: BagReader) -> NodeSettings:
+        """Return the settings of the nodes of a bag, and defaults for those that it lacks.
 
-        The parameters of estimator and controller count where the bag has them, as those of
-        ros_pad's recorder do; else what it says of its scene.
+        They come from the recorded parameters of estimator and controller, as in bags of ros_pad's
+        recorder, or else from the scene that the bag names.
 
         Raises
         ------
         BagError
-            When the bag describes its trial in a way that nobody understands.
+            When the custom data of the bag are not those of ros_pad.
         ConfigError
-            When its foot is not here.
+            When the foot of the bag is not found.
         """
-        try:
-            said = json.loads(bag.custom_data.get(KEY, '{}'))
-            told = said.get('settings') or {}
-            load = float(told.get('expected_load', 6.83))
-            ambient = float(said.get('ambient_pressure', AMBIENT_PRESSURE))
-            policy = str(said.get('policy') or 'adaptive')
-            source, seed = str(said.get('scene') or ''), int(said.get('seed') or 0)
-            floor = FloorPlan(**said['floor']).build(seed) if said.get('floor') else None
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BagError(
-                f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
-            ) from error
-        settings = cls(
-            Foot.load(told.get('foot', 'large37')),
-            load,
-            Tuning(moment_noise=0.0),
-            policy,
-            ambient_pressure=ambient,
-            floor=floor,
-            scene=source,
-            seed=seed,
-        )
-        told_nodes = _told(bag)
-        if told_nodes:
+        label, settings = _of_label(bag)
+        parameters = _parameters(bag)
+        if parameters:
             try:
-                return _of_nodes(settings, *told_nodes)
+                return _of_nodes(settings, *parameters)
             except (KeyError, TypeError, ValueError) as error:
                 raise BagError(
-                    f'{bag.path}: custom data {PARAMETERS!r} lack parameters of ros_pad, or have'
-                    f' others: {error!r}'
+                    f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator'
+                    f' or controller is missing or not valid: {error!r}'
                 ) from error
-        if not said:
-            return replace(
-                settings,
-                assumed=(
-                    'the bag does not say what its nodes were told: foot large37, policy adaptive,'
-                    f' expected_load {load:g} N and the default noise are assumed',
-                ),
+        if not label:
+            assumed = (
+                'the bag lacks the settings of its nodes: foot large37, policy adaptive,'
+                f' expected_load {settings.expected_load:g} N and the default noise are assumed'
             )
+            return replace(settings, assumed=(assumed,))
         try:
-            scene = Scene.load(source)
+            scene = Scene.load(settings.scene)
         except ConfigError:
-            return replace(
-                settings,
-                assumed=(f'scene {source!r} of the bag is not here: default noise is assumed',),
-            )
+            assumed = f'scene {settings.scene!r} of the bag cannot be read: default noise is used'
+            return replace(settings, assumed=(assumed,))
         return replace(
             settings,
-            tuning=loop.tuning_for(scene),
+            tuning=tuning_for(scene),
             dome_pressure=scene.dome_pressure or 0.0,
             legs=tuple(scene.legs),
         )
@@ -172,31 +180,25 @@ class Settings:
         values: Mapping[str, Value] | None = None,
         policy: str | None = None,
         foot: str | os.PathLike[str] | None = None,
-    ) -> Settings:
-        """Return others.
+    ) -> NodeSettings:
+        """Return changed settings.
 
         Parameters
         ----------
         values : mapping or None
-            By name: one of :data:`SETTABLE`, ``estimator.`` and an attribute of
-            :class:`ros_pad.estimation.Tuning`, or ``policy.`` and a parameter of
-            :func:`ros_pad.control.adaptive`.
+            New values, by name of a parameter of the estimator or controller node.
         policy : str or None
-            How shapes are chosen.
+            Name of the policy; None keeps it.
         foot : str, path or None
-            A name in config/feet, or a YAML file.
+            A name in config/feet, or a YAML file; None keeps the foot.
 
         Raises
         ------
         ConfigError, InvalidInput
-            Naming the parameter, its value and what is allowed.
+            When a name or value is not allowed; the message names it, and what is allowed.
         """
         tuning, of_policy, own = {}, {}, {}
-        known = (
-            *SETTABLE,
-            *(ESTIMATOR + each.name for each in fields(Tuning)),
-            *(POLICY + name for name in loop.POLICY_PARAMETERS),
-        )
+        known = [*(each.name for each in (*OWN, *POLICY_SETTINGS)), *_ESTIMATOR]
         for name, value in (values or {}).items():
             if name not in known:
                 near = difflib.get_close_matches(name, known, n=1)
@@ -204,18 +206,21 @@ class Settings:
                 raise InvalidInput(
                     f'parameter {name!r} is unknown.{hint} Allowed: {", ".join(known)}'
                 )
-            if name.startswith(ESTIMATOR):
-                tuning[name.removeprefix(ESTIMATOR)] = value
-            elif name.startswith(POLICY):
-                of_policy[name.removeprefix(POLICY)] = value
+            if name in _ESTIMATOR:
+                tuning[_ESTIMATOR[name]] = value
+            elif name.startswith(PREFIX):
+                of_policy[name.removeprefix(PREFIX)] = value
             else:
                 own[name] = value
+        policy = policy or self.policy
         try:
+            if of_policy:
+                policy_named(policy, parameters=of_policy)  # raises unless policy is adaptive
             changes: dict[str, Any] = {
                 **own,
                 'tuning': replace(self.tuning, **tuning),  # type: ignore[arg-type]
-                'policy': policy or self.policy,
-                'policy_parameters': of_policy,
+                'policy': policy,
+                'policy_parameters': self.policy_parameters | of_policy,
             }
             if foot is not None:
                 changes['foot'] = Foot.load(foot)
@@ -227,37 +232,77 @@ class Settings:
             raise InvalidInput(f'{given}: {error}' if given else str(error)) from error
         return settings
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the values that :meth:`changed` can change, by the same names."""
+        return (
+            {each.name: getattr(self, each.name) for each in OWN}
+            | {name: getattr(self.tuning, place) for name, place in _ESTIMATOR.items()}
+            | {PREFIX + name: value for name, value in (self._of_policy() or {}).items()}
+        )
+
+    def _of_policy(self) -> dict[str, Any] | None:
+        return self.policy_parameters if self.policy == 'adaptive' else None
+
     def rules(self) -> Policy:
-        """Return the policy."""
-        if not self.policy_parameters:
-            return policy_named(self.policy, self.floor.wet if self.floor else None)
-        if self.policy != 'adaptive':
-            raise InvalidInput(f'policy = {self.policy!r} has no parameters: only adaptive has')
-        return loop.adaptive_with(self.policy_parameters)
+        """Return the policy with its parameters and, for an oracle, the true ground."""
+        is_wet = self.floor.wet if self.floor else None
+        return policy_named(self.policy, is_wet, self._of_policy())
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
-        """Return a controller that has not heard of anything yet."""
+        """Return a new controller of some legs."""
         return MorphologyController(
             self.foot,
             legs,
             self.rules(),
             self.expected_load,
-            start=first_shapes(self.policy, legs),
+            start=first_morphologies(self.policy, legs),
             margin=self.margin,
             fixed_pressure=self.dome_pressure or None,
+            lift_off_share=self.lift_off_share,
+            command_timeout=self.command_timeout,
         )
 
 
-def _told(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Return the parameters of estimator and controller; None unless the bag has one of each."""
+def _of_label(bag: BagReader) -> tuple[dict[str, Any], NodeSettings]:
+    """Return the description of the trial in a bag, and the settings that follow from it."""
+    try:
+        label = json.loads(bag.custom_data.get(KEY, '{}'))
+        recorded = label.get('settings') or {}
+        load = float(recorded.get('expected_load', EXPECTED_LOAD.default))
+        ambient = float(label.get('ambient_pressure', AMBIENT_PRESSURE.default))
+        policy = str(label.get('policy') or 'adaptive')
+        source, seed = str(label.get('scene') or ''), int(label.get('seed') or 0)
+        floor = FloorPlan(**label['floor']).build(seed) if label.get('floor') else None
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise BagError(
+            f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
+        ) from error
+    settings = NodeSettings(
+        Foot.load(recorded.get('foot', 'large37')),
+        load,
+        Tuning(),
+        policy,
+        ambient_pressure=ambient,
+        floor=floor,
+        scene=source,
+        seed=seed,
+    )
+    return label, settings
+
+
+def _parameters(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """Return the recorded parameters of estimator and controller.
+
+    None unless the bag has those of exactly one estimator and one controller.
+    """
     try:
         nodes = list(json.loads(bag.custom_data.get(PARAMETERS, '{}')).values())
-        # By what they have: their names may be others.
+        # Find the nodes by their parameters, because users may rename nodes.
         estimators = [each for each in nodes if {'wet_prior', 'force_range'} <= each.keys()]
         controllers = [each for each in nodes if {'policy', 'margin'} <= each.keys()]
     except (AttributeError, TypeError, ValueError) as error:
         raise BagError(
-            f'{bag.path}: custom data {PARAMETERS!r} are no parameters of nodes: {error}'
+            f'{bag.path}: custom data {PARAMETERS!r} do not list parameters of nodes: {error}'
         ) from error
     if len(estimators) == len(controllers) == 1:
         return estimators[0], controllers[0]
@@ -265,11 +310,20 @@ def _told(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:
 
 
 def _of_nodes(
-    settings: Settings, estimator: dict[str, Any], controller: dict[str, Any]
-) -> Settings:
-    """Return settings with what the nodes themselves were told."""
-    tuning = {each.name: estimator[each.name] for each in fields(Tuning) if each.name in estimator}
-    tuning['force_range'] = tuning['force_range'] or math.inf
+    settings: NodeSettings, estimator: dict[str, Any], controller: dict[str, Any]
+) -> NodeSettings:
+    """Return settings with the recorded parameters of the two nodes."""
+    tuning = {place: estimator[name] for name, place in _ESTIMATOR.items() if name in estimator}
+    of_policy = {
+        each.name.removeprefix(PREFIX): controller[each.name]
+        for each in POLICY_SETTINGS
+        if each.name in controller
+    }
+    # Bags of earlier versions lack some of these.
+    own = {
+        each.name: controller.get(each.name, each.default)
+        for each in (MARGIN, LIFT_OFF, COMMAND_TIMEOUT)
+    }
     floor, seed = settings.floor, settings.seed
     if floor is None and controller.get('scene'):
         seed = int(controller.get('seed', 0))
@@ -281,7 +335,8 @@ def _of_nodes(
         tuning=Tuning(**tuning),
         policy=str(controller['policy']),
         dome_pressure=float(controller['dome_pressure']),
-        margin=float(controller['margin']),
+        policy_parameters=of_policy,
+        **own,
         ambient_pressure=float(controller['ambient_pressure']),
         publish_rate=float(estimator['publish_rate']),
         floor=floor,

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Replay: what was recorded of feet, through estimators and controller once more.
+"""Replay: run the recorded inputs of feet through estimators and controller again.
 
-Wrenches, positions and pressures of a bag go through the objects that the nodes are made of, in
-the order in which they were recorded, and what comes out is compared with what was recorded. The
-bag of a trial in simulated time gives the same to the bit. Other parameters show what they would
-have changed in what was estimated and decided; the robot walks as it walked.
+The stages of the nodes receive the wrenches, positions and pressures of a bag in the order of
+recording, and their output is compared with the recorded one. For a trial in simulated time, the
+two are equal to the bit. With other parameters, a replay shows how estimates and decisions would
+have changed; the motion of the robot stays as recorded.
 """
 
 from __future__ import annotations
@@ -22,14 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
-from ros_pad.trials.bag import BagReader
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
-from ros_pad.trials.node_settings import ESTIMATOR
-from ros_pad.trials.node_settings import POLICY
-from ros_pad.trials.node_settings import SETTABLE
-from ros_pad.trials.node_settings import Settings
+from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
 from ros_pad.trials.replay_comparison import compare_topics
 from ros_pad.trials.replay_notes import notes_on
@@ -45,19 +42,19 @@ from ros_pad.trials.trial import BOUNCE
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a leg; of each pair the first is as recorded, None where nobody recorded it.
+    """Counts of a leg. Pairs are recorded (None if the topic was not recorded) and replayed.
 
     Attributes
     ----------
     leg : int
     stance_ends : int
-        Stances that ended.
+        Number of stances that ended in the replay.
     wet_ends : tuple
-        Stance ends at which P(wet) was above one half.
+        Number of stance ends at which P(wet) was above one half.
     slips : tuple
-        Alarms.
+        Number of slip alarms.
     switches : tuple
-        Changes of shape.
+        Number of changes of morphology.
     """
 
     leg: int
@@ -69,33 +66,34 @@ class Outcome:
 
 @dataclass
 class Replay:
-    """What a replay found.
+    """Result of a replay.
 
     Attributes
     ----------
     bag : str
-    settings : Settings
-        That it was done with.
+    settings : NodeSettings
+        Settings with which the bag was replayed.
     legs : tuple of int
     start_ns : int
-        When the bag begins.
+        Beginning of the bag, ns.
     duration_s : float
+        Duration of the bag, s.
     samples : dict
-        Samples that each leg's estimator took.
+        Number of samples that the estimator used, by leg.
     refused : dict
-        Samples of each leg that it refused, and why the last one.
+        Number of rejected samples, and the reason of the last one, by leg.
     recorded, replayed : dict
         A :class:`Track` by leg and kind.
     comparisons : list of Comparison
-        Of the topics that were recorded.
+        One for each recorded topic of estimates and decisions.
     outcomes : list of Outcome
-        Of the legs.
+        One for each leg.
     notes : list of str
-        What is to be known of the bag, in words.
+        Assumptions, gaps and other remarks, one sentence each.
     """
 
     bag: str
-    settings: Settings
+    settings: NodeSettings
     legs: tuple[int, ...]
     start_ns: int
     duration_s: float
@@ -109,9 +107,9 @@ class Replay:
 
     @property
     def verdict(self) -> str:
-        """The worst of its comparisons, or ``nothing`` where nothing was recorded to compare.
+        """The worst verdict of the comparisons, or ``nothing`` if there was nothing to compare.
 
-        See :class:`Comparison`.
+        See :attr:`Comparison.verdict`.
         """
         verdicts = {each.verdict for each in self.comparisons if each.recorded}
         for worst in ('different', 'gap', 'rounding', 'equal'):
@@ -130,12 +128,7 @@ class Replay:
             'settings': {
                 'foot': settings.foot.source,
                 'policy': settings.policy,
-                **{name: getattr(settings, name) for name in SETTABLE},
-                **{
-                    ESTIMATOR + name: value if math.isfinite(value) else None
-                    for name, value in asdict(settings.tuning).items()
-                },
-                **{POLICY + name: each for name, each in settings.policy_parameters.items()},
+                **settings.as_dict(),
             },
             'samples': self.samples,
             'refused': {leg: count for leg, (count, _) in self.refused.items()},
@@ -148,24 +141,24 @@ class Replay:
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    # JSON knows no infinity.
+    # JSON has no infinity.
     return {n: None if value == math.inf else value for n, value in values.items()}
 
 
 def open_bag(path: str | os.PathLike[str]) -> BagReader:
-    """Open a bag; one in SQLite is refused with the way to convert it.
+    """Open a bag; for an SQLite bag, the error message has the command that converts it.
 
     Raises
     ------
     BagError
-        As :class:`ros_pad.trials.bag.BagReader`, and for ``.db3``.
+        When :class:`ros_pad.bags.BagReader` raises it, and for an SQLite bag (``.db3``).
     """
     path = pathlib.Path(path)
     if path.suffix == '.db3' or (path.is_dir() and list(path.glob('*.db3*'))):
         bag = path.parent if path.suffix == '.db3' else path
         raise BagError(
-            f'{path}: is an SQLite bag (.db3), and only MCAP is read. Convert it:'
-            f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml says'
+            f'{path} is an SQLite bag (.db3), and only MCAP can be read. Convert it:'
+            f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml has'
             f" 'output_bags: [{{uri: {bag}_mcap, storage_id: mcap, all: true}}]'"
         )
     return BagReader(path)
@@ -173,7 +166,7 @@ def open_bag(path: str | os.PathLike[str]) -> BagReader:
 
 def replay(
     bag: BagReader,
-    settings: Settings | None = None,
+    settings: NodeSettings | None = None,
     namespace: str | None = None,
     remaps: Mapping[str, str] | None = None,
     progress: Progress | None = None,
@@ -184,23 +177,25 @@ def replay(
     ----------
     bag : BagReader
         What was recorded.
-    settings : Settings or None
-        None is what the bag says: ``Settings.of(bag)``.
+    settings : NodeSettings or None
+        Settings of estimators and controller; None takes those of the bag:
+        ``NodeSettings.of(bag)``.
     namespace : str or None
-        Of the robot, such as ``/robot_1``; None takes the only one.
+        Namespace of the robot, such as ``/robot_1``; None takes the only one.
     remaps : mapping or None
-        Topic of the bag by its name in ros_pad, as ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``.
+        Topic of the bag, by its name in ros_pad: ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
 
     Raises
     ------
     BagError
-        When there is no wrench of any leg, or a topic has another message type.
+        When there is no wrench of any leg, a topic has another message type than in ros_pad, or
+        the bag has several robots and no namespace is given.
     InvalidInput
-        For a remap that fits nothing.
+        When a remap is not allowed, see :func:`ros_pad.trials.recorded.wanted_topics`.
     """
-    settings = settings or Settings.of(bag)
+    settings = settings or NodeSettings.of(bag)
     wanted = {
         topic: key
         for topic, key in wanted_topics(bag, namespace, remaps).items()
@@ -210,23 +205,23 @@ def replay(
     legs = tuple(sorted(leg for leg, kind in there if kind == 'wrench'))
     if not legs:
         raise BagError(
-            f'{bag.path}: has no wrench of a leg to replay, its topics are'
-            f' {", ".join(sorted(bag.topics))}: name the wrenches with a remap'
+            f'{bag.path}: no wrench of a leg was recorded; the topics are'
+            f' {", ".join(sorted(bag.topics))}. If one has wrenches, name it with a remap'
         )
-    # The order of the legs about the body, as the controller of the bag had it.
+    # Keep the order of the legs in the controller of the bag, around the body.
     legs = tuple(leg for leg in settings.legs if leg in legs) + tuple(
         leg for leg in legs if leg not in settings.legs
     )
     found = _once(bag, settings, wanted, legs, {}, progress)
     late = {leg: stamp_ns for leg in legs if (stamp_ns := _beginning(found, leg)) is not None}
     if late and found.verdict in ('different', 'gap'):
-        # The recorder may have lost the first estimates, or heard of the feet before the
-        # estimator did: what it says then tells.
+        # The first estimates are not in the bag, because the recorder lost them or because the
+        # estimator started later than the recorder. Replay both ways, and take the better match.
         other = _once(bag, settings, wanted, legs, late, progress)
         if _agreeing(other) > _agreeing(found):
             other.notes.append(
-                f'leg {", ".join(map(str, late))}: the estimator heard of it later than the'
-                ' recorder, and so does the replay'
+                f'leg {", ".join(map(str, late))}: the estimator started later than the recorder,'
+                ' so the replay leaves out the samples before its first recorded estimate'
             )
             return other
     return found
@@ -244,13 +239,13 @@ def _agreeing(found: Replay) -> int:
 
 def _once(
     bag: BagReader,
-    settings: Settings,
+    settings: NodeSettings,
     wanted: Mapping[str, tuple[int, str]],
     legs: Sequence[int],
     beginnings: Mapping[int, int],
     progress: Progress | None,
 ) -> Replay:
-    """Replay a bag whose estimators hear of some legs from a time stamp on, ns."""
+    """Replay a bag once; ``beginnings``: stamp of the first sample to use, ns, of some legs."""
     there = {key: topic for topic, key in wanted.items()}
     player = play(bag, settings, wanted, legs, beginnings, progress)
     comparisons = compare_topics(bag, player, there, settings)
@@ -260,9 +255,11 @@ def _once(
         legs=tuple(legs),
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
-        samples={leg: each.foot.samples for leg, each in player.legs.items()},
+        samples={leg: each.estimation.samples for leg, each in player.legs.items()},
         refused={
-            leg: (each.refused, each.refusal) for leg, each in player.legs.items() if each.refused
+            leg: (each.rejected, each.rejection)
+            for leg, each in player.legs.items()
+            if each.rejected
         },
         recorded=player.recorded,
         replayed=player.replayed,
@@ -272,15 +269,15 @@ def _once(
     )
 
 
-def _outcome(player: Player, leg: int, settings: Settings) -> Outcome:
-    felt = player.legs[leg]
+def _outcome(player: Player, leg: int, settings: NodeSettings) -> Outcome:
+    replayed = player.legs[leg]
     ends = [
         end
-        for end, landing in _with_next(felt.lift_offs, felt.landings)
+        for end, landing in _with_next(replayed.lift_offs, replayed.landings)
         if landing is None or landing - end >= BOUNCE * 1e9
     ]
-    # What is believed of the last stance has been told by then, and does not change in the air.
-    told_ns = round(2e9 / settings.publish_rate)
+    # After this delay the estimate of the stance is published; it is constant in the air.
+    delay_ns = round(2e9 / settings.publish_rate)
 
     def pair(kind: str, count: Callable[[Track], int]) -> tuple[int | None, int]:
         track = player.recorded[leg, kind]
@@ -290,7 +287,7 @@ def _outcome(player: Player, leg: int, settings: Settings) -> Outcome:
         leg=leg,
         stance_ends=len(ends),
         wet_ends=pair(
-            'wetness', lambda track: sum((track.at(end + told_ns) or 0.0) > 0.5 for end in ends)
+            'wetness', lambda track: sum((track.at(end + delay_ns) or 0.0) > 0.5 for end in ends)
         ),
         slips=pair(
             'slipping', lambda track: int(np.sum(np.diff(track.values[:, 0], prepend=0) > 0))
@@ -302,7 +299,7 @@ def _outcome(player: Player, leg: int, settings: Settings) -> Outcome:
 def _with_next(
     lift_offs: Sequence[int], landings: Sequence[int]
 ) -> Iterator[tuple[int, int | None]]:
-    """Yield each lift-off with the landing after it."""
+    """Yield each lift-off with the landing after it, or None after the last landing."""
     for end in lift_offs:
         place = int(np.searchsorted(landings, end))
         yield end, landings[place] if place < len(landings) else None

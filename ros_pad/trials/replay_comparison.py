@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All topics of a replay against what was recorded, and since when more may have been heard.
+"""Compare all topics of a replay with the recorded ones, and find gaps of the recording.
 
-:mod:`ros_pad.trials.comparison` compares one topic; here its messages are matched, and said from
-where on the nodes may have heard what the bag lacks, so that what differs then is no surprise.
+:mod:`ros_pad.trials.comparison` compares one topic; this module chooses the keys by which its
+messages are matched. In a gap, the nodes may have received messages that the bag lacks, so that
+differences after the first gap are excused.
 """
 
 from __future__ import annotations
@@ -12,46 +13,46 @@ from dataclasses import replace
 
 import numpy as np
 
-from ros_pad.estimation.listening import LISTEN_PERIOD_NS
-from ros_pad.trials.bag import BagReader
+from ros_pad.bags import BagReader
+from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
-from ros_pad.trials.node_settings import Settings
+from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay_player import DECISIONS
 from ros_pad.trials.replay_player import ESTIMATES
 from ros_pad.trials.replay_player import TEXTS
-from ros_pad.trials.replay_player import Leg
 from ros_pad.trials.replay_player import Player
+from ros_pad.trials.replay_player import ReplayedLeg
 
 LONGER = 1.6
-"""Times the usual one, a time between two messages is a gap: one may be lost."""
+"""A time between two messages that is longer than their median time by this factor is a gap."""
 
 EARLY_NS = 20_000_000
-"""By which a text may be in a bag before the estimate that it was told with, ns."""
+"""Longest time by which a text may be recorded before the estimate of the same sample, ns."""
 
 
 def compare_topics(
     bag: BagReader,
     player: Player,
     there: Mapping[tuple[int, str], str],
-    settings: Settings,
+    settings: NodeSettings,
 ) -> list[Comparison]:
-    """Compare every topic of the replayed legs that was recorded.
+    """Compare every recorded topic of estimates and decisions of the replayed legs.
 
     Parameters
     ----------
     bag : BagReader
-        What was played.
+        Bag that was played.
     player : Player
-        After it.
+        Player that has played the bag.
     there : mapping
         Topic of the bag by leg and kind.
-    settings : Settings
-        That it was played with.
+    settings : NodeSettings
+        Settings of the replay.
     """
     gaps = {leg: gap[0] for leg, each in player.legs.items() if (gap := first_gap(each))}
-    # Legs know of one another by what the controller decides.
+    # The controller's decision for one leg depends on the inputs of all legs.
     of_all = min(gaps.values(), default=None)
     if absent(player, there, settings):
         of_all = -1
@@ -66,19 +67,24 @@ def compare_topics(
             found.append(
                 compare(
                     there[leg, kind], leg, kind, one, other, bag.start, period_ns, gap_ns,
-                    0 if player.clocked else 2 * LISTEN_PERIOD_NS,
+                    0 if player.clocked else 2 * TICK_PERIOD_NS,
                 )
             )  # fmt: skip
     return found
 
 
-def absent(player: Player, there: Mapping[tuple[int, str], str], settings: Settings) -> list[int]:
-    """Return the legs that the robot had, and that cannot be replayed."""
+def absent(
+    player: Player, there: Mapping[tuple[int, str], str], settings: NodeSettings
+) -> list[int]:
+    """Return the legs of the robot that cannot be replayed."""
     return sorted(({*settings.legs} | {leg for leg, _ in there}) - set(player.legs))
 
 
-def first_gap(leg: Leg) -> tuple[int, str] | None:
-    """Return since when, ns, nodes may have heard more of a leg than was recorded, and of what."""
+def first_gap(leg: ReplayedLeg) -> tuple[int, str] | None:
+    """Return the log time of the first gap in the inputs of a leg, ns, and a text that names it.
+
+    The time is -1 if positions or pressures are missing altogether. None without a gap.
+    """
     found = []
     for kind, (stamps, times) in leg.inputs.items():
         if not len(stamps):
@@ -95,22 +101,22 @@ def first_gap(leg: Leg) -> tuple[int, str] | None:
 
 
 def _matched(player: Player, leg: int, kind: str) -> tuple[Track, Track]:
-    """Return the tracks of a topic with keys by which their messages find one another.
+    """Return the recorded and the replayed track of a topic, with keys that match their messages.
 
-    All that an estimator says of a moment is sent together, and only slip has a stamp. Where
-    as many messages of another kind were recorded, they belong together one by one; otherwise
-    the times have to do.
+    The topics of one estimate are published together, and only slip has a stamp. A topic with as
+    many messages as slip takes the stamps of slip as keys; otherwise the keys are log times.
     """
     recorded, replayed = player.recorded, player.replayed
     one, other, stamped = recorded[leg, kind], replayed[leg, kind], recorded[leg, 'slip']
     if kind == 'slip':
         return one, other
     if kind in TEXTS:
-        # How long nodes had been waiting for the first sample, their clock alone says.
+        # Without /clock the bag does not show how long the nodes waited for the first sample:
+        # leave out the texts before the first estimate.
         if player.clocked or not len(stamped):
             return one, other
-        told = replayed[leg, 'slip'].times
-        return one.since(stamped.times[0] - EARLY_NS), other.since(told[0] if len(told) else 0)
+        times = replayed[leg, 'slip'].times
+        return one.since(stamped.times[0] - EARLY_NS), other.since(times[0] if len(times) else 0)
     if len(one) == len(stamped) and len(other) == len(replayed[leg, 'slip']):
         return replace(one, keys=stamped.keys), other
     return one, replace(other, keys=other.times)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a trial leaves: its time series and its metrics, whoever ran it."""
+"""The result of a trial, simulated or recorded: its time series and its metrics."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from dataclasses import dataclass
@@ -14,51 +13,52 @@ import numpy as np
 
 from ros_pad.simulation.terrain import Floor
 
-BOUNCE = 0.03  # s without load that end no stance
+BOUNCE = 0.03  # s; a stance does not end if a foot is without load for less than this
 
-DOME_PRESSURE = 1000.0  # Pa gauge above which a pad is no longer flat
 
-OFTEN = 3  # faults of one kind on one leg that are each told of
+OFTEN = 3  # up to so many faults of one kind on one leg are listed one by one
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """Figures of a trial. Lists of numbers have one entry for each leg.
+    """Metrics of a trial. Lists of numbers have one entry for each leg.
 
     Attributes
     ----------
     distance_m : float
-        Advance of the body along x.
+        Distance of the body along x.
     duration_s : float
-        Simulated time.
+        Simulated time, including the time before the first step.
     cycles : float
         Gait cycles walked.
     distance_per_cycle_m : float
+        Mean distance of the body along x in a gait cycle.
     slip_path_m : list of float
-        Way that each foot slid under load.
+        Length of all slip of each foot.
     lateral_drift_m, yaw_drift_rad : float
-        Of the body at the end.
+        Sideways position and heading of the body at the end.
     dissipation_j : float
-        Work lost in feet that slip or turn.
+        Work lost in feet that slip or rotate.
     switches : list of int
-        Changes of shape.
+        Number of switches of each foot.
     overload_s : list of float
-        Time that inflated domes were past their force limit.
-    wet_accuracy : float
-        Share of flat stances of loaded feet at whose end P(wet) was on the right side of one half.
+        Time for which each foot was a dome above its force limit.
+    wet_accuracy : float or None
+        Share of flat stances at whose end P(wet) was on the correct side of 0.5; None without
+        flat stances.
     verdict : str or None
-        Why the walk is not valid.
+        Why the walk ended early and is not valid; None for a valid walk.
     refusals : list of str
-        Why feet that should have been domes stayed flat at the end; empty when all went well.
+        Why feet that should be domes were flat at the end; empty if there are none.
     faults : list of dict
-        What the controller found wrong with legs: ``leg``, ``start`` and ``end``, s (None while it
-        lasts), and ``reason``.
+        Faults of legs that the controller found: ``leg``, ``start``, ``end`` (s; None for a fault
+        that lasts to the end) and ``reason``.
     underpressure : list of int
-        How often each foot came down as a dome with less pressure than its load needs.
+        Number of touch-downs of each foot as a dome with less pressure than its load needs.
     goal_m : float or None
-        Way to the goal, on a rail that has one.
+        Distance to the goal; None for a scene without a goal.
     time_to_goal_s : float or None
-        From the first step until the body is there; None if it did not get there.
+        Time from the first step to the goal; None if the body did not reach it.
     """
 
     distance_m: float
@@ -84,10 +84,10 @@ class Metrics:
         return asdict(self)
 
 
-def told(faults: Iterable[dict[str, Any]]) -> list[str]:
-    """Return in words what a controller found wrong with legs, see ``Metrics.faults``.
+def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
+    """Describe faults of legs, one line each, see ``Metrics.faults``.
 
-    What came and went more than :data:`OFTEN` times on a leg is told once.
+    If a kind of fault occurred more than :data:`OFTEN` times on a leg, one line describes all.
     """
     alike: dict[tuple[int, str], list[dict[str, Any]]] = {}
     for fault in faults:
@@ -116,7 +116,7 @@ class Trial:
     """Time series and metrics of one trial.
 
     Fast series (``time``) have one row for each sensor sample, slow series (``slow_time``) one for
-    each control step; columns are legs, in the order of ``legs``. NaN where nothing is known.
+    each control step; columns are legs, in the order of ``legs``. Unknown values are NaN.
 
     Attributes
     ----------
@@ -124,30 +124,30 @@ class Trial:
     seed : int
     legs : tuple of int
     time : ndarray (n,)
-        s.
+        Time of each sensor sample, s.
     body : ndarray (n, 3)
-        x, y, m, and heading, rad.
+        Position x and y, m, and heading, rad.
     force, position : ndarray (n, legs, 3)
-        As measured, N and m.
+        Measured force of the ground, N, and position of each foot, m.
     slow_time : ndarray (m,)
-        s.
+        Time of each control step, s.
     pressure, setpoint : ndarray (m, legs)
-        Gauge, Pa.
+        Gauge pressure and set-point, Pa.
     wet_probability, friction, margin, slip_speed : ndarray (m, legs)
-        As estimated.
+        Estimates of P(wet), μ, friction margin and slip speed, m/s.
     slipping, dome : ndarray of bool (m, legs)
-        Alarm, and shape chosen.
+        Slip alarm, and whether the chosen morphology is dome.
     doubt : ndarray of int (m, legs)
-        Why a foot could not know the ground, as a place in :data:`ros_pad.estimation.DOUBTS`; 0
-        where it knew, -1 where nothing is known. No rows where nobody said.
+        Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
+        was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
     floor : Floor or None
-        The true floor, where there is one.
+        The true floor; None where it is unknown.
     metrics : Metrics or None
-        None where the truth is not known, as for a robot's bag.
+        None where the true floor is unknown, as for a robot's bag.
     settings : dict
-        Foot, gait and whatever else was recorded of the set-up.
+        Foot, gait and other recorded settings.
     real_time_factor : float or None
-        Simulated over wall time.
+        Simulated time over computing time; None where it is not on record.
     """
 
     scene: str
@@ -175,10 +175,9 @@ class Trial:
     doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=int))
 
     def standing(self, load_gate: float) -> np.ndarray:
-        """Whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).
+        """Return whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).
 
-        A foot that is without load for less than ``BOUNCE``, as when the other tripod lands, has
-        not stepped: it stands all the while.
+        A foot that bounces, without load for less than ``BOUNCE``, still stands.
         """
         loaded = self.force[:, :, 2] > load_gate
         time = self.time[:, None]
@@ -187,12 +186,17 @@ class Trial:
         return until - since < BOUNCE
 
     def wet(self) -> np.ndarray:
-        """Whether the true ground below each foot is wet at each control step: (m, legs) bool.
+        """Return whether the true ground below each foot is wet at each control step (m, legs).
 
-        False where the position of a foot is not known.
+        False where the position of a foot is unknown.
+
+        Raises
+        ------
+        ValueError
+            When the true floor is unknown.
         """
         if self.floor is None:
-            raise ValueError('the floor of this trial is not known')
+            raise ValueError('floor = None: the true ground of this trial is not on record')
         if not len(self.time):
             return np.zeros((len(self.slow_time), len(self.legs)), dtype=bool)
         rows = np.clip(np.searchsorted(self.time, self.slow_time - 1e-9), 0, len(self.time) - 1)
@@ -200,17 +204,3 @@ class Trial:
         known = np.isfinite(places).all(axis=2)
         places = np.where(known[:, :, None], places, 0.0)
         return known & self.floor.wet_along(places[:, :, 0], places[:, :, 1])
-
-    def to_json(self) -> str:
-        """Return metrics and set-up as JSON text."""
-        return json.dumps(
-            {
-                'scene': self.scene,
-                'policy': self.policy,
-                'seed': self.seed,
-                'fidelity': self.fidelity,
-                'legs': list(self.legs),
-                'metrics': self.metrics.as_dict() if self.metrics else None,
-                'settings': self.settings,
-            }
-        )

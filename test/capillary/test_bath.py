@@ -14,6 +14,9 @@ from ros_pad.contact.meniscus import Liquid
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
+# The quick tests of liquid are those of surfaces and meshes.
+pytestmark = pytest.mark.slow
+
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 DOMES = json.loads((REFERENCE / 'wet_dome_layers.json').read_text())['rows']
 FIBRES = json.loads((REFERENCE / 'fibre_meniscus.json').read_text())['rows']
@@ -37,7 +40,10 @@ def test_dome_of_the_reference_table(row):
 
 
 def runs_under(found, shift):
-    """Return whether the surface, started higher by a share, dives below the bath."""
+    """Return whether the surface falls below the bath if it starts higher by the share ``shift``.
+
+    It is integrated outward from the contact line.
+    """
 
     def rates(_, y):
         r, z, psi = y
@@ -75,7 +81,7 @@ def runs_under(found, shift):
     ],
 )
 def test_surface_ends_in_the_bath_at_the_contact_angle(wall, degrees):
-    """Outwards in arc length, which the method never goes, it has to meet the bath."""
+    """Integrated outward in arc length, unlike in the method, the surface meets the bath."""
     found = rise(wall, degrees)
     assert found.status == 'ok' and found.height > 0.01
     assert runs_under(found, -1e-7) and not runs_under(found, 1e-7)
@@ -93,7 +99,7 @@ def test_dome_geometry_at_the_contact_line():
 
 
 def test_force_is_pull_and_suction():
-    """Over the wall of a cone: tension at the line, and the suction on each ring."""
+    """The force on a cone is tension at the contact line and suction on each ring of its wall."""
     lean, rest = 1.0 / math.tan(0.7), 0.4
     found = rise(Wall.cone(rest, 0.7), 20)
     h = found.height
@@ -101,7 +107,7 @@ def test_force_is_pull_and_suction():
     pull = 2.0 * math.pi * found.radius * math.sin(found.slope)
     assert found.force == pytest.approx(pull + suction, rel=1e-10)
     assert found.pressure == -h
-    # By quadrature between the surface and the wall.
+    # The volume between surface and wall, by quadrature.
     under = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz
     surface = -math.pi * under(found.heights * 2.0 * found.radii, -found.radii)
     cone = math.pi / 3.0 * (found.radius**2 + found.radius * rest + rest**2) * h
@@ -142,7 +148,9 @@ def test_a_pad_on_the_floor_stays_dry_where_liquid_is_pushed_down():
     assert (found.height, found.force, found.status) == (0.0, 0.0, 'dry')
     assert found.radius == pytest.approx(0.4)
     assert rise(Wall.cone(0.4, 1.6), 90).status == 'dry'
-    assert rise(Wall.dome(0.5, 0.4), 100).status == 'ok'  # it overhangs: there is a wedge
+    assert (
+        rise(Wall.dome(0.5, 0.4), 100).status == 'ok'
+    )  # the wall overhangs and holds liquid below it
 
 
 def test_edge_of_the_wall_holds_the_liquid():
@@ -155,7 +163,7 @@ def test_edge_of_the_wall_holds_the_liquid():
 
 
 def test_of_several_the_first_from_the_floor_is_taken():
-    """A narrow neck under a wide rim lets the liquid stand low, or high under the rim."""
+    """With a narrow neck under a wide rim the liquid can stand low, or high below the rim."""
     z = np.linspace(0.0, 1.6, 60)
     r = 0.02 + 0.6 / (1.0 + np.exp(-(z - 0.5) / 0.03))
     found = rise(Wall.through(r, z), 30)
@@ -171,7 +179,7 @@ def test_profile_through_points_converges():
         phi = np.linspace(math.asin(0.4), 2.6, count)
         z = 0.5 * (math.cos(phi[0]) - np.cos(phi))
         errors.append(abs(rise(Wall.through(0.5 * np.sin(phi), z), 30).height / exact - 1.0))
-    assert errors[0] < 5e-4 and errors[1] < errors[0] / 8.0  # second order
+    assert errors[0] < 5e-4 and errors[1] < errors[0] / 8.0  # the method is of second order
 
 
 def test_units():
@@ -207,7 +215,7 @@ def test_bad_input(call, name):
 
 
 def test_surface_through_the_wall_is_refused():
-    """Over a skirt that juts out between the floor and the contact line."""
+    """The wall has a ridge that juts out between the floor and the contact line."""
     z = np.linspace(0.0, 2.0, 2001)
     r = 0.4 + 0.4 * np.exp(-(((z - 0.54) / 0.003) ** 2))
     with pytest.raises(NoSurface, match='run through') as refusal:

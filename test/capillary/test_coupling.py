@@ -17,8 +17,11 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 from ros_pad.errors import NoSurface
 
+# The quick tests of liquid are those of surfaces and meshes.
+pytestmark = pytest.mark.slow
+
 SIZE = LARGE_PAD.radius
-# So soft that the liquid bends it visibly.
+# A pad so soft that the liquid deforms it visibly.
 SOFT = Pad(SIZE, 0.4)
 
 
@@ -27,9 +30,10 @@ def wet(pressure=75e3, force=0.1, stiffness=40.0, liquid=WATER):
     return press_wet(Pad(SIZE, stiffness), pressure, force, liquid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('pressure', 'force'), [(75e3, 0.1), (60e3, 0.1), (85e3, 0.3)])
 def test_the_rigid_pad_is_the_exact_membrane(pressure, force):
-    """Which elliptic integrals give, in place of shooting."""
+    """``press`` solves the same membrane with elliptic integrals, ``press_wet`` by shooting."""
     rigid = wet(pressure, force).rigid
     exact = press(LARGE_PAD, pressure, force, model='membrane')
     assert rigid.gap == pytest.approx(exact.gap, rel=1e-9)
@@ -38,6 +42,7 @@ def test_the_rigid_pad_is_the_exact_membrane(pressure, force):
     assert rigid.radii[-1] == pytest.approx(SIZE, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_rigid_pad_has_the_meniscus_of_its_profile():
     rigid = wet().rigid
     alone = bath_meniscus(wall=Wall.through(rigid.radii, rigid.heights), liquid=WATER)
@@ -51,7 +56,7 @@ SOFT_CASE = {'pressure': 750.0, 'force': 1e-3, 'stiffness': 0.4}
 
 @pytest.mark.parametrize('case', [{}, SOFT_CASE], ids=['silicone', 'soft'])
 def test_the_rim_carries_the_load(case):
-    """Seen from outside, what lifts the pad's base is gas less membrane; the liquid is inside."""
+    """Air pushes the base up and the membrane pulls its rim down; the rest is the load."""
     found = wet(**case)
     pressure, force = case.get('pressure', 75e3), case.get('force', 0.1)
     for pad in (found, found.rigid):
@@ -62,7 +67,8 @@ def test_the_rim_carries_the_load(case):
 
 
 def test_wet_and_dry_wall_carry_their_pressures():
-    """Finite differences of the profile: tension times mean curvature, and area to tension."""
+    """By finite differences of the profile: pressure is tension times curvature, and the area
+    gives the tension."""
     found = wet(**SOFT_CASE)
     for part, push, tension in (
         (
@@ -101,8 +107,9 @@ def changes(found):
     return np.array([getattr(found, name) / getattr(rigid, name) - 1.0 for name in names])
 
 
+@pytest.mark.slow
 def test_coupling_vanishes_as_the_inverse_of_stiffness():
-    """At the same shape: pressure and force grow with the stiffness."""
+    """Pressure and force grow with the stiffness, so that the dry pad keeps its profile."""
     twice, eight = (changes(wet(75e3 * k, 0.1 * k, 40.0 * k)) for k in (2.0, 8.0))
     assert np.all(abs(twice) > 1e-4)
     assert twice / eight == pytest.approx(4.0, rel=2e-2)
@@ -110,7 +117,7 @@ def test_coupling_vanishes_as_the_inverse_of_stiffness():
 
 def test_liquid_presses_the_pad_down_and_a_soft_one_more():
     hard, soft = changes(wet()), changes(wet(**SOFT_CASE))
-    assert hard[1] > 0.0 and soft[1] > 0.1  # it draws the pad onto the floor
+    assert hard[1] > 0.0 and soft[1] > 0.1  # the liquid draws the pad onto the floor
     assert np.all(abs(soft) > 30.0 * abs(hard))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Overlaps of bodies: what overlaps is found wherever it is, what only touches is left alone.
+"""Bodies that overlap are found wherever they do; bodies that only touch are accepted.
 
-The truth is geometry: convex bodies are apart if they are so along one direction, and overlap if
-circles that fit into them at one height do, or a ball into both.
+Geometry gives the expected results: convex bodies do not overlap if they are apart along one
+direction; they overlap if circles inside them at one height do, or if a ball fits into both.
 """
 
 import math
@@ -15,8 +15,11 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from ros_pad.capillary import Mesh
-from ros_pad.capillary.mesh import _revolved
+from ros_pad.capillary.mesh import revolved
 from ros_pad.errors import MeshError
+
+# The quick tests of liquid are those of surfaces and meshes.
+pytestmark = pytest.mark.slow
 
 R, B = 1.55e-3, 0.6e-3
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 1e-3
@@ -33,7 +36,7 @@ def box(low, high) -> Mesh:
 
 
 def moved(mesh: Mesh, x: float = 0.0, y: float = 0.0, turn: float = 0.0, kind=float) -> Mesh:
-    """Turn about the z axis, shift, and round as a file of that kind of number would."""
+    """Turn a mesh about the z axis, shift it, and round its points to numbers of type ``kind``."""
     c, s = math.cos(turn), math.sin(turn)
     points = mesh.points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [x, y, 0.0]
     return Mesh(points.astype(kind).astype(float), mesh.faces, mesh.source)
@@ -50,7 +53,7 @@ def together(*meshes: Mesh) -> Mesh:
 
 
 def refusal(points: np.ndarray, faces: np.ndarray) -> tuple[str, np.ndarray]:
-    """Return what is said of a mesh that has to be refused, and the place that is named."""
+    """Check that a mesh is refused, and return the reason and the place, m, in the message."""
     with pytest.raises(MeshError) as refused:
         Mesh(points, faces, 'pad.stl')
     said = re.fullmatch(r'pad\.stl: (.*) at \((.*), (.*), (.*)\) m', str(refused.value))
@@ -65,12 +68,12 @@ def overlap(*meshes: Mesh) -> np.ndarray:
 
 
 def outer(mesh: Mesh, azimuth: float) -> float:
-    """Return how far a body reaches along a direction."""
+    """Return how far a body reaches along an azimuth, m."""
     return float((mesh.points[:, :2] @ [math.cos(azimuth), math.sin(azimuth)]).max())
 
 
 def inner(mesh: Mesh, sectors: int, heights: np.ndarray) -> np.ndarray:
-    """Return the radius of the circles that fit into a body of revolution."""
+    """Return the radii of circles that fit into a body of revolution at some heights, m."""
     r, z = np.hypot(*mesh.points[:-2, :2].T), mesh.points[:-2, 2]
     order = np.argsort(z, kind='stable')
     return np.interp(heights, z[order], r[order]) * math.cos(math.pi / sectors)
@@ -84,7 +87,7 @@ def test_domes_overlap_or_not_at_any_azimuth(seed: int):
     rng = np.random.default_rng(seed)
     rings, sectors = rng.integers([3, 3], [32, 64], (2, 2)).T.tolist()
     one = Mesh.dome(R, B, 2.2e-3, rings[0], sectors[0])
-    if seed % 3 == 0:  # twins, that may be each other's mirror image to the bit
+    if seed % 3 == 0:  # the same dome twice, which may be exact mirror images
         rings[1], sectors[1] = rings[0], sectors[0]
         other = one
     else:
@@ -113,20 +116,20 @@ def test_domes_overlap_or_not_at_any_azimuth(seed: int):
 @pytest.mark.parametrize('width', [1e-6, 1e-5, 2e-4])
 @pytest.mark.parametrize('turn', [0.0, 0.3, math.pi / 4.0])
 def test_a_needle_through_a_coarse_plate(width: float, turn: float):
-    # Ten thousand times as wide as the needle; its triangles are a thousand times as long as wide.
+    # The plate is up to ten thousand times as wide as the needle, whose triangles are very slim.
     plate = box([-5e-3, -5e-3, 0.0], [5e-3, 5e-3, 0.5e-3])
     needle = moved(Mesh.cone(width, 0.5 * width, 1e-3, 3, 5), 1.234e-3, -0.77e-3, turn)
     place = overlap(plate, needle)
-    # Either at the top of the plate, or where both stand on the floor.
+    # The place is at the top of the plate, or on the floor, where both bodies stand.
     assert np.allclose(place[:2], [1.234e-3, -0.77e-3], rtol=0.0, atol=2.0 * width)
     assert min(abs(place[2]), abs(place[2] - 0.5e-3)) < 1e-9
-    together(plate, moved(needle, 5e-3))  # beside it
+    together(plate, moved(needle, 5e-3))  # beside the plate
 
 
 def test_small_bodies_between_large_triangles_are_found():
     plate = box([0.0, 0.0, 0.0], [10e-3, 10e-3, 1e-3])
     dome = Mesh.dome(0.2e-3, 0.05e-3, None, 12, 24)
-    # They stand round the plate; one reaches into its side by a hundredth of its radius.
+    # The domes stand beside the plate; one reaches into it by a hundredth of the dome's radius.
     ring = [
         moved(dome, x, y)
         for k in range(20)
@@ -144,13 +147,13 @@ def test_small_bodies_between_large_triangles_are_found():
         (
             (0.5e-3, 0.0, 0.0),
             (1.5e-3, 1e-3, 1e-3),
-        ),  # in a row: edges in faces, no edge through one
+        ),  # side by side: edges lie in faces, and none crosses a face
         ((0.5e-3, 0.5e-3, 0.0), (1.5e-3, 1.5e-3, 1e-3)),
-        ((0.0, 0.0, 0.0), (1e-3, 1e-3, 1e-3)),  # the same twice
-        ((0.0, 0.0, 0.0), (0.5e-3, 0.5e-3, 0.5e-3)),  # in a corner
+        ((0.0, 0.0, 0.0), (1e-3, 1e-3, 1e-3)),  # the same box twice
+        ((0.0, 0.0, 0.0), (0.5e-3, 0.5e-3, 0.5e-3)),  # a small box in a corner
         ((0.25e-3, 0.25e-3, 0.0), (0.75e-3, 0.75e-3, 1e-3)),  # within, from floor to top
-        ((0.25e-3, -1e-3, 0.25e-3), (0.75e-3, 2e-3, 0.75e-3)),  # right through
-        ((0.999e-3, 0.2e-3, 0.2e-3), (2e-3, 0.3e-3, 0.3e-3)),  # by a thousandth
+        ((0.25e-3, -1e-3, 0.25e-3), (0.75e-3, 2e-3, 0.75e-3)),  # through the whole cube
+        ((0.999e-3, 0.2e-3, 0.2e-3), (2e-3, 0.3e-3, 0.3e-3)),  # an overlap of a thousandth
     ],
 )
 @pytest.mark.parametrize('turn', [0.0, 1.0])
@@ -172,7 +175,7 @@ def test_prisms_whose_sides_cross_in_edges_of_both_overlap():
     one = Mesh.cylinder(1e-3, 2e-3, 1, 6)
     for other, top in ((one, 2e-3), (Mesh.cylinder(1e-3, 1e-3, 1, 6), 1e-3)):
         x, y, z = overlap(one, moved(other, 1e-3))
-        assert 0.0 <= x <= 1e-3  # between both axes
+        assert 0.0 <= x <= 1e-3  # between the axes of the prisms
         assert abs(y) < 0.9e-3
         assert 0.0 <= z <= top
 
@@ -188,7 +191,7 @@ OCTAHEDRON_FACES = np.array(
 @pytest.mark.parametrize('shift', [0.0, 0.25, -0.5])
 @pytest.mark.parametrize('turn', [0.0, 0.25, 0.5, 0.7])
 def test_corners_and_edges_in_a_face_that_the_body_passes_through(turn: float, shift: float):
-    # Its tips stand out on both sides of a side of the cube; some of its edges lie in that side.
+    # A face of the cube cuts the octahedron, of which corners or edges can lie in that face.
     c, s = math.cos(turn * math.pi / 2.0), math.sin(turn * math.pi / 2.0)
     points = OCTAHEDRON @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     points = 1e-4 * np.where(np.abs(points) < 1e-12, 0.0, points) + 1e-3 * np.array([1, 0.4, 0.7])
@@ -199,7 +202,7 @@ def test_corners_and_edges_in_a_face_that_the_body_passes_through(turn: float, s
         assert what == 'bodies overlap'
         assert place[0] == pytest.approx(1e-3, rel=1e-6)
         assert math.dist(place, 1e-3 * np.array([1, 0.4, 0.7])) < 1.01e-4
-    points[:, 0] += 1e-3 - points[:, 0].min()  # touches from outside
+    points[:, 0] += 1e-3 - points[:, 0].min()  # now it only touches from outside
     Mesh(np.concatenate([CUBE, points]), faces)
 
 
@@ -214,11 +217,11 @@ def test_a_ring_of_corners_in_the_top_of_a_plate():
 
 TOUCHING = [
     ((1e-3, 0.0, 0.0), (2e-3, 1e-3, 1e-3)),  # a whole face
-    ((1e-3, 0.3e-3, 0.2e-3), (2e-3, 0.7e-3, 5e-3)),  # part of one
+    ((1e-3, 0.3e-3, 0.2e-3), (2e-3, 0.7e-3, 5e-3)),  # part of a face
     ((1e-3, 1e-3, 0.0), (2e-3, 2e-3, 1e-3)),  # an edge
-    ((0.2e-3, 0.3e-3, 1e-3), (0.5e-3, 5e-3, 2e-3)),  # on top, beyond it
+    ((0.2e-3, 0.3e-3, 1e-3), (0.5e-3, 5e-3, 2e-3)),  # on top, reaching beyond the edge
     ((1e-3, 1e-3, 1e-3), (2e-3, 2e-3, 2e-3)),  # a point
-    ((2e-3, 0.0, 0.0), (3e-3, 1e-3, 1e-3)),  # nowhere; floors in one plane
+    ((2e-3, 0.0, 0.0), (3e-3, 1e-3, 1e-3)),  # nothing; both stand on the floor
 ]
 
 
@@ -237,7 +240,8 @@ def test_boxes_that_touch_do_not_overlap(low, high, kind):
 
 
 def test_walls_of_slim_triangles_that_touch_do_not_overlap():
-    # Facets sixty times as long as wide, at right angles across a common plane.
+    # Two bodies touch in a plane; their facets are sixty times as long as wide and cross at right
+    # angles.
     n = 60
     strip = np.linspace(0.0, 1e-3, n)
     low = np.column_stack([np.zeros(n), strip, np.zeros(n)])
@@ -258,7 +262,7 @@ def test_walls_of_slim_triangles_that_touch_do_not_overlap():
     ends += [[n - 1, 4 * n - 1, 3 * n - 1], [n - 1, 2 * n - 1, 4 * n - 1]]
     faces = np.concatenate([band(0, 1), band(1, 3), band(3, 2), band(2, 0), ends])
     upright = Mesh(wall, faces, 'upright')
-    # The same body fallen over to the other side of the plane x = 0, its facets along y.
+    # The same body lies on the other side of the plane x = 0, with its long facets along y.
     lying = np.column_stack([-wall[:, 0], wall[:, 2], wall[:, 1]])
     rng = np.random.default_rng(5)
     for _ in range(4):
@@ -318,6 +322,7 @@ def hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize('kind', ['grid', 'slim'])
+@pytest.mark.slow
 def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
     rng = np.random.default_rng(7)
     counts = {True: 0, False: 0}
@@ -334,7 +339,7 @@ def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
                 two.append(1e-3 * (wide @ turn + 0.1 * rng.normal(size=3)))
         (one, first, planes), (other, second, more) = (hull(each) for each in two)
         limits = 1e3 * np.concatenate([planes, more])
-        # The largest ball within all half spaces, mm.
+        # The largest ball, mm, within all half spaces fits into both bodies.
         ball = linprog(
             [0.0, 0.0, 0.0, -1.0],
             A_ub=np.column_stack([1e-3 * limits[:, :3], np.ones(len(limits))]),
@@ -345,7 +350,7 @@ def test_convex_bodies_overlap_where_a_ball_fits_into_both(kind: str):
         points = np.concatenate([one, other])
         points[:, 2] -= points[:, 2].min()
         if 1e-12 < depth / np.abs(points).max() < 5e-6:
-            continue  # within what rounding may do
+            continue  # rounding may decide
         faces = np.concatenate([first, second + len(one)])
         counts[depth > 1e-14] += 1
         if depth > 1e-14:
@@ -363,7 +368,7 @@ def test_a_body_of_revolution_whose_profile_crosses_itself(sectors: int):
     r = 1e-3 * np.array([1.0, 1.0, 2.0, 2.0, 0.5, 0.5])
     z = 1e-3 * np.array([0.0, 0.7, 0.7, 0.4, 0.4, 4.0])
     with pytest.raises(MeshError) as refused:
-        _revolved(r, z, sectors, 'knot')
+        revolved(r, z, sectors, 'knot')
     said = re.fullmatch(
         r'knot: the mesh cuts itself at \((.*), (.*), (.*)\) m', str(refused.value)
     )
@@ -373,7 +378,8 @@ def test_a_body_of_revolution_whose_profile_crosses_itself(sectors: int):
 
 
 def test_a_body_that_cuts_itself_in_triangles_with_a_corner_in_common():
-    # Two pyramids on one triangle; the tip of the lower one is drawn up and out through a side.
+    # Two pyramids share a base; the tip of the lower one is moved up and out through a side of the
+    # upper one.
     a, b, c, top, tip = range(5)
     faces = [[a, b, top], [b, c, top], [c, a, top], [b, a, tip], [c, b, tip], [a, c, tip]]
     points = 1e-3 * np.array(
@@ -384,10 +390,10 @@ def test_a_body_that_cuts_itself_in_triangles_with_a_corner_in_common():
     points[tip] = 1e-3 * np.array([0.5, -0.5, 0.2])
     what, place = refusal(points, np.array(faces))
     assert what == 'the mesh cuts itself'
-    # The edge from c meets the side, y = 0.3 z, there; the cut runs from there to a and to b.
+    # Here the edge from c to the tip pierces the side y = 0.3 z; the cut runs on to a and to b.
     pierced = points[c] + (points[tip] - points[c]) / 1.56
     assert min(math.dist(place, 0.5 * (pierced + points[k])) for k in (a, b)) < 1e-7
-    # Drawn up inside it cuts nothing.
+    # A tip inside the upper pyramid cuts nothing.
     points[tip] = 1e-3 * np.array([0.5, 0.3, 0.6])
     Mesh(points, np.array(faces))
 
@@ -401,7 +407,7 @@ def test_a_body_within_another_is_found(z: float, size: float):
     big, small = Mesh.dome(R, 0.9e-3, rings=12, sectors=24), Mesh.cylinder(size, size, 1, 12)
     points, faces = arrays(big, small)
     for first in (True, False):
-        if not first:  # the same, listed the other way round
+        if not first:  # the same bodies in the other order
             points, faces = arrays(small, big)
         inside = slice(len(big.points), None) if first else slice(len(small.points))
         there = points.copy()

@@ -15,6 +15,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 from ros_pad.errors import NoSurface
 
+# The quick tests of liquid are those of surfaces and meshes.
+pytestmark = pytest.mark.slow
+
 SPHERE, REST = 1.55e-3, 0.583e-3
 START = math.asin(REST / SPHERE)
 DOME = Face.of_wall(Wall.dome(SPHERE, REST))
@@ -29,7 +32,10 @@ def line_heights(found):
 
 
 def dome_mesh(layers, slices, oval=1.0, lid=False):
-    """Return vertices and triangles of the dome as a mesh, stretched along x by ``oval``."""
+    """Return vertices, m, and triangles of the dome as a mesh, open at bottom and top.
+
+    ``oval`` stretches it along x and shrinks it along y; ``lid`` closes bottom and top.
+    """
     phi = np.linspace(START, 2.6, layers)
     turn = np.linspace(0.0, 2.0 * math.pi, slices, endpoint=False)
     r, z = SPHERE * np.sin(phi), SPHERE * (math.cos(START) - np.cos(phi))
@@ -47,6 +53,7 @@ def dome_mesh(layers, slices, oval=1.0, lid=False):
     return vertices, np.concatenate(walls)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('degrees', [20, 110])
 def test_bath_round_a_dome_is_the_exact_one_to_second_order(degrees):
     exact = bath_meniscus(SPHERE, REST, liquid=water(degrees))
@@ -68,7 +75,7 @@ def test_bath_round_a_meshed_dome():
     assert heights.mean() == pytest.approx(exact.height, rel=3e-3)
     assert np.ptp(heights) < 2e-3 * exact.height
     azimuths = np.linspace(0.0, 6.0, 7)
-    closed = dome_mesh(40, 80, lid=True)  # bottom and lid are no wall
+    closed = dome_mesh(40, 80, lid=True)  # bottom and top are no wall
     for names in (('points', 'faces'), ('vertices', 'triangles')):
         mesh = types.SimpleNamespace(**dict(zip(names, closed, strict=True)))
         assert np.array_equal(Face.of_mesh(mesh).rails(azimuths), face.rails(azimuths))
@@ -85,19 +92,20 @@ def test_radii_of_a_meshed_dome_are_second_order():
 
 
 def test_bath_round_an_oval_pad():
-    """Archimedes again: the pad carries what stands above the floor; by symmetry nothing else."""
+    """The pad carries the weight of the liquid above the floor, and no side force by symmetry."""
     found = bath_surface(Face.of_mesh(dome_mesh(40, 80, oval=1.25)), water(50), refinements=1)
     assert -found.forces[0, 2] == pytest.approx(9810.0 * found.volume, rel=3e-3)
     assert found.forces[0, :2] == pytest.approx([0.0, 0.0], abs=1e-5 * abs(found.forces[0, 2]))
     heights, x = line_heights(found), abs(found.vertices[found.lines[0].vertices, 0])
-    # It stands lower at the sharp ends.
+    # The liquid stands lower at the sharp ends.
     assert heights[np.argmax(x)] < 0.98 * heights.max()
     assert heights[np.argmax(x)] == pytest.approx(heights.min(), rel=1e-6)
 
 
 @pytest.mark.parametrize(('pitch', 'sides'), [(3.4e-3, 4), (3.4e-3, 6), (6e-3, 6)])
+@pytest.mark.slow
 def test_without_weight_the_film_between_domes_is_level(pitch, sides):
-    """It meets the spheres at the contact angle where cos φ = -cos θ, at any pitch."""
+    """The film meets the spheres at the contact angle where cos φ = -cos θ, at any pitch."""
     found = pattern_surface(
         DOME, water(50), pitch, sides, pressure=0.0, gravity=0.0, refinements=2
     )
@@ -136,6 +144,7 @@ def test_meshes_that_are_no_wall():
         Face.of_mesh((vertices, flipped))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('degrees', [10, 80])
 @pytest.mark.parametrize(
     'wall',
@@ -148,7 +157,7 @@ def test_meshes_that_are_no_wall():
     ids=['tiny', 'wide', 'cone', 'cylinder'],
 )
 def test_pads_of_other_shapes_and_sizes(wall, degrees):
-    """Coarse meshes: the error, of second order, is what is left of a curved surface."""
+    """Coarse meshes describe a curved surface with an error that falls on finer meshes."""
     exact = bath_meniscus(wall=wall, liquid=water(degrees))
     found = bath_surface(Face.of_wall(wall), water(degrees), refinements=0)
     finer = bath_surface(Face.of_wall(wall), water(degrees), sectors=36, refinements=0)

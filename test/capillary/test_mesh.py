@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes of pads: what is made has the size it should, what is broken is refused by name."""
+"""Generated meshes of pads have the right size; broken meshes are refused with their name."""
 
 import builtins
 import math
@@ -32,7 +32,7 @@ def test_a_cube_has_its_volume_and_height():
 
 
 def test_a_dome_has_the_volume_of_a_spherical_segment():
-    # Of two radii and a height: pi h (3 a² + 3 b² + h²) / 6.
+    # Volume from two radii and a height: pi h (3 a² + 3 b² + h²) / 6.
     centre = math.sqrt(R * R - B * B)
     for height in (0.3e-3, centre, centre + 0.9 * R):
         top = R * R - (height - centre) ** 2
@@ -45,7 +45,7 @@ def test_a_dome_has_the_volume_of_a_spherical_segment():
 
 
 def test_cone_and_cylinder_have_their_volumes():
-    polygon = 0.5 * 72 * math.sin(2 * math.pi / 72)  # of a circle of radius 1
+    polygon = 0.5 * 72 * math.sin(2 * math.pi / 72)  # area in a circle of radius 1
     cone = Mesh.cone(1e-3, 2e-3, 3e-3)
     assert cone.volume == pytest.approx(polygon * 3e-3 * (1 + 2 + 4) * 1e-6 / 3, rel=1e-9)
     assert Mesh.cone(0.0, 1e-3, 3e-3).volume == pytest.approx(polygon * 1e-9, rel=1e-9)
@@ -58,27 +58,27 @@ def test_a_pattern_is_hexagonal():
     middles = np.array([each.mean(axis=0)[:2] for each in np.split(pattern.points, 19)])
     apart = np.hypot(*(middles[:, None] - middles[None]).T)
     assert middles[0] == pytest.approx([0.0, 0.0], abs=1e-12)
-    # Of 19 in a hexagon 7 have six neighbours, 6 have four and 6 have three.
+    # Of 19 pads in a hexagon 7 have six neighbours, 6 have four and 6 have three.
     neighbours = np.sum(np.isclose(apart, 3.2e-3, rtol=1e-6), axis=0)
     assert sorted(neighbours) == [3] * 6 + [4] * 6 + [6] * 7
 
 
 def test_domes_that_overlap_are_refused():
-    with pytest.raises(MeshError, match=r'0\.0031 m wide and would overlap'):
+    with pytest.raises(MeshError, match=r'pitch = .* above 0\.0031 m'):
         Mesh.dome_pattern(7, 3e-3, R, B)
 
 
 @pytest.mark.parametrize(
     ('call', 'part'),
     [
-        (lambda: Mesh.dome(-1.0, 0.0), 'sphere_radius = -1 m'),
-        (lambda: Mesh.dome(1e-3, 1e-3), 'contact_radius = 0.001 m'),
-        (lambda: Mesh.dome(1e-3, 0.0, 2e-3), 'height = 0.002 m'),
+        (lambda: Mesh.dome(-1.0, 0.0), 'sphere_radius = -1'),
+        (lambda: Mesh.dome(1e-3, 1e-3), 'contact_radius = 0.001'),
+        (lambda: Mesh.dome(1e-3, 0.0, 2e-3), 'height = 0.002'),
         (lambda: Mesh.dome(1e-3, 0.0, rings=0), 'rings = 0'),
         (lambda: Mesh.dome(1e-3, 0.0, sectors=2), 'sectors = 2'),
-        (lambda: Mesh.cone(0.0, 0.0, 1e-3), 'top_radius = 0 m'),
-        (lambda: Mesh.cone(1e-3, math.nan, 1e-3), 'top_radius = nan m'),
-        (lambda: Mesh.cylinder(1e-3, 0.0), 'height = 0 m'),
+        (lambda: Mesh.cone(0.0, 0.0, 1e-3), 'top_radius = 0'),
+        (lambda: Mesh.cone(1e-3, math.nan, 1e-3), 'top_radius = nan'),
+        (lambda: Mesh.cylinder(1e-3, 0.0), 'height = 0'),
         (lambda: Mesh.dome_pattern(0, 4e-3, R, B), 'pads = 0'),
     ],
 )
@@ -100,8 +100,8 @@ FLAT[3] = np.nan
 @pytest.mark.parametrize(
     ('points', 'faces', 'part'),
     [
-        (np.empty((0, 3)), CUBE_FACES, 'empty'),
-        (CUBE_POINTS, np.empty((0, 3), int), 'empty'),
+        (np.empty((0, 3)), CUBE_FACES, 'no triangles'),
+        (CUBE_POINTS, np.empty((0, 3), int), 'no triangles'),
         (CUBE_POINTS[:, :2], CUBE_FACES, '(8, 2)'),
         (CUBE_POINTS, CUBE_FACES.astype(float), 'integers'),
         (CUBE_POINTS, CUBE_FACES + 1, '1 to 8'),
@@ -110,12 +110,12 @@ FLAT[3] = np.nan
         (CUBE_POINTS, np.concatenate([CUBE_FACES, CUBE_FACES[:1]]), 'non-manifold'),
         (CUBE_POINTS, np.concatenate([CUBE_FACES[:1, ::-1], CUBE_FACES[1:]]), 'flipped'),
         (CUBE_POINTS, CUBE_FACES[:, ::-1], 'the mesh is inside out'),
-        (CUBE_POINTS, np.concatenate([CUBE_FACES[:-1], [[1, 1, 3]]]), 'corner twice'),
+        (CUBE_POINTS, np.concatenate([CUBE_FACES[:-1], [[1, 1, 3]]]), 'triangle 11 '),
         (TWO, np.concatenate([CUBE_FACES, 8 + CUBE_FACES[:, ::-1]]), '1 of 2 bodies'),
         (CUBE_POINTS + np.array([0, 0, 1e-4]), CUBE_FACES, 'lift = -0.0001 m'),
         (CUBE_POINTS - np.array([0, 0, 1e-4]), CUBE_FACES, 'lift = 0.0001 m'),
         (1e3 * CUBE_POINTS, CUBE_FACES, 'scale=1e-3'),
-        (1e-3 * CUBE_POINTS, CUBE_FACES, 'scaled twice'),
+        (1e-3 * CUBE_POINTS, CUBE_FACES, 'at least 1e-05 m'),
     ],
 )
 def test_broken_meshes_are_refused(points, faces, part: str):
@@ -131,7 +131,7 @@ def test_bodies_that_overlap_are_refused():
     faces = np.concatenate([one.faces, one.faces + len(one.points)])
     with pytest.raises(MeshError, match=r'^changed: bodies overlap at \(.*\) m$'):
         changed(points, faces)
-    one = CUBE_POINTS * [1.0, 1.0, 0.5] + [0.0, 0.0, 1e-3]  # on top of a cube, or within it
+    one = CUBE_POINTS * [1.0, 1.0, 0.5] + [0.0, 0.0, 1e-3]  # on top of the cube
     faces = np.concatenate([CUBE_FACES, 8 + CUBE_FACES])
     assert changed(np.concatenate([CUBE_POINTS, one]), faces).volume == pytest.approx(1.5e-9)
     within = 0.5 * CUBE_POINTS + 0.25e-3
@@ -142,13 +142,13 @@ def test_bodies_that_overlap_are_refused():
 def test_a_body_that_cuts_itself_is_refused():
     cylinder = Mesh.cylinder(1e-3, 2e-3, sectors=12)
     points = cylinder.points.copy()
-    points[-1] = [2e-3, 0.1e-3, 1e-3]  # the middle of the top, drawn down and out through the wall
+    points[-1] = [2e-3, 0.1e-3, 1e-3]  # the middle of the top, moved out through the wall
     with pytest.raises(MeshError, match=r'^changed: the mesh cuts itself at \(.*\) m$'):
         changed(points, cylinder.faces)
 
 
 def test_bodies_that_touch_in_a_point_are_two():
-    # Welded, as a file may have them: each is looked at by itself.
+    # The cubes share a vertex, as in a file with merged vertices, but count as two bodies.
     points = np.concatenate([CUBE_POINTS, CUBE_POINTS[1:] + 1e-3])
     second = np.concatenate([[7], np.arange(8, 15)])[CUBE_FACES]
     assert changed(points, np.concatenate([CUBE_FACES, second])).volume == pytest.approx(2e-9)
@@ -171,7 +171,7 @@ def test_a_mesh_cannot_be_changed_afterwards():
     mesh = cube()
     with pytest.raises(ValueError, match='read-only'):
         mesh.points[0] = 1.0
-    CUBE_POINTS.copy()[0] = 0.0  # what it was made of stays as it was
+    CUBE_POINTS.copy()[0] = 0.0  # the arrays that it was made of stay writable
     assert CUBE_POINTS.flags.writeable
 
 

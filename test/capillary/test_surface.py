@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.menisci import spanned
 from ros_pad.capillary.surface import Line
-from ros_pad.capillary.surface import _Rails
-from ros_pad.capillary.surface import _System
+from ros_pad.capillary.surface import Rails
+from ros_pad.capillary.surface import System
 from ros_pad.capillary.surface import minimise
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
@@ -29,7 +29,7 @@ def between_discs(height, shift=0.0, sectors=16, rows=6, **asked):
 
 
 def test_gradient_and_hessian_are_those_of_finite_differences():
-    """On curved rails that differ with the azimuth, with weight, pressure and wetting."""
+    """The surface has curved rails that vary with the azimuth, weight, pressure and wetting."""
     noise = np.random.default_rng(0)
 
     def rails(azimuths):
@@ -42,7 +42,7 @@ def test_gradient_and_hessian_are_those_of_finite_differences():
     )
     vertices = vertices + 0.01 * noise.normal(size=vertices.shape)
     pressure = 0.3
-    problem = _Rails(_System(1.0, 2.0, 1.0, None, vertices, triangles, lines, pressure))
+    problem = Rails(System(1.0, 2.0, 1.0, None, vertices, triangles, lines, pressure))
     q = problem.start + 0.005 * noise.normal(size=problem.start.size)
     _, _, slope, volume_slope = problem.energy(q)
     matrix = problem.matrix(q, pressure).toarray()
@@ -70,8 +70,9 @@ def test_catenoid_between_two_rings():
 
 
 @pytest.mark.parametrize('half', [0.67, 1.0])
+@pytest.mark.slow
 def test_no_catenoid_beyond_the_critical_distance(half):
-    """0.6627 radii: there c cosh(half/c) = 1 has no root any more."""
+    """Beyond half a distance of 0.6627 radii, c cosh(half/c) = 1 has no root."""
     with pytest.raises(NoSurface, match='collapses') as refusal:
         between_discs(2.0 * half, pressure=0.0, refinements=1)
     assert refusal.value.status == 'collapsed'
@@ -84,7 +85,8 @@ def test_lateral_stiffness_of_a_cylinder(height):
     )
     side, _, up = found.forces[0]
     assert side == pytest.approx(-0.01 * math.pi / height, rel=2e-3)
-    # Its tension pulls the discs together with twice what its pressure pushes.
+    # The surface tension pulls the discs together with twice the force with which the pressure
+    # pushes them apart.
     assert up == pytest.approx(-math.pi, rel=1e-2)
     assert found.pressure == pytest.approx(1.0, rel=6e-3)
     assert found.forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-6)
@@ -92,12 +94,13 @@ def test_lateral_stiffness_of_a_cylinder(height):
 
 
 def test_a_cylinder_longer_than_its_circumference_breaks():
-    """Plateau and Rayleigh: 2 pi radii, on either side of which the same is asked."""
+    """The limit of Plateau and Rayleigh is 2 pi radii; one cylinder is shorter, one longer."""
     assert between_discs(6.1, rows=24, volume=6.1 * math.pi).pressure == pytest.approx(1, rel=0.03)
     with pytest.raises(NoSurface, match='collapses'):
         between_discs(6.5, rows=24, volume=6.5 * math.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'row',
     [row for row in BRIDGES if row['beta'] == 30 and row['theta'] >= 20],

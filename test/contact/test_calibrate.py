@@ -51,7 +51,7 @@ def constants(calibration):
 
 
 def slips_of(foot, rows, noise=0.0, seed=0):
-    """Return tangential forces as the foot has them: rows of pressure, load, wet, stance time."""
+    """Return data with a foot's tangential forces; rows are pressure, load, wet, stance time."""
     forces = []
     for pressure, load, wet, stance_time in rows:
         films = (0.0, 0.0)
@@ -85,7 +85,7 @@ class TestThesis:
         assert k.value == pytest.approx(40.32, abs=0.005)
         assert k.fitted
         assert k.points == 4
-        # By hand: s² = sum of squares/3, slope d ln h/d ln k by differences, t = 3.182.
+        # By hand: variance s² = sum of squares / 3, slope d ln h / d ln k, Student's t = 3.182.
         pad = self.found.foot.pad
         p, h = THESIS.free
         error = inflate(pad, p).height / h - 1
@@ -99,7 +99,7 @@ class TestThesis:
         each = stiffness_of(FOOT.pad, *THESIS.free)
         np.testing.assert_allclose(each, [44.03, 40.94, 39.06, 38.75], atol=0.005)
         assert len(self.found.warnings) == 1
-        assert 'from 44 N/m at 55000 Pa to 38.8' in self.found.warnings[0]
+        assert '44 N/m at 55000 Pa and 38.8' in self.found.warnings[0]
 
     def test_two_parameters_fit_within_a_kilopascal(self):
         rest, rise = (constants(self.found)[n] for n in ('tension_at_rest', 'tension_stiffness'))
@@ -116,7 +116,7 @@ class TestThesis:
         assert line.pressure == pytest.approx(75e3)
         assert line.force == pytest.approx(0.2833, abs=5e-5)
         assert line.slope == pytest.approx(1.25e-5)
-        # One point to spare, t = 12.7: residuals -1/120, 1/60, -1/120 of the line.
+        # One degree of freedom: Student's t = 12.7; residuals -1/120, 1/60 and -1/120 N.
         s = math.sqrt((2 * (1 / 120) ** 2 + (1 / 60) ** 2) / 1)
         known = constants(self.found)['force_limit']
         assert known.high - known.value == pytest.approx(12.7062 * s / math.sqrt(3), rel=1e-4)
@@ -176,7 +176,7 @@ class TestShapes:
     def test_softer_pads_lower_the_ceiling(self):
         data = dataclasses.replace(NOTHING, free=FreeDomes(np.array([75e3]), np.array([2e-3])))
         found = calibrate(data, FOOT)
-        # The model of 39.06 N/m ends at 3.426 k/r less a little, 89.2 kPa.
+        # With k = 39.06 N/m the model ends just below 3.426 k/r, at 89.2 kPa.
         assert found.foot.ceiling == 89e3
         assert 'lowered from 90000 to 89000 Pa' in found.warnings[0]
         assert calibrate(THESIS, FOOT).foot.ceiling == 90e3
@@ -198,16 +198,16 @@ class TestForceLimit:
         data = dataclasses.replace(
             NOTHING, force_limits=ForceLimits(np.array([60e3, 80e3]), np.array([0.4, 0.2]))
         )
-        with pytest.raises(InvalidInput, match='fall with pressure'):
+        with pytest.raises(InvalidInput, match=r'slope = -1e-05 N/Pa'):
             calibrate(data, FOOT)
 
-    def test_one_pressure_keeps_the_line_and_says_so(self):
+    def test_one_pressure_keeps_the_line_with_a_warning(self):
         data = dataclasses.replace(
             THESIS, force_limits=ForceLimits(np.array([75e3, 75e3]), np.array([0.28, 0.3]))
         )
         found = calibrate(data, FOOT)
         assert found.foot.pad.measured_limit is None
-        assert any('one pressure is not enough' in warning for warning in found.warnings)
+        assert any('force limit' in warning for warning in found.warnings)
         kept = constants(found)['force_limit']
         assert (kept.fitted, kept.value) == (False, 0.2833)
 
@@ -224,7 +224,7 @@ class TestFriction:
         assert found.warnings == ()
 
     def test_only_what_the_forces_tell_is_fitted(self):
-        # Under a flat sole that does not conform all over, F/N is friction + shear/conforming.
+        # If a flat sole conforms only partly, F/N = friction + shear_strength/conforming_pressure.
         found = calibrate(slips_of(OTHER, DRY_FLAT[:3]), FOOT, FILM, VISCOSITY)
         fitted = [c.name for c in found.constants if c.fitted]
         assert fitted == ['friction']
@@ -232,12 +232,13 @@ class TestFriction:
         kept = FOOT.shear_strength / FOOT.conforming_pressure
         assert found.foot.friction == pytest.approx(ratio - kept, rel=1e-6)
         assert 'shear_strength, conforming_pressure' in found.warnings[0]
-        # Dry ground says nothing of films.
+        # On dry ground the constants of the film have no effect.
         found = calibrate(slips_of(OTHER, DRY_FLAT + DRY_DOMES), FOOT, FILM, VISCOSITY)
         assert {c.name for c in found.constants if c.fitted} == {
             *('friction', 'shear_strength', 'conforming_pressure')
         }
 
+    @pytest.mark.slow
     def test_intervals_hold_the_truth_about_as_often_as_they_say(self):
         inside, of = Counter(), Counter()
         for seed in range(30):
@@ -299,17 +300,17 @@ def text_of(tmp_path, text):
 @pytest.mark.parametrize(
     ('text', 'complaint'),
     [
-        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0 cannot'),
-        ('pressure [kPa],height [mm]\n0,1\n55,1.2\n', 'pressure of a free dome = 0 cannot'),
-        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0 cannot'),
-        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0 cannot'),
+        ('pressure [kPa],height [mm]\n0,1\n', 'pressure of a free dome = 0 '),
+        ('pressure [kPa],height [mm]\n0,1\n55,1.2\n', 'pressure of a free dome = 0 '),
+        ('pressure [kPa],force [N],gap [mm]\n0,0.1,1\n', 'pressure of a pressed dome = 0 '),
+        ('pressure [kPa],force [N],gap [mm]\n75,0.1,0\n', 'gap = 0 '),
         (
             'pressure [kPa],force [N],height [mm]\n75,0.1,0\n',
-            'height of a pressed dome = 0 cannot',
+            'height of a pressed dome = 0 ',
         ),
     ],
 )
-def test_zeros_that_tell_nothing_are_refused(tmp_path, text, complaint):
+def test_zeros_cannot_be_fitted(tmp_path, text, complaint):
     with pytest.raises(InvalidInput, match=rf'mine\.csv: {complaint}'):
         calibrate(text_of(tmp_path, text), FOOT)
 
@@ -319,11 +320,11 @@ def test_zeros_that_tell_nothing_are_refused(tmp_path, text, complaint):
     [
         (
             'pressure [kPa],height [mm]\n75,1e-6\n',
-            r'stiffness comes out as 8\.437e\+07 N/m.*from 1 to',
+            r'stiffness = 8\.437e\+07 N/m.*from 1 to',
         ),
         (
             'pressure [kPa],force_limit [N]\n75,0.3\n85,0.30000001\n',
-            r'force_limit_slope comes out as 1e-12 N/Pa.*from 1e-09 to 1 N/Pa is needed',
+            r'force_limit_slope = 1e-12 N/Pa.*from 1e-09 to 1 N/Pa is needed',
         ),
     ],
 )

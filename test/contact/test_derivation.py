@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of docs/derivation.md that can be checked in numbers, by other means than the code's."""
+"""Numerical checks of steps in docs/derivation.md, by other methods than those of the code."""
 
 import math
 from collections.abc import Callable
@@ -42,7 +42,7 @@ def cut_sphere(height: mpf, depth: mpf) -> tuple[mpf, mpf]:
         return sphere**2 - (z - height + sphere) ** 2
 
     gap = height - depth
-    # The meridian's arc length per height is sphere/radius, the circumference 2 pi radius.
+    # Arc length of the meridian per height is sphere/radius; the circumference is 2 pi radius.
     wall = mpmath.quad(
         lambda z: 2 * mp.pi * mp.sqrt(section(z)) * sphere / mp.sqrt(section(z)), [0, gap]
     )
@@ -51,13 +51,13 @@ def cut_sphere(height: mpf, depth: mpf) -> tuple[mpf, mpf]:
 
 
 def tension_energy(area: mpf) -> mpf:
-    """Return what it takes to stretch the flat pad to an area against 1.5 k √(S/S₀) - k."""
+    """Return the work, J, that stretches the flat pad to an area S against 1.5 k √(S/S₀) - k."""
     flat = mp.pi * R * R
     return mpmath.quad(lambda s: K * (mpf(3) / 2 * mp.sqrt(s / flat) - 1), [flat, area])
 
 
 def printed_work(height: mpf, depth: mpf, contact: mpf, pressure: mpf) -> mpf:
-    """Return W_F as printed before 3.44, its adhesion with the sign of the appendix."""
+    """Return W_F, J, as printed before equation 3.44, with the appendix' sign of adhesion."""
     side = R * R + height**2 - depth**2
     return (
         -pressure * mp.pi / 6 * height * (3 * R * R + height**2)
@@ -77,7 +77,7 @@ def test_free_dome_is_where_the_energy_is_least(pressure: float):
     height = mpf(inflate(LARGE_PAD, pressure).height)
     slope, bend = mpmath.diff(energy, height), mpmath.diff(energy, height, 2)
     assert bend > 0
-    # The Newton step that is left to the least energy.
+    # The next Newton step to the least energy would be no more than rounding.
     assert abs(slope / bend / height) < 1e-14
 
 
@@ -103,12 +103,13 @@ def test_both_balances_from_the_work(pressure: float, share: float):
     def partial(*order: int) -> mpf:
         return mpmath.diff(lambda *at: printed_work(*at, mpf(pressure)), shape, order)
 
-    # 3.57: depth against height, the contact held.
+    # Equation 3.57: the derivative by depth less that by height, at constant contact radius.
     assert partial(0, 1, 0) - partial(1, 0, 0) == pytest.approx(force, rel=1e-9)
-    # The tangent membrane: air on the contact disc carries the floor, adhesion helps to spread it.
+    # Where the membrane is tangent to the floor, pressure on the disc balances load and adhesion.
     pull = 2 * mp.pi * GAMMA * dome.sphere_radius
     assert pressure * mp.pi * shape[2] ** 2 == pytest.approx(force + pull, rel=1e-12)
-    # 3.44 to 3.49, the contact moved along the sphere: less than half, of which 3.52 makes all.
+    # Equations 3.44 to 3.49 move the contact along the sphere: that gives less than half of the
+    # pressure force, which only the approximation 3.52 doubles.
     with_b = partial(0, 0, 1) * mp.sqrt(dome.sphere_radius**2 - shape[2] ** 2) / shape[2]
     without_adhesion = with_b + 2 * mp.pi * GAMMA * mp.sqrt(dome.sphere_radius**2 - shape[2] ** 2)
     assert without_adhesion < pressure * mp.pi * shape[2] ** 2 / 2
@@ -118,7 +119,7 @@ def test_both_balances_from_the_work(pressure: float, share: float):
 
 
 def balance(x: np.ndarray, depth: np.ndarray, tension: float, a: float) -> np.ndarray:
-    """Return the residual of 3.58 with the force taken from 3.53: zero at the equilibria."""
+    """Return the residual of equation 3.58 with the force of 3.53; it is zero in equilibrium."""
     rho = 0.5 * (x + 1 / x)
     sigma = np.sqrt(1 + (x - depth) * (x + depth))
     force = tension * depth * (2 * rho - depth) - 2 * a * rho
@@ -132,7 +133,7 @@ def certificate(x: np.ndarray, depth: np.ndarray, tension: float) -> np.ndarray:
 
 
 def halved(falls: Callable[[np.ndarray], np.ndarray], high: np.ndarray) -> np.ndarray:
-    """Return where a function that is positive at 0 loses its sign."""
+    """Return the zero, from 0 to ``high``, of a function that is positive at 0, by bisection."""
     low = np.zeros_like(high)
     for _ in range(70):
         middle = 0.5 * (low + high)
@@ -142,7 +143,7 @@ def halved(falls: Callable[[np.ndarray], np.ndarray], high: np.ndarray) -> np.nd
 
 
 def branch(tension: float, a: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return heights, whether they have a certified equilibrium, and the force there."""
+    """Return heights over radius, whether each has a certified equilibrium, and forces."""
     free = math.tan(
         float(mpmath.findroot(lambda t: 6 * mp.sin(t) - 2 * mp.sin(2 * t) - tension, tension / 4))
     )
@@ -180,11 +181,11 @@ def test_below_the_cusp_the_force_falls_along_the_branch(energy: float):
         x, there, force = branch(tension, a)
         assert (np.diff(np.flatnonzero(there)) == 1).all()
         assert (np.diff(force[there]) < 0).all()
-        # The code returns that branch.
+        # ``press`` returns this branch.
         some = np.flatnonzero(there & (force > 0) & (force < 0.95 * tension))[::500]
         loads = force[some] * math.pi * 40.0
         np.testing.assert_allclose(press(pad, tension * 40.0, loads).height, x[some], rtol=1e-7)
-    # The domain ends just below the cusp: a little higher, force against height is S-shaped.
+    # The model ends just below the cusp: at a slightly larger tension the curve is S-shaped.
     x, there, force = branch(end + 0.006 + 0.8 * a, a)
     assert (np.diff(force[there]) > 0).any()
 
@@ -198,7 +199,7 @@ def test_far_above_the_cusp_the_branch_breaks():
 
 @pytest.mark.parametrize('tension', [0.5, 2.0, 3.3])
 def test_first_order_of_the_force_near_flattening(tension: float):
-    # f = P - 4 x + a/x: it ends at x = √(a/2) for attraction and turns at √(-a)/2 for repulsion.
+    # The force P - 4 x + a/x ends at x = √(a/2) for attraction and turns at √(-a)/2 for repulsion.
     for scale in (1e-2, 1e-3):
         pad = Pad(1.0, 1.0, 1e-4 * scale)
         for adhesion, a in (('matlab', 1e-4 * scale), ('text', -1e-4 * scale), ('none', 0.0)):
@@ -220,7 +221,7 @@ def test_ring_hangs_from_its_own_surface(pressure: float, share: float):
     slope = math.sqrt(dome.sphere_radius**2 - b * b) / b  # cot of the wall's angle
     z, weights = np.polynomial.legendre.leggauss(4)
     z, weights = 0.5 * h * (z + 1), 0.5 * h * weights
-    # Between the wall, a cone, and the cylinder below the ring.
+    # Volume between the wall, taken as a cone, and the cylinder below the ring.
     volume = np.sum(weights * math.pi * (ring.ring_radius**2 - (b + z * slope) ** 2))
     lift = math.sin(WATER.angle + math.asin(b / dome.sphere_radius))
     pull = 2 * math.pi * ring.ring_radius * WATER.surface_tension * lift
@@ -253,5 +254,6 @@ def test_pinned_line_holds_between_pi_over_four_and_all_of_the_bound():
 
     jump = held(lambda angle: mpf(1) if mp.cos(angle) > 0 else mpf(0))
     smooth = held(lambda angle: (1 + mp.cos(angle)) / 2)
-    assert jump == pytest.approx(2)  # times γ r (cos θ_rec - cos θ_adv): K = 1 of w = 2 r
-    assert smooth == pytest.approx(mp.pi / 2)  # K = pi/4
+    # In docs/derivation.md the force is 2 K γ r (cos θ_rec - cos θ_adv), with K from pi/4 to 1.
+    assert jump == pytest.approx(2)
+    assert smooth == pytest.approx(mp.pi / 2)

@@ -23,8 +23,8 @@ from ros_pad.errors import NoEquilibrium
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
-# The appendix computed with pi = 3.1415. Pi enters only through force/pi, so the same numbers
-# come from the exact pi and a force larger by this factor.
+# The appendix used pi = 3.1415. Pi enters only through force/pi, so the exact pi gives the same
+# numbers with a force that is larger by this factor.
 APPENDIX_PI = math.pi / 3.1415
 
 # Pressure of the large pad and share of its flattening force, over the model's domain.
@@ -37,7 +37,7 @@ def rows(name):
 
 
 def flattening(pressure, pad=LARGE_PAD):
-    """Closed form of the end of the branch with the appendix' adhesion, to first order."""
+    """Return the load, N, that presses a dome flat: closed form to first order in adhesion."""
     r, k = pad.radius, pad.stiffness
     return math.pi * r * (pressure * r - math.sqrt(2 * pad.adhesion_energy * k))
 
@@ -77,7 +77,7 @@ class TestFree:
 
     @pytest.mark.parametrize('below', ['1e-9', '1e-6', '1e-3', '0.1', '0.9', '1.05'])
     def test_digits_are_kept_up_to_bursting(self, below):
-        # At P = 6 - d, in powers of two so that radius, stiffness and pressure are exact.
+        # P = 6 - below; radius and stiffness are powers of two, so that they are exact.
         pad = Pad(radius=2.0**-9, stiffness=32.0)
         pressure = (6.0 - float(below)) * 2.0**14
         with mpmath.workdps(40):
@@ -176,14 +176,14 @@ class TestPressed:
         row = next(r for r in rows('pressed_dome.json') if r['force'] == 0.524842)
         dome = press(LARGE_PAD, 75e3, 0.524842)
         assert dome.gap == pytest.approx(8.078574392658379753167e-8, rel=1e-11)
-        assert row['roots'] == 3  # two of them unphysical
+        assert row['roots'] == 3  # two roots are unphysical
 
     def test_not_the_root_that_fsolve_falls_for(self):
         pressure, force = 75e3, 0.52
         r, k, energy = LARGE_PAD.radius, LARGE_PAD.stiffness, LARGE_PAD.adhesion_energy
 
         def appendix(scaled):
-            """The two equations of appendix 7.2.2 in millimetres."""
+            """Return the residuals of the two equations of appendix 7.2.2, for lengths in mm."""
             a, c = scaled * 1e-3
             sphere = (r * r + c * c) / (2 * c)
             b2 = (force + 2 * energy * math.pi * sphere) / (pressure * math.pi)
@@ -193,7 +193,7 @@ class TestPressed:
             return [first * 1e3, second]
 
         wrong, _, flag, _ = fsolve(appendix, [1.0, 1.3], full_output=True)
-        assert flag == 1 and wrong[1] > 0.9  # it says it has solved them
+        assert flag == 1 and wrong[1] > 0.9  # fsolve reports success
         right = press(LARGE_PAD, pressure, force)
         assert right.height < 0.05e-3
         assert np.abs(appendix(np.array([right.depth, right.height]) * 1e3)).max() < 1e-12
@@ -208,7 +208,7 @@ class TestPressed:
         r, k = LARGE_PAD.radius, LARGE_PAD.stiffness
         sign = {'matlab': 1, 'text': -1, 'none': 0}[adhesion]
         if adhesion == 'text':
-            pressure = max(pressure, 5e3)  # below, repulsion leaves no branch worth the name
+            pressure = max(pressure, 5e3)  # below, repulsion leaves almost no branch
         force = share * max(flattening(pressure), 0.0)
         dome = press(LARGE_PAD, np.array([pressure]), force, adhesion=adhesion)
         status = dome.status[0]
@@ -232,13 +232,13 @@ class TestPressed:
         assert 0 < a <= c and 0 < b < r
         assert gap == pytest.approx(c - a, abs=1e-12 * c)
         assert sphere == pytest.approx((r * r + c * c) / (2 * c), rel=1e-13)
-        assert a * (2 * sphere - a) == pytest.approx(b * b, rel=1e-12)  # 3.48
+        assert a * (2 * sphere - a) == pytest.approx(b * b, rel=1e-12)  # equation 3.48
         pull = sign * 2 * math.pi * LARGE_PAD.adhesion_energy * sphere
         scale = math.pi * r * r * pressure
         assert pressure * math.pi * b * b == pytest.approx(force + pull, abs=1e-12 * scale)  # 3.53
         sigma = math.sqrt(1 + (c * c - a * a) / r**2)
         push = math.pi * (c + a) * (pressure * sphere - 2 * k * (1.5 * sigma - 1))
-        assert push == pytest.approx(force, abs=1e-11 * scale)  # 3.58
+        assert push == pytest.approx(force, abs=1e-11 * scale)  # equation 3.58
         certificate = (
             pressure * (sphere - 2 * a) / k + (3 * sigma - 2) - 3 * a * (c + a) / (r * r * sigma)
         )
@@ -303,28 +303,28 @@ class TestPressed:
                 assert np.isnan(together.height[row])
             else:
                 assert together.status[row] == alone.status
-                # Near flattening the height is ill-conditioned: a last digit more or less.
+                # Near flattening the height is ill-conditioned: its last digits may differ.
                 rel = 1e-13 / max(1e-4, abs(1.0 - share[row]))
                 assert together.height[row] == pytest.approx(alone.height, rel=rel)
                 assert together.contact_radius[row] == pytest.approx(alone.contact_radius, rel=rel)
 
     @pytest.mark.parametrize('tension', [1.0, 2.0, 3.0, 3.335])
     def test_text_sign_follows_its_branch_to_the_fold(self, tension):
-        # With repulsion this strong the second root is close; it has the lower dome.
+        # With repulsion this strong the second root, a lower dome, is close.
         pad = Pad(1.0, 1.0, 0.01)
         share = np.linspace(0.05, 1.0, 20001)
         dome = press(pad, tension, math.pi * tension * share, 'text')
         there = dome.status == 'ok'
         assert 5000 < there.sum() < 20001
-        assert (np.diff(there.astype(int)) <= 0).all(), 'once it has ended it does not come back'
+        assert (np.diff(there.astype(int)) <= 0).all(), 'after its end the branch must not return'
         fall = -np.diff(dome.height[there])
         assert (fall > 0.0).all()
-        # It falls ever faster into the fold, as a square root, without a jump.
+        # The height falls ever faster into the fold, like a square root, without a jump.
         assert fall[-1] < 0.2 * dome.height[there][-1]
         assert fall[-20:-1].max() < 3.0 * fall[-30:-2].max()
 
     def test_every_row_of_a_large_array_is_solved(self):
-        # Rows settle after different numbers of steps; none may drift away meanwhile.
+        # Rows converge after different numbers of steps; a converged row must not change any more.
         p, share = np.meshgrid(np.linspace(2e3, 91e3, 60), np.linspace(1e-4, 0.999, 400))
         dome = press(LARGE_PAD, p, share * flattening(p))
         assert (dome.status == 'ok').all()
@@ -370,7 +370,8 @@ class TestPressed:
 
     def test_no_contact_is_the_free_dome(self):
         free = inflate(LARGE_PAD, 75e3)
-        # The text's sign repels: the pad touches from about 2 pi energy sphere_radius, 58 uN.
+        # Adhesion with the text's sign repels: contact begins at about 2 pi energy sphere_radius,
+        # 58 uN.
         for force, adhesion in [(0.0, 'none'), (0.0, 'text'), (57e-6, 'text')]:
             dome = press(LARGE_PAD, 75e3, force, adhesion=adhesion)
             assert dome.status == 'no_contact'
@@ -380,7 +381,8 @@ class TestPressed:
         assert press(LARGE_PAD, 75e3, 59e-6, adhesion='text').status == 'ok'
 
     def test_small_pad_carries_its_area_share(self):
-        # Same P and f without adhesion: nine times less force at three times the pressure.
+        # A third of the radius, three times the pressure and a third of the force are the same
+        # dimensionless state without adhesion.
         large = press(LARGE_PAD, 30e3, 0.09, adhesion='none')
         small = press(SMALL_PAD, 90e3, 0.03, adhesion='none')
         assert small.height * 3 == pytest.approx(large.height, rel=1e-13)

@@ -18,7 +18,7 @@ UNIT = {'surface_tension': 1.0, 'density': 1.0, 'gravity': 1.0}  # capillary len
 @pytest.mark.parametrize('row', ROWS, ids=lambda row: f'{row["theta"]}-{row["r_over_lambda"]}')
 def test_reference_table(row):
     radius, theta = row['r_over_lambda'], math.radians(row['theta'])
-    # 7e-8 is the table's own error where it is largest.
+    # The largest error of the table itself is 7e-8.
     assert fibre_meniscus(radius, contact_angle=theta, **UNIT) == pytest.approx(
         row['h_over_lambda'], rel=1e-7
     )
@@ -31,7 +31,7 @@ def test_reference_table(row):
     ('radius', 'degrees'), [(1e-4, 0), (1e-4, 85), (0.02, 40), (0.5, 0), (3.0, 70), (100.0, 10)]
 )
 def test_surface_ends_in_the_bath(radius, degrees):
-    """Outwards in arc length, a height too large runs up and one too small runs under the bath."""
+    """Integrated outward, a surface that starts too high turns up, one too low dives under."""
 
     def runs_under(height):
         def rates(_, y):
@@ -57,7 +57,7 @@ def test_surface_ends_in_the_bath(radius, degrees):
         return path.t_events[0].size > 0
 
     height = fibre_meniscus(radius, contact_angle=math.radians(degrees), **UNIT)
-    # Too large a height outweighs the tension: the surface turns up before it is level.
+    # A surface that starts too high turns up before it is level with the bath.
     assert runs_under(height * (1 - 1e-7)) and not runs_under(height * (1 + 1e-7))
 
 
@@ -65,7 +65,7 @@ def test_surface_ends_in_the_bath(radius, degrees):
 def test_thick_fibre_is_a_plate(theta):
     plate = math.sqrt(2.0 * (1.0 - math.sin(theta)))
     height = fibre_meniscus(1e4, contact_angle=theta, **UNIT)
-    # The first correction is of the order of the radius' inverse and lowers it.
+    # The first correction is of the order of 1 / radius and lowers the height.
     assert 0.0 < plate - height < 1e-4 * plate
 
 

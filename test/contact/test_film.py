@@ -15,7 +15,7 @@ VISCOSITY = 1.0e-3
 
 
 def squeezed(start, pressure, radius, time, viscosity):
-    """Integrate the Stefan-Reynolds equation dh/dt = -2 p h³/(3 η a²) as it stands."""
+    """Return the film, m, by integrating the Stefan-Reynolds equation dh/dt = -2 p h³/(3 η a²)."""
 
     def thinning(_, log_h):
         return -2.0 * pressure * np.exp(2.0 * log_h) / (3.0 * viscosity * radius**2)
@@ -28,7 +28,7 @@ def squeezed(start, pressure, radius, time, viscosity):
 
 
 def dome_limit(load, pads, pressure, time):
-    """Film left under domes by a constant load after a long time."""
+    """Return the film, m, that a constant load leaves under domes after a long time."""
     return math.sqrt(3.0 * VISCOSITY * load / (4.0 * math.pi * pads * time)) / pressure
 
 
@@ -112,7 +112,7 @@ def test_constant_load_on_domes_whatever_the_steps(steps):
     radius = math.sqrt(load / (FOOT.pads * math.pi * pressure))
     expected = squeezed(3e-4, pressure, radius, duration, VISCOSITY)
     assert film.under_domes == pytest.approx(expected, rel=1e-7)
-    # 0.3 mm is thick: what is left is the closed form without it.
+    # A start of 0.3 mm is so thick that the closed form without it holds.
     assert film.under_domes == pytest.approx(
         dome_limit(load, FOOT.pads, pressure, duration), rel=1e-5
     )
@@ -130,7 +130,7 @@ def test_constant_load_on_the_flat_sole():
 
 
 def test_drainage_time_goes_as_one_over_pressure_squared():
-    """40 : 60 : 75 kPa need 3.52 : 1.56 : 1 of the time for the same film."""
+    """For the same film 40, 60 and 75 kPa need times in the ratio 3.52 : 1.56 : 1."""
     target, load = 2.0e-7, 2.0
     times = []
     for pressure in (40e3, 60e3, 75e3):
@@ -170,7 +170,7 @@ def soft_landing(time):
 
 
 def test_soft_landing_does_not_depend_on_the_step():
-    """A pad that is put down softly has at first no area at all: ∫ p²/N dt has no limit there."""
+    """A pad that lands softly has no contact area at first, so that ∫ p²/N dt diverges there."""
     left = []
     for dt in (4e-3, 1e-3, 1e-4):
         film = Film(FOOT, VISCOSITY)
@@ -178,13 +178,13 @@ def test_soft_landing_does_not_depend_on_the_step():
         stand(film, soft_landing, 75e3, 0.15, dt)
         left.append(film.under_domes)
     assert left == pytest.approx([left[-1]] * 3, rel=0.01)
-    # What touched last has drained for 0.05 s, what touched first for 0.15 s.
+    # Ground that was touched last has drained for 0.05 s, ground touched first for 0.15 s.
     assert left[-1] < dome_limit(6.8, 37, 75e3, 0.05)
     assert left[-1] > 0.99 * dome_limit(6.8, 37, 75e3, 0.15)
 
 
 def test_growing_contact_averages_over_its_area():
-    """d(A/h²)/dt = A 4p/(3ηb²) + (dA/dt)/h0²: integrate that for a steadily growing load."""
+    """For a steadily growing load, integrate d(A/h²)/dt = A 4p/(3ηb²) + (dA/dt)/h0²."""
     pressure, rate, thick = 75e3, 40.0, 2e-6
     film = Film(FOOT, VISCOSITY)
     film.touch_down(thick)
@@ -207,7 +207,7 @@ def test_shrinking_contact_keeps_its_film():
     before = film.under_domes
     film.drain(3.4, 0.0, 75e3, 1e-9)
     assert film.under_domes == pytest.approx(before, rel=1e-6)
-    film.drain(6.8, 0.0, 75e3, 1e-9)  # the half that comes back is wet again
+    film.drain(6.8, 0.0, 75e3, 1e-9)  # the half touched again has a thick film
     assert film.under_domes == pytest.approx(math.sqrt(2.0) * before, rel=1e-3)
 
 

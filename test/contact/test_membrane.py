@@ -24,24 +24,24 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
 LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
-UNIT = Pad(1.0, 1.0)  # pressure is then P, and force pi P times the share of the pad in contact
+UNIT = Pad(1.0, 1.0)  # then pressure is P, and force is pi P times the share in contact
 APPENDIX_PI = math.pi / 3.1415
 
-# Pressure P and share, over the whole domain: one rectangle up to the cusp, one past it.
+# Pressure P and share of the pad in contact: one rectangle up to the cusp and one beyond it.
 states = st.tuples(st.floats(1e-3, 5.14), st.floats(1e-9, 0.999)) | st.tuples(
     st.floats(5.14, 5.99), st.floats(1e-9, 0.7099)
 )
 
 
 def full(pad, pressure):
-    """Force at which the contact would span the pad."""
+    """Return the force, N, at which the contact would span the pad."""
     return math.pi * pad.radius**2 * pressure
 
 
 def exact_gap(pressure, share, digits=22):
-    """Gap over radius, by quadrature and bracketing in many digits.
+    """Return gap over radius, by quadrature and bracketing in many digits.
 
-    Kenmotsu's parameter of the same surface: r² = l² + m² + 2 l m sin(a), arc length l a.
+    The surface has Kenmotsu's parameter a: r² = l² + m² + 2 l m sin(a), arc length l a.
     """
     with mp.workdps(digits):
         pressure, share = mp.mpf(pressure), mp.mpf(share)
@@ -53,7 +53,7 @@ def exact_gap(pressure, share, digits=22):
             end = mp.atan2(mp.sin(psi) - inner, mp.cos(psi))
             end = end if end > start else end + 2 * mp.pi
             points, step = [start], mp.sqrt(share) / (4 * inner)
-            while start + step < end:  # the integrands are sharp near the floor
+            while start + step < end:  # the integrands change fast near the floor
                 points.append(start + step)
                 step *= 6
             points.append(end)
@@ -73,7 +73,7 @@ def exact_gap(pressure, share, digits=22):
 
 
 def balanced(psi, share):
-    """P that each rim angle balances, and gap, by Gauss-Legendre on the same parameter."""
+    """Return pressure P and gap over radius at rim angles, by Gauss-Legendre in Kenmotsu's a."""
     inner = (1 - share) / (2 * np.sin(psi))
     outer = np.sqrt(inner**2 + share)
     start = -np.arcsin(inner / outer)
@@ -98,6 +98,7 @@ class TestAgainstOtherMethods:
         assert exact.contact_radius == pytest.approx(thesis.contact_radius, rel=1e-14)
         assert exact == press_membrane(LARGE_PAD, 75e3, force)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ('pressure', 'share'),
         [
@@ -118,7 +119,7 @@ class TestAgainstOtherMethods:
     def test_gap_in_many_digits(self, pressure, share):
         force = float(math.pi * pressure * share)
         with mp.workdps(25):
-            share = mp.mpf(force) / mp.pi / pressure  # of the rounded force
+            share = mp.mpf(force) / mp.pi / pressure  # the share of the rounded force
         exact = exact_gap(pressure, share)
         pressed = press_membrane(UNIT, pressure, force)
         assert abs(pressed.gap / exact - 1) < 1e-12
@@ -126,10 +127,10 @@ class TestAgainstOtherMethods:
 
     @pytest.mark.parametrize(('pressure', 'share'), [(0.5, 0.3), (2.8125, 0.2), (4.5, 0.5)])
     def test_shape_makes_the_energy_stationary(self, pressure, share):
-        """No curvature, no tangent and no F = p pi b² put in: only the energy of the thesis.
+        """The test uses only the energy of the thesis: no curvature, no tangent, no F = p pi b².
 
-        The wall is any curve from the rim to the edge of contact, given by its distance from the
-        pad's centre over the angle; that curve, contact radius and gap are all free.
+        The wall is any curve from the rim to the edge of contact: its distance from the pad's
+        centre over the angle. This curve, contact radius and gap are all unknown.
         """
         order = 22
         node, weight = np.polynomial.legendre.leggauss(60)
@@ -159,13 +160,22 @@ class TestAgainstOtherMethods:
 
         guess = np.zeros(order + 3)
         guess[:2] = 0.5, 0.6 * inflate(UNIT, pressure).height
+
+        def hessian(shape):
+            step = 1e-6 * np.eye(shape.size)
+            return np.array([gradient(shape + row) - gradient(shape - row) for row in step]) / 2e-6
+
+        # Where root() stops depends on the machine's linear algebra. The contact radius is a
+        # double root, so that each Newton step halves its error.
         found = root(gradient, guess, tol=1e-12).x
-        assert np.abs(gradient(found)).max() < 1e-7
+        for _ in range(12):
+            found = found - np.linalg.solve(hessian(found), gradient(found))
+        assert np.abs(gradient(found)).max() < 1e-12
         pressed = press_membrane(UNIT, pressure, np.pi * pressure * share)
         assert found[0] == pytest.approx(pressed.contact_radius, rel=1e-6)
         assert found[1] == pytest.approx(pressed.gap, rel=1e-6)
 
-    # How far the sphere of the thesis is off, per cent, at 65, 75 and 85 kPa.
+    # Error of the thesis' spherical wall, per cent: least and largest of 65, 75 and 85 kPa.
     @pytest.mark.parametrize(
         ('share', 'least', 'most'),
         [(0.05, 5.5, 7.0), (0.2, 16.5, 18.0), (0.4, 27.5, 36.5), (0.6, 38.5, 87.5)],
@@ -187,21 +197,21 @@ class TestLimits:
         assert (apart.depth, apart.contact_radius) == (0.0, 0.0)
         assert apart.height == apart.gap == pytest.approx(free.height, rel=1e-14)
         assert apart.sphere_radius == pytest.approx(free.sphere_radius, rel=1e-14)
-        # A touch, for which another equation is solved, changes next to nothing.
+        # A tiny force, for which another equation is solved, changes almost nothing.
         touch = press_membrane(LARGE_PAD, pressure, 1e-15 * full(LARGE_PAD, pressure))
         assert touch.status == 'ok'
         for name in ('height', 'sphere_radius', 'gap'):
             assert getattr(touch, name) == pytest.approx(getattr(apart, name), rel=1e-11)
 
     def test_gentle_pressure_is_a_membrane_of_constant_tension(self):
-        # Small slopes at tension k/2: the height obeys z" + z'/r = -2P, so that
+        # With small slopes and tension k/2 the height obeys z" + z'/r = -2P, so that
         # gap = P (1 - b² + 2 b² ln b)/2.
         share = np.array([1e-6, 0.01, 0.3, 0.9])
         gap = press_membrane(UNIT, 1e-6, 1e-6 * np.pi * share).gap
         np.testing.assert_allclose(gap, 1e-6 * (1 - share + share * np.log(share)) / 2, rtol=1e-11)
 
     def test_nearly_flattened_the_wall_is_an_arc(self):
-        # The ring left is narrow and the tension k/2: an arc of radius 1/(2P).
+        # The remaining ring is narrow and its tension k/2, so that it is an arc of radius 1/(2P).
         pressure, rest = 2.8125, np.array([1e-4, 1e-6])
         gap = press_membrane(UNIT, pressure, np.pi * pressure * (1 - rest)).gap
         width = rest / 2
@@ -210,7 +220,7 @@ class TestLimits:
     @settings(max_examples=150)
     @given(states)
     def test_there_is_one_root_and_it_is_the_one_returned(self, state):
-        pressure, share = state[0], max(state[1], 1e-3)  # fewer nodes cannot tell from a point
+        pressure, share = state[0], max(state[1], 1e-3)  # ``balanced`` has too few nodes for less
         low = np.geomspace(1e-2, np.pi / 2, 700) * min(1.0, pressure * (1 - share))
         psi = np.unique(np.concatenate((low, np.pi - np.geomspace(1e-4, np.pi / 2, 1000))))
         balance, gap = balanced(psi, share)
@@ -222,7 +232,7 @@ class TestLimits:
     @settings(max_examples=200)
     @given(states, st.floats(1.001, 1.05))
     def test_more_force_lowers_the_pad_and_more_pressure_lifts_it(self, state, factor):
-        pressure, share = state[0], max(state[1], 1e-6)  # less is lost in rounding
+        pressure, share = state[0], max(state[1], 1e-6)  # less is lost in rounding errors
         force = math.pi * pressure * share
         pressed = press_membrane(UNIT, pressure, force)
         lowered = press_membrane(UNIT, [pressure], force * factor)
@@ -239,11 +249,11 @@ class TestLimits:
     @given(states, st.floats(1e-5, 1e-1), st.floats(0.1, 1e4))
     def test_one_pad_is_every_pad(self, state, radius, stiffness):
         pressure, share = state
-        # At the bounds themselves the rounding of the scaled numbers decides.
+        # Exactly at the bounds, rounding of the scaled numbers decides.
         assume(abs(pressure - LARGEST_PRESSURE) > 1e-9 and abs(share - LARGEST_SHARE) > 1e-9)
         force = math.pi * pressure * share
         one = press_membrane(UNIT, pressure, force)
-        pad = Pad(radius, stiffness, adhesion_energy=1.0)  # which has no say
+        pad = Pad(radius, stiffness, adhesion_energy=1.0)  # adhesion has no effect
         other = press_membrane(pad, pressure * stiffness / radius, force * stiffness * radius)
         loss = 1e-12 / min(1 - share, (6 - pressure) ** 2)
         for name in LENGTHS:
@@ -254,7 +264,7 @@ class TestLimits:
         pressure, share = state
         pressed = press_membrane(UNIT, pressure, math.pi * pressure * share)
         b, d = pressed.contact_radius, pressed.gap
-        with mp.workdps(40):  # the printed formula cancels
+        with mp.workdps(40):  # the printed formula loses digits
             part = 1 - mp.mpf(b) ** 2 - mp.mpf(d) ** 2
             height = (mp.sqrt(part**2 + 4 * mp.mpf(d) ** 2) - part) / (2 * mp.mpf(d))
             sphere = (1 + height**2) / (2 * height)
@@ -265,7 +275,7 @@ class TestLimits:
 
 class TestInterface:
     def test_statuses_at_the_edges(self):
-        # The cusp is at P = 5.1427 and a share of 0.7143, 137.14 kPa for the large pad.
+        # The cusp is at P = 5.1427, 137.14 kPa for the large pad, and a share of 0.7143.
         cases = [
             (0.0, 0.0, 'flattened'),  # a flat pad
             (1.0, 0.0, 'no_contact'),

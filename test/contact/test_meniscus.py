@@ -24,7 +24,7 @@ REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'meniscus_thesi
 APPENDIX_PI = math.pi / 3.1415  # see test_dome.py
 
 
-# Appendix at 75 kPa: force N; F_cap mN with the appendix' tensions and with those of water.
+# Appendix at 75 kPa: force, N; F_cap, mN, with the appendix' tensions and with those of water.
 @pytest.mark.parametrize(
     ('force', 'appendix', 'water'),
     [
@@ -57,13 +57,13 @@ def test_reference_table():
         assert ring.height == pytest.approx(float(row['h']), rel=1e-12)
         assert ring.ring_radius == pytest.approx(float(row['r_i']), rel=1e-12)
         assert ring.tangential_force == pytest.approx(float(row['F_cap']), rel=1e-12)
-        # h_exact hangs the weight from the solid's tension: give that one to the liquid.
+        # In h_exact the tension of the solid carries the weight: here the liquid has that tension.
         exact = meniscus(dome, Liquid(solid, solid, contact_angle=theta))
         assert exact.height == pytest.approx(float(row['h_exact']), rel=1e-12)
-        # F_cap_exact_h = 2 γ (2 r_i + h) of that ring, in the sign as printed.
+        # F_cap_exact_h = 2 γ (2 r_i + h) of the exact ring, with the printed sign.
         printed = 2 * surface * (2 * exact.ring_radius + exact.height)
         assert printed == pytest.approx(float(row['F_cap_exact_h']), rel=1e-12)
-        # F_cap_sign_fixed = 2 γ (2 r_i - h) of the ring as printed.
+        # F_cap_sign_fixed = 2 γ (2 r_i - h) of the printed ring.
         fixed = 2 * surface * (2 * ring.ring_radius - ring.height)
         assert fixed == pytest.approx(float(row['F_cap_sign_fixed']), rel=1e-12)
         assert exact.tangential_force == pytest.approx(
@@ -82,7 +82,7 @@ def test_corrected_height_carries_its_weight(pressure, share, theta):
     weight = 900.0 * 9.81 * cot * h * h * (3 * b + 2 * h * cot)
     assert weight == pytest.approx(6 * 0.05 * math.sin(theta + alpha) * (b + h * cot), rel=1e-11)
     assert ring.ring_radius == pytest.approx(b + h * cot, rel=1e-11)
-    # For one and the same tension the printed height is up to 22 % too high, never too low.
+    # If both tensions are equal, the printed height is up to 22 % too high and never too low.
     printed = meniscus(dome, Liquid(0.05, 0.05, 900.0, theta), 'thesis').height
     assert 1.0 <= printed / h < math.sqrt(1.5) + 1e-9
 
@@ -106,7 +106,7 @@ def test_arrays_carry_their_statuses():
 
 
 def test_contact_angle():
-    # The appendix' theta from its ratio of tensions, in the table's own digits.
+    # The appendix' theta follows from its ratio of tensions, here with the digits of the table.
     assert contact_angle(0.0027, 0.0073) == pytest.approx(1.352745229033721205, rel=1e-14)
     assert WATER.angle == pytest.approx(1.352745229033721205, rel=1e-14)
     assert THESIS_LIQUID.angle == 1.35
@@ -136,7 +136,7 @@ def test_tensions_that_do_not_broadcast():
         {'surface_tension': 0.0},
         {'surface_tension': math.nan},
         {'solid_tension': -0.1},
-        {'solid_tension': 0.001},  # no contact angle follows
+        {'solid_tension': 0.001},  # no contact angle has this ratio
         {'density': 0.0},
         {'contact_angle': -0.1},
         {'contact_angle': math.pi},
@@ -160,15 +160,15 @@ def test_bad_calls():
 
 @pytest.mark.parametrize('factor', [math.pi / 4, 0.9, 1.0])
 def test_hysteresis_force(factor):
-    # Water, 0.8 mm, cosines half apart: 0.06 mN.
+    # Water on a disc of 0.8 mm, with cosines that differ by 0.5: 0.06 mN.
     force = hysteresis_force(0.8e-3, 0.073, 2 * math.pi / 3, math.pi / 2, factor)
     assert force == pytest.approx(factor * 0.073 * 1.6e-3 * 0.5, rel=1e-14)
     assert type(force) is float
 
 
 def test_hysteresis_force_integrates_the_line():
-    # The pull of the line on the disc, with the angle's cosine going as that of the azimuth (pi/4)
-    # or jumping between its halves (1).
+    # The contact line pulls the disc. The cosine of its angle varies as the cosine of the azimuth
+    # (factor pi/4), or jumps between the two halves of the line (factor 1).
     azimuth = (np.arange(20000) + 0.5) * (2 * math.pi / 20000)
     low, high = math.cos(1.9), math.cos(0.7)
     for factor, share in ((math.pi / 4, np.cos(azimuth)), (1.0, np.sign(np.cos(azimuth)))):
@@ -178,10 +178,10 @@ def test_hysteresis_force_integrates_the_line():
 
 
 def test_thesis_force_is_the_hysteresis_bound_at_its_widest():
-    # 3.82 without its second radius: 4 γ r.
+    # Equation 3.82 without its second radius is 4 γ r.
     assert hysteresis_force(1e-3, 0.073, math.pi, 0.0) == pytest.approx(4 * 0.073e-3, rel=1e-14)
     assert hysteresis_force(1e-3, 0.073, 1.0, 1.0) == 0.0
-    # 1e-9 apart nothing is lost to cancellation.
+    # Angles that differ by 1e-9 lose no digits by cancellation.
     assert hysteresis_force(1.0, 1.0, 1.0 + 1e-9, 1.0) == pytest.approx(
         2e-9 * math.sin(1.0), rel=1e-6
     )

@@ -26,7 +26,8 @@ def test_the_strongest_wins():
     prints = Footprints()
     prints.add(0.0, 0.0, 0.95)
     prints.add(1.0, 0.0, 0.1)
-    # Half-way wet, 0.45 off the prior, says more than dry, 0.4 off it; nearer to dry it is dry.
+    # Half-way the wet footprint counts: it differs more from the prior, by 0.45, than the dry one,
+    # by 0.4. Near the dry footprint that one counts.
     assert prints.wet_probability(0.5, 0.0) == pytest.approx(0.5 + 0.45 * math.exp(-0.5))
     assert prints.wet_probability(0.9, 0.0) == pytest.approx(0.5 - 0.4 * math.exp(-0.1))
 
@@ -38,7 +39,7 @@ def test_of_equal_ones_the_last_wins():
     assert prints.wet_probability(0.0, 0.0) == pytest.approx(0.1)
 
 
-def test_a_footprint_that_says_nothing_hides_none():
+def test_an_undecided_footprint_hides_none():
     prints = Footprints()
     prints.add(0.0, 0.0, 0.9)
     prints.add(0.0, 0.0, 0.5)
@@ -75,11 +76,12 @@ def test_bad_values_are_named(name, value):
 
 
 def test_the_wet_share_counts_ways_not_feet():
-    """Beta(1, 1) and, by hand, 3 m in steps of 1 m, each worth 1 - 1/e, and 0.9 sure of 0.95."""
+    """By hand: prior Beta(1, 1), three distances of 1 m that count 1 - 1/e each, times 0.9 as
+    footprints of 0.95 are 90 % certain."""
     prints = Footprints()
     for step in range(4):
         for foot in range(6):
-            # Six feet on one place are worth one.
+            # Six feet on one place count as one.
             prints.add(float(step), 0.1 * foot, 0.95, walked=0.0 if foot or not step else 1.0)
     told = 3 * 0.9 * 0.632121
     assert prints.wet_share == pytest.approx((1.0 + 0.95 * told) / (2.0 + told), abs=1e-6)
@@ -98,7 +100,7 @@ def test_on_ground_that_is_all_alike_the_share_is_learnt(felt, least, most):
     for step in range(60):
         prints.add(0.5 * step, 0.0, felt, walked=0.5)
     assert least < prints.wet_share < most
-    # Far from every footprint that is what is expected; the prior stays what it was.
+    # Far from every footprint the wet share is expected; the prior does not change.
     assert prints.wet_expected(999.0, 0.0) == pytest.approx(prints.wet_share)
     assert prints.wet_probability(999.0, 0.0) == pytest.approx(0.5)
     assert prints.wet_expected(29.5, 0.0) == pytest.approx(felt)

@@ -16,7 +16,7 @@ from ros_pad.control import LiftOff
 from ros_pad.control import MorphologyController
 from ros_pad.control import adaptive
 from ros_pad.control import dome
-from ros_pad.control import first_shapes
+from ros_pad.control import first_morphologies
 from ros_pad.control import flat
 from ros_pad.control import oracle
 from ros_pad.control import policy_named
@@ -57,24 +57,24 @@ def test_fixed_policies_are_fixed(wet_ahead, morphology):
 @pytest.mark.parametrize(
     ('step', 'expected'),
     [
-        # A flat foot turns where it is likely wet, and not before.
+        # A flat foot becomes a dome above P(wet) = 0.65.
         ({'wet_ahead': 0.66}, Choice('dome')),
         ({'wet_ahead': 0.64}, Choice('flat')),
         ({'wet_ahead': 0.0}, Choice('flat')),
-        # It keeps its shape for two steps.
+        # It keeps its morphology for two steps.
         ({'wet_ahead': 0.99, 'steps': 1}, Choice('flat')),
         ({'wet_ahead': 0.99, 'steps': 2}, Choice('dome')),
-        # A domed foot goes back where it is likely dry.
+        # A domed foot becomes flat below P(wet) = 0.35.
         ({'morphology': 'dome', 'wet_ahead': 0.34}, Choice('flat')),
         ({'morphology': 'dome', 'wet_ahead': 0.34, 'steps': 1}, Choice('dome')),
-        # Where it does not know, it asks, one leg at a time.
+        # In between domed feet probe, up to 0.75 and one leg at a time.
         ({'morphology': 'dome', 'wet_ahead': 0.36}, Choice('flat', probe=True)),
         ({'morphology': 'dome', 'wet_ahead': 0.74}, Choice('flat', probe=True)),
         ({'morphology': 'dome', 'wet_ahead': 0.76}, Choice('dome')),
         ({'morphology': 'dome', 'wet_ahead': 0.5, 'others_probing': True}, Choice('dome')),
         ({'morphology': 'dome', 'wet_ahead': 0.34, 'others_probing': True}, Choice('flat')),
         ({'morphology': 'dome', 'wet_ahead': 0.5, 'steps': 1}, Choice('dome')),
-        # After a probe it need not dwell: back when wet, flat when dry.
+        # There is no dwell after a probe: the foot is a dome again if wet, else stays flat.
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.9}, Choice('dome')),
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.1}, Choice('flat')),
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.5}, Choice('flat')),
@@ -87,19 +87,19 @@ def test_adaptive_step_by_step(step, expected):
 @pytest.mark.parametrize(
     ('step', 'expected'),
     [
-        # What is unknown is as wet as the way so far, not as the prior.
+        # The expectation from the floor so far counts, not the probability with the prior.
         ({'wet_ahead': 0.5, 'wet_expected': 0.66}, Choice('dome')),
         ({'morphology': 'dome', 'wet_ahead': 0.5, 'wet_expected': 0.34}, Choice('flat')),
-        # Probes come when they are planned, one leg at a time, and not before a shape is settled.
+        # Planned probes are made by one leg at a time, and not during a dwell.
         ({'morphology': 'dome', 'plan': Plan(probe=True)}, Choice('flat', probe=True)),
         ({'morphology': 'dome', 'wet_ahead': 0.9, 'plan': Plan()}, Choice('dome')),
         ({'morphology': 'dome', 'others_probing': True, 'plan': Plan(probe=True)}, Choice('dome')),
         ({'morphology': 'dome', 'steps': 1, 'plan': Plan(probe=True)}, Choice('dome')),
-        # Where flat feet do not pay, dry ground is no reason to be flat.
+        # If flat feet do not pay, feet are domes on dry ground, too.
         ({'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
         ({'wet_ahead': 0.0, 'steps': 1, 'plan': Plan(flat_pays=False)}, Choice('flat')),
         ({'morphology': 'dome', 'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
-        # A trial is made on dry ground alone, and over after one step.
+        # A dome test is made on dry ground only and ends after one step.
         ({'wet_ahead': 0.1, 'plan': Plan(trial=True)}, Choice('dome', probe=True)),
         ({'wet_ahead': 0.5, 'plan': Plan(trial=True)}, Choice('flat')),
         ({'morphology': 'dome', 'steps': 1, 'probing': True, 'wet_ahead': 0.1}, Choice('flat')),
@@ -116,15 +116,15 @@ def test_a_fixed_count_of_steps_between_probes():
         assert policy(step).probe == (steps >= 7)
 
 
-def test_first_shapes():
+def test_first_morphologies():
     legs = (1, 2, 3, 4, 5, 6)
-    assert set(first_shapes('flat', legs).values()) == {'flat'}
-    assert set(first_shapes('oracle', legs).values()) == {'flat'}
-    assert set(first_shapes('dome', legs).values()) == {'dome'}
-    # One foot of each tripod feels the ground.
-    adaptive_shapes = first_shapes('adaptive', legs)
+    assert set(first_morphologies('flat', legs).values()) == {'flat'}
+    assert set(first_morphologies('oracle', legs).values()) == {'flat'}
+    assert set(first_morphologies('dome', legs).values()) == {'dome'}
+    # One foot of each tripod begins flat and observes the ground.
+    adaptive_shapes = first_morphologies('adaptive', legs)
     assert [leg for leg in legs if adaptive_shapes[leg] == 'flat'] == [1, 6]
-    assert first_shapes('adaptive', (1,)) == {1: 'flat'}
+    assert first_morphologies('adaptive', (1,)) == {1: 'flat'}
     controller = MorphologyController(FOOT, legs, adaptive(), LOAD, start=adaptive_shapes)
     assert {leg: controller.morphology(leg) for leg in legs} == adaptive_shapes
     assert sum(controller.switches.values()) == 0
@@ -133,7 +133,7 @@ def test_first_shapes():
 
 
 def test_between_the_thresholds_each_shape_stays():
-    """Hysteresis: without probes a belief between 0.35 and 0.65 changes nothing."""
+    """Hysteresis: without probes a P(wet) between 0.35 and 0.65 changes nothing."""
     policy = by_threshold(probe_below=0.0)
     for wet_ahead in (0.36, 0.5, 0.64):
         for shape in ('flat', 'dome'):
@@ -167,7 +167,7 @@ def test_policies_by_name():
     for name in POLICIES:
         assert callable(policy_named(name, lambda x, y: True))
     assert policy_named('flat') is flat
-    with pytest.raises(InvalidInput, match=r"'oracle': needs a floor"):
+    with pytest.raises(InvalidInput, match=r"'oracle' needs the map of the floor"):
         policy_named('oracle')
     with pytest.raises(InvalidInput, match="'brave': one of flat, dome, adaptive, oracle"):
         policy_named('brave')
@@ -177,7 +177,7 @@ def test_policies_by_name():
 
 
 class Walk:
-    """Legs that step one after the other along x, on ground of which flat feet tell the truth."""
+    """Legs that step one after the other along x; flat feet observe the ground correctly."""
 
     def __init__(self, policy, legs=(1,), is_wet=lambda x: False, told=(0.03, 0.97), **options):
         self.controller = MorphologyController(FOOT, legs, policy, LOAD, **options)
@@ -186,7 +186,7 @@ class Walk:
         self.belief = dict.fromkeys(legs, 0.5)
 
     def step(self, leg, load=LOAD):
-        """Stand, then lift off; the shape chosen for the next step is returned."""
+        """Stand, then lift off; return the morphology chosen for the next step."""
         controller, x = self.controller, self.x[leg]
         if controller.morphology(leg) == 'flat':
             self.belief[leg] = self.told[self.is_wet(x)]
@@ -201,7 +201,7 @@ class Walk:
 def test_a_flat_foot_turns_to_dome_on_wet_ground():
     walk = Walk(by_threshold(), is_wet=lambda x: x > 0.5)
     shapes = [walk.step(1) for _ in range(7)]
-    # The fifth footprint, at 0.64 m, is the first one that is wet.
+    # The fifth footprint, at 0.64 m, is the first wet one.
     assert shapes == ['flat'] * 4 + ['dome'] * 3
     assert walk.controller.setpoint(1) > 52e3
     assert walk.controller.switches == {1: 1}
@@ -212,8 +212,8 @@ def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
     shapes = [walk.step(1) for _ in range(40)]
     probes = [k for k in range(1, 40) if shapes[k] == 'flat' and shapes[k - 1] == 'dome']
     assert len(probes) >= 4
-    assert all(shapes[k + 1] == 'dome' for k in probes if k < 39)  # one step each
-    # What it knew, 0.97, has faded to 0.75 after ln(0.47/0.25) = 0.63 m: four strides.
+    assert all(shapes[k + 1] == 'dome' for k in probes if k < 39)  # probes last one step
+    # P(wet) fades from 0.97 to 0.75 in ln(0.47/0.25) = 0.63 m: four strides.
     assert {b - a for a, b in itertools.pairwise(probes)} == {4}
 
 
@@ -221,12 +221,12 @@ def test_a_probe_that_finds_dry_ground_stays_flat():
     walk = Walk(by_threshold(), is_wet=lambda x: x < 1.0)
     shapes = [walk.step(1) for _ in range(30)]
     assert 'dome' in shapes[:5]
-    # It knows after the next probe, at most five strides past the edge at 1 m.
+    # The next probe is at most five strides beyond the edge at 1 m, and finds dry ground.
     assert shapes[6 + 5 :] == ['flat'] * (30 - 11)
 
 
 def test_the_information_trap():
-    """Without probes a foot that was once on wet ground never returns: a dome feels no dry."""
+    """Without probes a foot that was once on wet ground stays a dome: domes observe no ground."""
     trapped = Walk(by_threshold(probe_below=0.0), is_wet=lambda x: x < 1.0)
     shapes = [trapped.step(1) for _ in range(300)]
     assert shapes[1:] == ['dome'] * 299
@@ -243,7 +243,7 @@ def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
             flats.append([n for n in legs if walk.controller.morphology(n) == 'flat'])
     settled = flats[3 * len(legs) :]
     assert max(map(len, settled)) == 1
-    # Six legs together ask hardly more often than one alone does, every fourth stride.
+    # Six legs together probe hardly more often than one leg alone, every fourth stride.
     probes = sum(bool(now) and now != before for before, now in itertools.pairwise(settled))
     assert 5 <= probes <= 12
 
@@ -253,7 +253,7 @@ def test_a_leg_that_is_held_up_keeps_no_other_from_probing():
     for _ in range(3):
         walk.step(1)
         walk.step(2)
-    # Leg 1 walks alone until it probes; then it is lost.
+    # Leg 1 walks alone until it probes; then it does not step any more.
     while walk.step(1) == 'dome':
         pass
     shapes = [walk.step(2) for _ in range(20)]
@@ -302,7 +302,7 @@ def test_steps_and_probes_are_counted_for_the_policy():
 def test_pressure_follows_the_heaviest_recent_step():
     walk = Walk(dome)
     walk.step(1, load=10.0)
-    # By hand: the larger of the peak felt, 10 N, and of the 10.2 N it began with, fading.
+    # By hand: the larger of the measured peak, 10 N, and the initial 10.2 N after fading.
     expected = 75e3 + (1.2 * 10.18 / 37 - 0.2833) / 1.25e-5
     assert walk.controller.setpoint(1) == pytest.approx(expected, abs=10.0)
     walk.step(1, load=12.0)
@@ -316,7 +316,7 @@ def test_pressure_follows_the_heaviest_recent_step():
     )
 
 
-def test_a_foot_too_heavy_for_domes_stays_flat_and_says_why():
+def test_a_foot_too_heavy_for_domes_stays_flat_with_a_reason():
     walk = Walk(dome)
     assert walk.step(1, load=LOAD) == 'dome'
     assert walk.step(1, load=20.0) == 'flat'
@@ -362,7 +362,7 @@ streams = st.lists(
 @settings(max_examples=150, deadline=None)
 @given(streams, st.sampled_from(POLICIES))
 def test_never_a_change_in_stance(stream, name):
-    """Whatever comes: set-points move only when a foot that stood is below the gate."""
+    """For any input a set-point changes only when a foot that stood falls below the load gate."""
     policy = policy_named(name, lambda x, y: x + y > 0.0)
     controller = MorphologyController(FOOT, (1, 2, 3), policy, LOAD)
     stood = dict.fromkeys((1, 2, 3), False)
@@ -387,7 +387,7 @@ def test_never_a_change_in_stance(stream, name):
 
 
 def test_noise_at_the_gate_is_no_step():
-    """Load that rises with jitter: one stance, and one decision when it ends."""
+    """A load that crosses the gate with jitter is one stance, with one decision at its end."""
     decisions = []
 
     def spy(step):
@@ -405,7 +405,7 @@ def test_noise_at_the_gate_is_no_step():
 
 
 def test_a_foot_that_lands_lightly_has_not_stepped():
-    """Feet touch with half their load and are light again until the other tripod lifts off."""
+    """Feet touch down with half their load, then carry little until the other tripod lifts off."""
     decisions = []
 
     def spy(step):
@@ -420,7 +420,7 @@ def test_a_foot_that_lands_lightly_has_not_stepped():
 
 @pytest.mark.parametrize('seed', range(20))
 def test_never_more_switches_than_the_dwell_allows(seed):
-    """Whatever feet feel: between changes of shape lie two steps, but for probes and trials."""
+    """For any input there are two steps between switches, except for probes and dome tests."""
     random = np.random.default_rng(seed)
     policy, dwell = adaptive(), 2
     morphology, probing, steps, kept = 'flat', False, math.inf, []
@@ -449,7 +449,7 @@ def test_values_that_are_no_numbers_change_nothing(bad, place):
     with pytest.raises(InvalidInput, match='leg 1: '):
         controller.update(1, values['load'], values['wet_probability'], (values['x'], values['y']))
     assert controller.setpoint(1) == 0.0
-    # The lift-off is still to come.
+    # The lift-off was not counted: the next valid sample is the lift-off.
     assert controller.update(1, 0.0, 0.5, (0.0, 0.0)) > 0.0
 
 
@@ -476,8 +476,8 @@ def test_unknown_legs_are_refused():
         ('margin', math.inf),
         ('fixed_pressure', 0.0),
         ('fixed_pressure', -5.0),
-        ('load_gate', 0.0),
-        ('load_gate', 0.7),
+        ('lift_off_share', 0.0),
+        ('lift_off_share', 0.7),
     ],
 )
 def test_bad_options_are_named(name, value):

@@ -18,7 +18,7 @@ FOOT = Foot.load('large37')
 
 @given(load=st.floats(0.0, 12.0), margin=st.floats(1.0, 1.4))
 def test_there_and_back_with_the_margin(load, margin):
-    """At the pressure chosen the pads carry the load with its margin, and 10 Pa less do not."""
+    """At the chosen pressure pads carry the load times the margin; at 10 Pa less they do not."""
     assume(load * margin < 17.4)  # 37 pads carry 17.42 N at the ceiling of 90 kPa
     pressure = dome_pressure(FOOT, load, margin)
     assert pressure <= FOOT.ceiling
@@ -55,7 +55,7 @@ def test_more_load_than_any_pressure_carries():
 
 
 def test_rounding_up_never_passes_the_ceiling():
-    """74 998 Pa are needed and allowed, but the next step of 10 Pa is not."""
+    """The needed pressure is below the ceiling of 74 998 Pa, but 75 000 Pa after rounding up."""
     load = FOOT.pads * force_limit(FOOT.pad, 74_996.0, 'measured')
     narrow = dataclasses.replace(FOOT, ceiling=74_998.0)
     with pytest.raises(LimitError, match='above the ceiling of 74998 Pa'):

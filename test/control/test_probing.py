@@ -24,7 +24,7 @@ STAKES = Stakes(gain=0.1, cost=0.2, probe_cost=0.01)
 
 
 def gain_per_metre(stakes, wet_share, length, interval, seed, way=40_000.0):
-    """Walk over patches that are drawn one by one, and probe at fixed ways: what that brings."""
+    """Walk over random patches with probes at a fixed interval, m; return the gain per metre."""
     random = np.random.default_rng(seed)
     mean = {True: length / (1.0 - wet_share), False: length / wet_share}
     x, gained, wet, end = 0.0, 0.0, True, random.exponential(mean[True])
@@ -36,7 +36,7 @@ def gain_per_metre(stakes, wet_share, length, interval, seed, way=40_000.0):
         if wet:
             gained -= stakes.probe_cost * STRIDE
         else:
-            # Two steps to a stride, to the end of the patch; one step too far.
+            # Two steps to a stride gain up to the end of the patch; one step beyond it is lost.
             gained += 2.0 * stakes.gain * (end - x) - stakes.cost * STRIDE
             x, wet = end, True
             end += random.exponential(mean[True])
@@ -62,13 +62,13 @@ def test_the_planned_interval_is_as_good_as_the_best(stakes, wet_share, length):
     }
     assert max(tried.values()) > 0.0
     assert tried[planned] > 0.95 * max(tried.values())
-    # And it matters: intervals that are far off bring much less.
+    # Intervals far from the best gain much less.
     assert min(tried.values()) < 0.8 * max(tried.values())
 
 
 @pytest.mark.parametrize('gain', [0.0, -0.005, 0.003])
 def test_where_probes_bring_nothing_they_take_a_fixed_share_of_the_way(gain):
-    """With patches of 0.3 m even a small gain is eaten by the steps into the next wet patch."""
+    """On patches of 0.3 m, steps into the next wet patch cost more than a small gain."""
     stakes = Stakes(gain, 0.2, 0.01)
     interval = probe_interval(stakes, 0.5, 0.15, STRIDE)
     assert stakes.probe_cost * STRIDE / interval == pytest.approx(PREMIUM)
@@ -76,7 +76,7 @@ def test_where_probes_bring_nothing_they_take_a_fixed_share_of_the_way(gain):
 
 
 def test_that_probes_cost_nothing_is_no_reason_to_make_them():
-    """Four strides: 0.01 of one over 0.0025 of the way."""
+    """At least 0.01 strides are counted as cost; at 0.0025 of the distance: four strides."""
     assert probe_interval(Stakes(0.0, 0.2, 0.0), 0.5, 1.0, STRIDE) == pytest.approx(4.0 * STRIDE)
 
 
@@ -99,7 +99,8 @@ def test_dearer_probes_and_wetter_ground_are_probed_less():
 
 
 def test_probes_that_cost_little_are_made_each_stride():
-    """By hand: the optimum is near sqrt(2 c₁ s ℓ²/((1 - q) 2 g ℓ/q)) = 0.08 m, below a stride."""
+    """By hand, with cost c₁, stride s, length ℓ, wet share q and gain g, the best interval is near
+    sqrt(2 c₁ s ℓ²/((1 - q) 2 g ℓ/q)) = 0.08 m, below a stride."""
     assert probe_interval(Stakes(0.4, 0.1, 0.02), 0.5, 1.0, STRIDE) == pytest.approx(STRIDE)
     assert probe_interval(Stakes(0.1, 0.1, 0.0), 0.5, 1.0, STRIDE) == STRIDE
 
@@ -123,7 +124,7 @@ def test_bad_stakes_are_named(name, value):
 
 
 def test_expected_stakes_follow_the_contact_model():
-    """A quarter of the differences of the friction that feet/large37.yaml states."""
+    """Stakes are a quarter of the differences in friction that feet/large37.yaml states."""
     foot = Foot.load('large37')
     stakes = Stakes.expected(foot, 6.8)
     assert stakes.gain == pytest.approx(0.25 * (0.80 - 0.41), abs=0.005)
@@ -136,7 +137,7 @@ def test_expected_stakes_follow_the_contact_model():
 
 
 class Body:
-    """Six feet that slip together: the share of each step that is lost is given."""
+    """Six feet that slip; each step loses a given share of the stride."""
 
     def __init__(self, heading=0.0, expected=STAKES):
         self.ground = Footprints()
@@ -150,7 +151,7 @@ class Body:
         return x * cos - y * sin, x * sin + y * cos
 
     def step(self, lost, flat=(), probing=(), wet=0.0):
-        """One step of the tripod whose turn it is; returns the plans of its legs."""
+        """Step with the tripod whose turn it is; return the plans of its legs."""
         tripod = TRIPODS[self.steps % 2]
         self.steps += 1
         for leg in tripod:
@@ -164,7 +165,7 @@ class Body:
 
 
 def on_dry_ground(body, steps, flat, domes):
-    """Walk as the policy does on dry ground; return which legs were tried, and the last plans."""
+    """Walk on dry ground; return the legs with a dome test, in order, and the last plans."""
     tried = []
     trying = set()
     for _ in range(steps):
@@ -182,7 +183,7 @@ def on_dry_ground(body, steps, flat, domes):
 @pytest.mark.parametrize('heading', [0.0, 2.0])
 @pytest.mark.parametrize('domes', [0.15, 0.04])
 def test_domes_are_tried_once_on_dry_ground(heading, domes):
-    """The trial shows that domes lose 0.15, or no more than flat feet, which lose 0.05."""
+    """The dome test shows that domes lose 0.15 or 0.04 of a stride; flat feet lose 0.05."""
     body = Body(heading)
     tried, plans = on_dry_ground(body, 60, 0.05, domes)
     assert sorted(tried) == list(LEGS)
@@ -214,25 +215,25 @@ def test_no_trial_where_flat_feet_lose_nothing():
 
 
 def test_what_a_probe_costs_is_what_its_tripod_lost_more_than_before():
-    """Even if all steps lose more and more, as when something is towed onto dry ground."""
+    """This holds even if all steps lose more and more, as when a sled comes onto dry ground."""
     body = Body()
-    for leg in LEGS:  # all have felt wet ground
+    for leg in LEGS:  # all legs have wet footprints
         body.ground.add(*body.at(0.0, leg), 0.97)
     for count in range(120):
         tripod = TRIPODS[count % 2]
         probe = tripod[:1] if count % 8 == 6 else ()
-        towed = 0.002 * (count // 2) + 0.05 * (count % 2)  # and one tripod always loses more
+        towed = 0.002 * (count // 2) + 0.05 * (count % 2)  # one tripod always loses more
         body.step(towed + (0.04 if probe else 0.01), flat=probe, probing=probe, wet=0.97)
-    # 0.03 more than the last step of the same tripod, and what is towed takes 0.002.
+    # 0.03 more than the last step of the same tripod, and 0.002 as all losses grow.
     assert body.planner.stakes.probe_cost == pytest.approx(0.032, abs=1e-6)
 
 
 def test_a_walk_on_dry_domes_shows_what_they_lose():
-    """Feet that have learnt to stay domes go on learning: flat ones may pay after all."""
+    """On domes the loss is still measured, so that flat feet can pay again."""
     body = Body()
     for _ in range(20):
         body.step(0.05, flat=LEGS)
     for _ in range(20):
-        body.ground.add(*body.at(body.x[1] + STRIDE, 1), 0.0)  # all of it is known to be dry
+        body.ground.add(*body.at(body.x[1] + STRIDE, 1), 0.0)  # ground known to be dry
         body.step(0.2)
     assert body.planner.stakes.gain == pytest.approx(0.15)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a foot cannot know, it says, and does not believe.
+"""A foot reports what it cannot measure, and does not estimate from it.
 
-Two worlds that look the same to a foot must leave it where it was; worlds that differ must not.
+If wet and dry ground give the same readings, the estimate must not change; else it must.
 """
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import trouble_in
+from ros_pad.estimation import sensor_fault
 from ros_pad.estimation.friction import FrictionPrior
 
 FOOT = Foot.load('large37')
@@ -23,7 +24,7 @@ LEVER = 2.0 / 3.0 * FOOT.sole_radius
 
 
 class Walk:
-    """A foot that walks ahead; its contact slides, turns or sticks as told."""
+    """A foot that walks ahead; slip, load and yaw moment of each stance are given."""
 
     def __init__(self, seed=0, **tuning):
         self.estimator = FootEstimator(FOOT, LOAD, Tuning(**tuning))
@@ -46,7 +47,7 @@ class Walk:
         return self.estimator.update(self.time, force.tolist(), marker.tolist(), pressure, moment)
 
     def stand(self, ratio=0.3, slip=0.0, seconds=0.5, load=LOAD, **more):
-        """Stand under a pull that grows to its full in a tenth of a second."""
+        """Stand under a pull that reaches ``ratio`` times the load after 0.1 s."""
         for k in range(round(seconds / PERIOD)):
             grown = min(1.0, k * PERIOD / 0.1)
             self.sample(grown * ratio, slip if grown == 1.0 else 0.0, load, **more)
@@ -64,20 +65,20 @@ def kind(estimate):
     return estimate.doubt.partition(':')[0]
 
 
-# --- what is below it ---------------------------------------------------------------------------
+# --- the ground ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('ratio', [0.0, 0.02, 0.05, 0.08])
 def test_a_foot_that_is_never_pulled_stays_with_its_prior(ratio):
-    """It would stick on wet ground and on dry: whatever it is, it cannot tell."""
+    """The foot would stick on wet and on dry ground, so that the ground is unobservable."""
     for prior in (0.1, 0.5, 0.9):
         walk = Walk(wet_prior=prior)
         for _ in range(20):
             estimate = walk.stand(ratio)
             assert kind(estimate) == 'not pulled'
             walk.swing()
-        # Sticking says a little for dry ground, which holds more: at most what one such stance in
-        # a patch length may say.
+        # Sticking is weak evidence of dry ground, which has more friction. It must not add up to
+        # more than that of one stance in a patch length.
         odds = math.log(estimate.wet_probability / (1.0 - estimate.wet_probability))
         assert abs(odds - math.log(prior / (1.0 - prior))) < 1.0
         assert estimate.friction_sd > 0.2
@@ -95,14 +96,14 @@ def test_knowledge_fades_over_the_way_and_comes_back(ratio, slip, wet):
         excess.append(abs(walk.stand(0.01).wet_probability - 0.5))
         assert kind(walk.estimate) == 'not pulled'
         walk.swing()
-    # exp(-d / 1.5 m): 1.4 m on, within what the ten stances between say of themselves.
+    # P(wet) fades with exp(-d / 1.5 m) over 1.4 m; the ten stances between add weak evidence.
     assert excess[-1] / excess[0] == pytest.approx(math.exp(-1.4 / 1.5), abs=0.12)
     assert kind(walk.stand(ratio, slip)) == ''
     assert (walk.estimate.wet_probability > 0.9) == wet
 
 
 @pytest.mark.parametrize('wet', [False, True])
-def test_a_dome_feels_both_grounds_alike_and_says_so(wet):
+def test_a_dome_cannot_distinguish_the_grounds_and_reports_it(wet):
     walk = Walk()
     known = walk.stand(*((0.12, 0.05) if wet else (0.6, 0.0)))
     excess = known.wet_probability - 0.5
@@ -118,7 +119,7 @@ def test_a_dome_feels_both_grounds_alike_and_says_so(wet):
 
 
 def test_a_pad_that_fills_under_load_is_no_longer_taken_for_flat():
-    """At 0.41 a flat foot would slip on neither ground that it expects."""
+    """A flat foot that sticks at 0.38 would be evidence of dry ground; a dome is not."""
     walk = Walk()
     walk.stand(0.05, pressure=0.0)
     for k in range(250):
@@ -127,7 +128,7 @@ def test_a_pad_that_fills_under_load_is_no_longer_taken_for_flat():
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.1)
 
 
-def test_half_inflated_is_said():
+def test_half_inflated_is_reported():
     walk = Walk()
     pressure = next(p for p in range(50_000, 90_000, 100) if FOOT.dome_load(LOAD, p) > 0.4 * LOAD)
     estimate = walk.stand(0.5, pressure=float(pressure))
@@ -135,7 +136,7 @@ def test_half_inflated_is_said():
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_light_foot_knows_little():
+def test_a_light_foot_measures_little():
     walk = Walk()
     estimate = walk.stand(0.5, load=0.15 * LOAD)
     assert kind(estimate) in ('', 'light')
@@ -145,7 +146,7 @@ def test_a_light_foot_knows_little():
 
 
 def test_friction_between_wet_and_dry_is_undecided():
-    """Slipping at 0.33, where wet ground should hold 0.12 and dry 0.8."""
+    """The foot slips at T/N = 0.33; wet ground is expected to give 0.12 and dry ground 0.8."""
     walk = Walk()
     estimate = walk.stand(0.33, 0.12)
     assert kind(estimate) in ('undecided', '')
@@ -155,32 +156,32 @@ def test_friction_between_wet_and_dry_is_undecided():
 
 @pytest.mark.parametrize('seed', range(3))
 def test_what_turning_hides_a_moment_shows(seed):
-    """T/N = 0.12 at 10 mm/s: wet, or dry ground on which the foot turns at 5.3 rad/s.
+    """A slip at T/N = 0.12 is on wet ground, or on dry ground where the foot also turns.
 
-    Without a moment it is taken for wet, as most feet that slide are.
+    Without a measured yaw moment wet ground is more probable.
     """
     shown = 0.12
     unknown = Walk(seed).stand(shown, 0.01)
     assert unknown.wet_probability > 0.5
     moment = math.sqrt(PRIOR.flat_dry**2 - shown**2) * LOAD * LEVER
-    dry = Walk(seed).stand(shown, 0.01, moment=moment)
+    dry = Walk(seed, moment_noise=5e-4).stand(shown, 0.01, moment=moment)
     assert dry.wet_probability < 0.05
     assert dry.friction_mean == pytest.approx(PRIOR.flat_dry, abs=2.0 * dry.friction_sd)
     assert dry.margin < 0.05
-    wet = Walk(seed).stand(shown, 0.04, moment=0.0)
+    wet = Walk(seed, moment_noise=5e-4).stand(shown, 0.04, moment=0.0)
     assert wet.wet_probability > 0.95
     assert wet.friction_mean == pytest.approx(shown, abs=2.0 * wet.friction_sd)
     assert wet.friction_sd < unknown.friction_sd
 
 
-def test_a_foot_that_only_turns_a_little_says_so():
-    estimate = Walk().stand(0.02, moment=0.1 * LOAD * LEVER)
+def test_a_foot_that_only_turns_a_little_reports_it():
+    estimate = Walk(moment_noise=5e-4).stand(0.02, moment=0.1 * LOAD * LEVER)
     assert kind(estimate) == 'turning'
     assert 0.3 < estimate.wet_probability < 0.7
 
 
 def test_doubts_are_where_the_errors_are():
-    """Stances drawn from what is expected: those that know are right, the others near chance."""
+    """In stances drawn from the prior, estimates without doubt are right, others near chance."""
     random = np.random.default_rng(11)
     knowing, doubting = [], []
     for seed in range(250):
@@ -197,22 +198,22 @@ def test_doubts_are_where_the_errors_are():
     assert len(doubting) > 60
     assert np.mean(np.array(knowing) > 0.5) > 0.97
     assert np.mean(doubting) < 0.65
-    # What is said to be likely comes true as often.
+    # Probabilities are calibrated.
     every = np.array(knowing + doubting)
     assert np.mean(every > 0.5) == pytest.approx(np.mean(np.maximum(every, 1.0 - every)), abs=0.06)
 
 
-def test_trouble_with_sensors_is_told_from_ground_that_says_nothing():
-    assert trouble_in('force stands still: 6.8 N to the last digit') == 'force stands still'
-    assert trouble_in('domed: wet and dry ground feel alike') == ''
-    assert trouble_in('') == ''
+def test_faults_of_sensors_are_distinguished_from_unobservable_ground():
+    assert sensor_fault('force stands still: 6.8 N, unchanged') == 'force stands still'
+    assert sensor_fault('domed: cannot be distinguished') == ''
+    assert sensor_fault('') == ''
 
 
-# --- its sensors --------------------------------------------------------------------------------
+# --- the sensors --------------------------------------------------------------------------------
 
 
 class Broken(Walk):
-    """A walk whose readings a function changes on their way to the estimator."""
+    """A walk in which a function changes the readings before the estimator receives them."""
 
     def __init__(self, change, seed=0, **tuning):
         super().__init__(seed, **tuning)
@@ -237,8 +238,8 @@ def frozen_marker(force, position, last_force, last_position):
     return force, last_position
 
 
-def test_a_force_sensor_that_freezes_takes_back_what_it_said():
-    """It froze at full load on dry ground, and the foot went on: that looked like a slip."""
+def test_estimates_from_a_frozen_force_sensor_are_taken_back():
+    """The sensor freezes at full load while the foot walks on, which looks like a slip."""
     walk = Broken(frozen_force)
     known = walk.stand(0.6)
     assert known.wet_probability < 0.1
@@ -248,7 +249,7 @@ def test_a_force_sensor_that_freezes_takes_back_what_it_said():
         alarms += walk.swing().slipping
         walk.stand(0.3)
     estimate = walk.estimate
-    assert estimate.doubt == f'force stands still: {walk.last[0][2]:.3g} N to the last digit'
+    assert estimate.doubt.startswith(f'force stands still: {walk.last[0][2]:.3g} N')
     assert not (estimate.sound or estimate.standing or estimate.slipping)
     assert alarms == 0
     assert math.isnan(estimate.margin)
@@ -266,7 +267,8 @@ def test_a_force_sensor_that_freezes_takes_back_what_it_said():
 
 
 def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
-    """Steps of 0.2 N: it repeats itself as it is, so that two seconds pass, in which it lies."""
+    """At a resolution of 0.2 N equal readings are normal, so that the fault is found after two
+    seconds; all estimates from this time are withdrawn."""
 
     kept = []
 
@@ -278,7 +280,7 @@ def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
     walk = Broken(coarse)
     walk.broken, stopped = True, False
     walk.swing()
-    for k in range(125):  # neither load nor pull stays as it is for long
+    for k in range(125):  # load and pull change all the time
         known = walk.sample(0.12 + 0.5 * math.sin(math.pi * k / 124), load=LOAD + 0.01 * k)
     assert known.wet_probability < 0.1
     stopped = True
@@ -291,7 +293,7 @@ def test_a_coarse_force_sensor_is_given_longer_and_takes_back_all_of_it():
 
 def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
     walk = Broken(frozen_marker)
-    for _ in range(12):  # to get to know the pace: 0.14 m in 0.9 s
+    for _ in range(12):  # the estimator learns the pace: 0.14 m in 0.9 s
         walk.stand(0.6)
         walk.swing()
     known = walk.stand(0.6)
@@ -306,19 +308,19 @@ def test_a_marker_that_freezes_fades_belief_at_the_pace_of_the_walk():
     assert walk.estimate.wet_probability == pytest.approx(faded, abs=0.06)
 
 
-@pytest.mark.parametrize('told', [True, False])
-def test_a_sensor_at_the_end_of_its_range_is_not_believed(told):
-    """At 5 N of 6.8 N a pull of 0.6 looks like 0.82."""
+@pytest.mark.parametrize('range_known', [True, False])
+def test_a_sensor_at_the_end_of_its_range_is_not_used(range_known):
+    """If the sensor ends at 5 N under a load of 6.8 N, T/N = 0.6 looks like 0.82."""
 
     def saturated(force, position, last_force, last_position):
         return [force[0], force[1], min(force[2], 5.0)], position
 
-    walk = Broken(saturated, **({'force_range': 5.0} if told else {}))
+    walk = Broken(saturated, **({'force_range': 5.0} if range_known else {}))
     walk.broken = True
     for _ in range(5):
         estimate = walk.stand(0.6)
         assert kind(estimate) == 'force out of range'
-        assert estimate.doubt.endswith('z = 5 N' if told else 'z stays at 5 N')
+        assert estimate.doubt.endswith('z = 5 N' if range_known else 'z stays at 5 N')
         walk.swing()
     assert estimate.friction_mean == pytest.approx(walk.estimate.friction_mean)
     assert estimate.wet_probability == pytest.approx(0.5, abs=0.05)
@@ -331,7 +333,7 @@ def test_a_sensor_that_dies_is_noticed_in_the_air_too():
     for _ in range(3):
         walk.swing()
         walk.stand()
-    assert walk.estimate.doubt == 'force stands still: reads exactly nothing'
+    assert walk.estimate.doubt.startswith('force stands still')
 
 
 def test_a_sensor_found_dead_on_the_ground_does_not_come_to_life_in_the_air():
@@ -354,15 +356,15 @@ def test_simulated_feet_may_read_nothing_in_the_air():
         assert walk.swing(seconds=1.5).sound
 
 
-def test_sensors_said_to_be_without_noise_may_repeat_themselves():
+def test_sensors_configured_without_noise_may_repeat_themselves():
     estimator = FootEstimator(FOOT, LOAD, Tuning(force_noise=0.0, position_noise=0.0))
     for k in range(1000):
         estimate = estimator.update(PERIOD * k, (-2.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0)
     assert estimate.sound
 
 
-def test_converters_with_steps_and_slow_markers_are_believed():
-    """Steps of 0.1 N with noise of 0.03 N, and a marker at 30 Hz with forces at 250 Hz."""
+def test_converters_with_steps_and_slow_markers_are_accepted():
+    """The force has steps of 0.1 N and noise of 0.03 N at 250 Hz; positions come at 31 Hz."""
     walk = Broken(None)
     walk.broken = True
     update = FootEstimator.update
@@ -386,7 +388,7 @@ def test_converters_with_steps_and_slow_markers_are_believed():
     assert sound
 
 
-def test_a_position_that_is_old_tells_no_slip():
+def test_an_old_position_shows_no_slip():
     walk = Walk()
     walk.stand(0.3)
     for _ in range(20):
@@ -395,12 +397,12 @@ def test_a_position_that_is_old_tells_no_slip():
         estimate = walk.estimator.update(
             walk.time, force, (0.0, 0.0, 0.0), 0.0, position_time=walk.time - 0.06
         )
-    assert estimate.doubt == 'marker lost: last seen 0.06 s ago'
+    assert re.fullmatch('marker lost: .* 0.06 s.*', estimate.doubt)
     assert not estimate.sound
 
 
 def test_a_marker_that_leaps_is_no_slip_and_no_way():
-    """As when motion capture takes another marker for it, and finds its error."""
+    """Motion capture can take another marker for this one for a while."""
     walk = Walk()
     known = walk.stand(0.6)
     walk.x += 0.4
@@ -414,7 +416,7 @@ def test_a_marker_that_leaps_is_no_slip_and_no_way():
 
 @pytest.mark.parametrize('every', [8, 4])
 def test_a_slow_marker_does_not_leap(every):
-    """At 31 and 62 Hz a foot that slides at 0.8 m/s has moved by 26 and 13 mm in between."""
+    """Between samples at 31 and 62 Hz a foot that slides at 0.8 m/s moves by 26 and 13 mm."""
     walk = Walk()
     estimator, seen = walk.estimator, None
     for k in range(150):
@@ -442,7 +444,7 @@ def test_a_clock_that_is_set_back_begins_a_new_stance():
 
 @pytest.mark.parametrize('bias', [0.5, 1.0, 3.0])
 def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
-    """It reads up to nearly half of its load in the air; there it rises, and no ground does."""
+    """In the air the sensor reads nearly half of the load, but a rising foot does not stand."""
     walk = Broken(lambda force, position, *_: ([force[0], force[1], force[2] + bias], position))
     walk.broken = True
     for _ in range(6):
@@ -453,7 +455,7 @@ def test_a_bias_too_large_to_be_none_is_found_in_the_first_swing(bias):
     assert estimate.friction_mean == pytest.approx(0.12, abs=0.04)
 
 
-def test_an_offset_that_is_not_known_yet_makes_it_less_sure():
+def test_an_offset_that_is_not_estimated_yet_adds_uncertainty():
     first = Walk().stand(0.45, 0.1)
     walk = Walk()
     for _ in range(5):

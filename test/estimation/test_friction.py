@@ -16,12 +16,12 @@ from ros_pad.estimation.friction import GroundFilter
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
 STILL = 0.0  # m/s
 DT = 0.04
-EXACT = 1e-3  # a model error that is none on a grid of 0.02
+EXACT = 1e-3  # a model error too small to have an effect on a grid of 0.02
 
 
 @pytest.fixture
 def exact(monkeypatch):
-    """No error of the model: beliefs are what Bayes' rule makes of the samples."""
+    """Switch the model error off, so that posteriors follow from Bayes' rule alone."""
     monkeypatch.setattr('ros_pad.estimation.friction.MODEL_SHARE', 0.0)
 
 
@@ -44,7 +44,7 @@ def slip(ground, ratio, count=5, speed=0.1):
 
 
 def test_the_prior_is_the_contact_model_of_the_foot():
-    """Dry 0.8 flat and 0.41 domed, wet 0.12 flat: what the foot's file says it is made for."""
+    """Friction is that of the foot's file: 0.8 flat and 0.41 domed if dry, 0.12 flat if wet."""
     prior = FrictionPrior.of(Foot.load('large19'), 2.0)
     assert prior.flat_dry == pytest.approx(0.8, abs=0.005)
     assert prior.flat_wet == pytest.approx(0.12, abs=1e-6)
@@ -76,8 +76,8 @@ def test_nothing_felt_is_the_prior(exact):
 
 
 @pytest.mark.parametrize('ratio', [0.1, 0.3, 0.6])
-def test_stick_excludes_friction_below_and_says_nothing_else(ratio, exact):
-    """Censored: the prior cut off by Φ((μ - ρ)/σ) and normalised, by SciPy's normal."""
+def test_stick_excludes_friction_below_and_nothing_else(ratio, exact):
+    """The posterior is the prior times Φ((μ - ρ)/σ), normalised; here with SciPy's Φ."""
     ground = stick(flat(wet_prior=0.4, temper=1.0, model_error=EXACT), ratio, noise=0.02)
     dry, wet = PRIOR.table(dome=False)
     cut = stats.norm.cdf(GRID, ratio, 0.02)
@@ -94,7 +94,7 @@ def test_stick_excludes_friction_below_and_says_nothing_else(ratio, exact):
         assert abs(ground.quantile(share) - GRID[cell]) <= 0.0101
 
 
-def test_stick_twice_as_long_says_no_more():
+def test_stick_twice_as_long_shows_no_more():
     once, often = stick(flat(), 0.3, 5), stick(flat(), 0.3, 200)
     assert often.friction[0] == pytest.approx(once.friction[0], abs=0.03)
     assert often.quantile(0.95) == pytest.approx(once.quantile(0.95), abs=0.03)
@@ -108,7 +108,7 @@ def test_slip_pulls_friction_to_the_ratio(ratio):
 
 
 def test_a_later_slip_wins_over_an_earlier_one():
-    """The ground has changed below the sliding foot."""
+    """The ground changes below the sliding foot."""
     ground = slip(flat(), 0.8, 5, speed=0.2)
     assert ground.wet_probability < 0.05
     slip(ground, 0.12, 8, speed=0.2)
@@ -121,15 +121,15 @@ def test_flat_slip_at_0_12_is_wet_and_stick_at_0_6_is_dry():
     assert stick(flat(), 0.6, 3).wet_probability < 0.05
 
 
-def test_between_the_expected_frictions_a_slip_says_little():
-    """Five standard deviations above what wet ground should give, three below dry ground."""
+def test_between_the_expected_frictions_a_slip_shows_little():
+    """0.33 is five standard deviations above wet ground and three below dry ground."""
     assert 0.1 < slip(flat(), 0.33, 1).wet_probability < 0.9
 
 
 @pytest.mark.parametrize('wet_prior', [0.1, 0.5, 0.9])
 @pytest.mark.parametrize('speed', [0.0, 0.003, 0.004])
-def test_low_excitation_tells_nothing(wet_prior, speed):
-    """Half a minute at T/N = 0.02, also with noise of a third more than is assumed."""
+def test_low_excitation_shows_nothing(wet_prior, speed):
+    """Half a minute at T/N = 0.02, also if speed has a third more noise than assumed."""
     ground = flat(wet_prior=wet_prior)
     for sample in range(750):
         ground.update(0.02, 0.03, speed * (-1.0) ** sample, 0.003, DT)
@@ -137,7 +137,7 @@ def test_low_excitation_tells_nothing(wet_prior, speed):
     assert abs(math.log(odds * (1.0 - wet_prior) / wet_prior)) < 0.6
 
 
-def test_a_stance_of_low_excitation_tells_less_than_one_that_pulls():
+def test_a_stance_of_low_excitation_shows_less_than_one_that_pulls():
     quiet, loud = stick(flat(), 0.02, 15), stick(flat(), 0.6, 15)
     assert abs(quiet.wet_probability - 0.5) < 0.05
     assert loud.wet_probability < 0.01
@@ -151,12 +151,21 @@ stream = st.lists(
         st.floats(1e-3, 0.1),  # its noise
         st.floats(1e-3, 1.0),  # duration
         st.booleans(),  # touch down first
-        st.booleans(),  # with the other shape
-        st.floats(0.0, 5.0),  # this far
+        st.booleans(),  # with the other morphology
+        st.floats(0.0, 5.0),  # distance to it
     ),
     min_size=1,
     max_size=30,
 )
+
+
+@pytest.mark.parametrize('sample', [stick, slip])
+def test_quantiles_have_the_mean_and_the_spread_of_friction(sample):
+    ground = sample(flat(), 0.4)
+    draws = [ground.quantile(share) for share in (np.arange(4000) + 0.5) / 4000]
+    mean, sd = ground.friction
+    assert np.mean(draws) == pytest.approx(mean, abs=0.002)
+    assert np.std(draws) == pytest.approx(sd, abs=0.002)
 
 
 @settings(max_examples=150, deadline=None)
@@ -176,9 +185,9 @@ def test_beliefs_stay_probabilities(samples):
         quantiles = [ground.quantile(share) for share in (0.0, 0.05, 0.5, 0.95, 1.0)]
         assert quantiles == sorted(quantiles)
         assert quantiles[0] >= 0.0 and quantiles[-1] <= 1.6 + 1e-9
-        # Conditional on each ground and over both, the whole is one.
-        assert ground._belief.sum() == pytest.approx(1.0, abs=1e-9)
-        assert ground._belief.min() >= 0.0
+        # The posterior adds up to 1.
+        assert ground.posterior[0].sum() == pytest.approx(1.0, abs=1e-9)
+        assert ground.posterior[0].min() >= 0.0
 
 
 @settings(max_examples=60, deadline=None)
@@ -197,7 +206,7 @@ def test_a_dome_only_fades_with_the_way_it_steps_and_slides():
     ground = slip(flat(wet_prior=0.3, patch_length=1.5), 0.12)
     before = ground.wet_probability
     ground.touch_down(0.16, dome=True)
-    slip(ground, 0.41, 10, speed=0.05)  # 20 mm
+    slip(ground, 0.41, 10, speed=0.05)  # slides 20 mm
     faded = 0.3 + (before - 0.3) * math.exp(-(0.16 + 10 * 0.05 * DT) / 1.5)
     assert ground.wet_probability == pytest.approx(faded, abs=1e-9)
 
@@ -209,7 +218,7 @@ def test_fading_over_many_steps_ends_at_the_prior():
     assert ground.wet_probability == pytest.approx(0.3, abs=1e-3)
 
 
-def test_friction_of_one_shape_says_nothing_of_the_other(exact):
+def test_friction_of_one_morphology_shows_nothing_of_the_other(exact):
     ground = slip(flat(model_error=EXACT), 0.12)
     ground.touch_down(0.0, dome=True)
     table = PRIOR.table(dome=True)[0]
@@ -232,7 +241,7 @@ def test_it_is_never_certain():
 
 
 def test_forgetting_under_domes_follows_a_film_that_drains():
-    """A dome slips at 0.2, then holds 0.4 without sliding: half a second later it may know."""
+    """A dome slips at 0.2, then sticks at 0.4: within half a second the estimate follows."""
     ground = GroundFilter(PRIOR)
     ground.touch_down(0.0, dome=True)
     slip(ground, 0.2, 5)
@@ -248,13 +257,13 @@ def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
     for _ in range(50):
         ground.update(ratio, 0.03, speed, 0.003, DT)
     assert math.isfinite(sum(ground.friction)) and 0.0 < ground.wet_probability < 1.0
-    # And it recovers.
+    # The filter recovers with plausible samples.
     slip(ground, 0.12, 40)
     assert ground.friction[0] == pytest.approx(0.12, abs=0.03)
 
 
 def test_no_number_of_samples_averages_the_model_error_out(monkeypatch):
-    """Variances add up; what is surely known lies 1.64 errors below the mean."""
+    """The model error adds its variance; the 5 % quantile is 1.64 deviations below the mean."""
     before = {}
     for share in (0.0, 0.05):
         monkeypatch.setattr('ros_pad.estimation.friction.MODEL_SHARE', share)
@@ -266,24 +275,24 @@ def test_no_number_of_samples_averages_the_model_error_out(monkeypatch):
         assert mean == pytest.approx(exact[0], abs=2e-3)
         expected = math.hypot(exact[1], share * exact[0], error if error > EXACT else 0.0)
         assert sd == pytest.approx(expected, rel=0.02)
-        if error > EXACT:  # else the belief is as narrow as the grid
+        if error > EXACT:  # else the posterior is as narrow as the grid
             assert ground.quantile(0.05) == pytest.approx(mean - 1.64 * sd, abs=0.02)
 
 
 @pytest.mark.parametrize('rim_speed', [0.02, 0.05])
 def test_a_foot_that_turns_shows_no_more_than_a_part_of_its_friction(rim_speed):
-    """Howe and Cutkosky: at v of slip and s of scrub T/N is μ v/hypot(v, s), s half-normal."""
+    """At slip speed v and rim speed s, T/N is μ v/hypot(v, s) (Howe, Cutkosky); s is random."""
     straight, turning = (slip(flat(rim_speed=s), 0.2, 1, 0.02) for s in (0.0, rim_speed))
     table = PRIOR.table(dome=False)
     draws = np.abs(np.random.default_rng(0).normal(0.0, rim_speed, 20_000))
     shown = 0.02 / np.hypot(0.02, draws)
     likelihood = [np.exp(-0.5 * ((mu * shown - 0.2) / 0.03) ** 2).mean() for mu in GRID]
-    # A slip at 20 mm/s, many times the noise: nothing else explains it. Tempered as the filter.
+    # 20 mm/s is many times the noise and must be slip. The evidence is tempered as in the filter.
     slipped = (np.exp(-GRID / 0.3) * likelihood) ** 0.5 * table
     wet = slipped[1].sum() / slipped.sum()
     assert turning.wet_probability == pytest.approx(wet, abs=0.05)
     assert turning.friction[0] > straight.friction[0] + 0.05
-    # Fast slips leave no doubt.
+    # In a fast slip turning hardly matters.
     fast = slip(flat(rim_speed=rim_speed), 0.12, 5, 0.5)
     assert fast.friction[0] == pytest.approx(0.12, abs=0.03)
 
@@ -300,5 +309,5 @@ def test_a_thousand_touch_downs_without_a_word_leave_a_belief(dome):
     ground = slip(flat(), 0.12)
     for _ in range(1000):
         ground.touch_down(1e-3, dome)
-    assert 0.6 < ground.wet_probability < 0.8  # a metre on, at 1.5 m between changes
+    assert 0.6 < ground.wet_probability < 0.8  # 1 m on; the patch length is 1.5 m
     assert 0.0 < ground.friction[0] < 1.6

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures of the node tests: own context and executor per test, own ROS domain per process.
+"""Fixtures of the node tests: a context and an executor per test, a ROS domain per process.
 
-A node of a test is made with ``context=context`` and added to ``executor``; whatever is in the
-executor at the end is destroyed. ``until(predicate)`` spins the executor until the predicate
-holds, and fails the test if it does not in time: no test ever sleeps.
+A test creates its nodes with ``context=context`` and adds them to ``executor``, which destroys
+them at the end. ``until(predicate)`` spins the executor until the predicate holds, and fails the
+test after a timeout.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from collections.abc import Iterator
 
 import pytest
 
-# Set before rclpy is loaded, and inherited by the processes that tests start. Workers of
-# pytest-xdist, and other runs on this machine, have other process ids and so other domains;
-# Linux has ports for 0 to 101.
+# These are set before rclpy is loaded, and processes that tests start inherit them. Workers of
+# pytest-xdist and other runs on this machine have other process ids and so other domains. On Linux
+# domains 0 to 101 have ports.
 os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ.setdefault('ROS_LOG_DIR', tempfile.mkdtemp(prefix='ros_pad_log_'))
@@ -35,8 +35,8 @@ def context() -> Iterator[rclpy.Context]:
     rclpy.init(context=context)
     yield context
     context.try_shutdown()
-    # Lifecycle nodes hold themselves, and with them their place in the domain, until the garbage
-    # is collected. There are only so many places: later tests would not find one another.
+    # Lifecycle nodes are in reference cycles: until they are collected, they stay participants of
+    # the domain. Participants are limited, so later nodes could not find one another.
     gc.collect()
 
 
@@ -54,12 +54,12 @@ def executor(context: rclpy.Context) -> Iterator[rclpy.executors.Executor]:
 @pytest.fixture
 def until(executor: rclpy.executors.Executor) -> Until:
     def until(
-        predicate: Callable[[], object], timeout: float = 10.0, what: str = 'the condition'
+        predicate: Callable[[], object], timeout: float = 60.0, what: str = 'the condition'
     ) -> None:
         deadline = time.monotonic() + timeout
         while not predicate():
             if time.monotonic() > deadline:
-                pytest.fail(f'{what} did not come true within {timeout:g} s')
+                pytest.fail(f'waited for {what}: timeout after {timeout:g} s')
             executor.spin_once(timeout_sec=0.01)
 
     return until

@@ -19,14 +19,14 @@ from rclpy.signals import SignalHandlerOptions
 from ros_pad import cli
 from ros_pad import configuration
 from ros_pad import trials
+from ros_pad.bags import BagReader
+from ros_pad.bags import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.errors import PadError
 from ros_pad.nodes import composed
 from ros_pad.nodes.composed import ComposedTrial
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.bag import BagReader
-from ros_pad.trials.bag import BagWriter
 
 AMBIENT = 101325.0
 LEGS = (1, 2, 3, 4, 5, 6)
@@ -42,7 +42,7 @@ def scene_of(name, cycles):
 
 @contextlib.contextmanager
 def trial_of(scene, policy, seed, bag):
-    """Yield the nodes of a trial, connected and at their first step."""
+    """Yield the nodes of a trial, connected and before their first step."""
     context = rclpy.Context()
     rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
@@ -70,9 +70,9 @@ def gauges(messages):
 @pytest.mark.parametrize(
     ('name', 'policy', 'cycles', 'moves'),
     [
-        ('hexapod_patches', 'adaptive', 8, 1),
+        pytest.param('hexapod_patches', 'adaptive', 8, 1, marks=pytest.mark.slow),
         ('hexapod_patches', 'oracle', 3, 1),
-        ('hexapod_patches', 'dome', 3, 0),
+        pytest.param('hexapod_patches', 'dome', 3, 0, marks=pytest.mark.slow),
         ('leg_wet_dome_60', 'dome', 2, 0),
     ],
 )
@@ -84,21 +84,22 @@ def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves
     for series in SERIES:
         assert np.array_equal(getattr(on_nodes, series), getattr(without, series)), series
     assert np.array_equal(on_nodes.body[:, :2], without.body[:, :2])
-    # The heading is sent as a quaternion: sine and back, 1e-15 rad.
+    # The heading is sent as a quaternion, which costs 1e-15 rad.
     assert np.max(np.abs(on_nodes.body[:, 2] - without.body[:, 2])) < 1e-15
     assert on_nodes.metrics == without.metrics
     assert not on_nodes.settings['interrupted']
-    # There is something to agree on.
+    # The walks are not trivial: there is pressure, switches and distance.
     assert np.max(on_nodes.pressure) > 30e3
     assert sum(on_nodes.metrics.switches) >= moves
     assert on_nodes.metrics.distance_m > 0.0
 
 
+@pytest.mark.slow
 def test_no_node_stays_behind(tmp_path):
-    """Whoever walks twice in one process would find the first regulator still on the graph."""
+    """A second walk in one process must not find nodes of the first one on the graph."""
     gc.collect()
-    held = living_nodes()  # of other tests: they count for nothing here
-    gc.disable()  # or chance might do it
+    held = living_nodes()  # nodes of other tests are not counted
+    gc.disable()  # else the collector could destroy nodes at any time
     try:
         composed.run(scene_of('leg_wet_dome_60', 1), 'dome', seed=2, bag=tmp_path / 'bag')
         assert not [each for each in living_nodes() if not any(each is old for old in held)]
@@ -110,14 +111,15 @@ def living_nodes():
     return [each for each in gc.get_objects() if isinstance(each, Node)]
 
 
+@pytest.mark.slow
 def test_faults_come_to_both_alike(tmp_path):
-    """Stuck, leaking, drifting and silent regulators, and a supply that goes for a while."""
+    """Regulators are stuck, leaking, drifting and silent, and the supply fails for a while."""
     texts = (
-        '{kind: silence, legs: [1], start: 1.51, end: 1.93}',  # shorter than the nodes wait
-        '{kind: silence, legs: [6], start: 0.053, end: 2.2}',  # longer, and in mid-filling
+        '{kind: silence, legs: [1], start: 1.51, end: 1.93}',  # too short to be reported
+        '{kind: silence, legs: [6], start: 0.053, end: 2.2}',  # reported; the pad is filling
         '{kind: leak, legs: [2], start: 1.0, conductance: 1.0e-9}',
         '{kind: sensor_drift, legs: [3], start: 0.7, offset: -8.0e3, rise: 2.0}',
-        '{kind: stuck_valve, legs: [4], start: 0.05}',  # nothing vents this pad
+        '{kind: stuck_valve, legs: [4], start: 0.05}',  # this pad cannot vent
         '{kind: supply_loss, start: 3.0, end: 3.6, time_constant: 0.3}',
     )
     faults = tuple(Fault.parse(text) for text in texts)
@@ -130,15 +132,16 @@ def test_faults_come_to_both_alike(tmp_path):
     assert on_nodes.metrics == without.metrics
     sound = trials.run(scene_of('hexapod_patches', 4), 'dome', seed=3)
     at = {round(time, 3): row for row, time in enumerate(sound.slow_time)}
-    assert on_nodes.pressure[at[2.16], 5] < 60e3 < sound.pressure[at[2.16], 5]  # as last heard
-    assert on_nodes.pressure[at[2.6], 5] > 70e3  # heard of again
+    assert on_nodes.pressure[at[2.16], 5] < 60e3 < sound.pressure[at[2.16], 5]  # last value
+    assert on_nodes.pressure[at[2.6], 5] > 70e3  # received again
     assert np.ptp(on_nodes.pressure[at[0.5] : at[3.0], 3]) < 20.0  # stuck
     assert (on_nodes.pressure[at[3.56]] < 30e3).all()
     assert on_nodes.pressure[at[2.9], 1] < sound.pressure[at[2.9], 1]
 
 
+@pytest.mark.slow
 def test_faulty_sensors_and_moments_come_to_both_alike(tmp_path):
-    """In a scene of one's own: each node loads it for itself."""
+    """The scene is a file that is not shipped; each node loads it."""
     text = configuration.locate('scenes', 'hexapod_patches').read_text()
     text = text.replace('cycles: 60', 'cycles: 4')
     text = text.replace('  position_noise:', '  moment_noise: 5.0e-4\n  position_noise:')
@@ -162,7 +165,7 @@ faults:
     assert on_nodes.metrics == without.metrics
     faults = {(fault['leg'], fault['reason']): fault for fault in without.metrics.faults}
     assert faults[1, 'force stands still']['end'] is not None
-    assert faults[2, 'force stands still']['start'] < 1.5 + 1.2  # told of in the next stance
+    assert faults[2, 'force stands still']['start'] < 1.5 + 1.2  # reported in the next stance
     doubts = messages_of(tmp_path / 'bag')
     for leg, doubt in {
         1: 'force stands still', 2: 'force stands still', 4: 'force out of range',
@@ -170,13 +173,14 @@ faults:
     }.items():  # fmt: skip
         said = [message.data.partition(':')[0] for message in doubts[f'/leg_{leg}/doubt']]
         assert doubt in said
-        if leg in (1, 5):  # it is well again
+        if leg in (1, 5):  # this fault ends
             assert said[-1] != doubt
     assert not any('still' in message.data for message in doubts['/leg_6/doubt'])
 
 
+@pytest.mark.slow
 def test_every_message_arrives(tmp_path):
-    """What one node sends is what the next one is called with: number for number, in order."""
+    """Numbers that one node publishes reach the functions of the next one unchanged, in order."""
     scene = scene_of('hexapod_patches', 3)
     felt = {leg: [] for leg in LEGS}
     commanded = {leg: [] for leg in LEGS}
@@ -194,7 +198,7 @@ def test_every_message_arrives(tmp_path):
 
         for leg in LEGS:
             watch(
-                trial.estimator.legs[leg]._estimator,
+                trial.estimator.legs[leg].stage.estimator,
                 'update',
                 lambda *arguments, leg=leg: felt[leg].append(arguments),
             )
@@ -218,11 +222,11 @@ def test_every_message_arrives(tmp_path):
             assert place == (p.x, p.y, p.z)
         assert len({at for at, *_ in felt[leg]}) == steps
         setpoints = gauges(heard[f'/leg_{leg}/pressure_setpoint'])
-        # At each control step; at the end the regulator vents of itself.
+        # There is a set-point at each control step; at the end the regulator vents without one.
         assert setpoints == commanded[leg][: len(setpoints)]
         assert set(commanded[leg][len(setpoints) :]) <= {0.0}
         assert len(heard[f'/leg_{leg}/wetness']) == len(setpoints) == 201
-        # A pressure reaches robot and estimator in time for the next sample.
+        # A pressure reaches robot and estimator before the next sample.
         pressures = heard[f'/leg_{leg}/pressure']
         by_time = {
             m.header.stamp.sec * 10**9 + m.header.stamp.nanosec: m.fluid_pressure - AMBIENT
@@ -246,6 +250,7 @@ def raw_messages(bag):
     return found
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_messages(tmp_path):
     for name, cycles, seed in [('first', 3, 5), ('second', 3, 5), ('other', 1, 6)]:
         scene = scene_of('hexapod_patches', cycles)
@@ -259,7 +264,7 @@ def test_the_same_seed_gives_the_same_messages(tmp_path):
 
 
 def check_vented(bag):
-    """The pads were under pressure, and are flat at the end of a bag that is whole."""
+    """Check that the bag is complete, and that pads had pressure and are flat at its end."""
     assert BagReader(bag).problem is None
     heard = messages_of(bag)
     for leg in LEGS:
@@ -269,6 +274,7 @@ def check_vented(bag):
     return heard
 
 
+@pytest.mark.slow
 def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
     with trial_of(scene_of('hexapod_patches', 30), 'dome', 0, tmp_path / 'bag') as trial:
 
@@ -281,11 +287,13 @@ def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
     assert len(heard['/leg_1/wrench']) == round(trial.simulator.robot.time * 250)
 
 
+@pytest.mark.slow
 def test_a_trial_that_comes_to_its_end_leaves_the_pads_flat(tmp_path):
     composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
     check_vented(tmp_path / 'bag')
 
 
+@pytest.mark.slow
 def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     sent = []
@@ -304,6 +312,7 @@ def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     check_vented(tmp_path / 'bag')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
     arguments = ['run', 'hexapod_patches', '--cycles', '30', '--policy', 'dome']
@@ -315,16 +324,16 @@ def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
         text=True,
     )
     try:
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 300.0
 
         def recorded():
             return sum(file.stat().st_size for file in out.glob('bag/*.mcap'))
 
         while recorded() < 1_000_000 and process.poll() is None:
-            assert time.monotonic() < deadline, 'no bag is growing'
+            assert time.monotonic() < deadline, 'the bag does not grow'
             time.sleep(0.05)
         process.send_signal(number)
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=300)
     finally:
         process.kill()
     assert process.returncode == 130, errors
@@ -333,27 +342,26 @@ def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
     check_vented(out / 'bag')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('deaf', ['controller', 'estimator', 'regulator', 'simulator'])
-def test_a_node_that_does_not_answer_is_told_of_soon(deaf, monkeypatch, tmp_path):
-    started = time.monotonic()
+def test_a_node_that_does_not_answer_is_reported(deaf, monkeypatch, tmp_path):
     with (
         trial_of(scene_of('hexapod_patches', 2), 'dome', 0, tmp_path / 'bag') as trial,
-        pytest.raises(PadError, match=r'waited 0\.3 s in vain for the nodes to answer to 0\.5'),
+        pytest.raises(PadError, match=r'waited more than 0\.3 s of wall time for .* 0\.5'),
     ):
 
         def progress(at):
             if at > 0.49:
-                # Not before: where much else runs the first step takes its time.
-                monkeypatch.setattr(composed, '_PATIENCE', 0.3)
-                trial._executor.remove_node(getattr(trial, deaf))
+                # Later than the first step, which takes long on a busy machine.
+                monkeypatch.setattr(composed, 'PATIENCE', 0.3)
+                trial.executor.remove_node(getattr(trial, deaf))
 
         trial.walk(progress)
-    assert time.monotonic() - started < 10.0
     assert BagReader(tmp_path / 'bag').problem is None
     assert len(messages_of(tmp_path / 'bag')['/leg_1/wrench']) > 120
 
 
-def test_a_full_disk_ends_the_trial_with_its_own_words(context, monkeypatch, tmp_path):
+def test_a_full_disk_ends_the_trial_with_its_message(context, monkeypatch, tmp_path):
     write = BagWriter.write
     count = 0
 
@@ -367,9 +375,9 @@ def test_a_full_disk_ends_the_trial_with_its_own_words(context, monkeypatch, tmp
     monkeypatch.setattr(BagWriter, 'write', until_full)
     with pytest.raises(BagError, match='5000 messages are saved'):
         composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
-    # No node stays behind and goes on talking.
+    # No node remains and publishes.
     observer = Node('observer', context=context)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while observer.count_publishers('/leg_1/morphology'):
         assert time.monotonic() < deadline
         time.sleep(0.05)
@@ -384,7 +392,7 @@ def test_a_bag_that_exists_is_not_overwritten(tmp_path):
 
 
 def test_it_runs_in_a_thread_too(tmp_path):
-    """Signals are the main thread's; elsewhere a trial does not ask for them."""
+    """Only the main thread can handle signals; in other threads a trial does not try to."""
     found = []
 
     def walk():
@@ -392,7 +400,7 @@ def test_it_runs_in_a_thread_too(tmp_path):
 
     thread = threading.Thread(target=walk)
     thread.start()
-    thread.join(timeout=30)
+    thread.join(timeout=300)
     assert found[0].metrics.duration_s == pytest.approx(scene_of('leg_wet_flat', 1).duration)
 
 

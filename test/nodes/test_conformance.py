@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every node takes names, parameters and time from its command line, as all nodes of ROS 2 do.
+"""Every node accepts names, parameters and time on its command line, like all ROS 2 nodes.
 
-One process of each node is shared by the tests; it is given all of this at once.
+The tests share one process of each node, which receives all of these arguments.
 """
 
 import subprocess
@@ -20,7 +20,7 @@ from rosgraph_msgs.msg import Clock
 
 from ros_pad.configuration import shared_folder
 
-# A parameter of each node, and what a copy of the shipped file has in its place.
+# A parameter of each node, its text in the shipped file, and its value in a changed copy.
 CHANGED = {
     'simulator': ('rate', '0.0', 125.0),
     'estimator': ('wet_prior', '0.5', 0.25),
@@ -29,11 +29,11 @@ CHANGED = {
     'recorder': ('folder', '""', 'FOLDER/bag'),
 }
 NODES = tuple(CHANGED)
-CLOCK = 5000  # s: neither zero nor the time of day
+CLOCK = 5000  # s, neither zero nor the time of day
 
 
 class Lab:
-    """Watches the graph, publishes ``/clock``, and keeps the stamps of what nodes say."""
+    """Observes the graph, publishes ``/clock``, and records stamps of the nodes' messages."""
 
     def __init__(self):
         self._context = rclpy.Context()
@@ -48,7 +48,7 @@ class Lab:
         now.clock.sec = CLOCK
 
         def tick():
-            now.clock.sec += 1  # nodes look at what they have to say as time goes on
+            now.clock.sec += 1  # nodes publish as time advances
             clock.publish(now)
 
         self.node.create_timer(0.1, tick)
@@ -63,11 +63,11 @@ class Lab:
         self.stamps['other_simulator'] = message.header.stamp.sec
 
     def until(self, predicate, what):
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 60.0
         while not (found := predicate()):
             assert [each.poll() for each in self.processes] == [None] * len(self.processes)
             if time.monotonic() > deadline:
-                pytest.fail(f'{what} did not come true within 30 s')
+                pytest.fail(f'waited for {what}: timeout after 60 s')
             self._executor.spin_once(timeout_sec=0.05)
         return found
 
@@ -124,6 +124,7 @@ def lab(tmp_path_factory):
         lab.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('node', NODES)
 def test_name_and_namespace(lab, node):
     wanted = (f'other_{node}', '/lab')

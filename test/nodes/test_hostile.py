@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever comes from the graph, the nodes live and no pad is told more than it may be."""
+"""For any messages the nodes go on, and no set-point is above the ceiling."""
 
 import contextlib
 import math
@@ -12,7 +12,7 @@ from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError  # rclpy has no public name for it
 from rclpy.logging import LoggingSeverity
 from rclpy.logging import set_logger_level
 from rclpy.node import Node
@@ -25,11 +25,11 @@ from std_srvs.srv import Trigger
 
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
-from ros_pad.nodes import regulator as module
+from ros_pad.nodes import controller
+from ros_pad.nodes import estimator
+from ros_pad.nodes import regulator
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
-from ros_pad.nodes.controller import normal_force
-from ros_pad.nodes.controller import position_in
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.regulator import RegulatorNode
@@ -44,7 +44,7 @@ CEILING = 80e3
 LEGS = (1, 2)
 TICK_NS = 10_000_000
 START_NS = 1_000_000_000_000
-LAST_NS = 2**31 * 10**9 - 1  # in 2038, where stamps end
+LAST_NS = 2**31 * 10**9 - 1  # the last stamp of ROS, in 2038
 
 numbers = st.one_of(
     st.floats(),
@@ -58,20 +58,23 @@ frames = st.one_of(
     st.sampled_from(['', 'leg_1_pad', 'leg_2_pad', 'leg_1_sole', 'a/leg_2_pad', 'world']),
     st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=20),
 )
-# As ROS has them: a whole number of 32 bit, and one without sign.
+# Seconds and nanoseconds of a ROS stamp: int32 and uint32.
 stamps = st.tuples(st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
 
 
 def deliver(node, name, message):
-    """Hand a message to a node's subscriptions as an executor does."""
+    """Call a node's subscriptions to a topic with a message, as an executor does."""
     for subscription in node.subscriptions:
         if subscription.topic_name == '/' + name.removeprefix('/'):
-            subscription.callback(serialize_message(message) if subscription.raw else message)
+            if subscription.raw and not isinstance(message, bytes):
+                subscription.callback(serialize_message(message))
+            else:
+                subscription.callback(message)
 
 
 @pytest.fixture(autouse=True)
 def quiet():
-    """Thousands of refusals are not to be read."""
+    """Do not log thousands of refusals."""
     names = ('regulator', 'estimator', 'controller', 'simulator')
     for name in names:
         set_logger_level(name, LoggingSeverity.FATAL)
@@ -80,13 +83,40 @@ def quiet():
         set_logger_level(name, LoggingSeverity.UNSET)
 
 
+class Outbox(list):
+    """Messages that were published on one topic."""
+
+    publish = list.append
+
+
+@pytest.fixture
+def sent(monkeypatch):
+    """Replace all publishers; return the published messages by topic."""
+    boxes = {}
+
+    def publisher(topic, node, leg=None):
+        return boxes.setdefault(topic.name(leg), Outbox())
+
+    monkeypatch.setattr(topics.Topic, 'publisher', publisher)
+    return boxes
+
+
+@pytest.fixture
+def ticks(monkeypatch):
+    """Replace timers of ticks; return their callbacks."""
+    callbacks = []
+    for module in (controller, estimator, regulator):
+        monkeypatch.setattr(module, 'on_tick', lambda node, period, call: callbacks.append(call))
+    return callbacks
+
+
 class Device:
-    """Writes down what it is told; its cable may break, and then nobody knows what arrived."""
+    """Records set-points; if its cable is ``broken``, its answers are lost."""
 
     made = ()
 
     def __init__(self, ceiling, clock=None, pad_volume=0.0):
-        self.ceiling, self.setpoint, self.told = ceiling, 0.0, []
+        self.ceiling, self.setpoint, self.received = ceiling, 0.0, []
         self.broken = False
         Device.made = (*Device.made, self)
 
@@ -94,28 +124,28 @@ class Device:
         pass
 
     def set_pressure(self, gauge_pa):
-        self.told.append(gauge_pa)
+        self.received.append(gauge_pa)
         self.setpoint = gauge_pa
-        self._talk()
+        self._answer()
 
     def read(self):
-        self._talk()
+        self._answer()
         return Reading(self.setpoint, self.setpoint, (), 0.0)
 
     def vent(self):
-        self._talk()
+        self._answer()
         self.setpoint = 0.0
 
     def close(self):
         pass
 
-    def _talk(self):
+    def _answer(self):
         if self.broken:
             raise TransportError('cable')
 
 
-class Bench:
-    """A regulator node in simulated time, and what must be true of it."""
+class Rig:
+    """A regulator node in simulated time, with checks of its set-points."""
 
     def __init__(self, node):
         self.node = node
@@ -123,8 +153,8 @@ class Bench:
         self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
 
     def begin(self):
-        """Start an example: an active node with sound devices."""
-        with contextlib.suppress(Exception):  # it may be so already
+        """Start an example: an active node with devices that answer."""
+        with contextlib.suppress(Exception):  # the node may already be inactive
             self.node.trigger_deactivate()
         self.node.trigger_cleanup()
         Device.made = ()
@@ -135,10 +165,14 @@ class Bench:
         assert all(each.successful for each in changed)
         self.node.trigger_configure()
         self.node.trigger_activate()
-        assert self.node._active
+        assert self.node.active
         assert len(Device.made) == len(LEGS)
         self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
         self.tick(START_NS - self.time_ns)
+
+    @property
+    def timeout(self):
+        return self.node.get_parameter('command_timeout').value
 
     def device(self, leg):
         channel = self.node.channels.get(leg)
@@ -150,8 +184,8 @@ class Bench:
         clock = topics.CLOCK.message()
         set_stamp(clock.clock, self.time_ns)
         deliver(self.node, '/clock', clock)
-        assert self.node._now_ns == self.time_ns
-        timeout_ns = self.node._values['command_timeout'] * 1e9
+        assert self.node.tick_ns == self.time_ns
+        timeout_ns = self.timeout * 1e9
         for leg in LEGS:
             device = self.device(leg)
             if device is None or device.broken:
@@ -165,9 +199,9 @@ class Bench:
         message.header.frame_id = frame
         message.header.stamp.sec, message.header.stamp.nanosec = stamp
         channel = self.node.channels.get(leg)
-        before = channel and channel.commands
+        before = channel and channel.accepted
         deliver(self.node, topics.PRESSURE_SETPOINT.name(leg), message)
-        if channel and channel.commands > before:
+        if channel and channel.accepted > before:
             self.accepted_ns[leg] = self.time_ns
             assert frame != f'leg_{3 - leg}_pad'
         self.check()
@@ -176,12 +210,13 @@ class Bench:
         self.send(leg, AMBIENT + gauge, divmod(self.time_ns, 10**9), frame, 0.0)
 
     def transit(self, name):
-        with contextlib.suppress(Exception):  # rclpy refuses those that are not possible now
+        with contextlib.suppress(Exception):  # rclpy refuses impossible transitions
             getattr(self.node, f'trigger_{name}')()
         self.check()
 
     def vent(self):
-        answer = self.node._on_vent(Trigger.Request(), Trigger.Response())
+        (service,) = [each for each in self.node.services if each.srv_name.endswith('/vent')]
+        answer = service.callback(Trigger.Request(), Trigger.Response())
         devices = [each for each in map(self.device, LEGS) if each]
         assert answer.success == (bool(devices) and not any(each.broken for each in devices))
         self.check()
@@ -195,7 +230,7 @@ class Bench:
 
     def check(self):
         for device in Device.made:
-            assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.told)
+            assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.received)
 
 
 legs = st.sampled_from(LEGS)
@@ -221,7 +256,7 @@ ACTIONS = st.one_of(
 
 
 @pytest.fixture
-def bench(context, monkeypatch):
+def rig(context, monkeypatch):
     monkeypatch.setitem(BACKENDS, 'simulated', Device)
     monkeypatch.setattr(Device, 'made', ())
     overrides = {'legs': list(LEGS), 'use_sim_time': True, 'ceiling': CEILING}
@@ -229,79 +264,73 @@ def bench(context, monkeypatch):
         context=context,
         parameter_overrides=[Parameter(name, value=v) for name, v in overrides.items()],
     )
-    yield Bench(node)
+    yield Rig(node)
     node.destroy_node()
 
 
-def test_no_sequence_of_messages_moves_a_pad_past_its_ceiling_or_stops_the_watchdog(bench):
-    @settings(max_examples=300, deadline=None)
+def test_no_sequence_of_messages_passes_the_ceiling_or_stops_the_timeout(rig):
+    @settings(max_examples=100, deadline=None)
     @given(st.lists(ACTIONS, max_size=25))
     def behave(actions):
-        bench.begin()
+        rig.begin()
         for name, *arguments in actions:
-            getattr(bench, name)(*arguments)
+            getattr(rig, name)(*arguments)
         for leg in LEGS:
-            bench.cable(leg, broken=False)
-        timeout_ns = round(bench.node._values['command_timeout'] * 1e9)
-        bench.time_ns = min(bench.time_ns, LAST_NS - timeout_ns - TICK_NS)
-        bench.tick(timeout_ns)
-        bench.tick(TICK_NS)
-        assert all(device.setpoint == 0.0 for device in Device.made if bench.node.channels)
-        bench.transit('configure')
-        bench.transit('activate')
-        if bench.time_ns < LAST_NS:
-            bench.tick(TICK_NS)
-            bench.send_now(1, 30e3)
-            assert bench.node.channels[1].commands
+            rig.cable(leg, broken=False)
+        timeout_ns = round(rig.timeout * 1e9)
+        rig.time_ns = min(rig.time_ns, LAST_NS - timeout_ns - TICK_NS)
+        rig.tick(timeout_ns)
+        rig.tick(TICK_NS)
+        assert all(device.setpoint == 0.0 for device in Device.made if rig.node.channels)
+        rig.transit('configure')
+        rig.transit('activate')
+        if rig.time_ns < LAST_NS:
+            rig.tick(TICK_NS)
+            rig.send_now(1, 30e3)
+            assert rig.node.channels[1].accepted
 
     behave()
 
 
-def test_a_clock_that_is_set_back_keeps_no_pad_up(bench):
-    bench.begin()
-    bench.send_now(1, 50e3)
-    bench.tick(TICK_NS)
-    assert Device.made[0].setpoint == 50e3
-    bench.tick(-2 * TICK_NS)
-    assert Device.made[0].setpoint == 0.0
-
-
-def test_the_time_of_day_does_not_make_a_command_last(context, monkeypatch):
-    """Set back at each tick, as by a bad time server: the age is told by another clock."""
+def test_the_time_of_day_does_not_make_a_command_last(context, monkeypatch, ticks):
+    """The time of day goes back at each tick; the timeout of commands uses another clock."""
     monkeypatch.setattr(Device, 'made', ())
     monkeypatch.setitem(BACKENDS, 'simulated', Device)
     node = RegulatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
+    (tick,) = ticks
     try:
         steady_ns = 10**12
-        monkeypatch.setattr(module, 'time', types.SimpleNamespace(monotonic_ns=lambda: steady_ns))
+        monkeypatch.setattr(
+            regulator, 'time', types.SimpleNamespace(monotonic_ns=lambda: steady_ns)
+        )
         now_ns = node.get_clock().now().nanoseconds
-        node._tick(now_ns)
+        tick(now_ns)
         message = FluidPressure(fluid_pressure=AMBIENT + 50e3)
-        set_stamp(message.header.stamp, now_ns)
+        set_stamp(message.header.stamp, node.get_clock().now().nanoseconds)
         deliver(node, 'leg_1/pressure_setpoint', message)
         (device,) = Device.made
         for step in range(1, 51):
             assert device.setpoint == 50e3
             steady_ns += TICK_NS
-            node._tick(now_ns - step * TICK_NS)
+            tick(now_ns - step * TICK_NS)
         steady_ns += TICK_NS
-        node._tick(now_ns - 51 * TICK_NS)
+        tick(now_ns - 51 * TICK_NS)
         assert device.setpoint == 0.0
     finally:
         node.destroy_node()
 
 
-def test_set_points_of_one_leg_do_not_keep_the_watchdog_from_another(bench):
-    """No tick comes between them, as if set-points were all that a flood leaves time for."""
-    bench.begin()
-    bench.send_now(2, 50e3)
+def test_set_points_of_one_leg_do_not_delay_the_timeout_of_another(rig):
+    """In a flood of set-points there may be no tick between them."""
+    rig.begin()
+    rig.send_now(2, 50e3)
     clock = topics.CLOCK.message()
-    set_stamp(clock.clock, bench.time_ns + 500_000_001)
-    for subscription in bench.node.subscriptions:
+    set_stamp(clock.clock, rig.time_ns + 500_000_001)
+    for subscription in rig.node.subscriptions:
         if subscription.topic_name == '/clock' and not subscription.raw:
             subscription.callback(clock)
     assert Device.made[1].setpoint == 50e3
-    bench.send(1, math.nan, (0, 0), '', 0.0)
+    rig.send(1, math.nan, (0, 0), '', 0.0)
     assert Device.made[1].setpoint == 0.0
 
 
@@ -316,22 +345,15 @@ def test_frames_of_another_leg_are_refused(frame):
         check_frame(frame, 2)
 
 
-def test_a_set_point_in_the_frame_of_another_leg_is_refused_and_told_of(bench):
-    bench.begin()
-    stamp = divmod(bench.time_ns, 10**9)
-    bench.send(1, AMBIENT + 50e3, stamp, 'leg_2_pad', 0.0)
-    channel = bench.node.channels[1]
-    assert (channel.commands, channel.refusals) == (0, 1)
+def test_a_set_point_in_the_frame_of_another_leg_is_refused(rig):
+    rig.begin()
+    stamp = divmod(rig.time_ns, 10**9)
+    rig.send(1, AMBIENT + 50e3, stamp, 'leg_2_pad', 0.0)
+    channel = rig.node.channels[1]
+    assert (channel.accepted, channel.refused) == (0, 1)
     assert channel.refusal.startswith("frame_id = 'leg_2_pad' is not allowed on a topic of leg 1")
-    bench.send(1, AMBIENT + 50e3, stamp, 'leg_1_pad', 0.0)
-    assert channel.commands == 1
-
-
-class Outbox(list):
-    """Takes the place of a publisher."""
-
-    def publish(self, message):
-        self.append(message.fluid_pressure if isinstance(message, FluidPressure) else message.data)
+    rig.send(1, AMBIENT + 50e3, stamp, 'leg_1_pad', 0.0)
+    assert channel.accepted == 1
 
 
 wrenches = st.builds(
@@ -377,14 +399,14 @@ def sensed(node, action):
 
 
 @pytest.mark.parametrize('moment_noise', [0.0, 0.01])
-def test_the_estimator_lives_and_says_only_what_can_be(context, moment_noise):
+def test_the_estimator_survives_and_estimates_what_is_possible(context, sent, ticks, moment_noise):
     overrides = {'legs': [1], 'publish_rate': 1000.0, 'moment_noise': moment_noise}
     node = EstimatorNode(
         context=context,
         parameter_overrides=[Parameter(name, value=v) for name, v in overrides.items()],
     )
-    leg = node.legs[1]
-    leg._wetness, leg._friction = Outbox(), Outbox()
+    (tick,) = ticks
+    wetness, friction = sent[topics.WETNESS.name(1)], sent[topics.FRICTION.name(1)]
 
     @settings(max_examples=300, deadline=None)
     @given(st.lists(st.one_of(wrenches, positions, pressures, paired, samples), max_size=20))
@@ -392,17 +414,17 @@ def test_the_estimator_lives_and_says_only_what_can_be(context, moment_noise):
         for group in groups:
             for action in group if isinstance(group, list) else [group]:
                 sensed(node, action)
-                node._tick(START_NS)
-        assert all(0.0 <= each <= 1.0 for each in leg._wetness)
-        assert all(math.isfinite(each) and each >= 0.0 for each in leg._friction)
-        # And a sound sample is taken afterwards: one of these is far from the last.
-        taken = leg.samples
+                tick(START_NS)
+        assert all(0.0 <= each.data <= 1.0 for each in wetness)
+        assert all(math.isfinite(each.data) and each.data >= 0.0 for each in friction)
+        # A valid sample is used afterwards; at least one of these is later than the last stamp.
+        taken = node.samples
         for second in (100, 200_000):
             sensed(node, ('position', (second, 0), '', (0.0, 0.0, 0.0)))
             sensed(node, ('wrench', (second, 0), '', (0.0, 0.0, 7.0), 0.0))
-        assert leg.samples > taken
-        leg._wetness.clear()
-        leg._friction.clear()
+        assert node.samples > taken
+        wetness.clear()
+        friction.clear()
 
     try:
         behave()
@@ -411,13 +433,15 @@ def test_the_estimator_lives_and_says_only_what_can_be(context, moment_noise):
 
 
 @pytest.mark.parametrize('policy', ['adaptive', 'dome'])
-def test_the_controller_lives_and_asks_for_no_more_than_the_ceiling(context, policy):
+def test_the_controller_survives_and_commands_no_more_than_the_ceiling(
+    context, sent, ticks, policy
+):
     node = ControllerNode(
         context=context,
         parameter_overrides=[Parameter('legs', value=[1]), Parameter('policy', value=policy)],
     )
-    (leg,) = node._legs
-    leg._setpoints = sent = Outbox()
+    (tick,) = ticks
+    setpoints = sent[topics.PRESSURE_SETPOINT.name(1)]
     wetnesses = st.tuples(st.just('wetness'), st.one_of(numbers, st.floats(0.0, 1.0)))
     doubts = st.tuples(st.just('doubt'), st.text(max_size=40))
     broken = st.tuples(st.sampled_from(['raw_wrench', 'raw_position']), st.binary(max_size=120))
@@ -448,22 +472,22 @@ def test_the_controller_lives_and_asks_for_no_more_than_the_ceiling(context, pol
                 elif kind == 'doubt':
                     deliver(node, 'leg_1/doubt', String(data=values[0]))
                 elif kind == 'raw_wrench':
-                    leg._on_wrench(values[0])
+                    deliver(node, 'leg_1/wrench', values[0])
                 elif kind == 'raw_position':
-                    leg.heard.position(values[0])
+                    deliver(node, 'leg_1/position', values[0])
                 elif kind == 'tick':
-                    node._tick(node.get_clock().now().nanoseconds)
+                    tick(node.get_clock().now().nanoseconds)
                 else:
                     sensed(node, action)
         ceiling = node.get_parameter('ambient_pressure').value + 90e3
-        assert all(AMBIENT <= each <= ceiling for each in sent)
-        # And sound input is answered afterwards.
-        sent.clear()
+        assert all(AMBIENT <= each.fluid_pressure <= ceiling for each in setpoints)
+        # Valid input is answered afterwards.
+        setpoints.clear()
         sensed(node, ('position', (5, 0), '', (0.0, 0.0, 0.0)))
         sensed(node, ('wrench', (5, 0), '', (0.0, 0.0, 7.0), 0.0))
         deliver(node, 'leg_1/wetness', Float64(data=0.5))
-        assert len(sent) == 1
-        sent.clear()
+        assert len(setpoints) == 1
+        setpoints.clear()
 
     try:
         behave()
@@ -471,7 +495,7 @@ def test_the_controller_lives_and_asks_for_no_more_than_the_ceiling(context, pol
         node.destroy_node()
 
 
-def test_the_simulator_lives(context):
+def test_the_simulator_survives(context):
     overrides = {'scene': 'leg_wet_dome_40', 'free_running': False, 'fidelity': 'L0'}
     node = SimulatorNode(
         context=context,
@@ -495,12 +519,6 @@ def test_the_simulator_lives(context):
         behave()
     finally:
         node.destroy_node()
-
-
-@pytest.mark.parametrize('data', [b'', b'\0', b'\0\1\0\0', bytes(16), b'\0\1\0\0' + b'\xff' * 40])
-def test_bytes_that_are_no_message_have_no_force_and_no_place(data):
-    assert math.isnan(normal_force(data))
-    assert all(map(math.isnan, position_in(data))) or data[4:] == b'\xff' * 40
 
 
 TORN = (
@@ -527,11 +545,11 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
         publisher = topic.publisher(attacker, 1)
         until(publisher.get_subscription_count)
         for data in TORN:
-            # In one process the middleware may tell the sender too; a later one is heard of.
+            # In one process the error may be raised here; later pressures must still arrive.
             with contextlib.suppress(RCLError):
                 publisher.publish(data)
             count = len(heard)
-            until(lambda count=count: len(heard) > count, what='a pressure')  # it lives
+            until(lambda count=count: len(heard) > count, what='a pressure')  # the node goes on
         attacker.destroy_publisher(publisher)
     wrench, position = (topic.publisher(attacker, 1) for topic in (topics.WRENCH, topics.POSITION))
     until(lambda: wrench.get_subscription_count() == position.get_subscription_count() == 2)
@@ -550,4 +568,4 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
 
     until(answered, what='a set-point after a sound sample')
     assert nodes[1].samples >= 1
-    assert nodes[0].channels[1].commands >= 1
+    assert nodes[0].channels[1].accepted >= 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layouts for Foxglove and RViz, against the topics of a walk that was recorded just now."""
+"""The layouts for Foxglove and RViz fit the topics of a walk that is recorded here."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from typing import Any
 import pytest
 import yaml
 
+from ros_pad.bags import BagReader
 from ros_pad.nodes import composed
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.bag import BagReader
 
 CONFIG = pathlib.Path(__file__).resolve().parent.parent.parent / 'config'
 LAYOUT = json.loads((CONFIG / 'foxglove' / 'ros_pad.json').read_text())
 RVIZ = yaml.safe_load((CONFIG / 'rviz' / 'ros_pad.rviz').read_text())
 
-# Those that Foxglove and Lichtblick both have, without an account or an extension.
+# Panels of both Foxglove and Lichtblick that need no account or extension.
 PANELS = {'3D', 'Plot', 'StateTransitions', 'DiagnosticSummary', 'RawMessages', 'Tab'}
 DRAWN = {'visualization_msgs/msg/MarkerArray', 'geometry_msgs/msg/PoseStamped'}
 RVIZ_TYPES = {
@@ -63,7 +63,7 @@ def leaves(tree: Any) -> list[str]:
 
 
 def problems(layout: dict[str, Any]) -> list[str]:
-    """Return what keeps a viewer from opening every panel of a layout once."""
+    """Return the reasons why a viewer cannot open every panel of a layout exactly once."""
     configs = layout['configById']
     placed = leaves(layout['layout'])
     for name in placed:
@@ -81,7 +81,7 @@ def problems(layout: dict[str, Any]) -> list[str]:
 
 
 def test_the_layout_is_whole():
-    # What Lichtblick's LayoutData has.
+    # Keys of Lichtblick's type LayoutData.
     assert set(LAYOUT) == {
         *('configById', 'layout', 'globalVariables', 'userNodes', 'playbackConfig')
     }
@@ -93,15 +93,15 @@ def test_the_layout_is_whole():
 
 
 def plain(value: Any) -> Any:
-    """Return a byte as the number that viewers take it for."""
+    """Return a byte as a number, as viewers read it."""
     return int.from_bytes(value) if isinstance(value, bytes) else value
 
 
 def values(path: str, messages: dict[str, list[Any]]) -> list[Any]:
-    """Return what a message path finds in the bag, all messages together."""
+    """Return the values of a message path in all messages of the bag."""
     match = re.fullmatch(r'((?:/\w+)+)((?:\.\w+(?:\[:\])?(?:\{\w+[!=]=\d+\})?)*)', path)
-    assert match, f'{path}: is no message path'
-    assert match[1] in messages, f'{path}: no such topic'
+    assert match, f'{path} is no message path'
+    assert match[1] in messages, f'{path}: the bag has no such topic'
     found = messages[match[1]]
     for name, every, key, sign, number in re.findall(
         r'\.(\w+)(\[:\])?(?:\{(\w+)([!=]=)(\d+)\})?', match[2]
@@ -118,6 +118,7 @@ def values(path: str, messages: dict[str, list[Any]]) -> list[Any]:
     return found
 
 
+@pytest.mark.slow
 def test_every_plotted_path_is_a_number_in_the_bag(messages: dict[str, list[Any]]):
     shown = set()
     for name, config in panels('Plot'):
@@ -146,7 +147,7 @@ def test_every_state_is_one_in_the_bag(messages: dict[str, list[Any]]):
     for name, config in panels('StateTransitions'):
         for path in config['paths']:
             found = values(path['value'], messages)
-            # Numbers with a fraction are no states.
+            # States are texts or booleans; a plot of states cannot show other numbers.
             assert found and all(isinstance(each, bool | str) for each in found), (name, path)
             shown.append(path['value'])
     for leg in range(1, 7):
@@ -182,9 +183,9 @@ def test_rviz_shows_topics_of_the_bag(bag: BagReader):
     shown = {each['Class']: each['Topic'] for each in displays if 'Topic' in each}
     assert set(shown) == set(RVIZ_TYPES)
     for kind, topic in shown.items():
-        # Relative, so that a namespace of rviz2 moves it as it moves the nodes.
+        # Names are relative, so that a namespace applies to rviz2 as to the nodes.
         assert not topic['Value'].startswith('/')
         assert bag.topics[f'/{topic["Value"]}'] == RVIZ_TYPES[kind]
-        assert topic['Reliability Policy'] == 'Best Effort'  # hears every publisher
+        assert topic['Reliability Policy'] == 'Best Effort'  # fits every publisher
     for each in displays:
         assert each['Enabled'] and each['Value'] is True

@@ -18,7 +18,7 @@ DT = 0.004
 
 
 def walked(scene_name, seconds, pressure=0.0):
-    """Yield a robot every 0.1 s, with its markers after a journey over the wire."""
+    """Yield scene, floor, robot and its markers, serialized and read again, every 0.1 s."""
     scene = Scene.load(scene_name)
     floor = scene.floor.build(0)
     robot = fidelity.build(scene, floor, DT, 'L0' if scene.robot == 'rail_leg' else 'L1')

@@ -15,7 +15,7 @@ from ros_pad.nodes.process import run
 
 
 class Probe(Node):
-    """Does something at its first tick, and notes how it was ended."""
+    """Calls ``deed`` at its first tick, and records whether its context was valid at the end."""
 
     def __init__(self, deed, ends):
         super().__init__('probe', start_parameter_services=False)
@@ -28,7 +28,7 @@ class Probe(Node):
         deed()
 
     def destroy_node(self):
-        # A context that is still there can carry the last word of a node.
+        # Only with a valid context can a node publish at its end.
         self._ends.append('in order' if rclpy.ok() else 'cut off')
         super().destroy_node()
 
@@ -39,7 +39,7 @@ def fail(error):
 
 @pytest.fixture(params=[EventsExecutor, SingleThreadedExecutor], ids=['events', 'single'])
 def perform(request):
-    """Run a probe that does a deed; return the exit status. It must end in order anyhow."""
+    """Run a probe with a deed; return the exit status. The probe must always end in order."""
 
     def perform(deed):
         ends = []
@@ -85,10 +85,12 @@ def test_a_node_that_cannot_be_made(capfd):
     assert not rclpy.ok()
 
 
-def test_a_node_that_ros_refuses_says_why(capfd):
-    # As where SROS 2 is asked for, and this ROS 2 was built without it.
+def test_a_node_that_ros_refuses_reports_the_reason(capfd):
+    # As when SROS 2 is requested, but ROS 2 was built without it.
     assert run(lambda: fail(rclpy_implementation.RCLError('no security libraries')), []) == 1
-    assert capfd.readouterr().err == ('ros_pad: ROS 2 refuses the node: no security libraries\n')
+    assert capfd.readouterr().err == (
+        'ros_pad: ROS 2 cannot create the node: no security libraries\n'
+    )
     assert not rclpy.ok()
 
 

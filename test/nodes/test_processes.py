@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five processes in real time, as on a robot; this test is the sixth, and only listens.
+"""Five node processes in real time, as on a robot; the test process only subscribes.
 
-One walk of five seconds is shared by the tests of it. Its processes are always ended.
+All tests share one walk, measured for five seconds.
 """
 
 import gc
@@ -19,15 +19,16 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad.bags import BagReader
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
-from ros_pad.trials.bag import BagReader
 
 pytestmark = pytest.mark.realtime
 
 LEGS = (1, 2, 3, 4, 5, 6)
 AMBIENT = 101325.0
 RATE = 100.0  # Hz
+COMMAND_TIMEOUT = 0.5  # s
 SECONDS = 5.0
 TOPICS = (topics.WRENCH, topics.WETNESS, topics.PRESSURE_SETPOINT, topics.PRESSURE)
 PARAMETERS = {
@@ -48,12 +49,13 @@ def start(name, *parameters):
 
 
 class Observer:
-    """Listens to the topics of every leg and keeps when each message came, and the last one."""
+    """Records arrival times and the last message of the topics of every leg."""
 
     def __init__(self):
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
-        # Thousands of messages a second; nothing here publishes from another thread.
+        # EventsExecutor keeps up with thousands of messages a second, and is safe because no
+        # other thread publishes here.
         self._executor = EventsExecutor(context=self._context)
         self.node = Node('observer', context=self._context)
         self.times = {topic.name(leg): [] for topic in TOPICS for leg in LEGS}
@@ -76,11 +78,11 @@ class Observer:
         deadline = time.monotonic() + seconds
         while not predicate():
             if time.monotonic() > deadline:
-                pytest.fail(f'{what} did not come true within {seconds:g} s')
+                pytest.fail(f'waited for {what}: timeout after {seconds:g} s')
             self._executor.spin_once(timeout_sec=0.05)
 
     def measure(self, seconds, result):
-        """Listen for so long; note rate, Hz, and longest silence, s, of each topic."""
+        """Receive for a time, s; store rate, Hz, and longest gap, s, of each topic."""
         begin = time.monotonic()
         end = begin + seconds
         while time.monotonic() < end:
@@ -103,10 +105,10 @@ class Observer:
 
 
 @pytest.fixture(scope='module')
-def walk(tmp_path_factory):
-    """Run the five processes, count for five seconds, then end them one by one."""
+def walk(tmp_path_factory, skip_if_slow_now):
+    """Run the five processes, measure for five seconds, then end them one by one."""
     bag = tmp_path_factory.mktemp('walk') / 'bag'
-    # Nodes of earlier tests that are still in this process would be peers of the walk's.
+    # Nodes of earlier tests that still exist in this process would take part in the walk.
     gc.collect()
     observer = Observer()
     processes = {}
@@ -121,7 +123,7 @@ def walk(tmp_path_factory):
         processes['recorder'] = start('recorder', f'folder:={bag}')
         for name, parameters in PARAMETERS.items():
             processes[name] = start(name, *parameters)
-        # Python takes its time to start; finding one another is what is limited.
+        # Starting Python takes long; only the time of discovery is limited.
         observer.until(
             lambda: all(observer.node.count_publishers(name) for name in observer.times),
             30.0,
@@ -134,20 +136,24 @@ def walk(tmp_path_factory):
         observer.until(
             lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 10.0, 'pads under pressure'
         )
-        # Whatever else the machine does may take the processor away for a while.
+        # Other work on the machine may disturb one or two of these measurements.
         for _ in range(3):
+            began = time.time_ns()
             observer.measure(SECONDS, result)
-            if min(result.rates.values()) >= 0.95 * RATE:
+            result.measured = began, time.time_ns()
+            kept_up = min(result.rates.values()) >= 0.95 * RATE
+            if kept_up and max(result.longest.values()) < COMMAND_TIMEOUT:
                 break
-        result.measured_ns = time.time_ns()
-        # The controller goes, and with it the set-points; the regulator vents by itself.
+        else:
+            skip_if_slow_now()
+        # Set-points end with the controller, and the regulator vents.
         end('controller', signal.SIGTERM)
         gone = time.monotonic()
         observer.until(
             lambda: max(observer.gauge(leg) for leg in LEGS) < 1000.0, 5.0, 'vented pads'
         )
         result.vented_after = time.monotonic() - gone
-        # Pads are under pressure again when the regulator is told to go.
+        # Pads are under pressure again when the regulator ends.
         processes['controller'] = start('controller', *PARAMETERS['controller'])
         observer.until(
             lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 15.0, 'pads under pressure'
@@ -164,9 +170,9 @@ def walk(tmp_path_factory):
         for name, process in processes.items():
             process.kill()
             if not process.stderr.closed:
-                # Shown by pytest if the walk did not get as far as this.
+                # pytest shows this if the walk failed.
                 print(f'--- {name}', process.communicate()[1], sep='\n')
-        print('never heard:', *[name for name, times in observer.times.items() if not times])
+        print('no message:', *[name for name, times in observer.times.items() if not times])
         observer.close()
     return result
 
@@ -177,15 +183,15 @@ def test_they_find_one_another(walk):
 
 @pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.pattern.split('/')[1])
 def test_they_keep_100_hz(walk, topic):
-    """The mean of five seconds on every leg; none is silent for longer than a set-point lives."""
+    """Mean over five seconds on every leg; no gap is longer than the command timeout."""
     rates = {leg: walk.rates[topic.name(leg)] for leg in LEGS}
     assert all(rate >= 0.95 * RATE for rate in rates.values()), rates
     assert all(rate <= 1.05 * RATE for rate in rates.values()), rates
-    assert max(walk.longest[topic.name(leg)] for leg in LEGS) < 0.5
+    assert max(walk.longest[topic.name(leg)] for leg in LEGS) < COMMAND_TIMEOUT
 
 
 def test_pads_are_vented_when_the_controller_dies(walk):
-    assert walk.vented_after < 2.0  # 0.5 s of patience, and the air in the hose
+    assert walk.vented_after < 2.0  # command timeout 0.5 s, and the time to vent
 
 
 def test_they_end_as_they_should(walk):
@@ -195,7 +201,7 @@ def test_they_end_as_they_should(walk):
         assert 'ERROR' not in errors, name
 
 
-def test_the_regulator_says_that_it_vents_as_it_goes(walk):
+def test_the_regulator_logs_its_vent_at_shutdown(walk):
     for leg in LEGS:
         assert f'leg {leg}: vented: closing' in walk.errors['regulator']
 
@@ -207,12 +213,13 @@ def test_the_bag_has_the_walk(walk):
         assert reader.counts[f'/{topic.name(leg)}'] >= 0.95 * RATE * SECONDS, topic.name(leg)
     assert reader.counts['/body/pose'] >= 0.95 * RATE * SECONDS
     assert reader.counts['/diagnostics'] >= 4
-    # When regulator or estimator go before the controller, a foot is flat, and is said to be.
-    shapes = [
-        message.data
-        for _, message, log_ns in reader.messages({'/leg_3/morphology'})
-        if log_ns < walk.measured_ns
-    ]
-    assert set(shapes) == {'dome'}
+    # While nodes start or end, feet may be flat for want of estimates or air.
+    begin, end = walk.measured
+    messages = reader.messages({'/leg_3/morphology'})
+    shapes = [(message.data, log_ns) for _, message, log_ns in messages if log_ns < end]
+    before = [shape for shape, log_ns in shapes if log_ns < begin]
+    # The last one before the measurement is still in force; discovery may bring it only now.
+    in_force = before[-1:] + [shape for shape, log_ns in shapes if log_ns >= begin]
+    assert set(in_force) == {'dome'}, shapes
     highest = max(m.fluid_pressure for _, m, _ in reader.messages({'/leg_3/pressure'})) - AMBIENT
     assert 55e3 < highest < 61e3

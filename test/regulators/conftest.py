@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scripted dialogues, emulated devices, and waiting for what they do."""
+"""Scripted dialogues, emulated devices, and a function that waits for a condition."""
 
 import contextlib
 import fcntl
@@ -22,62 +22,62 @@ from ros_pad.regulators import create
 from ros_pad.regulators.emulate import EMULATORS
 from ros_pad.regulators.emulate import Emulator
 
-LIMIT = 20.0  # s, for slow machines: no test that passes takes so long
-PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # so that a slow machine is no lost device
+LIMIT = 60.0  # s, enough on slow machines
+PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # s: slow machines must not lose devices
 
 
 def wait_until(condition: Callable[[], Any], limit: float = LIMIT) -> Any:
-    """Wait for a condition and return what it returned."""
+    """Call a function until its result is true, and return this result."""
     end = time.monotonic() + limit
     while not (found := condition()):
-        assert time.monotonic() < end, f'not within {limit} s'
+        assert time.monotonic() < end, f'the condition is not true within {limit} s'
         time.sleep(0.002)
     return found
 
 
 class Dialogue:
-    """A device that knows its script by heart: what it must hear, what it says then.
+    """A device with a script: the commands it must receive, and its replies.
 
-    It ends well only when the driver said all of it in this order, said nothing else, and read
-    everything.
+    ``problems`` is empty only if the driver sent all commands in this order and nothing else, and
+    read all replies.
     """
 
     def __init__(self, script: list[tuple[str, str]], terminator: str = '\r') -> None:
-        self._script = [(said + terminator, reply) for said, reply in script]
+        self._script = [(command + terminator, reply) for command, reply in script]
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         self.path = os.ttyname(self._far)
         self._closing = False
         self.problems: list[str] = []
-        self.said = 0
+        self.sent = 0
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     def _serve(self) -> None:
-        heard = ''
+        received = ''
         while not self._closing:
             if not select.select([self._near], [], [], 0.01)[0]:
                 continue
-            heard += os.read(self._near, 4096).decode('latin-1')
-            if self.said == len(self._script):
-                self.problems.append(f'heard {heard!r} after the end of the script')
+            received += os.read(self._near, 4096).decode('latin-1')
+            if self.sent == len(self._script):
+                self.problems.append(f'received {received!r} after the end of the script')
                 return
-            while heard and self.said < len(self._script):
-                expected, reply = self._script[self.said]
-                # Only what needs no answer may be followed by more.
-                if heard == expected or (heard.startswith(expected) and not reply):
-                    heard = heard.removeprefix(expected)
-                    self.said += 1  # before whoever waits for the reply can look
+            while received and self.sent < len(self._script):
+                expected, reply = self._script[self.sent]
+                # Only a command without a reply may be followed by the next one at once.
+                if received == expected or (received.startswith(expected) and not reply):
+                    received = received.removeprefix(expected)
+                    self.sent += 1  # before the reply can be read
                     os.write(self._near, reply.encode('latin-1'))
-                elif expected.startswith(heard):
+                elif expected.startswith(received):
                     break
                 else:
-                    self.problems.append(f'heard {heard!r}, the script has {expected!r}')
+                    self.problems.append(f'received {received!r}, the script has {expected!r}')
                     return
 
     @property
     def over(self) -> bool:
-        return self.said == len(self._script) or bool(self.problems)
+        return self.sent == len(self._script) or bool(self.problems)
 
     def close(self) -> None:
         self._closing = True
@@ -87,13 +87,13 @@ class Dialogue:
             os.close(end)
         if unread:
             self.problems.append(f'{unread} bytes of replies were left unread')
-        if self.said < len(self._script):
-            self.problems.append(f'never heard {self._script[self.said][0]!r}')
+        if self.sent < len(self._script):
+            self.problems.append(f'never received {self._script[self.sent][0]!r}')
 
 
 @pytest.fixture
 def dialogue() -> Iterator[Callable[..., Dialogue]]:
-    """Make a scripted device; at the end of the test it must have heard and been heard."""
+    """Return a function that makes a scripted device; its script must be complete at the end."""
     made: list[Dialogue] = []
 
     def make(script: list[tuple[str, str]], terminator: str = '\r') -> Dialogue:
@@ -108,13 +108,13 @@ def dialogue() -> Iterator[Callable[..., Dialogue]]:
 
 @pytest.fixture
 def mute() -> Callable[..., Dialogue]:
-    """Make a scripted device whose ending the test judges itself."""
+    """Return a function that makes a scripted device, whose end the test itself checks."""
     return Dialogue
 
 
 @pytest.fixture
 def emulated() -> Iterator[Callable[..., Any]]:
-    """Make an emulated device on a port: (device, emulator)."""
+    """Return a function that makes an emulated device on a port: (device, emulator)."""
     made: list[Emulator] = []
 
     def make(name: str, link: str | None = None, **options: Any) -> tuple[Any, Emulator]:
@@ -129,7 +129,7 @@ def emulated() -> Iterator[Callable[..., Any]]:
 
 @pytest.fixture
 def opened() -> Iterator[Callable[..., Regulator]]:
-    """Make and open a regulator; it is closed at the end of the test."""
+    """Return a function that opens a regulator, which is closed at the end of the test."""
     made: list[Regulator] = []
 
     def make(backend: str, **options: Any) -> Regulator:
@@ -140,7 +140,7 @@ def opened() -> Iterator[Callable[..., Regulator]]:
 
     yield make
     for each in made:
-        with contextlib.suppress(PadError):  # what was wrong is the test's matter
+        with contextlib.suppress(PadError):  # errors of close() are checked elsewhere
             each.close()
 
 

@@ -10,10 +10,10 @@ from ros_pad.regulators import BACKENDS
 from ros_pad.regulators.emulate import EMULATORS
 from ros_pad.regulators.emulate import AlicatEmulator
 from ros_pad.regulators.emulate import Emulator
-from ros_pad.regulators.emulate import Faults
-from ros_pad.regulators.emulate import Pneumatics
+from ros_pad.regulators.emulate import FaultSchedule
 from ros_pad.regulators.emulate import SerialTextEmulator
 from ros_pad.regulators.emulate import SmcItvEmulator
+from ros_pad.regulators.emulate import Valve
 
 
 def test_every_serial_backend_has_an_emulator():
@@ -23,7 +23,7 @@ def test_every_serial_backend_has_an_emulator():
 def test_pressure_follows_with_one_time_constant(monkeypatch):
     now = 100.0
     monkeypatch.setattr(time, 'monotonic', lambda: now)
-    valve = Pneumatics(time_constant=0.1)
+    valve = Valve(time_constant=0.1)
     valve.setpoint = 50e3
     now += 0.1
     assert valve.pressure == pytest.approx(50e3 * 0.6321206)
@@ -36,10 +36,10 @@ def test_pressure_follows_with_one_time_constant(monkeypatch):
     assert valve.pressure == before
 
 
-def test_faults_act_when_and_where_they_are_told(monkeypatch):
+def test_faults_act_at_their_times_and_addresses(monkeypatch):
     clock = iter([100.0, *[100.5] * 3, *[101.5] * 3, *[102.5] * 3, *[103.5] * 3, 104.0])
     monkeypatch.setattr(time, 'monotonic', lambda: next(clock))
-    faults = Faults(('silence', 'echo'), ['silence@B:1:2', 'echo:3'])
+    faults = FaultSchedule(('silence', 'echo'), ['silence@B:1:2', 'echo:3'])
     seen = []
     for _ in range(4):
         seen.append((faults.act('silence', 'A'), faults.act('silence', 'B'), faults.act('echo')))
@@ -51,9 +51,9 @@ def test_faults_act_when_and_where_they_are_told(monkeypatch):
 @pytest.mark.parametrize(
     'text', ['fire', 'echo:2:1', 'echo:-1', 'echo:x', 'echo:1:2:3', 'echo:nan']
 )
-def test_faults_that_are_none_are_refused(text):
+def test_invalid_faults_are_refused(text):
     with pytest.raises(InvalidInput, match='is not allowed'):
-        Faults(('silence', 'echo'), [text])
+        FaultSchedule(('silence', 'echo'), [text])
 
 
 def test_a_port_comes_and_goes_on_its_schedule(emulated, until, tmp_path):
@@ -64,7 +64,7 @@ def test_a_port_comes_and_goes_on_its_schedule(emulated, until, tmp_path):
     until(lambda: os.path.exists(link))
 
 
-def test_a_name_taken_meanwhile_is_left_and_told(until, tmp_path):
+def test_a_file_that_takes_the_link_is_kept_and_reported(until, tmp_path):
     link = tmp_path / 'regulator'
     device = SmcItvEmulator()
     emulator = Emulator(device, str(link))
@@ -73,14 +73,14 @@ def test_a_name_taken_meanwhile_is_left_and_told(until, tmp_path):
     link.write_text('mine')
     open_before = len(os.listdir('/proc/self/fd'))
     device.faults.clear()
-    with pytest.raises(TransportError, match='cannot be plugged in: something else has taken'):
+    with pytest.raises(TransportError, match='cannot be plugged in: another file has this path'):
         emulator.wait()
     assert len(os.listdir('/proc/self/fd')) <= open_before
-    emulator.close()  # it was told
+    emulator.close()  # does not raise the error again
     assert link.read_text() == 'mine'
 
 
-def test_what_ended_the_emulator_is_told_at_the_end_of_a_block(until, tmp_path):
+def test_the_error_that_ended_the_emulator_is_raised_at_the_end_of_a_block(until, tmp_path):
     folder = tmp_path / 'ports'
     folder.mkdir()
     link = folder / 'regulator'
@@ -91,7 +91,7 @@ def test_what_ended_the_emulator_is_told_at_the_end_of_a_block(until, tmp_path):
         until(lambda: not os.path.lexists(link))
         folder.rmdir()
         device.faults.clear()
-        until(lambda: not emulator._thread.is_alive())
+        until(emulator.ended.is_set)
         folder.mkdir()
 
     with (
@@ -100,7 +100,7 @@ def test_what_ended_the_emulator_is_told_at_the_end_of_a_block(until, tmp_path):
     ):
         lose_the_folder()
     device.faults.clear()
-    with (  # but no error of the block is hidden by it
+    with (  # an error of the block has priority
         pytest.raises(ZeroDivisionError),
         Emulator(device, str(link)) as emulator,
     ):
@@ -109,7 +109,7 @@ def test_what_ended_the_emulator_is_told_at_the_end_of_a_block(until, tmp_path):
 
 
 @pytest.mark.parametrize('other', ['file', 'link', 'nothing'])
-def test_a_link_that_another_one_replaced_is_left(other, until, tmp_path):
+def test_a_link_that_was_replaced_is_kept(other, until, tmp_path):
     link = tmp_path / 'regulator'
     emulator = Emulator(SmcItvEmulator(), str(link))
     link.unlink()
@@ -124,36 +124,37 @@ def test_a_link_that_another_one_replaced_is_left(other, until, tmp_path):
 def test_a_link_that_was_lost_comes_back_with_the_device(until, tmp_path):
     link = tmp_path / 'regulator'
     device = SmcItvEmulator()
-    with Emulator(device, str(link)) as emulator:
+    with Emulator(device, str(link)):
+        port = os.readlink(link)
         link.unlink()
         device.faults.add('unplugged')
-        until(lambda: emulator._ends is None)
+        until(lambda: not os.path.exists(port))
         device.faults.clear()
         until(lambda: os.path.exists(link))
         assert os.readlink(link).startswith('/dev/')
     assert not os.path.lexists(link)
 
 
-def test_words_of_an_alicat():
+def test_replies_of_an_alicat():
     device = AlicatEmulator('AB', time_constant=1e-6)
 
-    def said(command):
+    def reply(command):
         return device.answer(command)
 
-    assert said('C') is None  # no such unit
-    assert said('a') == ('A', 'A +000.00 +000.00')
-    assert said('AS75.00')[1].endswith(' +075.00')
-    assert said('ASx')[1] == said('AS-1')[1] == said('AS1000')[1] == said('AWHAT')[1] == '?'
-    assert said('ALS 60.00 10')[1] == 'A +060.00 +060.00 10 kPaG'
-    assert said('ALS')[1] == 'A +060.00 +060.00 10 kPaG'
-    assert said('ALS 60.00 7')[1] == said('ALS 60.00')[1] == said('ALS 1000 10')[1] == '?'
-    assert said('AHP')[1].endswith(' HLD')
-    assert not said('AC')[1].endswith(' HLD')
-    assert said('BLSS')[1] == 'B S'
+    assert reply('C') is None  # no such unit
+    assert reply('a') == ('A', 'A +000.00 +000.00')
+    assert reply('AS75.00')[1].endswith(' +075.00')
+    assert reply('ASx')[1] == reply('AS-1')[1] == reply('AS1000')[1] == reply('AWHAT')[1] == '?'
+    assert reply('ALS 60.00 10')[1] == 'A +060.00 +060.00 10 kPaG'
+    assert reply('ALS')[1] == 'A +060.00 +060.00 10 kPaG'
+    assert reply('ALS 60.00 7')[1] == reply('ALS 60.00')[1] == reply('ALS 1000 10')[1] == '?'
+    assert reply('AHP')[1].endswith(' HLD')
+    assert not reply('AC')[1].endswith(' HLD')
+    assert reply('BLSS')[1] == 'B S'
     assert AlicatEmulator(firmware='7v09').answer('ALSS')[1].endswith(' LCK')
 
 
-def test_words_of_an_itv():
+def test_replies_of_an_itv():
     device = SmcItvEmulator(time_constant=1e-6)
     words = ['SET 1000', 'INC', 'DEC', 'REQ', 'SET 2000', 'set 1', 'SET', 'SET -1', '']
     assert [device.answer(each)[1] for each in words] == [
@@ -162,10 +163,10 @@ def test_words_of_an_itv():
     ]
 
 
-def test_words_of_a_board():
+def test_replies_of_a_board():
     device = SerialTextEmulator(channels=1)
     words = ['SET 1 2.5', 'READ 1', 'SET 1', 'SET 2 1.0', 'SET 1 x', '', 'WHAT 1 1']
-    said = [device.answer(each)[1] for each in words]
-    assert said[0] == 'OK 1 2.500'
-    assert said[1].startswith('1 1.')
-    assert said[2:] == ['ERROR'] * 5
+    reply = [device.answer(each)[1] for each in words]
+    assert reply[0] == 'OK 1 2.500'
+    assert reply[1].startswith('1 1.')
+    assert reply[2:] == ['ERROR'] * 5

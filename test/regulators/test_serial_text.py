@@ -11,7 +11,7 @@ from ros_pad.regulators import create
 SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
 
 
-def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
+def test_commands_to_set_read_and_vent(dialogue, until):
     device = dialogue(
         [
             ('READ 3', '3 1.040\n'),
@@ -24,7 +24,7 @@ def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
     assert isinstance(regulator, Regulator)
     regulator.open()
     assert regulator.read().pressure == pytest.approx(1e3)
-    assert math.isnan(regulator.read().setpoint)  # nobody can ask the board
+    assert math.isnan(regulator.read().setpoint)  # the board does not report it
     regulator.set_pressure(75e3)
     until(lambda: regulator.read().setpoint == 75e3)
     assert regulator.read().pressure == pytest.approx(74e3)
@@ -32,8 +32,8 @@ def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
     regulator.close()
 
 
-def test_a_board_with_other_words_counts_and_no_answer(dialogue, until):
-    # 12 bit; the command falls with the pressure; nothing is said to a command.
+def test_a_board_with_other_templates_counts_and_no_reply(dialogue, until):
+    # Counts have 12 bit, the count of a command falls with pressure, and commands have no reply.
     device = dialogue(
         [
             ('p2?', 'p2=+204.8\r\n'),
@@ -69,10 +69,10 @@ def test_a_board_with_other_words_counts_and_no_answer(dialogue, until):
 
 
 @pytest.mark.parametrize('reply', ['', '2 1.0', '1 x', '1 1.0 V', '1 nan', 'ERROR'])
-def test_what_is_no_reading_is_refused_with_port_command_and_reply(reply):
+def test_an_invalid_reading_is_refused_with_port_command_and_reply(reply):
     regulator = create('serial_text', port='/dev/somewhere')
-    with pytest.raises(ProtocolError, match='not a reply as read_reply has it') as caught:
-        regulator._poll(lambda command: reply)
+    with pytest.raises(ProtocolError, match='the reply does not match read_reply') as caught:
+        regulator.poll(lambda command: reply)
     assert f"port /dev/somewhere, command 'READ 1', reply {reply!r}" in str(caught.value)
 
 
@@ -80,9 +80,7 @@ def test_what_is_no_reading_is_refused_with_port_command_and_reply(reply):
     ('kind', 'words'),
     [('rejection', "reply 'ERROR'"), ('echo', '3.000 was sent, 1.5 is in force')],
 )
-def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
-    emulated, opened, until, kind, words
-):
+def test_a_setpoint_that_is_not_in_force_is_a_fault(emulated, opened, until, kind, words):
     device, line = emulated('serial_text')
     regulator = opened('serial_text', port=line.path)
     device.faults.add(kind)
@@ -104,7 +102,7 @@ def test_six_channels_share_a_port(emulated, opened, until):
     wanted = [10e3 * (number + 1) for number in range(6)]
     until(lambda: abs(feet[-1].read().pressure - wanted[-1]) < 100.0)
     until(lambda: all(foot.read().setpoint == at for foot, at in zip(feet, wanted, strict=True)))
-    # Nobody has another channel's: steps of the board are 20 Pa.
+    # Each channel has its own pressure; the resolution of the board is 20 Pa.
     until(lambda: abs(feet[0].read().pressure - wanted[0]) < 100.0)
     assert [foot.read().pressure for foot in feet] == pytest.approx(wanted, abs=500.0)
 
@@ -116,28 +114,30 @@ def test_six_channels_share_a_port(emulated, opened, until):
         ({'set_template': 'SET {value:.3f} {value:.3f}'}, '1 {value} is needed'),
         ({'set_template': 'SET {value:x}'}, '1 {value} is needed'),
         ({'set_template': 'SET {value'}, '1 {value} is needed'),
-        ({'set_template': 'SET {value}'}, 'how many decimals'),
+        ({'set_template': 'SET {value}'}, 'the number of decimals is missing'),
         ({'set_template': 7}, 'ASCII text'),
         ({'set_reply': '{value} {value}'}, '0 or 1 {value} is needed'),
         ({'read_template': 'READ {value}'}, '0 {value} is needed'),
         ({'read_reply': 'nothing'}, '1 {value} is needed'),
-        ({'set_template': 'SET {value:d}'}, 'its step is 20000 Pa, too coarse'),
-        ({'command_zero': 0.0001}, 'has 3 decimals, and a vent must be exact'),
-        ({'command_zero': 5.0}, 'another value than command_zero'),
-        ({'monitor_full': 1.0}, 'another value than monitor_zero'),
+        ({'set_template': 'SET {value:d}'}, 'its step is 20000 Pa, and at most a tenth'),
+        ({'command_zero': 0.0001}, 'has 3 decimals, which must express the value of a vent'),
+        ({'command_zero': 5.0}, 'must differ from command_zero'),
+        ({'monitor_full': 1.0}, 'must differ from monitor_zero'),
         ({'monitor_full': math.nan}, 'monitor_full = nan'),
         ({'terminator': ''}, '1 to 4 ASCII'),
         ({'channel': 100}, '0 to 99'),
         ({'full_scale': 50e3}, 'from 1 to 50000 Pa'),
     ],
 )
-def test_bad_options_say_what_is_needed(options, words):
+def test_bad_options_name_what_is_allowed(options, words):
     with pytest.raises(ConfigError) as caught:
         create('serial_text', port='somewhere', **options)
     assert words in str(caught.value)
 
 
-def test_a_number_too_large_to_be_one_is_no_pressure():
+def test_an_infinite_reading_is_refused():
     regulator = create('serial_text', port='none')
-    with pytest.raises(ProtocolError, match=r"not a pressure: port none, .* reply '1 1e999'"):
-        regulator._poll(lambda command, reply=True: '1 1e999')
+    with pytest.raises(
+        ProtocolError, match=r"the value is not finite: port none, .* reply '1 1e999'"
+    ):
+        regulator.poll(lambda command, reply=True: '1 1e999')

@@ -15,6 +15,7 @@ from ros_pad.regulators import Reading
 from ros_pad.regulators import Regulator
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
+from ros_pad.simulation.pneumatics import PneumaticChannel
 
 
 class Clock:
@@ -55,7 +56,7 @@ def test_it_reaches_its_setpoint_and_vents():
 
 
 def test_half_way_up_it_shows_the_second_order_response():
-    # Hardly any hose or volume, so that the pad follows the outlet.
+    # Hose and volume are so small that the pad follows the outlet.
     regulator, clock = opened(hose_length=0.0, pad_volume=1e-8)
     regulator.set_pressure(75e3)
     clock.now = 0.047
@@ -69,7 +70,9 @@ def test_half_way_up_it_shows_the_second_order_response():
 def test_setpoint_that_is_no_pressure(value):
     regulator, _ = opened()
     regulator.set_pressure(40e3)
-    with pytest.raises(InvalidInput, match=r'set-point .* Pa is not allowed: 0 to 90000 Pa'):
+    with pytest.raises(
+        InvalidInput, match=r'set-point .* Pa is not allowed: a number from 0 to 90000'
+    ):
         regulator.set_pressure(value)
     assert regulator.read().setpoint == 40e3
 
@@ -77,7 +80,7 @@ def test_setpoint_that_is_no_pressure(value):
 def test_setpoint_above_the_ceiling_is_refused_not_clipped():
     regulator, clock = opened(ceiling=60e3)
     regulator.set_pressure(60e3)
-    with pytest.raises(LimitError, match='above the ceiling of 60000 Pa gauge: refused'):
+    with pytest.raises(LimitError, match='above the ceiling of 60000 Pa gauge'):
         regulator.set_pressure(60e3 + 0.1)
     regulator.set_pressure(40e3)
     with pytest.raises(LimitError):
@@ -106,7 +109,7 @@ def test_open_and_close_may_be_repeated_and_the_air_stays():
     regulator.open()
     regulator.close()
     regulator.close()
-    clock.now = 0.5  # another clock may run from here
+    clock.now = 0.5  # the clock may go back while closed
     regulator.open()
     assert regulator.read() == Reading(50e3, 50e3, (), 0.5)
 
@@ -126,7 +129,7 @@ def test_close_does_not_lose_the_last_part_of_a_step():
 
 
 def trajectory(read_times):
-    """Follow three commands, reading also at these times; return what is seen at fixed times."""
+    """Give three commands, read also at ``read_times``; return readings at fixed times."""
     commands = {0.0: 75e3, 0.0613: 20e3, 0.25: 85e3}
     fixed = np.round(np.arange(0.0, 0.6, 0.0173), 6).tolist()
     regulator, clock = opened(sensor_resolution=0.1)
@@ -186,13 +189,21 @@ def test_a_clock_that_goes_back():
     assert regulator.read() == before
 
 
-def test_a_day_without_a_reading_is_quick():
+def test_a_day_without_a_reading_takes_few_steps(monkeypatch):
+    steps = 0
+    step = PneumaticChannel.step
+
+    def counted(self, setpoint, duration):
+        nonlocal steps
+        steps += 1
+        return step(self, setpoint, duration)
+
+    monkeypatch.setattr(PneumaticChannel, 'step', counted)
     regulator, clock = opened()
     regulator.set_pressure(75e3)
     clock.now = 86400.0
-    start = time.perf_counter()
     assert regulator.read().pressure == 75e3
-    assert time.perf_counter() - start < 1.0  # 21.6 million steps would take a minute
+    assert 0 < steps < 2000  # a day has 21.6 million internal steps
 
 
 def test_real_time():
@@ -200,12 +211,12 @@ def test_real_time():
     regulator.open()
     regulator.set_pressure(75e3)
     first = regulator.read()
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while regulator.read().pressure < 74e3 and time.monotonic() < deadline:
         time.sleep(0.002)
     reading = regulator.read()
     assert reading.pressure >= 74e3
-    assert 0.08 < reading.time - first.time < 10.0
+    assert reading.time - first.time > 0.08
 
 
 # --- sensor ------------------------------------------------------------------------------------
@@ -255,7 +266,7 @@ def test_air_used():
 # --- faults ------------------------------------------------------------------------------------
 
 
-def test_silent_it_raises_what_a_device_raises_that_does_not_answer():
+def test_a_silent_device_raises_like_one_that_does_not_answer():
     regulator, clock = opened(faults=['{kind: silence, start: 1.0, end: 2.0}'])
     regulator.set_pressure(75e3)
     clock.now = math.nextafter(1.0, 0.0)
@@ -301,16 +312,16 @@ def test_drifted_sensor_reads_the_setpoint_and_the_pad_is_off():
         seen[now] = regulator.read().pressure, regulator.pad_pressure
     assert seen[0.5] == seen[7.0] == (60e3, 60e3)
     assert seen[3.0] == (60e3, 66e3)
-    assert seen[5.0] == (66e3, 66e3)  # sound again, and nothing has moved yet
+    assert seen[5.0] == (66e3, 66e3)  # the drift has ended, but the pad has not moved yet
 
 
 def test_no_command_and_a_drifted_sensor_can_pass_full_scale():
-    """Above the ceiling a pad can be where the sensor reads too little, above full scale never."""
+    """A pad whose sensor reads too little can exceed the ceiling, but never full scale."""
     regulator, clock = opened(faults=['{kind: sensor_drift, offset: -30.0e3}'])
     regulator.set_pressure(90e3)
     clock.now = 2.0
     assert regulator.pad_pressure == 100e3
-    assert regulator.read().pressure == 70e3  # less than asked for: it cannot do more
+    assert regulator.read().pressure == 70e3  # below the set-point, as the supply is the limit
     regulator.vent()
     clock.now = 4.0
     assert regulator.pad_pressure == 0.0
@@ -349,13 +360,13 @@ def test_a_fault_after_a_quiet_hour_is_exact():
     sound.set_pressure(75e3)
     sound_clock.now = 0.05
     clock.now = 3600.9
-    # The pad ends where the outlet was when the valve stuck; a hose of 4 mm is hardly behind.
+    # The pad keeps the pressure of the outlet at the start; through 4 mm it hardly lags behind.
     assert regulator.read().pressure == pytest.approx(sound.read().pressure, abs=500.0)
     clock.now = 3602.0
     assert regulator.read().pressure == 75e3
 
 
-def test_bad_faults_are_told():
+def test_bad_faults_are_refused():
     with pytest.raises(ConfigError, match=r'fault .*kind = .fire. is not allowed'):
         create('simulated', faults=['{kind: fire}'])
     for bad in ('{kind: silence}', 3):
@@ -366,7 +377,7 @@ def test_bad_faults_are_told():
 # --- create ------------------------------------------------------------------------------------
 
 
-def test_unknown_backend_lists_what_there_is():
+def test_unknown_backend_lists_the_backends():
     with pytest.raises(ConfigError, match=r"no regulator backend 'simulatd' .*'simulated'"):
         create('simulatd')
 

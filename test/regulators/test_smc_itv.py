@@ -11,7 +11,7 @@ SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
 COUNT = 100e3 / 1023
 
 
-def test_it_sets_reads_and_vents_word_by_word(dialogue, until):
+def test_commands_to_set_read_and_vent(dialogue, until):
     device = dialogue(
         [
             *[('REQ', '0\r\n'), ('MON', '3\r\n')],
@@ -36,7 +36,7 @@ def test_a_setpoint_at_the_ceiling_is_rounded_down(dialogue, until):
     device = dialogue(
         [
             *[('REQ', '0\r\n'), ('MON', '0\r\n')],
-            *[('SET 613', '613\r\n'), ('REQ', '613\r\n'), ('MON', '0\r\n')],  # of 613.8
+            *[('SET 613', '613\r\n'), ('REQ', '613\r\n'), ('MON', '0\r\n')],  # 613.8 rounded down
             *[('SET 0', '0\r\n'), ('REQ', '0\r\n'), ('MON', '0\r\n')],
         ],
         '\r\n',
@@ -50,17 +50,19 @@ def test_a_setpoint_at_the_ceiling_is_rounded_down(dialogue, until):
 
 
 @pytest.mark.parametrize('reply', ['', '-1', '1024', '5.0', 'OK', '²'])
-def test_what_is_no_count_is_refused_with_port_command_and_reply(reply):
+def test_an_invalid_count_is_refused_with_port_command_and_reply(reply):
     regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
-    with pytest.raises(ProtocolError, match='not a number from 0 to 1023') as caught:
-        regulator._poll(lambda command: reply)
+    with pytest.raises(ProtocolError, match='not a whole number from 0 to 1023') as caught:
+        regulator.poll(lambda command: reply)
     assert f"port /dev/somewhere, command 'REQ', reply {reply!r}" in str(caught.value)
 
 
 def test_a_rejection_is_a_fault_of_the_device():
     regulator = create('smc_itv', port='/dev/somewhere', full_scale=100e3)
-    with pytest.raises(DeviceFault, match=r"rejected: .* 'SET 512', reply 'UNKNOWN COMMAND'"):
-        regulator._set(lambda command: 'UNKNOWN COMMAND', 50e3)
+    with pytest.raises(
+        DeviceFault, match=r"rejected the command: .* 'SET 512', reply 'UNKNOWN COMMAND'"
+    ):
+        regulator.send(lambda command: 'UNKNOWN COMMAND', 50e3)
 
 
 @pytest.mark.parametrize(
@@ -68,12 +70,10 @@ def test_a_rejection_is_a_fault_of_the_device():
     [
         ('rejection', 'rejected'),
         ('echo', '614 was sent, 307 is in force'),
-        ('analog_source', 'is not obeyed: 0 Pa is in force'),
+        ('analog_source', 'is not in force, but 0 Pa is'),
     ],
 )
-def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
-    emulated, opened, until, kind, words
-):
+def test_a_setpoint_that_is_not_in_force_is_a_fault(emulated, opened, until, kind, words):
     device, line = emulated('smc_itv')
     regulator = opened('smc_itv', port=line.path, full_scale=100e3)
     device.faults.add(kind)
@@ -89,7 +89,7 @@ def test_a_setpoint_that_is_not_obeyed_is_a_fault_until_it_is(
 def test_bad_options_name_value_and_range():
     with pytest.raises(ConfigError, match="needs the option 'full_scale'"):
         create('smc_itv', port='somewhere')
-    with pytest.raises(ConfigError, match=r'ceiling = 90000 Pa .* from 1 to 50000 Pa'):
+    with pytest.raises(ConfigError, match=r'ceiling = 90000\.0 .* from 1 to 50000 Pa'):
         create('smc_itv', port='somewhere', full_scale=50e3)
-    with pytest.raises(ConfigError, match=r'full_scale = 100 Pa .* from 1000 to 1e\+07 Pa'):
+    with pytest.raises(ConfigError, match=r'full_scale = 100\.0 .* from 1000 to 10000000 Pa'):
         create('smc_itv', port='somewhere', full_scale=100.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One port, its thread, and the regulators on it: who waits for whom, and what is lost when."""
+"""Regulators on one port share its thread, and no call waits for a reply."""
 
 import subprocess
 import sys
@@ -12,8 +12,8 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
 from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
-from ros_pad.regulators import channel
 from ros_pad.regulators import create
+from ros_pad.regulators import serial_device
 from ros_pad.regulators import transport
 
 QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
@@ -60,19 +60,19 @@ def test_one_command_is_in_flight_at_a_time(mute, until):
         for each in 'AB'
     ]
     calls[0].start()
-    until(lambda: device.said)
+    until(lambda: device.sent)
     calls[1].start()
-    time.sleep(0.3)  # B has joined, and A has 1.7 s left to answer
+    time.sleep(0.3)  # B now shares the port, and A may still answer for 1.7 s
     for each in calls:
         each.join()
     device.close()
-    assert not device.problems  # the device never heard of B
+    assert not device.problems  # the device received nothing for B
 
 
 def test_a_port_has_one_line_setting_and_each_address_once(emulated, opened):
     _, line = emulated('alicat', unit_ids='AB')
     opened('alicat', port=line.path)
-    with pytest.raises(ConfigError, match=r'open with .*19200.*38400.* not allowed beside it'):
+    with pytest.raises(ConfigError, match=r'open with .*19200.*38400.* cannot share it'):
         opened('alicat', port=line.path, unit_id='B', baudrate=38400)
     with pytest.raises(ConfigError, match="has a device 'A' already"):
         opened('alicat', port=line.path)
@@ -81,27 +81,27 @@ def test_a_port_has_one_line_setting_and_each_address_once(emulated, opened):
 
 def test_nothing_waits_for_the_line(emulated, opened, until):
     device, line = emulated('alicat')
-    regulator = opened('alicat', port=line.path, reply_timeout=1.0, silence=10.0)
+    regulator = opened('alicat', port=line.path, reply_timeout=2.0, silence=10.0)
     regulator.set_pressure(10e3)
     until(lambda: regulator.read().setpoint == 10e3)
     device.faults.add('silence')
-    heard = len(line.commands)
-    until(lambda: len(line.commands) > heard)  # the thread waits 1 s for an answer now
-    started = time.monotonic()
+    received = len(line.commands)
+    until(lambda: len(line.commands) > received)  # the thread waits 2 s for an answer now
+    received = len(line.commands)
     for _ in range(100):
         regulator.read()
         regulator.set_pressure(20e3)
     regulator.vent()
-    assert time.monotonic() - started < 0.5
+    assert len(line.commands) == received  # all calls returned meanwhile
     device.faults.clear()
 
 
-def test_the_latest_setpoint_wins_and_none_is_queued(emulated, opened, until):
+def test_the_latest_setpoint_replaces_earlier_ones(emulated, opened, until):
     device, line = emulated('alicat')
-    regulator = opened('alicat', port=line.path, reply_timeout=0.3, silence=10.0)
+    regulator = opened('alicat', port=line.path, reply_timeout=1.0, silence=10.0)
     device.faults.add('silence')
-    heard = len(line.commands)
-    until(lambda: len(line.commands) > heard)
+    received = len(line.commands)
+    until(lambda: len(line.commands) > received)
     for pressure in range(1000, 80_000, 1000):
         regulator.set_pressure(float(pressure))
     device.faults.clear()
@@ -109,10 +109,10 @@ def test_the_latest_setpoint_wins_and_none_is_queued(emulated, opened, until):
     assert {each for each in line.commands if each.startswith('ALS ')} == {'ALS 79.00 10'}
 
 
-def test_a_vent_goes_before_all_else(emulated, opened, until):
+def test_a_vent_is_sent_before_other_commands(emulated, opened, until):
     device, line = emulated('alicat', unit_ids='ABCDEF')
     feet = {
-        each: opened('alicat', port=line.path, unit_id=each, reply_timeout=0.2, silence=10.0)
+        each: opened('alicat', port=line.path, unit_id=each, reply_timeout=1.0, silence=10.0)
         for each in 'ABCDEF'
     }
     for foot in feet.values():
@@ -120,9 +120,9 @@ def test_a_vent_goes_before_all_else(emulated, opened, until):
     for foot in feet.values():
         until(lambda foot=foot: foot.read().setpoint == 50e3)
     device.faults.add('silence@A')
-    heard = len(line.commands)
-    until(lambda: 'A' in line.commands[heard:])
-    # While the thread waits for A, five commands come in; the vent is the last of them.
+    received = len(line.commands)
+    until(lambda: 'A' in line.commands[received:])
+    # While the thread waits for A, set-points are requested; the vent is the last request.
     for each in 'BCDE':
         feet[each].set_pressure(60e3)
     feet['F'].vent()
@@ -143,26 +143,26 @@ def test_a_device_that_is_lost_is_vented_when_it_is_back(emulated, opened, until
     assert isinstance(error, (TransportError, ProtocolError))
     for part in (line.path, 'command', 'reply'):
         assert part in str(error)
-    # Nobody knows what the device would make of it: it is refused, not kept for later.
+    # Set-points are refused, not kept for later.
     assert raised(lambda: regulator.set_pressure(70e3))
     assert raised(regulator.vent)
     device.faults.clear()
     until(lambda: raised(regulator.read) is None)
     until(lambda: regulator.read().setpoint == 0.0)
-    assert line.commands.count('ALSS') > 1  # met anew: it may be another one
+    assert line.commands.count('ALSS') > 1  # identified again: it may be another device
     regulator.set_pressure(30e3)
     until(lambda: regulator.read().setpoint == 30e3)
 
 
 def test_one_bad_reply_is_no_fault(emulated, opened, until):
     device, line = emulated('alicat')
-    regulator = opened('alicat', port=line.path, reply_timeout=0.05, silence=10.0)
+    regulator = opened('alicat', port=line.path, reply_timeout=0.2, silence=10.0)
     regulator.set_pressure(60e3)
     until(lambda: regulator.read().setpoint == 60e3)
     for kind in ('silence', 'half_line', 'garbage'):
         device.faults.add(kind)
-        heard = len(line.commands)
-        until(lambda heard=heard: len(line.commands) > heard)
+        received = len(line.commands)
+        until(lambda received=received: len(line.commands) > received)
         device.faults.clear()
         now = time.monotonic()
         until(lambda now=now: regulator.read().time > now)
@@ -189,6 +189,7 @@ def test_unplugged_in_mid_run_and_back(emulated, opened, until, tmp_path):
     assert len(threads()) == 1
 
 
+@pytest.mark.slow
 def test_a_silent_neighbour_does_not_silence_the_others(emulated, opened, until):
     device, line = emulated('alicat', unit_ids='AB')
     first = opened('alicat', port=line.path, **QUICK)
@@ -199,11 +200,11 @@ def test_a_silent_neighbour_does_not_silence_the_others(emulated, opened, until)
     until(lambda: second.read().setpoint == 20e3)
     before = len(line.commands)
     until(lambda: len(line.commands) > before + 100)
-    heard = line.commands[before:]
-    assert heard.count('A') < 0.2 * heard.count('B')  # it is asked less and less often
+    received = line.commands[before:]
+    assert received.count('A') < 0.2 * received.count('B')  # the pauses between queries of A grow
 
 
-def test_errors_that_are_raised_again_do_not_pile_up(emulated, opened, until):
+def test_errors_that_are_raised_again_do_not_grow(emulated, opened, until):
     device, line = emulated('alicat')
     regulator = opened('alicat', port=line.path, **QUICK)
     device.faults.add('silence')
@@ -213,10 +214,10 @@ def test_errors_that_are_raised_again_do_not_pile_up(emulated, opened, until):
         trace = error.__traceback__
         while trace:
             depth, trace = depth + 1, trace.tb_next
-        assert depth == 3  # raised(), read() and the check
+        assert depth == 3  # frames of raised(), read() and its check
 
 
-def test_closing_vents_and_says_when_it_could_not(emulated, until):
+def test_closing_vents_and_raises_if_it_cannot(emulated, until):
     device, line = emulated('alicat')
     regulator = create('alicat', port=line.path, **QUICK)
     regulator.open()
@@ -228,17 +229,17 @@ def test_closing_vents_and_says_when_it_could_not(emulated, until):
     regulator.set_pressure(60e3)
     until(lambda: regulator.read().setpoint == 60e3)
     device.faults.add('rejection')
-    with pytest.raises(PadError, match=r'closed, and not known to be vented: .*rejected'):
+    with pytest.raises(PadError, match=r'closed without a confirmed vent: .*rejected'):
         regulator.close()
     assert not threads()
     device.faults.clear()
     device.faults.add('silence')
-    with pytest.raises(TransportError, match=r'no reply in 0\.1 s'):
+    with pytest.raises(TransportError, match=r'no reply within 0\.1 s'):
         regulator.open()
     assert not threads()
 
 
-def test_a_setpoint_under_way_does_not_survive_the_closing(emulated, until):
+def test_a_pending_setpoint_does_not_survive_the_closing(emulated, until):
     device, line = emulated('alicat')
     for _ in range(20):
         regulator = create('alicat', port=line.path)
@@ -248,7 +249,7 @@ def test_a_setpoint_under_way_does_not_survive_the_closing(emulated, until):
         assert device.valves['A'].setpoint == 0.0
 
 
-def test_what_is_closed_takes_nothing(emulated):
+def test_a_closed_regulator_accepts_nothing(emulated):
     _, line = emulated('alicat')
     regulator = create('alicat', port=line.path)
     for call in (regulator.read, regulator.vent, lambda: regulator.set_pressure(1e3)):
@@ -256,7 +257,7 @@ def test_what_is_closed_takes_nothing(emulated):
     regulator.close()
 
 
-def test_a_port_that_is_not_there_or_taken_is_an_error(emulated, opened):
+def test_a_port_that_is_missing_or_in_use_is_an_error(emulated, opened):
     with pytest.raises(
         TransportError, match=r'port /dev/nowhere cannot be opened: .*No such file'
     ):
@@ -285,7 +286,8 @@ def test_errors_carry_port_command_and_reply():
 
     error = transport.failure(ProtocolError, 'a strange reply', Port, 'AS20.00', b'?')
     assert (error.port, error.command, error.reply) == ('/dev/ttyUSB9', 'AS20.00', b'?')
-    assert str(error) == "a strange reply: port /dev/ttyUSB9, command 'AS20.00', reply b'?'"
-    again = channel._again(error)
+    for part in ('a strange reply', '/dev/ttyUSB9', "'AS20.00'", "b'?'"):
+        assert part in str(error)
+    again = serial_device.copied(error)
     assert again is not error
     assert (type(again), str(again), again.reply) == (ProtocolError, str(error), b'?')

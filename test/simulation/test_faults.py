@@ -43,7 +43,7 @@ def walk(channel, setpoint, duration, dt=0.004):
 
 
 def orifice(c, b, upstream, downstream):
-    """Volume flow of reference air by ISO 6358, m³/s, times 100 kPa."""
+    """Return the flow of reference air by ISO 6358, m³/s, times 100 kPa."""
     ratio = downstream / upstream
     if ratio <= b:
         return c * upstream * 1e5
@@ -77,7 +77,7 @@ def test_what_a_leak_takes_grows_with_pressure():
 
 @pytest.mark.parametrize('dt', [0.001, 0.004, 0.02])
 def test_leaking_pad_against_scipy(dt):
-    # A hole bursts in a pad of some size: it sags to what hose and hole agree on.
+    # A leak begins: the pressure falls to where the flows of hose and leak are equal.
     channel = channel_with(Fault('leak', start=1.0, conductance=3e-9), volume=50e-6)
     channel.step(75e3, 1.0)
 
@@ -100,7 +100,7 @@ def test_leaking_pad_against_scipy(dt):
 @pytest.mark.parametrize('conductance', [1e-12, 1e-10, 1e-8, 1e-6])
 @pytest.mark.parametrize('volume', [1e-9, 1e-6])
 def test_a_leak_does_not_make_the_pad_chatter(dt, conductance, volume, monkeypatch):
-    """Neither a pad that holds next to nothing, nor a hole wider than the hose, nor long steps."""
+    """The pressure does not oscillate for tiny pads, leaks wider than the hose, or long steps."""
     monkeypatch.setattr(pneumatics, 'MAX_STEP', 0.02)
     leak = Fault('leak', start=1.0, conductance=conductance)
     channel = channel_with(leak, hose=Hose(0.004, 0.0), volume=volume)
@@ -116,7 +116,7 @@ def test_air_lost_through_a_leak_is_air_used():
     channel.step(75e3, 2.0)
     before, pad = channel.air_used, channel.pad_pressure
     channel.step(75e3, 10.0)
-    # Choked or not by ISO 6358, at the pad's steady pressure.
+    # Flow of the leak by ISO 6358 at the steady pressure of the pad.
     flow = orifice(1e-9, 0.5, pad + AMBIENT, AMBIENT) / 1e5 * 1.185
     assert channel.air_used - before == pytest.approx(10.0 * flow, rel=1e-3)
 
@@ -145,7 +145,7 @@ def test_valve_that_sticks_on_its_way_keeps_its_outlet_and_the_pad_follows():
     channel = channel_with(Fault('stuck_valve', start=0.05))
     channel.step(75e3, 0.05)
     outlet = channel.outlet_pressure
-    # Critical damping, in closed form: 1 - (1 + ω t) exp(-ω t).
+    # Closed form of critical damping: 1 - (1 + ω t) exp(-ω t).
     assert outlet == pytest.approx(75e3 * (1.0 - 3.25 * math.exp(-2.25)), abs=0.1)
     assert channel.pad_pressure < outlet - 1e3
     channel.step(75e3, 1.0)
@@ -168,7 +168,7 @@ def test_all_feet_of_a_supply_sag_together(remaining):
         for channel, setpoint in zip(channels, setpoints, strict=True):
             channel.step(setpoint, 0.1)
             assert channel.outlet_pressure <= supply + 1e-6
-            # The pad is behind by what the hose takes, some tens of milliseconds.
+            # Behind the hose the pad lags by some tens of milliseconds.
             late = remaining + (100e3 - remaining) * math.exp(-(elapsed - 0.05) / 0.5)
             assert min(supply, setpoint) - 1.0 < channel.pad_pressure < min(late, setpoint) + 1.0
     for channel, setpoint in zip(channels, setpoints, strict=True):
@@ -192,7 +192,7 @@ def test_drift_moves_the_pad_the_other_way(offset):
     channel.step(60e3, 1.0)
     for elapsed in (1.0, 2.0, 3.0, 4.0):
         channel.step(60e3, 1.0)
-        # A critically damped loop is 2/ω behind a ramp; the hose a little more.
+        # A critically damped loop lags 2/ω behind a ramp; the hose adds a little.
         behind = 2.0 / 45.0 * abs(offset) / 4.0
         expected = 60e3 - offset * elapsed / 4.0
         assert channel.pad_pressure == pytest.approx(expected, abs=1.3 * behind)
@@ -203,7 +203,7 @@ def test_drift_moves_the_pad_the_other_way(offset):
 
 
 @pytest.mark.parametrize('offset', [-8e3, 8e3])
-def test_zero_opens_the_exhaust_whatever_the_sensor_says(offset):
+def test_zero_opens_the_exhaust_whatever_the_sensor_reads(offset):
     channel = channel_with(Fault('sensor_drift', offset=offset))
     channel.step(60e3, 1.0)
     channel.step(0.0, 1.0)
@@ -235,7 +235,7 @@ def test_zero_opens_the_exhaust_whatever_the_sensor_says(offset):
     st.sampled_from([0.001, 0.004, 0.0173]),
 )
 def test_no_fault_but_drift_takes_a_pad_above_its_setpoint(faults, dt):
-    """What a drifted sensor can do is bounded: by its offset, and by full scale."""
+    """Drift raises a pad by at most its offset, and never above full scale."""
     channel = channel_with(*faults)
     low = sum(min(0.0, fault.offset) for fault in faults if fault.kind == 'sensor_drift')
     for setpoint in (40e3, 85e3, 60e3, 85e3):
@@ -249,7 +249,7 @@ def test_no_fault_but_drift_takes_a_pad_above_its_setpoint(faults, dt):
 
 
 def test_faults_start_and_end_between_steps():
-    """Whatever the step, a fault acts from its start to its end, and not a step longer."""
+    """For any step a fault acts exactly from its start to its end."""
     fault = Fault('stuck_valve', start=0.0533, end=0.1017)
     ends = []
     for dt in (0.001, 0.004, 0.0173, 0.05):
@@ -257,10 +257,10 @@ def test_faults_start_and_end_between_steps():
         for _ in range(round(0.5191 / dt)):
             channel.step(75e3, dt)
             if 0.0533 < channel.time < 0.1017:
-                # Critical damping in closed form, at the start of the fault.
+                # Closed form of critical damping at the start of the fault.
                 held = 75e3 * (1.0 - (1.0 + 45.0 * 0.0533) * math.exp(-45.0 * 0.0533))
                 assert channel.outlet_pressure == pytest.approx(held, abs=0.5)
-        # From rest where it was held, the same response to the rest of the way.
+        # After the fault the outlet starts from rest with the same response.
         free = channel.time - 0.1017
         left = (75e3 - held) * (1.0 + 45.0 * free) * math.exp(-45.0 * free)
         ends.append(channel.outlet_pressure - (75e3 - left))
@@ -325,7 +325,7 @@ BAD = [
     ('{start: 1.0}', "key 'kind' is missing"),
     ('{kind: leak}', "key 'conductance' is missing"),
     ('{kind: leak, conductance: 1.0}', 'a number from 1e-14 to 1e-06 m³/(s Pa) is needed'),
-    ('{kind: silence, start: -1}', 'start = -1 is not allowed: a number from 0 to 1e+09 s'),
+    ('{kind: silence, start: -1}', 'start = -1 is not allowed: a number from 0 to 1000000000 s'),
     ('{kind: silence, start: 2, end: 2}', 'end = 2 is not allowed: a number from 2 to'),
     ('{kind: silence, start: .nan}', 'start = nan is not allowed'),
     ('{kind: silence, legs: [7]}', 'legs = [7] is not allowed: a list of different whole'),
@@ -342,7 +342,7 @@ BAD = [
     ('{kind: leak', 'not valid YAML'),
     ('{kind: silence, start: 2026-99-99}', 'not valid YAML'),
     ("{kind: silence, start: !!int ''}", 'not valid YAML'),
-    ('{kind: silence, kind: leak}', "key 'kind' is there twice"),
+    ('{kind: silence, kind: leak}', "key 'kind' occurs twice"),
 ]
 
 
@@ -358,10 +358,10 @@ def test_bad_texts(text, message):
     [
         ({'kind': 'fire'}, 'kind'),
         ({'kind': 'silence', 'start': math.inf}, 'start'),
-        ({'kind': 'silence', 'start': 2.0, 'end': 1.0}, 'end = 1 s'),
+        ({'kind': 'silence', 'start': 2.0, 'end': 1.0}, 'end = 1.0 '),
         ({'kind': 'silence', 'end': math.nan}, 'end'),
         ({'kind': 'silence', 'legs': (0,)}, 'legs'),
-        ({'kind': 'silence', 'offset': 5.0}, 'a fault of kind silence has none'),
+        ({'kind': 'silence', 'offset': 5.0}, 'a fault of kind silence has no offset'),
         ({'kind': 'leak'}, 'conductance = 0'),
         ({'kind': 'leak', 'conductance': math.nan}, 'conductance'),
     ],

@@ -18,6 +18,10 @@ FOUR_BY_ONE = Hose(0.004, 1.0)
 BARE = RegulatorModel(dead_time=0.0, dead_band=0.0, quantum=0.0)
 
 
+def mass_flow(hose, first, second):
+    return hose.conductance(first, second) * (first - second)
+
+
 def walk(channel, setpoint, duration, dt):
     return np.array([channel.step(setpoint, dt) for _ in range(round(duration / dt))])
 
@@ -47,7 +51,7 @@ VISCOSITY = 1.82e-5
 @pytest.mark.parametrize('diameter', [0.0005, 0.001, 0.002, 0.004, 0.006])
 @pytest.mark.parametrize('length', [0.1, 1.0, 10.0])
 def test_flow_agrees_with_pipe_flow_from_creeping_to_choked(diameter, length):
-    # Isothermal compressible flow from rest, one and a half dynamic heads lost at the ends.
+    # Isothermal compressible flow from rest loses one and a half dynamic heads at the ends.
     hose, seen = Hose(diameter, length), []
     for excess in (100.0, 500.0, 2e3, 7.5e3, 25e3, 75e3):
         upstream = 101325.0 + excess
@@ -59,19 +63,19 @@ def test_flow_agrees_with_pipe_flow_from_creeping_to_choked(diameter, length):
             return (upstream**2 - outlet**2) / RT - flux**2 * head
 
         flux = brentq(short_of, 1e-6, 0.999 * upstream / math.sqrt(RT))
-        flow = hose.mass_flow(upstream, 101325.0)
+        flow = mass_flow(hose, upstream, 101325.0)
         seen.append(flow / (flux * math.pi / 4.0 * diameter**2))
     assert min(seen) > 0.93
     assert max(seen) < 1.5
-    # Without Poiseuille's law the thinnest would pass eight times as much at 7.5 kPa.
+    # Without Poiseuille's law the flow of the thinnest hose would be eightfold at 7.5 kPa.
     if diameter == 0.0005:
         assert seen[3] == pytest.approx(1.0, abs=0.13)
 
 
 @pytest.mark.parametrize('diameter, length', [(0.002, 1.0), (0.004, 2.0), (0.006, 5.0)])
 def test_conductance_agrees_with_turbulent_pipe_flow(diameter, length):
-    # Choked isothermal flow in a smooth pipe, Blasius friction, half a dynamic head lost at the
-    # inlet: nothing of ISO 6358 in it. It tells metres from millimetres (a factor of sixty).
+    # Choked isothermal flow in a smooth pipe with Blasius' friction and half a dynamic head lost
+    # at the inlet is independent of ISO 6358. Confusing m and mm would be a factor of 60.
     upstream, rt, viscosity = 2.0e5, 287.05 * 293.15, 1.82e-5
 
     def excess(flux):
@@ -87,28 +91,28 @@ def test_conductance_agrees_with_turbulent_pipe_flow(diameter, length):
 
 
 def test_choked_mass_flow():
-    # 1.19636e-8 m³/(s Pa) · 1.185 kg/m³ · 600 kPa; 150/600 lies below b.
-    assert FOUR_BY_ONE.mass_flow(600e3, 150e3) == pytest.approx(8.506e-3, rel=1e-3)
-    assert FOUR_BY_ONE.mass_flow(600e3, 10e3) == FOUR_BY_ONE.mass_flow(600e3, 150e3)
+    # 1.19636e-8 m³/(s Pa) · 1.185 kg/m³ · 600 kPa; the flow is choked, as 150/600 is below b.
+    assert mass_flow(FOUR_BY_ONE, 600e3, 150e3) == pytest.approx(8.506e-3, rel=1e-3)
+    assert mass_flow(FOUR_BY_ONE, 600e3, 10e3) == mass_flow(FOUR_BY_ONE, 600e3, 150e3)
 
 
 def test_subsonic_mass_flow():
     # r = 0.8, (r − b)/(1 − b) = 0.69021, √(1 − 0.69021²) = 0.72362; choked at 200 kPa: 2.8354e-3.
-    assert FOUR_BY_ONE.mass_flow(200e3, 160e3) == pytest.approx(2.0517e-3, rel=1e-3)
-    assert FOUR_BY_ONE.mass_flow(160e3, 200e3) == -FOUR_BY_ONE.mass_flow(200e3, 160e3)
+    assert mass_flow(FOUR_BY_ONE, 200e3, 160e3) == pytest.approx(2.0517e-3, rel=1e-3)
+    assert mass_flow(FOUR_BY_ONE, 160e3, 200e3) == -mass_flow(FOUR_BY_ONE, 200e3, 160e3)
 
 
 def test_flow_is_continuous_and_linear_near_equal_pressures():
-    at = [FOUR_BY_ONE.mass_flow(1e5, 1e5 * r) for r in (0.9990001, 0.9989999)]
+    at = [mass_flow(FOUR_BY_ONE, 1e5, 1e5 * r) for r in (0.9990001, 0.9989999)]
     assert at[0] == pytest.approx(at[1], rel=1e-3)
-    half = FOUR_BY_ONE.mass_flow(1e5, 1e5 * 0.9995)
+    half = mass_flow(FOUR_BY_ONE, 1e5, 1e5 * 0.9995)
     assert half == pytest.approx(at[0] / 2.0, rel=1e-3)
-    assert FOUR_BY_ONE.mass_flow(1e5, 1e5) == 0.0
+    assert mass_flow(FOUR_BY_ONE, 1e5, 1e5) == 0.0
 
 
 def test_measured_figures_replace_the_formulae():
     line = Hose(0.004, 1.0, measured_conductance=1e-9, measured_critical_ratio=0.5)
-    assert line.mass_flow(600e3, 100e3) == pytest.approx(1e-9 * 1.185 * 600e3)
+    assert mass_flow(line, 600e3, 100e3) == pytest.approx(1e-9 * 1.185 * 600e3)
     assert line.volume == FOUR_BY_ONE.volume
 
 
@@ -146,9 +150,9 @@ def test_commands_in_flight_arrive_one_after_another():
     channel = PneumaticChannel(model, FOUR_BY_ONE, 5e-6)
     walk(channel, 80e3, 0.020, 0.004)
     walk(channel, 10e3, 0.030, 0.002)
-    assert channel.outlet_pressure == pytest.approx(0.0, abs=1e-6)  # the first arrives now
+    assert channel.outlet_pressure == pytest.approx(0.0, abs=1e-6)  # now the first one acts
     walk(channel, 10e3, 0.020, 0.004)
-    assert channel.outlet_pressure > 8e3  # risen towards the first
+    assert channel.outlet_pressure > 8e3  # on its way to the first set-point
     walk(channel, 10e3, 1.0, 0.004)
     assert channel.outlet_pressure == 10e3
 
@@ -205,7 +209,7 @@ def test_full_scale_that_is_no_multiple_of_the_quantum():
 
 
 def reference(hose, volume, setpoint, start, times):
-    """Integrate regulator and pad with SciPy, from ISO 6358 and Poiseuille written out anew."""
+    """Integrate regulator and pad with SciPy, with independent ISO 6358 and Poiseuille laws."""
     c, b = hose.sonic_conductance, hose.critical_ratio
     creep = math.pi * hose.inner_diameter**4 / (256.0 * 1.82e-5 * hose.length) / 100e3
 
@@ -250,7 +254,7 @@ def test_filling_and_venting_against_scipy(hose, volume, start, end):
 
 
 def test_stiff_orifice_fills_in_the_isothermal_time():
-    # With the outlet at once at 75 kPa: p V = ∫ C p1 ψ p0 dt, so t = V/(C p0) ∫ dp/(p1 ψ).
+    # If the outlet is at 75 kPa at once, p V = ∫ C p1 ψ p0 dt, so t = V/(C p0) ∫ dp/(p1 ψ).
     line = Hose(0.004, 1.0, measured_conductance=2e-10, measured_critical_ratio=0.4)
     model = RegulatorModel(natural_frequency=1000.0, damping=1.0, dead_time=0.0)
     channel = PneumaticChannel(model, line, 10e-6)
@@ -264,7 +268,7 @@ def test_stiff_orifice_fills_in_the_isothermal_time():
     while channel.pad_pressure < 50e3 and time < 5.0:
         channel.step(75e3, 0.001)
         time += 0.001
-    assert time == pytest.approx(expected + 0.002, abs=0.003)  # 2/ω: the regulator's own lag
+    assert time == pytest.approx(expected + 0.002, abs=0.003)  # the regulator lags by 2/ω
     assert expected > 0.3
 
 
@@ -303,7 +307,7 @@ def test_four_milliseconds_against_a_tenth(hose, volume, start, end):
 @pytest.mark.parametrize('volume', [1e-9, 1e-7, 5e-6, 2e-4])
 @pytest.mark.parametrize('diameter', [0.002, 0.006])
 def test_filling_is_monotone_at_any_step(dt, volume, diameter):
-    model = RegulatorModel(damping=1.0)  # which does not overshoot by itself
+    model = RegulatorModel(damping=1.0)  # without overshoot of the regulator
     channel = PneumaticChannel(model, Hose(diameter, 0.1), volume)
     for end, sign in ((75e3, 1.0), (76e3, 1.0), (0.0, -1.0)):
         start = channel.pad_pressure
@@ -315,7 +319,7 @@ def test_filling_is_monotone_at_any_step(dt, volume, diameter):
 
 @pytest.mark.parametrize('volume', [1e-9, 5e-6])
 def test_one_step_of_20_ms_does_not_chatter_either(volume, monkeypatch):
-    """Where pressures meet, the law of the flow is so steep that explicit steps overshoot."""
+    """Near equal pressures the flow law is so steep that explicit steps overshoot."""
     monkeypatch.setattr(pneumatics, 'MAX_STEP', 0.02)
     line = Hose(0.006, 0.1, measured_conductance=1e-7, measured_critical_ratio=0.4)
     channel = PneumaticChannel(RegulatorModel(damping=1.0), line, volume)
@@ -324,7 +328,7 @@ def test_one_step_of_20_ms_does_not_chatter_either(volume, monkeypatch):
     assert pad[-1] == 75e3
     naive, signs = 75e3 - 50.0, set()
     for _ in range(20):
-        flow = line.mass_flow(75e3 + 101325.0, naive + 101325.0)
+        flow = mass_flow(line, 75e3 + 101325.0, naive + 101325.0)
         naive += 0.02 * flow * 100e3 / 1.185 / (volume + line.volume)
         signs.add(naive > 75e3)
     assert signs == {True, False}
@@ -332,7 +336,7 @@ def test_one_step_of_20_ms_does_not_chatter_either(volume, monkeypatch):
 
 @pytest.mark.parametrize('start, end', [(0.0, 90e3), (90e3, 0.0), (30e3, 75e3)])
 def test_air_through_the_hose_is_air_in_the_domes(start, end):
-    """Mass balance by the ideal gas law on the shape of the domes, not on the channel's table."""
+    """Mass balance by the ideal gas law with volumes of the domes, not of the channel's table."""
     foot = Foot.load('large37')
     line = Hose(0.001, 0.0, measured_conductance=2e-11, measured_critical_ratio=0.4)
     channel = PneumaticChannel(BARE, line, foot.air_volume)
@@ -341,17 +345,17 @@ def test_air_through_the_hose_is_air_in_the_domes(start, end):
     for _ in range(2500):
         channel.step(end, 2e-4)
         states.append((channel.outlet_pressure, channel.pad_pressure))
-    flows = [line.mass_flow(a + 101325.0, b + 101325.0) for a, b in states]
+    flows = [mass_flow(line, a + 101325.0, b + 101325.0) for a, b in states]
     passed = np.trapezoid(flows, dx=2e-4) if hasattr(np, 'trapezoid') else np.trapz(flows, dx=2e-4)
     first, last = states[0][1], states[-1][1]
-    rt = 100e3 / 1.185  # of the reference air
+    rt = 100e3 / 1.185  # J/kg, of the reference air
 
     def mass(pressure):
         return (pressure + 101325.0) * foot.air_volume(pressure) / rt
 
     assert abs(last - first) > 30e3
     assert passed == pytest.approx(mass(last) - mass(first), rel=2e-3)
-    # That the domes swell is a fifth of it and more.
+    # Swelling of the domes adds more than a fifth.
     rigid = (last - first) * foot.air_volume(0.0) / rt
     assert abs(passed / rigid) > 1.2
 
@@ -379,22 +383,19 @@ def test_air_of_a_swelling_pad():
 
 
 def test_settled_channel_skips_an_hour():
-    channel = PneumaticChannel(RegulatorModel(), FOUR_BY_ONE, 5e-6)
+    class Counted(Hose):
+        def conductance(self, first, second):
+            nonlocal calls
+            calls += 1
+            return super().conductance(first, second)
+
+    channel, calls = PneumaticChannel(RegulatorModel(), Counted(0.004, 1.0), 5e-6), 0
     assert channel.settled
     channel.step(75e3, 0.004)
     assert not channel.settled
-    steps = 0
-    advance = channel._advance
-
-    def counted(*arguments):
-        nonlocal steps
-        steps += 1
-        advance(*arguments)
-
-    channel._advance = counted
     assert channel.step(75e3, 3600.0) == 75e3
     assert channel.settled
-    assert 50 < steps < 500
+    assert 100 < calls < 1000  # two calls in each internal step
 
 
 # --- time to nine tenths ------------------------------------------------------------------------
@@ -409,12 +410,12 @@ def time_to_ninety_percent(hose, volume):
 
 
 def time_through_a_divided_hose(diameter, length, volume):
-    """Time to 90 % with the hose divided into 16 cells, by Churchill's friction in each."""
+    """Return the time to 90 %, s, with the hose divided into 16 cells, by Churchill's friction."""
     cells = 16
     area = math.pi / 4.0 * diameter**2
     capacity = np.full(cells, area * length / cells)
-    capacity[-1] = capacity[-1] / 2.0 + volume  # the other half of a cell is at the outlet
-    # Of f Re², which the pressures give, the Reynolds number.
+    capacity[-1] = capacity[-1] / 2.0 + volume  # half a cell belongs to the outlet
+    # Pressures give f Re²; this table gives the Reynolds number for it.
     numbers = np.geomspace(1e-6, 1e7, 2000)
     given = np.log(churchill(numbers) * numbers**2)
 
@@ -423,7 +424,7 @@ def time_through_a_divided_hose(diameter, length, volume):
         before = np.concatenate([[outlet + 101325.0], pads[:-1]])
         squares = before**2 - pads**2
         lengths = np.full(cells, length / cells)
-        for _ in range(4):  # the inlet's one and a half dynamic heads, as a longer first cell
+        for _ in range(4):  # inlet loss of 1.5 dynamic heads as a longer first cell
             drive = np.abs(squares) * diameter**3 / (RT * lengths * VISCOSITY**2)
             reynolds = np.exp(np.interp(np.log(np.maximum(drive, 1e-12)), given, np.log(numbers)))
             lengths[0] = length / cells + 1.5 * diameter / churchill(reynolds[0])
@@ -460,14 +461,14 @@ def test_time_to_fill_against_a_divided_hose(size, volume):
 def test_hoses_that_are_the_lag_are_long_and_thin_or_feed_much():
     for size, volume in [((0.001, 5.0), 2.4e-6), ((0.0005, 1.0), 2.4e-6), ((0.001, 1.0), 20e-6)]:
         assert time_to_ninety_percent(Hose(*size), volume) > 3.0 * 0.086
-    # A fitting of 0.15 mm² or so (C = 1.6e-3 A) does it too, whatever the hose.
+    # A narrow fitting of about 0.1 mm² (C = 1.6e-3 A) is as slow, whatever the hose.
     choked = Hose(0.004, 1.0, measured_conductance=1.5e-10, measured_critical_ratio=0.5)
     assert time_to_ninety_percent(choked, 2.4e-6) > 3.0 * 0.086
 
 
 @pytest.mark.parametrize('size', [(0.002, 0.5), (0.002, 1.0), (0.004, 1.0), (0.004, 2.0)])
 def test_regulator_is_the_lag_of_a_foot_of_a_few_millilitres(size):
-    # The regulator alone takes 0.086 s: dead time 10 ms, and 3.42/45 s of a ζ = 0.9 step.
+    # The regulator alone takes 0.086 s: 10 ms of dead time, and 3.42/45 s of a ζ = 0.9 step.
     assert time_to_ninety_percent(Hose(*size), 5e-6) == pytest.approx(0.087, abs=0.004)
 
 
@@ -476,8 +477,8 @@ def test_regulator_is_the_lag_of_a_foot_of_a_few_millilitres(size):
     [(2, 500, 0.31), (2, 1000, 0.57), (2, 2000, 1.25), (4, 1000, 0.41), (4, 2000, 0.87)],
 )
 def test_times_that_a_hose_formula_in_millimetres_gives(diameter, length, expected):
-    # A slip to know: these follow from the formula with D and L in mm and C taken as
-    # dm³/(s bar), and 0.8 mL of pads. A line as narrow as that can be had by its measured C.
+    # These times are an error of units: the formula with D and L in mm and C read as dm³/(s bar),
+    # for 0.8 mL of pads. A line that really is so slow is described by its measured C.
     c = 0.029 * diameter**2 / math.sqrt(length / diameter**1.25 + 510.0)
     line = Hose(diameter / 1e3, length / 1e3, c * 1e-8, 474.0 * c / diameter**2)
     assert time_to_ninety_percent(line, 0.8e-6) == pytest.approx(expected, rel=0.03)
@@ -500,7 +501,7 @@ def test_times_that_a_hose_formula_in_millimetres_gives(diameter, length, expect
     ],
 )
 def test_regulator_refuses(name, value):
-    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed: a number from'):
+    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed'):
         RegulatorModel(**{name: value})
 
 

@@ -11,6 +11,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.simulation import Scene
 from ros_pad.simulation.rail_leg import RailLeg
+from ros_pad.simulation.rail_leg import push
 from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import RailBody
@@ -48,10 +49,10 @@ def walk(leg, cycles, each=lambda: None):
 
 
 class SteadyLeg(RailLeg):
-    """A foot that goes back at constant speed in stance, as the closed form wants it."""
+    """A leg whose foot goes back at constant speed in stance, as the closed form assumes."""
 
-    def _plan(self, time):
-        stands, offset, height = super()._plan(time)
+    def plan(self, time):
+        stands, offset, height = super().plan(time)
         since = time % (STANCE + SWING)
         if stands:
             offset = STROKE * (0.5 - since / STANCE)
@@ -59,10 +60,10 @@ class SteadyLeg(RailLeg):
 
 
 def test_closed_form_of_a_slipping_foot():
-    """At constant foot speed: d = ½ a Ts² (1 + a M/F), a = (c - F)/M.
+    """At constant foot speed the distance is ½ a Ts² (1 + a M/F) with a = (c - F)/M.
 
-    The body gains a Ts while it is pushed, and coasts v²/(2 F/M) further in the swing. It holds
-    while a Ts is less than the speed of the foot, 0.1 m/s, and the coasting shorter than a swing.
+    The body gains the speed a Ts in a stance, and coasts v²/(2 F/M) in the swing. The formula is
+    valid while a Ts is below the speed of the foot, 0.1 m/s, and coasting ends within the swing.
     """
     for cap in (0.51, 0.55, 0.65):
         a = (cap - DRAG) / MASS
@@ -77,7 +78,7 @@ def test_closed_form_of_a_slipping_foot():
 
 
 def smooth_cycle(cap, drag, cycles):
-    """Integrate M v' = c tanh((u - v)/w) - F tanh(v/w) with LSODA: another way, w = 10 um/s."""
+    """Integrate M v' = c tanh((u - v)/w) - F tanh(v/w), w = 10 um/s, with LSODA."""
     width = 1e-5
 
     def motion(time, state):
@@ -108,13 +109,13 @@ def smooth_cycle(cap, drag, cycles):
 
 @pytest.mark.parametrize('cap', [0.4, 0.53, 0.6, 0.75, 1.2, 3.0])
 def test_half_cosine_stroke_against_smooth_friction(cap):
-    """The foot's own speed is a half sine: pushed, overtaken and braked, as the cap allows."""
+    """The foot's speed is a half sine: the body is pushed, overtakes the foot and is braked."""
     expected = smooth_cycle(cap, DRAG, 2)
     assert walk(leg_of(scene_of(cap), 2.5e-4), 2.0) == pytest.approx(expected, rel=3e-3, abs=3e-5)
 
 
 def test_strong_foot_takes_the_body_along():
-    """No slip on any part of the stroke needs c > M π² S/(2 Ts²) + F = 1.49 N."""
+    """A foot that does not slip needs c > M π² S/(2 Ts²) + F = 1.49 N."""
     leg = leg_of(scene_of(1.6))
     moved = walk(leg, 10.0)
     assert moved == pytest.approx(10 * STROKE, rel=2e-3)
@@ -127,7 +128,7 @@ def test_strong_foot_takes_the_body_along():
 
 @pytest.mark.parametrize('cap', [0.0, 0.3, 0.499])
 def test_threshold(cap):
-    """A foot that holds less than the wheels does not move the body at all, and slips."""
+    """A foot that holds less than the drag of the wheels slips and does not move the body."""
     leg = leg_of(scene_of(cap))
     assert walk(leg, 3.0) == 0.0
     assert leg.feet[0].slip_path == pytest.approx(3 * STROKE, rel=1e-2)
@@ -135,7 +136,7 @@ def test_threshold(cap):
 
 
 def test_near_the_threshold_one_per_cent_of_friction_is_worth_many():
-    """d ln d/d ln c = c/(c - F) (1 + a/(a + F/M)) by the closed form: 19 at c = 1.06 F."""
+    """By the closed form d ln d/d ln c = c/(c - F) (1 + a/(a + F/M)), 19 at c = 1.06 F."""
     cap = 1.06 * DRAG
     one, more = (
         walk(leg_of(scene_of(c), 5e-4, SteadyLeg), 1.0) for c in (cap * 0.995, cap * 1.005)
@@ -145,7 +146,7 @@ def test_near_the_threshold_one_per_cent_of_friction_is_worth_many():
 
 
 def test_momentum_and_both_stick():
-    """M dv/dt = force - drag: where the body rolls, the drag is F; at rest it is at most F."""
+    """M dv/dt = force - drag; the drag is F while the body rolls, and at most F at rest."""
     leg = leg_of(scene_of(0.7))
     speeds, forces, caps = [0.0], [], []
     last = [0.0]
@@ -164,7 +165,7 @@ def test_momentum_and_both_stick():
     assert drag[rolling] == pytest.approx(DRAG * np.sign(speeds[1:][rolling]), abs=1e-9)
     assert np.abs(drag[~rolling]).max() <= DRAG + 1e-9
     assert (np.abs(forces) <= caps + 1e-9).all()
-    # While it settles neither foot nor wheels move.
+    # While the robot settles neither foot nor wheels move.
     still = leg_of(scene_of(0.7, settle=1.0))
     walk(still, 0.99)
     assert still.body == (0.0, 0.0, 0.0)
@@ -173,8 +174,8 @@ def test_momentum_and_both_stick():
 
 
 def test_step_is_the_minimum_of_its_convex_function():
-    """½ (v - v0)² + (dt/M) (c |v - u| + F |v|), minimised by golden section."""
-    leg = leg_of(scene_of(1.0))
+    """A step minimises ½ (v - v0)² + (dt/M) (c |v - u| + F |v|); here by golden section."""
+    body = scene_of(1.0).body
     rng = np.random.default_rng(0)
     seen = set()
     for _ in range(300):
@@ -188,17 +189,16 @@ def test_step_is_the_minimum_of_its_convex_function():
         found = minimize_scalar(
             function, bounds=(-0.5, 0.5), method='bounded', options={'xatol': 1e-12}
         ).x
-        leg._speed = before
-        force = leg._push(cap, back, dt)
-        assert leg._speed == pytest.approx(found, abs=2e-7)
-        assert function(leg._speed) <= function(found) + 1e-15
+        speed, force = push(before, back, cap, body, dt)
+        assert speed == pytest.approx(found, abs=2e-7)
+        assert function(speed) <= function(found) + 1e-15
         assert abs(force) <= cap + 1e-12
-        seen.add('rest' if leg._speed == 0.0 else 'stick' if leg._speed == back else 'slip')
+        seen.add('rest' if speed == 0.0 else 'stick' if speed == back else 'slip')
     assert seen == {'rest', 'stick', 'slip'}
 
 
 def test_dissipation_is_the_work_of_the_slipping_foot():
-    """Work that the foot's drive puts in = slip + wheels + kinetic energy."""
+    """Work of the foot's drive is lost in slip and wheels or becomes kinetic energy."""
     leg = leg_of(scene_of(0.6), 2e-4)
     put_in, rolled = [0.0], [0.0]
     last = [0.0, leg.feet[0].position[0]]
@@ -206,20 +206,20 @@ def test_dissipation_is_the_work_of_the_slipping_foot():
     def note():
         x = leg.body[0]
         rolled[0] += DRAG * abs(x - last[0])
-        foot = x + leg._offset
-        back = (x - last[0]) - (foot - last[1])  # of the body over the foot
+        foot = x + leg.plan(leg.time)[1]
+        back = (x - last[0]) - (foot - last[1])  # motion of the body over the foot
         put_in[0] += leg.feet[0].force[0] * back
         last[:] = [x, foot]
 
-    last[1] = leg._offset
+    last[1] = leg.plan(0.0)[1]
     walk(leg, 2.3, note)
-    kinetic = 0.5 * MASS * leg._speed**2
+    kinetic = 0.5 * MASS * leg.speed**2
     assert put_in[0] == pytest.approx(leg.dissipation + rolled[0] + kinetic, rel=5e-3)
     assert leg.dissipation > 0.1 * rolled[0]
 
 
 def test_marker_rides_on_soft_pads():
-    """An estimator that takes the pads' shear off sees a foot that stands as one that stands."""
+    """The marker moves as soft pads shear, but the estimator corrects it and reports no slip."""
     scene = dataclasses.replace(
         scene_of(1.6), foot=dataclasses.replace(scene_of(1.6).foot, shear_stiffness=500.0)
     )
@@ -253,7 +253,7 @@ def test_plan_of_the_foot():
 
 
 def test_wet_domes_and_their_limit():
-    """Pressures reach the foot: film, load sharing and overload are the foot's own."""
+    """Pressures change film, load sharing and overload of the foot."""
     wet = dataclasses.replace(SHIPPED, floor=FloorPlan('wet', 3e-4, 1e-3), settle=0.0)
     grips = {}
     for pressure in (0.0, 60e3, 75e3):
@@ -262,7 +262,7 @@ def test_wet_domes_and_their_limit():
             leg.step([pressure])
         grips[pressure] = leg.feet[0].grip
         assert leg.feet[0].wet
-        # 19 pads at 60 kPa carry 1.82 N of the 2.5 N, at 75 kPa all of it.
+        # 19 pads carry 1.82 N of the 2.5 N at 60 kPa, and all of it at 75 kPa.
         assert (leg.feet[0].overload_time > 0.0) == (pressure == 60e3)
     assert grips[0.0] == pytest.approx(0.12 * 2.5, rel=1e-3)
     assert grips[0.0] < grips[60e3] < grips[75e3]
@@ -276,7 +276,7 @@ def on_slope(scene, slope):
 
 
 def test_wheels_hold_up_to_their_drag_and_roll_above():
-    """No grip at all: M g sin(slope) against F; above, a = g sin(slope) - F/M downhill."""
+    """Without grip the body rests while M g sin(slope) < F, else a = g sin(slope) - F/M."""
     limit = math.asin(DRAG / (MASS * 9.81))
     assert walk(leg_of(on_slope(scene_of(0.0), 0.99 * limit)), 2.0) == 0.0
     steep = 3.0 * limit
@@ -286,7 +286,7 @@ def test_wheels_hold_up_to_their_drag_and_roll_above():
 
 
 def test_a_slope_is_a_drag_while_the_body_goes_ahead():
-    """Uphill, wheels of drag F are as wheels of F + M g sin on the level, until they stop."""
+    """Uphill a drag F acts like F + M g sin(slope) on level ground until the wheels stop."""
     slope = 0.02
     weight = MASS * 9.81 * math.sin(slope)
     uphill = leg_of(on_slope(scene_of(0.9), slope), 2.5e-4)
@@ -299,12 +299,12 @@ def test_a_slope_is_a_drag_while_the_body_goes_ahead():
 
 
 def mixed_legs():
-    """Dry, wet, drained, patched, rough, sloping, fast and slow legs."""
+    """Return scenes, floors and pressures, Pa, of many kinds of legs."""
     patched = FloorPlan('patches', 3e-4, 1e-3, 0.45, 1.0, slope=-0.01, roughness=5e-7)
     scenes = [Scene.load(f'leg_{name}') for name in ('dry_flat', 'wet_flat', 'wet_dome_60')]
     scenes.append(dataclasses.replace(scenes[1], floor=patched))
     scenes.append(on_slope(scene_of(0.7, settle=0.3, stance=0.4), 0.005))
-    wetter = dataclasses.replace(scenes[2].foot, capillary_force=5e-3)  # a tenth of its grip
+    wetter = dataclasses.replace(scenes[2].foot, capillary_force=5e-3)  # a tenth of the grip
     scenes.append(dataclasses.replace(scenes[2], foot=wetter))
     pressures = [0.0, 0.0, 60e3, 75e3, 40e3, 60e3]
     return scenes, [scene.floor.build(3) for scene in scenes], pressures
@@ -340,7 +340,7 @@ def test_liquid_without_depth_is_dry_ground():
 
 
 def test_many_legs_against_the_closed_form_of_a_glide():
-    """Without a grip, on slopes of many angles: -½ (g sin - F/M) t², or rest."""
+    """Without grip, bodies on slopes of many angles move by -½ (g sin - F/M) t², or rest."""
     slopes = np.linspace(0.0, 0.3, 60)
     scenes = [on_slope(scene_of(0.0), slope) for slope in slopes.tolist()]
     floor = scenes[0].floor.build(0)
@@ -364,7 +364,7 @@ def test_many_legs_refuse():
 
 @pytest.mark.parametrize('period', [0.0, -0.004, math.nan, math.inf])
 def test_bad_period(period):
-    with pytest.raises(InvalidInput, match=r'period = .* s is not allowed'):
+    with pytest.raises(InvalidInput, match=r'period = .* is not allowed: .* s is needed'):
         leg_of(SHIPPED, period)
 
 

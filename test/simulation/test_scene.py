@@ -20,7 +20,7 @@ LEG = yaml.safe_load((FOLDER / 'leg_wet_dome_60.yaml').read_text())
 
 
 def written(tmp_path, source, *changes):
-    """Write a scene with changes (path of keys, value); a value of ... takes the key away."""
+    """Write a scene with changes (path of keys, value); the value ... removes the key."""
     values = copy.deepcopy(source)
     for path, value in changes:
         *parts, last = path.split('.')
@@ -50,13 +50,13 @@ def test_shipped_scenes(name):
     floor = scene.floor.build(0)
     assert floor.wet_map.any() == (scene.floor.kind != 'dry')
     assert floor.wet_map.all() == (scene.floor.kind == 'wet')
-    # The feet reach the floor beside the body's centre, and the gait keeps them apart.
+    # The reach of the gait keeps the feet of one side apart.
     if isinstance(scene.gait, TripodGait):
         assert 2.0 * scene.gait.reach() < 1.3 * scene.body.homes[0][0]
 
 
 def test_options_of_the_regulator(tmp_path):
-    """Line and faults of devices, in words that ROS can carry; sensors are another's matter."""
+    """Options have line and faults of the regulator, as ROS parameters, but no sensor faults."""
     assert Scene.load('hexapod_patches').regulator_options == HEXAPOD['regulator']
     faults = [
         {'kind': 'leak', 'legs': [2], 'start': 1.5, 'conductance': 1e-9},
@@ -74,15 +74,16 @@ def test_options_of_the_regulator(tmp_path):
 def test_values_come_where_they_belong():
     scene = Scene.load('hexapod_patches')
     assert scene.body.mass == HEXAPOD['body']['mass']
-    assert scene.expected_load == pytest.approx(2.09 * 9.81 / 3.0)
-    assert scene.stride == scene.gait.stride == 0.14
-    assert scene.tow.friction_dry == 0.5 and scene.tow.friction_wet == 0.12
-    assert scene.sensors.rate == 250.0 and scene.sensors.position == 1.5e-4
-    assert scene.settle == 1.0
+    assert scene.expected_load == pytest.approx(scene.body.mass * 9.81 / 3.0)
+    assert scene.stride == scene.gait.stride == HEXAPOD['gait']['stride']
+    assert scene.tow.friction_dry == HEXAPOD['tow']['friction_dry']
+    assert scene.tow.friction_wet == HEXAPOD['tow']['friction_wet']
+    assert scene.sensors.rate == HEXAPOD['sensors']['rate']
+    assert scene.sensors.position == HEXAPOD['sensors']['position_noise']
     leg = Scene.load('leg_wet_dome_60')
-    assert leg.dome_pressure == 60e3
-    assert leg.stride == 0.05 and leg.expected_load == 2.5 and leg.heading_gain == 0.0
-    assert leg.tow.weight == 0.0
+    assert leg.dome_pressure == LEG['dome_pressure']
+    assert leg.stride == LEG['gait']['stroke'] and leg.expected_load == LEG['body']['load']
+    assert leg.heading_gain == 0.0 and leg.tow.weight == 0.0
 
 
 def test_legs_are_numbered_as_in_the_thesis():
@@ -91,7 +92,7 @@ def test_legs_are_numbered_as_in_the_thesis():
     assert all(y > 0.0 for _, y in left) and all(y < 0.0 for _, y in right)
     assert [x > 0.0 for x, _ in (homes[0], homes[5])] == [True, True]
     assert homes[1][0] == homes[4][0] == 0.0  # 2 and 5 are the middle legs
-    # Each tripod has the centre of mass inside: balance of the three feet, all positive.
+    # The centre of mass is inside each tripod: all three loads in balance are positive.
     for tripod in ((0, 2, 4), (1, 3, 5)):
         (ax, ay), (bx, by), (cx, cy) = (homes[index] for index in tripod)
         areas = [ax * by - bx * ay, bx * cy - cx * by, cx * ay - ax * cy]
@@ -167,8 +168,8 @@ def test_numbers_that_are_text_to_pyyaml(tmp_path, source, path, text, value):
     assert found == value
 
 
-def test_scene_of_ones_own(tmp_path, monkeypatch):
-    """Names itself after its file; a foot's path is taken from the scene's folder."""
+def test_scene_by_path(tmp_path, monkeypatch):
+    """A scene has the name of its file; a foot's path is relative to the scene's folder."""
     shutil.copy(configuration.shared_folder() / 'feet/large37.yaml', tmp_path / 'my_foot.yaml')
     file = written(tmp_path, HEXAPOD, ('foot', 'my_foot.yaml'))
     monkeypatch.chdir('/')
@@ -178,7 +179,7 @@ def test_scene_of_ones_own(tmp_path, monkeypatch):
     assert pathlib.Path(scene.foot.source) == tmp_path / 'my_foot.yaml'
 
 
-def test_bad_foot_of_ones_own_names_both_files(tmp_path):
+def test_bad_foot_by_path_names_both_files(tmp_path):
     (tmp_path / 'my_foot.yaml').write_text('pads: 3\n')
     file = written(tmp_path, HEXAPOD, ('foot', 'my_foot.yaml'))
     with pytest.raises(ConfigError, match=r"mine\.yaml: foot: .*my_foot\.yaml: key 'pad' is miss"):
@@ -200,7 +201,7 @@ def test_without_a_tow(tmp_path):
 def test_floor_of_a_scene_depends_on_the_seed():
     plan = Scene.load('hexapod_patches').floor
     assert (plan.build(1).wet_map != plan.build(2).wet_map).any()
-    assert plan.build(1).film_thickness == 3e-4
+    assert plan.build(1).film_thickness == plan.film_thickness
 
 
 def test_a_floor_can_be_drawn(tmp_path):
@@ -216,8 +217,8 @@ def test_a_floor_can_be_drawn(tmp_path):
 @pytest.mark.parametrize(
     'drawing, message',
     [
-        ('#.\n#', 'floor: drawing: row 2 has 1 characters, the first 2'),
-        ('#x', "floor: drawing: row 1 has 'x'"),
+        ('#.\n#', 'floor: drawing: row 2 has 1 characters and row 1 has 2'),
+        ('#x', "floor: drawing: row 1 contains 'x'"),
         ('', 'floor: drawing is empty'),
         (3, 'floor: drawing = 3 is not allowed: text is needed'),
     ],

@@ -11,7 +11,7 @@ NOISE = SensorNoise(rate=250.0, force=0.03, position=1.5e-4)
 
 
 class Statue:
-    """Two feet that never move."""
+    """A robot with two feet that never move."""
 
     def __init__(self):
         self.feet = [FootState(), FootState()]
@@ -27,7 +27,7 @@ def read(noise=NOISE, seed=0, count=5000):
 def test_noise_is_white_and_as_wide_as_asked_for():
     samples = read()
     means, sds = samples.mean(axis=0), samples.std(axis=0)
-    # Means to 5 standard errors, standard deviations to 5 %.
+    # Means are within 5 standard errors, standard deviations within 5 %.
     assert means[0, 0] == pytest.approx([1.0, -2.0, 7.0], abs=5 * 0.03 / 5000**0.5)
     assert means[1, 1] == pytest.approx([0.1, 0.2, 0.3], abs=5 * 1.5e-4 / 5000**0.5)
     assert sds[:, 0] == pytest.approx(np.full((2, 3), 0.03), rel=0.05)
@@ -36,7 +36,7 @@ def test_noise_is_white_and_as_wide_as_asked_for():
     across = flat.T @ flat / len(flat)
     assert np.abs(across - np.eye(12)).max() < 0.08
     assert np.abs((flat[1:] * flat[:-1]).mean(axis=0)).max() < 0.08
-    # Numbers are drawn in blocks: no block comes twice.
+    # Noise is drawn in blocks, and no block repeats.
     assert np.abs((flat[1000:] * flat[:-1000]).mean(axis=0)).max() < 0.08
 
 
@@ -68,7 +68,7 @@ def test_moments_are_read_where_they_are_measured():
 
 
 def test_a_moment_leaves_the_other_readings_as_they_are():
-    """Results of scenes without it stay what they were."""
+    """Reading moments must not change the noise of other readings."""
     noise = SensorNoise(rate=250.0, force=0.03, position=1.5e-4, moment=5e-4)
     sensors, statue = Sensors(noise, 2, 0), Statue()
     readings = []
@@ -95,7 +95,7 @@ def test_faults_are_in_what_is_read_and_end(kind):
     for number in range(100):
         statue.time = number / 250.0
         if number == 30:
-            statue.feet[0].force = (1.1, -2.0, 7.0)  # moves while it is frozen
+            statue.feet[0].force = (1.1, -2.0, 7.0)  # the force changes while the sensor is frozen
         if fault.start <= statue.time < fault.end:
             held = before[0][0] if expected is None else expected
             if number >= 30 and expected and expected[0] == 1.0:

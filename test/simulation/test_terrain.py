@@ -14,14 +14,14 @@ SEEDS = range(8)
 
 
 def mean_chord(floor):
-    """Mean length of wet ground along straight lines in x, m: counted, run by run."""
+    """Return the mean length of wet runs along lines in x, m."""
     lengths = []
     for row in floor.wet_map:
         edges = np.flatnonzero(np.diff(row.astype(int)))
         starts = [e for e in edges if not row[e]]
         if not starts:
             continue
-        turned = np.roll(row, -starts[0] - 1)  # begins with a wet run: none is cut in two
+        turned = np.roll(row, -starts[0] - 1)  # begins with a whole wet run
         run = 0
         for wet in [*turned.tolist(), False]:
             if wet:
@@ -73,12 +73,12 @@ def test_floor_repeats_itself_without_a_seam():
     rng = np.random.default_rng(0)
     for x, y in rng.uniform(-20.0, 20.0, (500, 2)):
         assert floor.wet(x, y) == floor.wet(x + length, y) == floor.wet(x, y - width)
-    # Across the seam the ground changes no more often than elsewhere.
+    # At the seam the ground changes no more often than elsewhere.
     seam = np.mean(floor.wet_map[:, 0] != floor.wet_map[:, -1])
     assert seam < 0.1
 
 
-def test_cells_are_where_the_origin_says():
+def test_cells_are_placed_by_the_origin():
     floor = Floor(np.array([[True, False, False], [False, False, True]]), 0.5, (-1.0, 2.0), FILM)
     assert floor.wet(-0.9, 2.1) and floor.wet(-0.51, 2.49)
     assert not floor.wet(-0.49, 2.1) and not floor.wet(-0.9, 2.51)
@@ -89,7 +89,7 @@ def test_cells_are_where_the_origin_says():
 
 
 def test_wet_along_is_wet():
-    """Also on the edges of cells, where a quotient that is rounded falls into the next cell."""
+    """Both agree also at edges of cells, where a rounded quotient can be in the next cell."""
     floor = Floor.patches(0.45, 0.2, FILM, 1)
     rng = np.random.default_rng(1)
     x, y = rng.uniform(-30.0, 30.0, (2, 2000))
@@ -121,7 +121,7 @@ def test_bad_wet_fraction(fraction):
 def test_patch_lengths_that_no_floor_can_show(fraction):
     shortest, longest = patch_lengths(fraction)
     for length in (0.99 * shortest, 1.01 * longest, math.nan, 0.0):
-        with pytest.raises(InvalidInput, match=r'patch_length = .* m: .*has room for'):
+        with pytest.raises(InvalidInput, match=r'patch_length = .* m is needed'):
             Floor.patches(fraction, length, FILM, 0)
     for length in (shortest, longest):
         assert Floor.patches(fraction, length, FILM, 0).wet_map.any()
@@ -135,16 +135,16 @@ def test_bad_seed(seed):
 
 # --- drawn floors -----------------------------------------------------------------------------
 
-DRAWING = ('..#', '###')  # the left of the robot (+y) first
+DRAWING = ('..#', '###')  # the first row is on the left (+y)
 
 
 def test_a_drawing_lies_as_the_robot_sees_it():
     floor = Floor.drawn(DRAWING, 0.5, FILM)
-    # Columns are about x = 0, 0.5 and 1; rows about y = 0.25 and -0.25.
+    # Columns are centred at x = 0, 0.5 and 1 m; rows at y = 0.25 and -0.25 m.
     assert [floor.wet(x, 0.25) for x in (0.0, 0.5, 1.0)] == [False, False, True]
     assert [floor.wet(x, -0.25) for x in (0.0, 0.5, 1.0)] == [True, True, True]
     assert floor.depth(1.0, 0.25) == FILM
-    # It begins again where it ends.
+    # The drawing repeats.
     assert not floor.wet(1.5, 0.25)
     assert floor.wet(-0.5, 0.25)
     assert floor.wet(0.0, 0.75) and not floor.wet(0.0, 1.25)
@@ -155,8 +155,8 @@ def test_a_drawing_lies_as_the_robot_sees_it():
     [
         ((), 'drawing is empty'),
         (('',), 'drawing is empty'),
-        (('#.', '#'), 'row 2 has 1 characters, the first 2'),
-        (('#.', '#o'), "row 2 has 'o': # (wet) and . (dry) are known"),
+        (('#.', '#'), 'row 2 has 1 characters and row 1 has 2'),
+        (('#.', '#o'), "row 2 contains 'o': only # (wet) and . (dry) are allowed"),
     ],
 )
 def test_bad_drawings(drawing, message):
@@ -182,7 +182,7 @@ def test_heights_have_the_spread_and_the_reach_that_are_asked_for(seed):
     for axis, cells, expected in ((0, 2, 0.527), (1, 2, 0.527), (0, 4, 0.077), (1, 4, 0.077)):
         likeness = (heights * np.roll(heights, cells, axis)).mean() / 25e-8
         assert likeness == pytest.approx(expected, abs=0.02)
-    # As a normal distribution has it: 68.3 % within one standard deviation, 95.4 within two.
+    # Normal distribution: 68.3 % within one standard deviation, 95.4 % within two.
     assert (np.abs(heights) < 5e-4).mean() == pytest.approx(0.683, abs=0.02)
     assert (np.abs(heights) < 1e-3).mean() == pytest.approx(0.954, abs=0.02)
 
@@ -193,7 +193,7 @@ def test_heights_are_the_seeds_own_and_leave_the_wet_map_alone():
     assert (rough.wet_map == floor.wet_map).all()
     assert rough.height(1.0, 1.0) == floor.uneven(1e-3, 4).height(1.0, 1.0)
     assert rough.height(1.0, 1.0) != floor.uneven(1e-3, 5).height(1.0, 1.0)
-    # Wet places are neither high nor low: the two maps are drawn apart.
+    # Heights do not correlate with wet ground.
     assert abs(np.corrcoef(rough.heights.ravel(), rough.wet_map.ravel())[0, 1]) < 0.05
     with pytest.raises(InvalidInput, match='seed = -1'):
         floor.uneven(1e-3, -1)
@@ -213,14 +213,16 @@ def test_bad_depth(depth):
         lambda: Floor.patches(0.5, 0.5, depth, 0),
         lambda: Floor.drawn(['#.'], 0.5, depth),
     ):
-        with pytest.raises(InvalidInput, match=r'film_thickness = .* m is not allowed'):
+        with pytest.raises(
+            InvalidInput, match=r'film_thickness = .* is not allowed: .* m is needed'
+        ):
             make()
 
 
 @pytest.mark.parametrize('value', [-1e-3, math.nan, math.inf])
 def test_bad_cell_and_unevenness(value):
     for cell in (value, 0.0):
-        with pytest.raises(InvalidInput, match=r'cell = .* m is not allowed'):
+        with pytest.raises(InvalidInput, match=r'cell = .* is not allowed: .* m is needed'):
             Floor.drawn(['#.'], cell, FILM)
-    with pytest.raises(InvalidInput, match=r'unevenness = .* m is not allowed'):
+    with pytest.raises(InvalidInput, match=r'unevenness = .* is not allowed: .* m is needed'):
         Floor.uniform(False, FILM).uneven(value, 0)

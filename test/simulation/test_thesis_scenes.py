@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The thesis' walks (5.2 and 5.3) come out in the order that it reports."""
+"""Simulated walks agree with what the thesis reports of its walks (5.2 and 5.3)."""
 
 import dataclasses
 import math
@@ -29,15 +29,17 @@ def time_to_goal(name: str, seed: int = 0) -> float:
 
 @pytest.fixture(scope='module')
 def goal_times():
-    # A fixed shape on a uniform floor meets no chance: the seed moves sensor noise alone.
+    # With a fixed morphology on a uniform floor the seed changes sensor noise only.
     return {name: time_to_goal(name) for name in LEG_SCENES}
 
 
+@pytest.mark.slow
 def test_flat_on_wet_ground_takes_about_five_times_as_long(goal_times):
     """Thesis 5.2: "approximately five times longer than in case 5"."""
     assert 4.0 < goal_times['leg_wet_flat'] / goal_times['leg_wet_dome_75'] < 6.0
 
 
+@pytest.mark.slow
 def test_higher_pressure_walks_faster(goal_times):
     """Thesis 5.2: "higher pressure notably improved walking performance"."""
     times = [goal_times[f'leg_wet_dome_{pressure}'] for pressure in (40, 60, 75)]
@@ -46,11 +48,13 @@ def test_higher_pressure_walks_faster(goal_times):
     assert times[0] <= goal_times['leg_wet_flat']
 
 
+@pytest.mark.slow
 def test_dome_on_wet_ground_is_quite_similar_to_flat_on_dry_ground(goal_times):
     """Thesis 5.2: cases 1 and 5 "were quite similar"."""
     assert 1.0 <= goal_times['leg_wet_dome_75'] / goal_times['leg_dry_flat'] < 1.15
 
 
+@pytest.mark.slow
 def test_seed_does_not_move_the_leg(goal_times):
     assert time_to_goal('leg_wet_flat', seed=1) == goal_times['leg_wet_flat']
 
@@ -63,10 +67,10 @@ def test_dry_leg_advances_by_its_stroke():
 
 
 def test_slipping_leg_advances_as_its_forces_say():
-    """By hand: the floating foot pushes with 0.12 * 2.5 N, the wheels hold with 0.235 N, 0.85 kg.
+    """By hand: a foot with 0.12 * 2.5 N of friction pushes 0.85 kg against a drag of 0.235 N.
 
-    The body gains speed at (0.30 - 0.235)/0.85 until the foot, which goes back at (pi S/2T) sin(pi
-    t/T), has become slower than it; from there foot and wheels brake; after lift-off the wheels.
+    The body gains speed at (0.30 - 0.235)/0.85 until it is faster than the foot, whose speed is
+    (pi S/2T) sin(pi t/T). Then foot and wheels brake, and after lift-off the wheels alone.
     """
     stroke, stance, mass = 0.05, 0.5, 0.85
     grip, drag = 0.30 / mass, 0.235 / mass  # m/s²
@@ -75,28 +79,32 @@ def test_slipping_leg_advances_as_its_forces_say():
     meets = times[np.argmax(foot < (grip - drag) * times)]
     speed, rest = (grip - drag) * meets, stance - meets
     leaves = speed - (grip + drag) * rest
-    way = 0.5 * speed * meets + 0.5 * (speed + leaves) * rest + leaves**2 / (2.0 * drag)
-    assert way == pytest.approx(0.00938, rel=0.01)
+    distance = 0.5 * speed * meets + 0.5 * (speed + leaves) * rest + leaves**2 / (2.0 * drag)
+    assert distance == pytest.approx(0.00938, rel=0.01)
     trial = run('leg_wet_flat')
-    assert trial.metrics.distance_per_cycle_m == pytest.approx(way, rel=0.01)
+    assert trial.metrics.distance_per_cycle_m == pytest.approx(distance, rel=0.01)
 
 
+@pytest.mark.slow
 def test_domes_are_overloaded_below_their_force_limit():
-    """Thesis: 0.30 N a pad at 75 kPa, and by the same line 0.10 at 60 and none at 40 kPa."""
+    """The thesis measured 0.30 N a pad at 75 kPa; its line gives 0.10 N at 60, none at 40 kPa."""
     load_per_pad = 2.5 / 19
     assert 0.10 < load_per_pad < 0.30
     stance_time = 70 * 0.5
     assert run('leg_wet_dome_40').metrics.overload_s[0] > stance_time
     assert run('leg_wet_dome_60').metrics.overload_s[0] > stance_time
-    assert run('leg_wet_dome_75').metrics.overload_s[0] < 0.1  # only while they fill
+    assert run('leg_wet_dome_75').metrics.overload_s[0] < 0.1  # only while pads fill
 
 
 NAMES = ('dry_flat', 'wet_flat', 'wet_dome')
 
 
-@pytest.fixture(scope='module', params=['smooth', 'rough'])
+KINDS = [pytest.param(kind, marks=pytest.mark.slow) for kind in ('smooth', 'rough')]
+
+
+@pytest.fixture(scope='module', params=KINDS)
 def walks(request):
-    """Walks on three floors of each kind, with joints and servos (L2)."""
+    """Return walks on three floors of one kind, with joints and servos (L2), by scene."""
     pytest.importorskip('mujoco')
     return {
         name: [run(f'hexapod_{request.param}_{name}', seed=seed, fidelity='L2') for seed in SEEDS]
@@ -105,7 +113,7 @@ def walks(request):
 
 
 def middle_slip(walks, name):
-    """Return how far legs 2 and 5 slip in a cycle, m, in the mean of the floors."""
+    """Return the mean slip path of legs 2 and 5 in a cycle, m, over all floors."""
     return np.mean([
         (trial.metrics.slip_path_m[1] + trial.metrics.slip_path_m[4]) / 2.0 / trial.metrics.cycles
         for trial in walks[name]
@@ -113,18 +121,19 @@ def middle_slip(walks, name):
 
 
 def bend(trial):
-    """Return how far the path strays sideways, relative to its length ahead."""
+    """Return the largest sideways distance over the distance ahead."""
     return np.abs(trial.body[:, 1]).max() / trial.body[-1, 0]
 
 
+@pytest.mark.slow
 def test_walks_are_valid(walks):
     assert [trial.metrics.verdict for name in NAMES for trial in walks[name]] == [None] * 9
 
 
-def test_dry_hexapod_goes_its_way(walks):
+def test_dry_hexapod_reaches_its_distance(walks):
     """Thesis 5.3: "robust performance in both smooth and rough terrains", "no signs of slippage".
 
-    Feet on joints scuff a little when they land: a few millimetres in a stride of 120.
+    At touch-down feet scuff a few millimetres in a stride of 120 mm.
     """
     for trial in walks['dry_flat']:
         assert trial.metrics.distance_per_cycle_m == pytest.approx(0.12, rel=0.05)
@@ -133,13 +142,13 @@ def test_dry_hexapod_goes_its_way(walks):
 
 
 def test_middle_legs_slip_on_wet_ground_and_domes_help(walks):
-    """Thesis 5.3, figures 41 and 42: legs 2 and 5 slip on flat pads, on domes much less."""
+    """Thesis 5.3, figures 41 and 42: legs 2 and 5 slip with flat pads, much less with domes."""
     assert middle_slip(walks, 'wet_flat') > 3.0 * middle_slip(walks, 'dry_flat')
     assert middle_slip(walks, 'wet_flat') > 2.0 * middle_slip(walks, 'wet_dome')
 
 
 def test_middle_legs_slip_more_than_the_others(walks):
-    """Thesis 5.3: "legs 2 and 5 carry a higher risk of slipping". So they do where feet stick."""
+    """Thesis 5.3: "legs 2 and 5 carry a higher risk of slipping": true where feet mostly stick."""
     for name in ('dry_flat', 'wet_dome'):
         every = np.mean(
             [np.sum(t.metrics.slip_path_m) / 6 / t.metrics.cycles for t in walks[name]]
@@ -163,9 +172,10 @@ def test_wet_dome_hexapod_is_like_the_dry_one(walks):
         assert max(wet.metrics.overload_s) < 0.15 * wet.metrics.duration_s
 
 
-@pytest.mark.parametrize('kind', ['smooth', 'rough'])
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', KINDS)
 def test_in_the_plane_the_thesis_statements_hold_too(kind):
-    """L1, with neither servos nor scuffing: slip is all or nothing, and so is the bend."""
+    """L1 has no servos and no scuffing: a walk slips and bends clearly, or not at all."""
     trials = {
         name: [run(f'hexapod_{kind}_{name}', seed=seed, fidelity='L1') for seed in SEEDS]
         for name in NAMES
@@ -181,7 +191,7 @@ def test_in_the_plane_the_thesis_statements_hold_too(kind):
 
 
 def test_a_floor_wet_all_over_slows_but_does_not_turn():
-    """Deviation needs ground that differs from side to side: thesis' liquid spread at random."""
+    """A robot deviates only if ground differs from side to side, as in the thesis' tests."""
     scene = Scene.load('hexapod_smooth_wet_flat')
     floor = dataclasses.replace(scene.floor, kind='wet')
     walk = run(dataclasses.replace(scene, floor=floor), fidelity='L1').metrics

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What estimators are worth on walks with full dynamics, where feet scuff, fight and turn."""
+"""Accuracy of estimators on walks with full dynamics, where feet scuff and turn."""
 
 import dataclasses
 import math
@@ -12,16 +12,16 @@ from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 
 PERIOD = 0.004  # s
-LATE = 15  # samples after the end of a slip in which an alarm still tells of it
-SLIP = 3e-3  # m of the contact that must be told of
-STILL = 5e-4  # m of the contact that are none
-LOOK_BACK = 75  # samples
+LATE = 15  # samples after a slip in which an alarm still counts for the slip
+SLIP = 3e-3  # m, slip path that must raise the alarm
+STILL = 5e-4  # m, slip path that must not
+LOOK_BACK = 75  # samples before an alarm in which a slip path counts
 
 WALKS = [(policy, seed) for policy in ('flat', 'adaptive') for seed in (10, 11, 12)]
 
 
 def walked(policy, seed, cycles=12):
-    """Return arrays (samples, feet): the truth, and what the estimators made of it."""
+    """Return arrays (samples, feet) of true values and estimates."""
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2')
     log = TrialLog(scene, policy, seed, 'L2')
@@ -53,7 +53,7 @@ def walks():
 
 
 def stretches(true):
-    """Return (first, last) of each run of True, gaps of up to five samples bridged."""
+    """Return (first, last) of each run of True; gaps of up to five samples are bridged."""
     places = np.flatnonzero(true)
     if not len(places):
         return []
@@ -61,7 +61,8 @@ def stretches(true):
     return list(zip(places[[0, *breaks + 1]], places[[*breaks, -1]], strict=True))
 
 
-def test_slips_of_3_mm_are_heard_and_sticks_are_not(walks):
+@pytest.mark.slow
+def test_slips_of_3_mm_raise_the_alarm_and_sticks_do_not(walks):
     slips = missed = false = 0
     stuck = 0.0
     for walk in walks:
@@ -82,17 +83,17 @@ def test_slips_of_3_mm_are_heard_and_sticks_are_not(walks):
                 false += slid < STILL
     assert slips > 500 and stuck > 1.5
     assert missed <= 0.01 * slips
-    assert false <= stuck  # one a minute
+    assert false <= stuck  # at most one a minute
 
 
-def test_wet_and_dry_are_told_apart_at_the_end_of_a_flat_stance(walks):
+def test_wet_and_dry_are_distinguished_at_the_end_of_a_flat_stance(walks):
     right = []
     for walk in walks:
         for foot in range(6):
             standing = walk['standing'][:, foot] > 0.0
             for first, last in stretches(standing):
                 middle = (first + last) // 2
-                # Touching the floor is no stance, and a foot that is cut off has not ended one.
+                # A short touch is no stance, and the last stance of a walk has no end.
                 if last - first < 25 or last + 1 == len(standing):
                     continue
                 if walk['pressure'][middle, foot] < 30e3:
@@ -103,7 +104,7 @@ def test_wet_and_dry_are_told_apart_at_the_end_of_a_flat_stance(walks):
 
 
 def test_the_true_friction_is_within_two_sigma_nine_times_in_ten(walks):
-    """And no more than 99 times in a hundred: who is never wrong claims too little."""
+    """It is so at most 99 times in a hundred: else the standard deviation is too large."""
     covered, below, spread = [], [], []
     for walk in walks:
         use = (walk['fresh'] > 0.0) & (walk['standing'] > 0.0) & np.isfinite(walk['grip'])

@@ -14,7 +14,7 @@ from ros_pad.trials import loop as loop_module
 from ros_pad.trials import run
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.loop import tuning_for
+from ros_pad.trials.node_settings import tuning_for
 
 PATCHES = Scene.load('hexapod_patches')
 SERIES = (
@@ -24,7 +24,7 @@ SERIES = (
 
 
 def short(cycles, kind=None):
-    """Return hexapod_patches with fewer cycles, and perhaps the same ground everywhere."""
+    """Return hexapod_patches with other cycles, and on uniform ground if ``kind`` is given."""
     floor = dataclasses.replace(PATCHES.floor, kind=kind) if kind else PATCHES.floor
     return dataclasses.replace(PATCHES, cycles=cycles, floor=floor)
 
@@ -52,7 +52,7 @@ def test_another_seed_is_another_trial():
     one, two = run(scene, 'adaptive', seed=5), run(scene, 'adaptive', seed=6)
     assert not np.array_equal(one.floor.wet_map, two.floor.wet_map)
     assert not np.array_equal(one.force, two.force)
-    # On even ground the seed is that of the noise alone.
+    # On uniform ground the seed changes the noise only.
     dry = short(2, 'dry')
     assert not np.array_equal(run(dry, 'flat', 1).force, run(dry, 'flat', 2).force)
 
@@ -80,7 +80,7 @@ def test_set_points_follow_the_shapes_and_pressures_the_set_points(policy):
     assert trial.setpoint.max() <= PATCHES.foot.ceiling
     assert trial.dome.any() == (policy != 'flat')
     assert trial.dome.all() == (policy == 'dome')
-    # Half a second after the last change a pad is where it should be, to the dead band.
+    # Half a second after a change a pad has its set-point, within the dead band.
     still = np.array([
         (trial.setpoint[row - 25 : row + 1] == trial.setpoint[row]).all(axis=0)
         for row in range(25, len(trial.setpoint))
@@ -91,7 +91,7 @@ def test_set_points_follow_the_shapes_and_pressures_the_set_points(policy):
 
 
 def test_shapes_never_change_in_stance():
-    """Set-points change only when the sensor of that foot says that it has lifted off."""
+    """A set-point changes only if the load of the foot is below the gate for lift-off."""
     scene = short(8)
     trial = run(scene, 'adaptive', seed=1)
     rows = np.searchsorted(trial.time, trial.slow_time - 1e-9)
@@ -133,16 +133,16 @@ def test_estimators_can_be_tuned():
     plain, told = (run(scene, 'flat', tuning=each) for each in (None, tuning_for(scene)))
     assert np.array_equal(plain.wet_probability, told.wet_probability)
     sure = run(scene, 'flat', tuning=dataclasses.replace(tuning_for(scene), wet_prior=0.9))
-    # Before the first step nothing but the prior is known.
+    # Before the first step the estimate is the prior.
     assert plain.wet_probability[0] == pytest.approx(0.5, abs=0.02)
     assert sure.wet_probability[0] == pytest.approx(0.9, abs=0.02)
-    assert np.array_equal(plain.force, sure.force)  # a fixed shape does not listen
+    assert np.array_equal(plain.force, sure.force)  # a fixed morphology ignores estimates
 
 
 def test_policies_take_their_parameters():
     scene = short(6, 'wet')
     shy = run(scene, 'adaptive', policy_parameters={'wet_above': 1.0})
-    assert sum(shy.metrics.switches) == 0  # no ground is more than surely wet
+    assert sum(shy.metrics.switches) == 0  # no probability is above 1
     assert sum(run(scene, 'adaptive').metrics.switches) > 0
 
 
@@ -151,7 +151,7 @@ def test_policies_take_their_parameters():
     [
         ('adaptive', {'wet_abov': 0.5}, "no parameter 'wet_abov'. Did you mean 'wet_above'"),
         ('adaptive', {'wet_above': 1.5}, 'wet_above = 1.5 .* to 1'),
-        ('flat', {'wet_above': 0.5}, "policy = 'flat' has no parameters, and wet_above"),
+        ('flat', {'wet_above': 0.5}, "policy = 'flat' has no parameters, but wet_above"),
     ],
 )
 def test_parameters_that_a_policy_has_not_are_refused(policy, parameters, message):
@@ -161,7 +161,7 @@ def test_parameters_that_a_policy_has_not_are_refused(policy, parameters, messag
 
 @pytest.fixture
 def regulators(monkeypatch):
-    """Every regulator that a trial makes."""
+    """Return a list that receives every regulator of a trial."""
     made = []
     create = loop_module.create
 
@@ -183,7 +183,7 @@ def regulators(monkeypatch):
 
 def test_pads_are_vented_and_closed_at_the_end(regulators):
     run(short(1), 'dome')
-    assert [one.calls for one in regulators] == [['vent', 'close']] * 6
+    assert [one.calls[-2:] for one in regulators] == [['vent', 'close']] * 6
 
 
 @pytest.mark.parametrize('error', [KeyboardInterrupt, RuntimeError])
@@ -194,10 +194,10 @@ def test_pads_are_vented_and_closed_when_a_trial_is_cut_short(regulators, error)
 
     with pytest.raises(error):
         run(short(4), 'dome', progress=stop)
-    assert [one.calls for one in regulators] == [['vent', 'close']] * 6
+    assert [one.calls[-2:] for one in regulators] == [['vent', 'close']] * 6
 
 
-def test_progress_is_told_the_simulated_time_each_second():
+def test_progress_receives_the_simulated_time_each_second():
     told = []
     trial = run(short(3), 'flat', progress=told.append)
     assert told == pytest.approx([0.004, 1.004, 2.004, 3.004])
@@ -212,11 +212,12 @@ def test_a_walk_that_is_no_longer_valid_ends_with_its_verdict():
     assert len(trial.time) == len(trial.force) == len(trial.body)
 
 
-# --- what adapting is worth ---------------------------------------------------------------------
+# --- the gain of adapting -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_adaptive_beats_both_fixed_shapes_on_patches():
-    """The main job as shipped, but 40 cycles, with joints (L2), three floors."""
+    """The shipped hexapod_patches with 40 cycles at L2, on three floors."""
     ways = {
         policy: [per_cycle(short(40), policy, seed) for seed in (0, 1, 2)]
         for policy in ('flat', 'dome', 'adaptive')
@@ -225,28 +226,31 @@ def test_adaptive_beats_both_fixed_shapes_on_patches():
     assert mean['adaptive'] > 1.08 * max(mean['flat'], mean['dome'])
     for flat, dome, adapted in zip(*ways.values(), strict=True):
         assert adapted > max(flat, dome)
-        assert min(flat, dome) > 0.02  # nobody is stuck: the comparison is not with a wreck
+        assert min(flat, dome) > 0.02  # neither robot is stuck
 
 
+@pytest.mark.slow
 def test_on_dry_ground_adapting_costs_the_start_and_one_trial():
-    """Feet start as domes, and are domes for one more step: what do they lose on dry ground?"""
+    """Most feet start as domes and make one dome test, which costs less than 1 % on dry ground."""
     scene = short(60, 'dry')
     flat, dome, adapted = (per_cycle(scene, each) for each in ('flat', 'dome', 'adaptive'))
     assert flat > 1.2 * dome
     assert adapted > 0.99 * flat
 
 
+@pytest.mark.slow
 def test_on_wet_ground_adapting_costs_the_probes():
     trials = {each: run(short(60, 'wet'), each) for each in ('dome', 'adaptive')}
     way = {each: trial.metrics.distance_m for each, trial in trials.items()}
     assert way['adaptive'] > 0.99 * way['dome']
-    # Probes there were.
+    # There were probes.
     assert sum(trials['adaptive'].metrics.switches) >= 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('foot', ['as shipped', 'no better flat than domed'])
 def test_where_domes_cannot_be_beaten_adapting_costs_little(foot):
-    """Nothing towed, so that domes hold everywhere; or dry friction without adhesion."""
+    """Domes always hold without a tow, or if a foot has no adhesion."""
     if foot == 'as shipped':
         scene = dataclasses.replace(short(60), tow=dataclasses.replace(PATCHES.tow, weight=0.0))
     else:
@@ -255,15 +259,17 @@ def test_where_domes_cannot_be_beaten_adapting_costs_little(foot):
     assert per_cycle(scene, 'adaptive', seed=41) > 0.99 * per_cycle(scene, 'dome', seed=41)
 
 
+@pytest.mark.slow
 def test_the_information_trap_on_patches():
-    """Without probes wet patches make domes of all feet, and then no foot ever learns of dry."""
+    """Without probes all feet become domes on wet patches, and none detects dry ground again."""
     seed = 0
-    # A load that domes on dry ground do not pull without slip.
+    # Domes on dry ground slip with this sled.
     tow = dataclasses.replace(PATCHES.tow, weight=12.0, distance=0.4)
     scene = dataclasses.replace(short(40), tow=tow)
     trapped = ClosedLoop(scene, 'adaptive', seed, 'L1')
-    trapped.controller = MorphologyController(
-        scene.foot, scene.legs, adaptive(probe_below=0.0, probing='threshold'), scene.expected_load
+    policy = adaptive(probe_below=0.0, probing='threshold')
+    trapped.connect(
+        controller=MorphologyController(scene.foot, scene.legs, policy, scene.expected_load)
     )
     log = TrialLog(scene, 'adaptive', seed, 'L1')
     for _ in range(round(scene.duration / 0.004)):
@@ -272,18 +278,19 @@ def test_the_information_trap_on_patches():
     first = int(np.argmax(trial.dome.all(axis=1)))
     assert 0 < first < 0.5 * len(trial.dome)
     assert trial.dome[first:].all()
-    # There was dry ground after that, where domes hold less than flat feet.
+    # After that the robot crosses dry ground, where domes hold less than flat feet.
     assert 0.2 < np.mean(~trial.wet()[first:]) < 0.9
     free = run(scene, 'adaptive', seed=seed, fidelity='L1')
     assert not free.dome[first:].all(axis=1).all()
     assert free.metrics.distance_m > 1.05 * trial.metrics.distance_m
 
 
-# --- what the estimators are worth --------------------------------------------------------------
+# --- accuracy of the estimators -----------------------------------------------------------------
 
 
 def watched(policy, seed, cycles=20):
-    """Walk; return rows of (true friction, mean, sd, quantile, domed) and of flat stance ends."""
+    """Walk; return rows (true friction, mean, sd, quantile, domed), and for each end of a flat
+    stance (estimated wet, wet)."""
     scene = short(cycles)
     loop = ClosedLoop(scene, policy, seed, 'L1')
     log = TrialLog(scene, policy, seed, 'L1')
@@ -292,7 +299,7 @@ def watched(policy, seed, cycles=20):
         loop.tick(log)
         for index, foot in enumerate(loop.robot.feet):
             estimate = loop.estimators[index].estimate
-            # While the robot only stands before it walks there is nothing to feel.
+            # Before the robot walks the ground is unobservable.
             if estimate.standing and foot.force[2] > 0.0 and estimate.time > scene.settle + 0.3:
                 ratio = math.hypot(*foot.force[:2]) / foot.force[2]
                 truth = foot.grip / foot.force[2]
@@ -308,12 +315,13 @@ def watched(policy, seed, cycles=20):
     return np.array(rows, dtype=float), np.array(ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('policy', ['flat', 'adaptive'])
 def test_estimates_are_as_sure_as_they_may_be(policy):
     """Measured on six floors: coverage 0.96 to 1.00, accuracy of all stances 0.98 and 0.99.
 
-    The estimator knows the foot's contact model here, and L1 has neither scuffing nor feet that
-    fight: that is the best case.
+    This is the best case: the estimator has the exact contact model of the foot, and at L1 feet
+    neither scuff nor push one another.
     """
     walks = [watched(policy, seed) for seed in (0, 1, 2)]
     for rows, _ in walks:
@@ -321,7 +329,7 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
         assert len(rows) > 4000
         assert np.mean(abs(truth - mean) < 2.0 * sd) > 0.9
         assert np.mean(truth < quantile) < 0.1
-        assert np.mean(sd) < 0.2  # sure of something
+        assert np.mean(sd) < 0.2  # not trivially uncertain
     ends = np.concatenate([ends for _, ends in walks])
-    assert len(ends) > 100  # domes that seldom probe have few
+    assert len(ends) > 100  # domes have few flat stances
     assert np.mean(ends[:, 0] == ends[:, 1]) > 0.95

@@ -21,10 +21,10 @@ GATE = 2.0  # N
 
 
 def written(load, x, wet_probability, pressure=None, floor=None):
-    """Return a trial from series that are written down: a control step every second sample.
+    """Return a trial made of given series, with a control step at every second sample.
 
-    ``load`` and ``x`` have a row for each sample, the others one for each control step; columns
-    are legs.
+    ``load``, N, and ``x``, m, have a row for each sample, the others one for each control step;
+    columns are legs.
     """
     load, x = np.array(load, dtype=float), np.array(x, dtype=float)
     samples, legs = load.shape
@@ -44,7 +44,7 @@ def written(load, x, wet_probability, pressure=None, floor=None):
     )  # fmt: skip
 
 
-# Wet where x is below 1 m, dry to 2 m, and again.
+# Wet for x from 0 to 1 m, dry from 1 to 2 m, and so on.
 STRIPES = Floor(np.array([[True, False]]), 1.0, (0.0, 0.0), 3e-4)
 #        sample 1  2  3  4  5  6  7  8  9 10
 LOADS = [[9, 9, 9, 9, 0, 0, 9, 9, 9, 0]]
@@ -60,15 +60,15 @@ def one_leg(belief, pressure=None, floor=STRIPES):
 
 def test_stances_end_at_the_first_control_step_after_the_last_loaded_sample():
     trial = one_leg([0.5] * 5)
-    # Control steps at samples 1, 3, 5, 7, 9. The first stance ends with sample 4: row 2 is the
-    # next. The second ends with sample 9, after which there is none.
+    # Control steps are at samples 1, 3, 5, 7 and 9. The first stance ends with sample 4, so that
+    # its row is 2. The second ends with sample 9, after which there is no control step.
     assert [rows.tolist() for rows in stance_ends(trial, GATE)] == [[2]]
 
 
 def test_a_bounce_ends_no_stance():
     trial = one_leg([0.5] * 5)
     fast = dataclasses.replace(trial, time=0.05 * trial.time, slow_time=0.05 * trial.slow_time)
-    # Samples 5 and 6 are then 10 ms without load, between two that are 15 ms apart.
+    # Samples 5 and 6 without load then last 10 ms, too short to end a stance.
     assert fast.standing(GATE)[:, 0].tolist() == [True] * 9 + [False]
     assert trial.standing(GATE)[:, 0].tolist() == [load > GATE for load in LOADS[0]]
     assert [rows.tolist() for rows in stance_ends(fast, GATE)] == [[]]
@@ -82,7 +82,7 @@ def test_a_stance_that_is_cut_off_by_the_end_does_not_count():
 
 @pytest.mark.parametrize(('at_end', 'expected'), [(0.9, 1.0), (0.1, 0.0), (0.5, 0.0)])
 def test_belief_at_the_end_of_a_stance_against_the_ground_it_stood_on(at_end, expected):
-    """It stood at 0.5 m, on wet ground; beliefs before and after that stance do not matter."""
+    """The foot stands at 0.5 m, on wet ground; estimates before and after do not matter."""
     assert wet_accuracy(one_leg([0.0, 0.0, at_end, 0.0, 0.0]), GATE) == expected
 
 
@@ -95,7 +95,7 @@ def test_accuracy_is_over_all_legs_and_stances():
     load = [[9, 9, 0], [9, 9, 9], [0, 9, 9], [9, 0, 9], [9, 9, 9], [9, 9, 0], [0, 9, 0]]
     x = [[0.5, 1.5, 0.5]] * 7
     belief = [[0.9, 0.9, 0.5]] * 4
-    # Wet, right, twice; dry, taken for wet, once; the third leg stood on wet ground unsure.
+    # Leg 1: two wet stances, right. Leg 2: a dry one, estimated wet. Leg 3: a wet one at 0.3.
     trial = written(load, x, np.array(belief) - [[0.0, 0.0, 0.2]], floor=STRIPES)
     assert [len(rows) for rows in stance_ends(trial, GATE)] == [2, 1, 1]
     assert wet_accuracy(trial, GATE) == 2 / 4
@@ -105,7 +105,7 @@ def test_without_a_known_floor_there_is_no_accuracy():
     assert wet_accuracy(one_leg([0.9] * 5, floor=None), GATE) is None
 
 
-def test_a_summary_is_what_the_robot_says():
+def test_a_summary_has_the_values_of_the_robot():
     trial = one_leg([0.9] * 5)
     feet = [types.SimpleNamespace(slip_path=0.25, overload_time=0.5)]
     robot = types.SimpleNamespace(
@@ -157,7 +157,7 @@ def test_metrics_agree_with_the_series():
     changes = np.sum(trial.dome[1:] != trial.dome[:-1], axis=0)
     assert metrics.switches == changes.tolist()
     assert sum(metrics.switches) > 0
-    # Contacts slide at least as far as markers advance while loaded, but for the shear of pads.
+    # Slip paths are at least the advance of loaded markers, except for the shear of pads.
     loaded = trial.force[:, :, 2] > 0.5 * scene.expected_load
     moved = np.where(loaded[1:] & loaded[:-1], np.diff(trial.position[:, :, 0], axis=0), 0.0)
     assert all(
@@ -169,21 +169,11 @@ def test_metrics_agree_with_the_series():
     assert 0.9 <= metrics.wet_accuracy <= 1.0
 
 
-def test_a_trial_as_json():
-    trial = run(dataclasses.replace(SCENE, cycles=1), 'flat')
-    said = json.loads(trial.to_json())
-    assert said['scene'] == 'hexapod_patches'
-    assert said['policy'] == 'flat'
-    assert said['legs'] == [1, 2, 3, 4, 5, 6]
-    assert said['metrics']['switches'] == [0] * 6
-    assert said['metrics']['distance_m'] == trial.metrics.distance_m
-
-
 def test_wet_ground_below_the_feet_is_that_of_the_floor():
     trial = one_leg([0.5] * 5)
-    # x is 0.5 m to sample 5, 1.5 m after it; control steps are samples 1, 3, 5, 7, 9.
+    # x is 0.5 m up to sample 5 and 1.5 m after it; control steps are samples 1, 3, 5, 7 and 9.
     assert trial.wet()[:, 0].tolist() == [True, True, True, False, False]
-    with pytest.raises(ValueError, match='not known'):
+    with pytest.raises(ValueError, match='floor'):
         dataclasses.replace(trial, floor=None).wet()
 
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip('rclpy', reason='messages are serialized by ROS itself')
+pytest.importorskip('rclpy', reason='rclpy is needed: it serializes the messages')
 
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import PoseStamped
@@ -19,17 +19,17 @@ from std_msgs.msg import Bool
 from std_msgs.msg import Float64
 from std_msgs.msg import String
 
+from ros_pad.bags import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.simulation import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials import run
-from ros_pad.trials.bag import BagWriter
 
 MS = 1_000_000
 
 
 class Recording:
-    """A bag that takes messages as objects."""
+    """A bag to which ROS messages are added as objects."""
 
     def __init__(self, folder, **description):
         data = {'ros_pad': json.dumps(description)} if description else None
@@ -85,7 +85,7 @@ def pressure(gauge):
 
 
 def record(trial, folder):
-    """Record a trial as the nodes publish it: only what changes is sent about the shape."""
+    """Record a trial as nodes publish it; a morphology is published only when it changes."""
     shapes = {}
     slow = {round(time * 1e9): row for row, time in enumerate(trial.slow_time)}
     description = {
@@ -136,6 +136,7 @@ def record(trial, folder):
     return folder
 
 
+@pytest.mark.slow
 def test_a_recorded_trial_is_the_trial_to_the_bit(tmp_path):
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=20)
     trial = run(scene, 'adaptive', seed=0)
@@ -162,13 +163,13 @@ def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
     start = 1_750_000_000 * 10**9  # 2025-06-15 15:06:40 UTC
     with Recording(tmp_path / 'bag') as bag:
         bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, 4.0), start, start)
-        # The marker of leg 2 starts late and is slower; that of leg 5 never comes.
+        # Positions of leg 2 start late and are slower; leg 5 has none.
         for k in range(1, 10):
             bag.add('/spider/leg_2/wrench', wrench(0.5, 0.0, float(k)), start, start + k * 10 * MS)
         bag.add('/spider/leg_2/position', point(1.0, 2.0, 3.0), start, start + 25 * MS)
         bag.add('/spider/leg_2/position', point(4.0, 5.0, 6.0), start, start + 60 * MS)
         bag.add('/spider/leg_5/wrench', wrench(0.0, 0.0, 9.0), start, start + 31 * MS)
-        # No estimator: the pressure gives the times.
+        # There is no estimator: pressures give the control times.
         bag.add('/spider/leg_5/pressure', pressure(20000.0), start, start + 15 * MS)
         bag.add('/spider/leg_5/pressure', pressure(30000.0), start, start + 35 * MS)
         bag.add('/spider/leg_5/pressure_setpoint', pressure(30000.0), start, start + 15 * MS)
@@ -197,7 +198,7 @@ def test_other_rates_gaps_and_missing_topics_of_a_robot(tmp_path):
     assert trial.settings['recorded'] == '2025-06-15 15:06:40 UTC'
 
 
-def test_a_leg_that_only_says_one_thing_is_enough(tmp_path):
+def test_a_leg_with_one_topic_is_enough(tmp_path):
     with Recording(tmp_path / 'bag') as bag:
         bag.add('/leg_1/wetness', Float64(data=0.25), 40 * MS)
         bag.add('/leg_1/wetness', Float64(data=0.75), 60 * MS)
@@ -228,7 +229,7 @@ def test_messages_out_of_order_and_without_stamp(tmp_path):
     np.testing.assert_array_equal(trial.force[:, 0, 2], [1.0, 2.0, 3.0])
 
 
-def test_what_the_recorder_missed_is_known(tmp_path):
+def test_what_the_recorder_missed_is_read(tmp_path):
     with Recording(tmp_path / 'bag') as bag:
         bag.add('/leg_1/wrench', wrench(0.0, 0.0, 1.0), 0, 0)
         bag.writer.describe({'ros_pad_lost': '{"/leg_1/wrench": 3}'})
@@ -243,7 +244,7 @@ def test_ambient_pressure_comes_from_the_bag(tmp_path):
 
 @pytest.mark.parametrize('heading', [-3.0, -0.1, 0.0, 1.0, 3.0])
 def test_heading_of_a_tilted_body(tmp_path, heading):
-    # Yaw of Rz(heading) Ry(pitch) Rx(roll), the quaternion written out by hand.
+    # Quaternion of Rz(heading) Ry(pitch) Rx(roll), by hand.
     pitch, roll = 0.2, -0.1
     message = PoseStamped()
     cy, sy = math.cos(heading / 2), math.sin(heading / 2)
@@ -289,7 +290,7 @@ def test_bags_that_are_no_trial(tmp_path):
         recorded.load(tmp_path / 'label')
 
 
-def test_a_bag_that_was_not_closed_says_so(tmp_path):
+def test_a_bag_that_was_not_closed_is_reported(tmp_path):
     bag = Recording(tmp_path / 'bag')
     for number in range(1, 20000):
         bag.add('/leg_1/wetness', Float64(data=number / 20000), number * MS)
@@ -308,12 +309,3 @@ def test_progress_ends_at_one(tmp_path):
     shares = []
     recorded.load(tmp_path / 'bag', progress=shares.append)
     assert shares == sorted(shares) and shares[-1] == 1.0 and 3 <= len(shares) <= 10
-
-
-def test_topics_are_those_of_the_nodes():
-    topics = pytest.importorskip('ros_pad.nodes.topics')
-    of_nodes = {
-        topic.pattern.removeprefix('leg_{leg}/'): topic.type_name
-        for topic in (*topics.LEG_TOPICS, topics.BODY_POSE)
-    }
-    assert {kind: entry[0] for kind, entry in recorded._KINDS.items()} == of_nodes

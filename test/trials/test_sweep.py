@@ -19,6 +19,7 @@ from ros_pad.errors import PadError
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials import sweep as sweeps
+from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.sweep import Results
 from ros_pad.trials.sweep import Sweep
 
@@ -28,11 +29,11 @@ SMALL = Sweep([LEG], ['flat', 'dome'], [0, 1], {**SHORT, 'body.rolling_drag': [0
 
 
 def without_pace(rows):
-    """Return rows without the one thing that depends on the machine."""
+    """Return rows without the column that depends on the machine's speed."""
     return [{name: row[name] for name in row if name != 'real_time_factor'} for row in rows]
 
 
-# --- what is asked for --------------------------------------------------------------------------
+# --- jobs ---------------------------------------------------------------------------------------
 
 
 def test_every_combination_is_there_once_and_in_order():
@@ -44,7 +45,7 @@ def test_every_combination_is_there_once_and_in_order():
         for seed in (0, 1)
     ]
     assert len({job.key for job in jobs}) == 8
-    assert {job.rung for job in jobs} == {'L0'}
+    assert {job.level for job in jobs} == {'L0'}
     for job in jobs:
         assert job.scene.cycles == 2
         assert job.scene.body.rolling_drag == job.labels['body.rolling_drag']
@@ -57,9 +58,9 @@ def test_values_land_where_they_belong():
         [3],
         {
             'tow.weight': [4],
-            'floor.slope': [0.1],  # which the file leaves to its default
+            'floor.slope': [0.1],  # the file has the default
             'foot': ['large19'],
-            'estimator.filter_period': [0.1],
+            'filter_period': [0.1],
             'policy.wet_above': [0.9],
         },
     ).jobs()[0]
@@ -68,8 +69,8 @@ def test_values_land_where_they_belong():
         0.1,
         'large19',
     )
-    # Noise stays what the scene's sensors have.
-    plain = loop.tuning_for(Scene.load('hexapod_patches'))
+    # The noise is still that of the scene's sensors.
+    plain = tuning_for(Scene.load('hexapod_patches'))
     assert job.tuning == dataclasses.replace(plain, filter_period=0.1)
     assert job.policy_parameters == {'wet_above': 0.9}
 
@@ -105,22 +106,22 @@ def test_ways_of_probing_are_swept_by_name():
         ({'scenes': ['leg_wet_fla']}, "'leg_wet_fla'.* Did you mean 'leg_wet_flat'"),
         ({'scenes': ['bench_press']}, 'is a bench'),
         ({'scenes': []}, 'scene: at least one'),
-        ({'scenes': [LEG, LEG]}, f"scene = '{LEG}': is there twice"),
+        ({'scenes': [LEG, LEG]}, f"scene = '{LEG}' is given twice"),
         ({'policies': ['brave']}, "policy = 'brave': one of flat, dome, adaptive, oracle"),
         ({'seeds': []}, 'seed: at least one'),
         ({'seeds': [-1]}, 'seed = -1: a whole number from 0 to 2147483647'),
         ({'seeds': [True]}, 'seed = True'),
-        ({'fidelity': 'L2'}, "fidelity = 'L2': scene 'leg_wet_flat' has a rail_leg"),
+        ({'fidelity': 'L2'}, "fidelity = 'L2' is not allowed: scene 'leg_wet_flat'"),
         ({'parameters': {'body.mass': []}}, 'body.mass: at least one value'),
-        ({'parameters': {'body.mass': [1.0, 1.0]}}, 'body.mass = 1.0: is there twice'),
+        ({'parameters': {'body.mass': [1.0, 1.0]}}, 'body.mass = 1.0 is given twice'),
         ({'parameters': {'body.mass': [1.0, 1e3]}}, 'body.mass=1000.0: .*mass .* 0.01 to 100 kg'),
         ({'parameters': {'body.mas': [1.0]}}, "body.mas=1.0: .* Did you mean 'mass'"),
         ({'parameters': {'cycles': [2.5]}}, 'cycles=2.5: .* whole number from 1 to 100000'),
         ({'parameters': {'body.mass': ['heavy']}}, "body.mass=heavy: .*'heavy'"),
-        ({'parameters': {'foot.friction': [0.3]}}, "foot = 'large19' is no table of keys"),
+        ({'parameters': {'foot.friction': [0.3]}}, "foot = 'large19' has no keys below it"),
         ({'parameters': {'policy': ['flat']}}, '--policy'),
-        ({'parameters': {'estimator.filter_perio': [1]}}, "mean 'estimator.filter_period'"),
-        ({'parameters': {'estimator.wet_prior': [2.0]}}, 'wet_prior=2.0: .*0.01 to 0.99'),
+        ({'parameters': {'estimator.filter_perio': [1]}}, "mean 'filter_period'"),
+        ({'parameters': {'wet_prior': [2.0]}}, 'wet_prior=2.0: .*0.01 to 0.99'),
         ({'parameters': {'policy.wet_abov': [0.5]}}, "Did you mean 'policy.wet_above'"),
         ({'parameters': {'policy.wet_above': [0.5]}}, 'only adaptive has parameters'),
     ],
@@ -132,25 +133,26 @@ def test_what_is_not_allowed_is_refused_by_name(changes, message, tmp_path: path
 
 
 def test_a_policy_parameter_out_of_range_names_itself():
-    with pytest.raises(InvalidInput, match=r'policy.wet_above=1.5: wet_above = 1.5 .* to 1'):
+    with pytest.raises(InvalidInput, match=r'policy.wet_above = 1.5 .* to 1'):
         Sweep(['hexapod_patches'], ['adaptive'], [0], {'policy.wet_above': [0.5, 1.5]}).jobs()
 
 
-# --- what comes out -----------------------------------------------------------------------------
+# --- results ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_rows_are_those_of_single_trials_whatever_the_number_of_workers(tmp_path: pathlib.Path):
-    told = []
-    one = sweeps.run(SMALL, tmp_path / 'one', 1, progress=lambda *done: told.append(done))
+    reported = []
+    one = sweeps.run(SMALL, tmp_path / 'one', 1, progress=reported.append)
     two = sweeps.run(SMALL, tmp_path / 'two', 2)
     assert without_pace(one) == without_pace(two)
-    assert told == [(done, 8) for done in range(9)]
+    assert reported == list(range(9))
     row = one[5]
     assert (row['policy'], row['seed'], row['body.rolling_drag']) == ('flat', 1, 1.0)
     trial = loop.run(sweeps.scene_with(LEG, {'cycles': 2, 'body.rolling_drag': 1.0}), 'flat', 1)
     assert row['distance_per_cycle_m'] == trial.metrics.distance_per_cycle_m
     assert row['slip_path_m_leg1'] == trial.metrics.slip_path_m[0]
-    assert (row['rung'], row['verdict'], row['error']) == ('L0', None, None)
+    assert (row['level'], row['verdict'], row['error']) == ('L0', None, None)
     assert row['real_time_factor'] > 1.0
     with (tmp_path / 'two' / 'trials.csv').open(newline='') as file:
         read = list(csv.DictReader(file))
@@ -181,7 +183,7 @@ def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path: pathlib.Pa
     rows = sweeps.run(sweep, tmp_path / 'sweep', 2)
     assert [bool(row['error']) for row in rows] == [False, True, False]
     assert 'AttributeError' in rows[1]['error']
-    assert (rows[1]['seed'], rows[1]['distance_m'], rows[1]['rung']) == (1, None, 'L0')
+    assert (rows[1]['seed'], rows[1]['distance_m'], rows[1]['level']) == (1, None, 'L0')
     monkeypatch.undo()
     assert sweeps.run(sweep, tmp_path / 'sweep', 1) == rows
     again = sweeps.run(sweep, tmp_path / 'sweep', 1, retry=True)
@@ -190,12 +192,13 @@ def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path: pathlib.Pa
 
 
 class Deadly:
-    """What ends the process that unpickles it."""
+    """An object that ends the process that unpickles it."""
 
     def __reduce__(self):
         return os._exit, (1,)
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_costs_only_its_own_trial(tmp_path: pathlib.Path, monkeypatch):
     sweep = Sweep([LEG], ['flat'], range(5), SHORT)
     jobs = sweep.jobs()
@@ -206,11 +209,12 @@ def test_a_process_that_dies_costs_only_its_own_trial(tmp_path: pathlib.Path, mo
     assert 'died' in rows[2]['error']
 
 
-# --- going on -----------------------------------------------------------------------------------
+# --- continuing ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_sweep_that_was_stopped_keeps_what_is_done_and_goes_on(tmp_path: pathlib.Path):
-    def stop(done, total):
+    def stop(done):
         if done == 3:
             raise KeyboardInterrupt
 
@@ -218,9 +222,9 @@ def test_a_sweep_that_was_stopped_keeps_what_is_done_and_goes_on(tmp_path: pathl
         sweeps.run(SMALL, tmp_path / 'sweep', 1, progress=stop)
     with (tmp_path / 'sweep' / 'trials.csv').open(newline='') as file:
         assert len(list(csv.DictReader(file))) == 3
-    told = []
-    rows = sweeps.run(SMALL, tmp_path / 'sweep', 1, progress=lambda done, _: told.append(done))
-    assert told == [3, 4, 5, 6, 7, 8]
+    reported = []
+    rows = sweeps.run(SMALL, tmp_path / 'sweep', 1, progress=reported.append)
+    assert reported == [3, 4, 5, 6, 7, 8]
     assert without_pace(rows) == without_pace(sweeps.run(SMALL, tmp_path / 'whole', 1))
 
 
@@ -231,7 +235,7 @@ def test_more_of_the_same_is_added_and_less_refused(tmp_path: pathlib.Path):
     rows = sweeps.run(more, tmp_path / 'sweep', 1)
     assert [row['seed'] for row in rows] == [1, 0]
     assert rows[1] == first[0]
-    with pytest.raises(InvalidInput, match=r'1 trials that this sweep does not ask for.*seed=1'):
+    with pytest.raises(InvalidInput, match=r'1 trials that are not in this sweep.*seed=1'):
         sweeps.run(small, tmp_path / 'sweep', 1)
 
 
@@ -263,33 +267,33 @@ def test_folders_that_hold_something_else_are_left_alone(tmp_path: pathlib.Path)
         Results(tmp_path / 'full', {}, [])
     (tmp_path / 'bad').mkdir()
     (tmp_path / 'bad' / sweeps.RESULTS).write_text('no base of data' * 100)
-    with pytest.raises(PadError, match=r'trials.sqlite: is damaged'):
+    with pytest.raises(PadError, match=r'trials.sqlite is damaged'):
         Results(tmp_path / 'bad', {}, [])
 
 
 def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path: pathlib.Path):
     with (
         Results(tmp_path / 'sweep', {}, []),
-        pytest.raises(PadError, match='another sweep is at work'),
+        pytest.raises(PadError, match='another sweep is running'),
     ):
         Results(tmp_path / 'sweep', {}, [])
     Results(tmp_path / 'sweep', {}, []).__exit__()
 
 
 def test_a_kill_in_the_middle_of_a_write_leaves_the_rows_before_it(tmp_path: pathlib.Path):
-    """The process is killed when a large row has reached the file, but not its commit."""
+    """The process is killed after many rows are in the file, but before their commit."""
     child = os.fork()
     if not child:
-        results = Results(tmp_path / 'sweep', {}, ['a', 'b'])
-        results.add('a', {'n': 1})
-        base = results._base
+        with Results(tmp_path / 'sweep', {}, ['a', 'b']) as results:
+            results.add('a', {'n': 1})
+        base = sqlite3.connect(tmp_path / 'sweep' / sweeps.RESULTS, isolation_level=None)
         base.execute('PRAGMA cache_size = 1')
         base.execute('BEGIN')
         for number in range(100):
             base.execute('INSERT INTO trial VALUES (?, ?)', (f'b{number}', 'x' * 10000))
         os.kill(os.getpid(), signal.SIGKILL)
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
-    assert (tmp_path / 'sweep' / sweeps.RESULTS).stat().st_size > 500_000  # half of it is there
+    assert (tmp_path / 'sweep' / sweeps.RESULTS).stat().st_size > 500_000  # rows without commit
     with Results(tmp_path / 'sweep', {}, ['a', 'b']) as results:
         assert results.rows(['a', 'b'])[0]['n'] == 1
         assert len(results) == 1
@@ -335,12 +339,13 @@ def test_without_dask_the_extra_is_named(tmp_path: pathlib.Path, monkeypatch):
 
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: pathlib.Path, monkeypatch):
     pytest.importorskip('distributed', reason='pip install "ros_pad[sweep]"')
-    monkeypatch.setattr(sweeps, 'PATIENCE', 0.5)
-    with pytest.raises(PadError, match=r'scheduler tcp://127.0.0.1:1: does not answer'):
+    monkeypatch.setattr('ros_pad.trials.sweep.execution.PATIENCE', 0.5)
+    with pytest.raises(PadError, match=r'cannot connect to scheduler tcp://127.0.0.1:1: '):
         sweeps.run(SMALL, tmp_path / 'sweep', scheduler='tcp://127.0.0.1:1')
     assert not (tmp_path / 'sweep').exists()
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path: pathlib.Path):
     distributed = pytest.importorskip('distributed', reason='pip install "ros_pad[sweep]"')
     sweep = Sweep([LEG], ['flat', 'dome'], range(8), {'cycles': [10]})
@@ -350,7 +355,7 @@ def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path: pathlib.Path):
     ) as cluster:
         assert len(cluster.workers) == 2
 
-        def kill(done, total):
+        def kill(done):
             if done == 3:
                 killed.append(cluster.workers[0].pid)
                 os.kill(killed[0], signal.SIGKILL)
@@ -361,7 +366,7 @@ def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path: pathlib.Path):
     assert killed
     with Results(tmp_path / 'here', {}, []) as results:
         for job in sweep.jobs():
-            results.add(job.key, sweeps.walk(job))
+            results.add(job.key, sweeps.run_job(job))
         here = results.rows(job.key for job in sweep.jobs())
     assert [row['error'] for row in rows] == [None] * 16
     assert without_pace(rows) == without_pace(here)

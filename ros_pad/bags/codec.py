@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read and write CDR, the bytes in which ROS 2 sends messages.
+
+:class:`MessageType` reads and writes messages of any type from its definition, with ``rosbags``.
+The functions read single values from the bytes of a message, which is faster than decoding it.
+
+Source: OMG, Common Object Request Broker Architecture, part 2, section 9.3 (CDR). A message starts
+with four bytes of encapsulation, of which the second gives the byte order; after them each number
+is at a multiple of its size.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import struct
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores
+from rosbags.typesys import get_types_from_msg
+from rosbags.typesys import get_typestore
+
+_ENCAPSULATION_SIZE = 4
+_LONGEST_ARRAY = 65536
+"""Largest number of elements of a fixed-length array: rosbags generates code for each one."""
+
+_DTYPE = {'byte': 'uint8', 'char': 'uint8', 'octet': 'uint8'}  # NumPy has other names for these
+
+# Big-endian first: the byte-order flag of a message (0 or 1) is the index.
+_TIME = struct.Struct('>iI'), struct.Struct('<iI')
+_LENGTH = struct.Struct('>I'), struct.Struct('<I')
+_VECTOR = struct.Struct('>3d'), struct.Struct('<3d')
+_HEADER_LENGTH_AT = 12  # after encapsulation and stamp: the length of ``frame_id``
+_NO_VECTOR = (math.nan, math.nan, math.nan)
+
+
+class MessageType:
+    """Read and write messages of one type.
+
+    Parameters
+    ----------
+    name : str
+        Name of the type, such as ``std_msgs/msg/Float64``.
+    definition : str
+        Definitions of the type and of all types that it refers to (``ros2msg``), see
+        :func:`ros_pad.bags.definitions.message_definition`.
+
+    Raises
+    ------
+    Exception
+        Of any kind, when the definition is invalid or incomplete, or has an array of fixed length
+        with more than 65536 elements.
+    """
+
+    def __init__(self, name: str, definition: str) -> None:
+        self.name = name
+        self._store = get_typestore(Stores.EMPTY)
+        self._store.register(get_types_from_msg(definition.replace('\r\n', '\n'), name))
+        for _, fields in self._store.fielddefs.values():
+            for field, description in fields:
+                if description[0] == Nodetype.ARRAY and description[1][1] > _LONGEST_ARRAY:
+                    raise ValueError(f'array {field} has more than {_LONGEST_ARRAY} elements')
+        self._type = self._store.get_msgdef(name)
+
+    def decode(self, data: bytes) -> Any:
+        """Return a message, with an attribute for each field, from its bytes.
+
+        Raises
+        ------
+        Exception
+            Of any kind, when the bytes are not a message of this type.
+        """
+        if data[0] or data[1] > 1:
+            raise ValueError(f'encapsulation {data[:2].hex()} is not 0000 or 0001, plain CDR')
+        of = self._type
+        read = of.deserialize_cdr_le if data[1] else of.deserialize_cdr_be
+        message, _ = read(data[_ENCAPSULATION_SIZE:], 0, of.cls, self._store)
+        return message
+
+    def encode(self, message: Any) -> bytes:
+        """Return the bytes of a message, little-endian."""
+        return bytes(self._store.serialize_cdr(message, self.name, little_endian=True))
+
+    def blank(self) -> Any:
+        """Return a message of zeros, empty texts and empty lists."""
+        return self._blank(self.name)
+
+    def _blank(self, name: str) -> Any:
+        _, fields = self._store.fielddefs[name]
+        return self._store.types[name](*(self._zero(*description) for _, description in fields))
+
+    def _zero(self, kind: Nodetype, inner: Any) -> Any:
+        if kind == Nodetype.NAME:
+            return self._blank(inner)
+        if kind == Nodetype.BASE:
+            return '' if inner[0] == 'string' else 0
+        (element_kind, element), length = inner
+        count = length if kind == Nodetype.ARRAY else 0
+        if element_kind == Nodetype.BASE and element[0] != 'string':
+            return np.zeros(count, _DTYPE.get(element[0], element[0]))
+        return [self._zero(element_kind, element) for _ in range(count)]
+
+
+@functools.lru_cache(maxsize=256)
+def message_type(name: str, definition: str) -> MessageType:
+    """Return a message type, cached because making one takes 10 ms. See :class:`MessageType`."""
+    return MessageType(name, definition)
+
+
+def clock_time(data: bytes) -> int | None:
+    """Return the time, ns, of a ``rosgraph_msgs/Clock``; None when there are too few bytes."""
+    try:
+        seconds, nanoseconds = _TIME[data[1] & 1].unpack_from(data, _ENCAPSULATION_SIZE)
+    except (IndexError, struct.error):
+        return None
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
+
+
+def _first_vector(data: bytes) -> tuple[float, float, float]:
+    """Return the three doubles after the header; NaN when there are too few bytes."""
+    try:
+        order = data[1] & 1
+        (length,) = _LENGTH[order].unpack_from(data, _HEADER_LENGTH_AT)
+        place = (_HEADER_LENGTH_AT + length + 7) // 8 * 8 + _ENCAPSULATION_SIZE
+        x, y, z = _VECTOR[order].unpack_from(data, place)
+    except (IndexError, struct.error):
+        return _NO_VECTOR
+    return x, y, z
+
+
+def normal_force(data: bytes) -> float:
+    """Return force.z, N, of a ``geometry_msgs/WrenchStamped``; NaN if there are too few bytes."""
+    return _first_vector(data)[2]
+
+
+def horizontal_position(data: bytes) -> tuple[float, float]:
+    """Return x and y, m, of a ``geometry_msgs/PointStamped``; NaN if there are too few bytes."""
+    return _first_vector(data)[:2]
+
+
+__all__ = ['MessageType', 'clock_time', 'horizontal_position', 'message_type', 'normal_force']

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Repair a bag that a killed recorder, a full disk or a power cut left incomplete."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import pathlib
+import re
+from collections import Counter
+from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import asdict
+from dataclasses import dataclass
+from dataclasses import field
+from typing import Any
+
+from mcap.records import Channel
+from mcap.records import Chunk
+from mcap.records import Footer
+from mcap.records import McapRecord
+from mcap.records import Message
+from mcap.records import Schema
+from mcap.stream_reader import StreamReader
+from mcap.stream_reader import breakup_chunk
+
+from ros_pad.bags import metadata
+from ros_pad.bags.writer import BagWriter
+from ros_pad.errors import BagError
+
+KEY = 'ros_pad_repair'
+"""Key of the custom data in which a repaired bag lists what was lost."""
+
+_RECORD_SIZE_LIMIT = 1 << 30  # bytes; a longer record counts as damage
+
+
+@dataclass
+class Repair:
+    """Findings of a repair.
+
+    Attributes
+    ----------
+    messages : int
+        Messages that can be read; a repair writes them into the new bag.
+    damaged_chunks : int
+        Chunks that cannot be read; a repair leaves them out.
+    lost_messages : int
+        Messages that can be read, but whose topic was declared in a damaged chunk.
+    unread_bytes : int
+        Bytes after the last record that can be read.
+    closed : bool
+        Whether every file was closed by its writer.
+    described : bool
+        Whether ``metadata.yaml`` names all files and the number of messages that can be read.
+    """
+
+    messages: int = 0
+    damaged_chunks: int = 0
+    lost_messages: int = 0
+    unread_bytes: int = 0
+    closed: bool = True
+    described: bool = True
+
+    @property
+    def sound(self) -> bool:
+        """Whether there is nothing to repair."""
+        whole = self.closed and not self.damaged_chunks and not self.unread_bytes
+        return whole and self.described
+
+
+@dataclass
+class _File:
+    """One MCAP file, with the channels and schemas of its messages."""
+
+    path: pathlib.Path
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+
+
+def inspect(
+    source: str | os.PathLike[str], progress: Callable[[float], None] | None = None
+) -> Repair:
+    """Return what a repair would find, without writing anything.
+
+    Parameters
+    ----------
+    source : path
+        Folder of a bag, with or without its metadata, or one MCAP file.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    BagError
+        When there is no MCAP file.
+    """
+    return _examine(pathlib.Path(source), progress)[1]
+
+
+def repair(
+    source: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    progress: Callable[[float], None] | None = None,
+) -> Repair:
+    """Write every message that can be read into a new bag.
+
+    Parameters
+    ----------
+    source : path
+        Folder of a bag, with or without its metadata, or one MCAP file. It is not changed.
+    folder : path
+        Folder of the new bag, which must not exist.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    BagError
+        When there is no MCAP file, no message can be read, a topic has two types, the new bag
+        exists, or the disk is full.
+    """
+    source = pathlib.Path(source)
+    files, found = _examine(source, None)
+    if not found.messages:
+        raise BagError(f'{source}: none of its messages can be read')
+    done = 0
+    with BagWriter(folder, _custom_data(source)) as writer:
+        for name, (channel, schema) in _topics(source, files).items():
+            writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
+        for file in files:
+            for record in _records(file.path, Repair()):
+                if isinstance(record, Message) and record.channel_id in file.channels:
+                    topic = file.channels[record.channel_id].topic
+                    writer.write(topic, record.data, record.log_time, record.publish_time)
+                    done += 1
+                    if progress:
+                        progress(done / found.messages)
+        writer.close({KEY: json.dumps({'source': source.name} | asdict(found))})
+    return found
+
+
+def _files(source: pathlib.Path) -> list[pathlib.Path]:
+    """Return the MCAP files in the order of their numbers; metadata may be missing or wrong."""
+    if source.is_file():
+        return [source]
+    if not source.is_dir():
+        raise BagError(f'{source}: no such bag')
+
+    def number(path: pathlib.Path) -> tuple[int, str]:
+        found = re.search(r'_(\d+)$', path.stem)
+        return int(found[1]) if found else -1, path.name
+
+    files = sorted(source.glob('*.mcap'), key=number)
+    if not files:
+        raise BagError(f'{source}: has no MCAP file: only MCAP files can be repaired')
+    return files
+
+
+def _examine(
+    source: pathlib.Path, progress: Callable[[float], None] | None
+) -> tuple[list[_File], Repair]:
+    """Return all files with their topics, and the findings.
+
+    This reads all files once, because the topic of a message may be declared after the message.
+    """
+    files = [_File(path) for path in _files(source)]
+    total = Repair()
+    for place, file in enumerate(files):
+        counts: Counter[int] = Counter()
+        for record in _records(file.path, total):
+            match record:
+                case Schema():
+                    file.schemas[record.id] = record
+                case Channel():
+                    file.channels[record.id] = record
+                case Message():
+                    counts[record.channel_id] += 1
+        known = sum(count for channel, count in counts.items() if channel in file.channels)
+        total.messages += known
+        total.lost_messages += counts.total() - known
+        if progress:
+            progress((place + 1) / len(files))
+    total.described = _described(source, files, total.messages)
+    return files, total
+
+
+def _topics(source: pathlib.Path, files: list[_File]) -> dict[str, tuple[Channel, Schema]]:
+    """Return channel and message type of each topic in all files."""
+    topics: dict[str, tuple[Channel, Schema]] = {}
+    for file in files:
+        for channel in file.channels.values():
+            none = Schema(id=0, name='', encoding='', data=b'')
+            schema = file.schemas.get(channel.schema_id, none)
+            _, known = topics.setdefault(channel.topic, (channel, schema))
+            if known.name != schema.name:
+                raise BagError(
+                    f'{source}: topic {channel.topic} has the message types {known.name} and'
+                    f' {schema.name}: a repaired bag can have only one'
+                )
+    return topics
+
+
+def _information(source: pathlib.Path) -> dict[str, Any]:
+    """Return the metadata of a bag; empty when it is missing or damaged."""
+    try:
+        return metadata.read(source)
+    except BagError:
+        return {}
+
+
+def _described(source: pathlib.Path, files: list[_File], messages: int) -> bool:
+    """Return whether the metadata names these files and this number of messages."""
+    information = _information(source)
+    try:
+        names = {pathlib.PurePath(name).name for name in information['relative_file_paths']}
+    except (KeyError, TypeError):
+        return False
+    return (
+        names == {file.path.name for file in files}
+        and information.get('message_count') == messages
+    )
+
+
+def _custom_data(source: pathlib.Path) -> dict[str, str]:
+    """Return the custom data of the broken bag, if that can be read."""
+    data = _information(source).get('custom_data')
+    return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
+
+
+def _records(path: pathlib.Path, found: Repair) -> Iterator[McapRecord]:
+    """Yield the records of a file, also those in chunks, and count the damage in `found`."""
+    with path.open('rb') as stream:
+        reached = 0
+        closed = False
+        reader = StreamReader(stream, emit_chunks=True, record_size_limit=_RECORD_SIZE_LIMIT)
+        records = iter(reader.records)
+        with contextlib.suppress(Exception):  # damaged bytes can raise any exception
+            while (record := next(records, None)) is not None:
+                reached = stream.tell()
+                closed = closed or isinstance(record, Footer)
+                yield from _opened(record, found)
+        if not closed:
+            found.closed = False
+            found.unread_bytes += path.stat().st_size - reached
+
+
+def _opened(record: McapRecord, found: Repair) -> list[McapRecord]:
+    if not isinstance(record, Chunk):
+        return [record]
+    try:
+        return breakup_chunk(record, validate_crc=True)
+    except Exception:  # each decompressor raises another exception type
+        found.damaged_chunks += 1
+        return []

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Policies that choose flat or dome for the next step of a foot that lifts off."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ros_pad.configuration import Setting
+from ros_pad.configuration import number
+from ros_pad.control.probing import Plan
+from ros_pad.errors import InvalidInput
+
+FLAT = 'flat'
+DOME = 'dome'
+
+
+@dataclass(frozen=True)
+class LiftOff:
+    """Inputs of a policy when a foot lifts off.
+
+    Attributes
+    ----------
+    leg : int
+        Number of the leg.
+    morphology : str
+        Morphology of the step that ends, ``flat`` or ``dome``.
+    steps : float
+        Number of steps with that morphology, including the one that ends; infinite before the
+        first change.
+    probing : bool
+        Whether that step was a probe or a dome test.
+    wet_ahead : float
+        Probability that the ground is wet where the foot will stand next, 0 to 1.
+    next_position : tuple of float
+        Position where the foot will stand next, x and y, m.
+    others_probing : bool
+        Whether another leg is in a probe or a dome test now.
+    wet_expected : float
+        The same probability as `wet_ahead`, but far from footprints it approaches the wet share,
+        not the prior.
+    plan : Plan
+        Plan of probes and dome tests.
+    """
+
+    leg: int
+    morphology: str
+    steps: float
+    probing: bool
+    wet_ahead: float
+    next_position: tuple[float, float]
+    others_probing: bool
+    wet_expected: float
+    plan: Plan
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Morphology of the next step, and whether that step is a probe or a dome test."""
+
+    morphology: str
+    probe: bool = False
+
+
+Policy = Callable[[LiftOff], Choice]
+
+IsWet = Callable[[float, float], bool]
+"""Function that returns whether the ground is wet at x and y, m."""
+
+PROBING = ('value', 'count', 'threshold')
+"""Methods of planning the probes of :func:`adaptive`."""
+
+SETTINGS = (
+    Setting(
+        'policy.wet_above', 0.65,
+        'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome.',
+        '', 0.0, 1.0,
+    ),
+    Setting(
+        'policy.dry_below', 0.35,
+        'Adaptive policy: probability of wet ground ahead below which a foot becomes flat; at most'
+        ' policy.wet_above.',
+        '', 0.0, 1.0,
+    ),
+    Setting(
+        'policy.probe_below', 0.75,
+        'Adaptive policy: probability of wet ground ahead below which a domed foot probes, if'
+        ' policy.probing is threshold.',
+        '', 0.0, 1.0,
+    ),
+    Setting(
+        'policy.dwell', 2, 'Adaptive policy: steps for which a morphology is kept at least.',
+        'steps', 1, 1000,
+    ),
+    Setting(
+        'policy.probing', 'value',
+        'Adaptive policy: whether probes are planned by their value, by a count of steps, or by a'
+        ' threshold of the probability.',
+        choices=PROBING,
+    ),
+    Setting(
+        'policy.probe_every', 20,
+        'Adaptive policy: steps as a dome after which a foot probes, if policy.probing is count.',
+        'steps', 1, 100000,
+    ),
+)  # fmt: skip
+"""The settings of :func:`adaptive`, each named ``policy.`` and its argument."""
+
+PREFIX = 'policy.'
+_DEFAULTS = {each.name.removeprefix(PREFIX): each.default for each in SETTINGS}
+
+
+def flat(step: LiftOff) -> Choice:
+    """Choose flat at every step."""
+    return Choice(FLAT)
+
+
+def dome(step: LiftOff) -> Choice:
+    """Choose dome at every step."""
+    return Choice(DOME)
+
+
+def adaptive(
+    wet_above: float = _DEFAULTS['wet_above'],
+    dry_below: float = _DEFAULTS['dry_below'],
+    probe_below: float = _DEFAULTS['probe_below'],
+    dwell: int = _DEFAULTS['dwell'],
+    probing: str = _DEFAULTS['probing'],
+    probe_every: int = _DEFAULTS['probe_every'],
+) -> Policy:
+    """Return a policy that follows the probability of wet ground, with hysteresis and probes.
+
+    The friction of a dome hardly depends on whether the ground is wet, so under domes the estimate
+    only fades: without probes, feet would stay domes for ever after the first wet ground. A probe
+    is one flat step of a foot that is otherwise a dome. One leg probes at a time.
+
+    Parameters
+    ----------
+    wet_above, dry_below : float
+        Probabilities of wet ground ahead, 0 to 1, above which a foot becomes a dome and below
+        which it becomes flat again.
+    probe_below : float
+        Probability, 0 to 1, below which a domed foot probes, if ``probing`` is ``threshold``.
+    dwell : int
+        Steps for which a morphology is kept at least, except in probes and dome tests.
+    probing : str
+        How probes are planned. ``value``: by their cost and gain measured on this walk, see
+        :class:`ros_pad.control.probing.Planner`; feet then also stay domes where flat feet gain
+        nothing. Two baselines measure neither: with ``count`` a foot probes after ``probe_every``
+        steps, with ``threshold`` when the probability is below ``probe_below``.
+    probe_every : int
+        Steps as a dome after which a foot probes, if ``probing`` is ``count``.
+
+    Raises
+    ------
+    InvalidInput
+        For a probability outside 0 to 1, ``dry_below`` above ``wet_above``, ``dwell`` or
+        ``probe_every`` outside their ranges, or an unknown method of ``probing``.
+    """
+    given = (wet_above, dry_below, probe_below, dwell, probing, probe_every)
+    for setting, value in zip(SETTINGS, given, strict=True):
+        setting.accept(value)
+    number('policy.dry_below', dry_below, '', high=wet_above)
+
+    def choose(step: LiftOff) -> Choice:
+        if probing == 'value':
+            wet, plan, due = step.wet_expected, step.plan, step.plan.probe
+        else:
+            wet, plan = step.wet_ahead, Plan()
+            due = step.steps >= probe_every if probing == 'count' else wet < probe_below
+        settled = step.probing or step.steps >= dwell
+        if step.morphology == FLAT:
+            if settled and (wet > wet_above or not plan.flat_pays):
+                return Choice(DOME)
+            if settled and plan.trial and wet < dry_below:
+                return Choice(DOME, probe=True)
+            return Choice(FLAT)
+        if settled and wet < dry_below and plan.flat_pays:
+            return Choice(FLAT)
+        if settled and due and not step.others_probing:
+            return Choice(FLAT, probe=True)
+        return Choice(DOME)
+
+    return choose
+
+
+def oracle(is_wet: IsWet) -> Policy:
+    """Return a policy that chooses by the true ground at the foot's next position.
+
+    Parameters
+    ----------
+    is_wet : callable
+        Function of x and y, m, that returns whether the ground is wet there.
+    """
+
+    def choose(step: LiftOff) -> Choice:
+        return Choice(DOME if is_wet(*step.next_position) else FLAT)
+
+    return choose
+
+
+def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
+    """Return the morphology that each leg starts with under a policy.
+
+    With the adaptive policy the first and the last leg, one of each tripod, start flat to measure
+    the ground; the others start as domes. On an unknown floor, six flat feet lose more on wet
+    ground than six domes on dry ground, and two flat feet are enough to estimate the ground.
+
+    Parameters
+    ----------
+    policy : str
+        Name of a policy, see :data:`POLICIES`.
+    legs : sequence of int
+        Numbers of the legs, in their order about the body.
+    """
+    if policy == 'adaptive':
+        return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
+    return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)
+
+
+POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
+
+POLICY_PARAMETERS = tuple(_DEFAULTS)
+"""Names of the parameters of the adaptive policy."""
+
+
+def policy_named(
+    name: str,
+    is_wet: IsWet | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Policy:
+    """Return a policy by its name.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`POLICIES`.
+    is_wet : callable or None
+        Function that returns whether the ground is wet at x and y, m; only ``oracle`` needs it.
+    parameters : mapping or None
+        Arguments of :func:`adaptive` by name; the other policies have none.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown name, an oracle without ``is_wet``, or a parameter that the policy does not
+        have or that is outside its range.
+    """
+    if parameters and name != 'adaptive':
+        raise InvalidInput(
+            f'policy = {name!r} has no parameters, but {", ".join(parameters)} was given:'
+            ' only the adaptive policy has parameters'
+        )
+    for parameter in parameters or ():
+        if parameter not in POLICY_PARAMETERS:
+            near = difflib.get_close_matches(parameter, POLICY_PARAMETERS, n=1)
+            hint = f' Did you mean {near[0]!r}?' if near else ''
+            raise InvalidInput(
+                f'the adaptive policy has no parameter {parameter!r}.{hint}'
+                f' Allowed: {", ".join(POLICY_PARAMETERS)}'
+            )
+    if name == 'oracle':
+        if is_wet is None:
+            raise InvalidInput("policy = 'oracle' needs the map of the floor (is_wet)")
+        return oracle(is_wet)
+    policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive(**(parameters or {}))}
+    if name not in policies:
+        raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
+    return policies[name]

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimation stage of one foot: pair its samples, and emit estimates at a given rate.
+
+The estimator node, the loop without ROS and replay use the same class.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ros_pad.configuration import Setting
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation.foot import Estimate
+from ros_pad.estimation.foot import FootEstimator
+from ros_pad.pace import CONTROL_PERIOD_NS
+from ros_pad.pace import Pace
+
+PUBLISH_RATE = Setting(
+    'publish_rate', 1e9 / CONTROL_PERIOD_NS, 'Estimates a second.', 'Hz', 5.0, 1000.0
+)
+
+SILENCE = 0.4
+"""Time without a sample after which the sensors of a foot count as faulty, s."""
+
+LARGEST_FORCE = 1e5
+LARGEST_POSITION = 1e6
+LARGEST_PRESSURE = 1e7
+LARGEST_MOMENT = 1e5
+"""Largest sizes of sensor values: force, N, position, m, gauge pressure, Pa, and moment, N m. A
+larger value, though finite, would spoil sums and means for ever."""
+
+Vector = tuple[float, float, float]
+
+
+class EstimationStage:
+    """Pair the wrenches of a foot with its positions, and emit the estimates.
+
+    A wrench is paired with the position of the same time stamp, whichever arrives first. If the
+    next wrench arrives before such a position, the last position is used instead.
+
+    Parameters
+    ----------
+    estimator : FootEstimator
+        Estimator of the foot.
+    period_ns : int
+        Period of the emitted estimates, ns.
+    emit : callable
+        Called once a period with the time stamp of the wrench, ns, and the estimate.
+    emit_doubt : callable
+        Called with the doubt of the foot when the kind of the doubt has changed, before the
+        estimate of the same sample.
+    reject : callable
+        Called with the error when a sample is rejected; the sample is not used.
+
+    Attributes
+    ----------
+    estimator : FootEstimator
+        Estimator of the foot, as given.
+    samples : int
+        Number of samples used so far.
+    doubt : str or None
+        Doubt emitted last, with the present details after the colon; None before the first sample.
+    sound : bool
+        Whether the sensors can be used.
+    """
+
+    def __init__(
+        self,
+        estimator: FootEstimator,
+        period_ns: int,
+        emit: Callable[[int, Estimate], None],
+        emit_doubt: Callable[[str], None],
+        reject: Callable[[InvalidInput], None],
+    ) -> None:
+        self.estimator = estimator
+        self._pace = Pace(period_ns)
+        self._moments = estimator.tuning.moment_noise > 0.0
+        self._emit, self._emit_doubt, self._reject = emit, emit_doubt, reject
+        self._pressure = 0.0
+        self._wrench: tuple[int, Vector, float | None] | None = None
+        self._position: tuple[int, Vector] | None = None
+        self._used: tuple[int, Vector] | None = None  # position of the last sample
+        self._used_ns = 0  # stamp of the wrench with which that position was first used
+        self._silent_since_ns: int | None = None
+        self._rejection = ''
+        self.samples = 0
+        self.doubt: str | None = None
+        self.sound = True
+
+    def pressure(self, gauge: float) -> None:
+        """Store a gauge pressure of the pads, Pa; ignore NaN and values beyond 1e7 Pa."""
+        if abs(gauge) <= LARGEST_PRESSURE:
+            self._pressure = gauge
+
+    def wrench(self, stamp_ns: int, force: Vector, moment: float | None) -> None:
+        """Process a wrench: time stamp, ns, force, N, and torque z, N m, None if not measured."""
+        if self._wrench is not None and self._position is not None:
+            # No position came for the last wrench: the marker is hidden or sampled more slowly.
+            self._update(self._wrench, self._position)
+        self._wrench = stamp_ns, force, moment if self._moments else None
+        if self._position is not None and self._position[0] == stamp_ns:
+            self._update(self._wrench, self._position)
+
+    def position(self, stamp_ns: int, point: Vector) -> None:
+        """Process a position of the marker: its time stamp, ns, and coordinates, m."""
+        # Some motion capture systems send NaN for a hidden marker: keep the last position.
+        if math.isfinite(point[0] + point[1] + point[2]):
+            self._position = stamp_ns, point
+        wrench, position = self._wrench, self._position
+        if wrench is not None and position is not None and wrench[0] == stamp_ns:
+            self._update(wrench, position)
+
+    def _update(
+        self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
+    ) -> None:
+        """Process a sample."""
+        self._wrench = None
+        stamp_ns, force, moment = wrench
+        if position is not self._used:
+            # The position's own stamp may come from another clock.
+            self._used, self._used_ns = position, stamp_ns
+        try:
+            _check_sizes(force, position[1], moment)
+            estimate = self.estimator.update(
+                stamp_ns * 1e-9,
+                force,
+                position[1],
+                self._pressure,
+                moment,
+                self._used_ns * 1e-9,
+            )
+        except InvalidInput as error:
+            self.reject(error)
+            return
+        self.samples += 1
+        self._silent_since_ns, self._rejection = None, ''
+        self._update_doubt(estimate.doubt, estimate.sound)
+        if self._pace.due(stamp_ns):
+            self._emit(stamp_ns, estimate)
+
+    def reject(self, error: InvalidInput) -> None:
+        """Report a rejected sample; its error becomes the doubt if no sample follows for long."""
+        self._rejection = str(error)
+        self._reject(error)
+
+    def _update_doubt(self, doubt: str, sound: bool) -> None:
+        before = self.doubt
+        self.doubt, self.sound = doubt, sound
+        # Details, after the colon, may change with every sample.
+        if doubt != before and (
+            before is None or doubt.partition(':')[0] != before.partition(':')[0]
+        ):
+            self._emit_doubt(doubt)
+
+    def tick(self, now_ns: int) -> None:
+        """Check at a time, ns, whether samples are missing; call it every `TICK_PERIOD_NS`."""
+        if self._silent_since_ns is None:
+            self._silent_since_ns = now_ns
+        silence = (now_ns - self._silent_since_ns) * 1e-9
+        if silence > SILENCE:
+            self._update_doubt(self._missing(silence), False)
+
+    def _missing(self, silence: float) -> str:
+        if self._rejection:
+            return f'sample refused: {self._rejection}'
+        if self._position is None and self._wrench is not None:
+            return f'no position: for {silence:.1f} s'
+        return f'no wrench: for {silence:.1f} s'
+
+
+def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
+    """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
+    (fx, fy, fz), (x, y, z) = force, point
+    if abs(fx) + abs(fy) + abs(fz) > LARGEST_FORCE:
+        _check_size('force', force, LARGEST_FORCE, 'N')
+    if abs(x) + abs(y) + abs(z) > LARGEST_POSITION:
+        _check_size('position', point, LARGEST_POSITION, 'm')
+    if moment is not None:
+        _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')
+
+
+def _check_size(name: str, values: tuple[float, ...], largest: float, unit: str) -> None:
+    """Refuse finite numbers that are larger than ``largest`` in size."""
+    for value in values:
+        if largest < abs(value) < math.inf:
+            raise InvalidInput(
+                f'{name} = {value!r} {unit} is not allowed: a number from {-largest:g} to'
+                f' {largest:g} {unit} is needed'
+            )

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of an estimator: one table for Python, ROS parameters, sweeps and replays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ros_pad.configuration import Setting
+from ros_pad.contact.resistance import Foot
+from ros_pad.estimation.alarm import THRESHOLD
+from ros_pad.estimation.load_gate import CONTACT_SHARE
+
+EXPECTED_LOAD = Setting(
+    'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',
+    'N', 0.01, 1000.0,
+)  # fmt: skip
+
+SETTINGS = (
+    Setting(
+        'position_noise', 1.5e-4,
+        'Standard deviation of a marker coordinate; 0: readings may repeat.', 'm', 0.0, 0.1,
+    ),
+    Setting(
+        'force_noise', 0.03,
+        'Standard deviation of a force component; 0: readings may repeat.', 'N', 0.0, 100.0,
+    ),
+    Setting(
+        'moment_noise', 0.0,
+        'Standard deviation of the torque z of a wrench; 0: the sensors do not measure it.',
+        'N m', 0.0, 10.0,
+    ),
+    Setting(
+        'force_range', 0.0,
+        'Largest component of force that a sensor can show; 0: not known.', 'N', 0.0, 1e5,
+    ),
+    Setting(
+        'load_gate', CONTACT_SHARE, 'Share of the expected load above which a foot stands.',
+        '', 0.001, 1.0,
+    ),
+    Setting('smoothing', 0.02, 'Time constant of the slip speed.', 's', 0.001, 10.0),
+    Setting(
+        'filter_period', 0.04, 'Time between updates of the wetness and friction filter.',
+        's', 0.001, 10.0,
+    ),
+    Setting(
+        'patch_length', 1.5, 'Distance over which wet and dry ground change.', 'm', 0.01, 100.0,
+    ),
+    Setting(
+        'wet_prior', 0.5, 'Prior probability of wet ground.', '', 0.01, 0.99,
+    ),
+    Setting(
+        'ratio_noise', 0.03, 'Model error of T/N, added to that of the sensors.', '', 1e-4, 10.0,
+    ),
+    Setting(
+        'speed_noise', 2e-3,
+        'Model error of the slip speed, added to that of the sensors: feet also roll and bend.',
+        'm/s', 1e-6, 1.0,
+    ),
+    Setting(
+        'turning_rate', 4.0,
+        'Root mean square of the rate at which a standing foot turns about the vertical; for legs'
+        ' without an ankle, the speed of the body over the length of the leg.',
+        'rad/s', 0.0, 100.0,
+    ),
+    Setting(
+        'alarm.threshold', THRESHOLD,
+        'Threshold of the slip alarm: on average at least exp(threshold) samples lie between false'
+        ' alarms.',
+        'nats', 0.1, 100.0,
+    ),
+)  # fmt: skip
+"""Settings of an estimator; an attribute of :class:`Tuning` has ``_`` in place of a dot."""
+
+_DEFAULTS = {each.name: each.default for each in SETTINGS}
+
+
+def attribute(setting: Setting) -> str:
+    """Return the attribute of :class:`Tuning` that holds a setting."""
+    return setting.name.replace('.', '_')
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Settings of an estimator for robot, sensors and ground.
+
+    Attributes, their units, ranges and meanings are those of :data:`SETTINGS`.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is outside its range; the message names it.
+    """
+
+    position_noise: float = _DEFAULTS['position_noise']
+    force_noise: float = _DEFAULTS['force_noise']
+    moment_noise: float = _DEFAULTS['moment_noise']
+    force_range: float = _DEFAULTS['force_range']
+    load_gate: float = _DEFAULTS['load_gate']
+    smoothing: float = _DEFAULTS['smoothing']
+    filter_period: float = _DEFAULTS['filter_period']
+    wet_prior: float = _DEFAULTS['wet_prior']
+    patch_length: float = _DEFAULTS['patch_length']
+    ratio_noise: float = _DEFAULTS['ratio_noise']
+    speed_noise: float = _DEFAULTS['speed_noise']
+    turning_rate: float = _DEFAULTS['turning_rate']
+    alarm_threshold: float = _DEFAULTS['alarm.threshold']
+
+    def __post_init__(self) -> None:
+        for setting in SETTINGS:
+            setting.accept(getattr(self, attribute(setting)))
+
+    def rim_speed(self, foot: Foot) -> float:
+        """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius, m/s."""
+        return foot.turning_radius * self.turning_rate

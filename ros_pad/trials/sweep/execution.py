@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Run the trials of a sweep by the same code on a pool of processes or on a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Generator
+from collections.abc import Iterable
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED
+from concurrent.futures import CancelledError
+from concurrent.futures import Executor
+from concurrent.futures import Future
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager
+from contextlib import ExitStack
+from contextlib import closing
+from contextlib import contextmanager
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+from typing import TypeAlias
+
+import ros_pad
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
+from ros_pad.pace import Progress
+from ros_pad.trials import loop
+from ros_pad.trials.sweep.plan import Job
+from ros_pad.trials.sweep.plan import Row
+from ros_pad.trials.sweep.plan import Sweep
+from ros_pad.trials.sweep.table import Results
+from ros_pad.trials.sweep.table import columns_of
+from ros_pad.trials.sweep.table import identity
+from ros_pad.trials.sweep.table import write_tables
+
+PATIENCE = 20.0  # s, longest wait for a Dask scheduler or its first worker
+CLUSTER_JOBS = 1000  # trials submitted to a Dask cluster at the same time
+
+Finished: TypeAlias = 'Generator[tuple[Job, Row], None, None]'
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Processes or cluster on which trials run.
+
+    Attributes
+    ----------
+    executor : callable
+        Opens an executor of ``concurrent.futures``.
+    jobs : int
+        Number of trials that are submitted to it at the same time.
+    """
+
+    executor: Callable[[], AbstractContextManager[Executor]]
+    jobs: int
+
+
+def run(
+    sweep: Sweep,
+    folder: str | os.PathLike[str],
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    retry: bool = False,
+) -> list[Row]:
+    """Run the trials that are not finished yet, store their rows in a folder, and return all rows.
+
+    A script needs ``if __name__ == '__main__':`` before this call, as for every pool of processes.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Sweep to run.
+    folder : path
+        A new folder, or the folder of this sweep or of a part of it, which then continues.
+    workers : int or None
+        Number of processes, from 1; None is one for each core.
+    scheduler : str or None
+        Address of a Dask scheduler, such as ``tcp://host:8786``; its cluster is used instead of
+        processes.
+    progress : callable or None
+        Called with the number of finished trials.
+    retry : bool
+        Whether trials that failed before run again.
+
+    Returns
+    -------
+    list of dict
+        One row for each trial, in the order of the sweep. Except for the real-time factor, the
+        rows do not depend on the workers.
+
+    Raises
+    ------
+    ConfigError, InvalidInput
+        When an argument is not allowed, or the folder holds something else; no trial runs then.
+    PadError
+        When Dask is missing, its cluster does not answer or has another version of ros_pad, or
+        another sweep is running in the folder.
+    """
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise InvalidInput(f'workers = {workers!r}: a whole number from 1 is needed')
+    jobs = {job.key: job for job in sweep.jobs()}
+    with ExitStack() as stack:
+        if scheduler is None:
+            used = _processes(workers or _cores())
+        else:
+            used = stack.enter_context(_cluster(scheduler))
+        results = stack.enter_context(Results(folder, identity(sweep), jobs))
+        if retry:
+            results.forget_failures()
+        missing = [job for key, job in jobs.items() if key not in results]
+        try:
+            if progress:
+                progress(len(results))
+            with closing(finished(missing, used)) as rows:
+                for job, row in rows:
+                    results.add(job.key, row)
+                    if progress:
+                        progress(len(results))
+        finally:
+            table = results.rows(jobs)
+            write_tables(table, results.folder)
+        return table
+
+
+def run_job(job: Job) -> Row:
+    """Run one trial and return its row; if the trial fails, the row has its error."""
+    try:
+        trial = loop.run(
+            job.scene,
+            job.policy,
+            job.seed,
+            job.level,
+            tuning=job.tuning,
+            policy_parameters=job.policy_parameters,
+        )
+    except Exception as error:  # the other trials continue after any error
+        return job.failed(f'{type(error).__name__}: {error}')
+    return job.labels | columns_of(trial)
+
+
+def finished(jobs: Iterable[Job], workers: Workers) -> Finished:
+    """Yield jobs with their rows as they finish.
+
+    A process that dies (for lack of memory, for example) breaks its whole pool. The trials of this
+    pool run again, each alone in a pool; a trial whose process dies again has failed.
+    """
+    left = deque(jobs)
+    while left:
+        suspects = yield from _until_broken(left, workers)
+        for job in suspects:
+            if (yield from _until_broken(deque([job]), workers)):
+                yield job, job.failed('its process died, possibly for lack of memory')
+
+
+def _until_broken(
+    left: deque[Job], workers: Workers
+) -> Generator[tuple[Job, Row], None, list[Job]]:
+    """Run the remaining jobs; if the executor breaks, return the jobs that it had accepted."""
+    running: dict[Future[Row], Job] = {}
+    with workers.executor() as executor:
+        try:
+            while left or running:
+                while left and len(running) < workers.jobs:
+                    running[executor.submit(run_job, left[0])] = left[0]
+                    left.popleft()
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    row = _row(running[future], future)
+                    yield running.pop(future), row
+        except BrokenProcessPool:
+            return list(running.values())
+    return []
+
+
+def _row(job: Job, future: Future[Row]) -> Row:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        raise
+    except CancelledError as error:
+        raise PadError(f'the connection to the Dask scheduler was lost: {error}') from error
+    except Exception as error:  # for example a job that killed several workers of a cluster
+        return job.failed(f'{type(error).__name__}: {error}')
+
+
+# --- on the cores of this machine ---------------------------------------------------------------
+
+
+def _processes(count: int) -> Workers:
+    # Twice as many jobs as processes, so that no process waits for work.
+    return Workers(lambda: _pool(count), 2 * count)
+
+
+@contextmanager
+def _pool(count: int) -> Iterator[Executor]:
+    context = multiprocessing.get_context('spawn')
+    alive, parent = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, _start_worker, (alive,))
+    try:
+        yield pool
+    finally:
+        parent.close()  # ends workers that still run
+        pool.shutdown(cancel_futures=True)
+        alive.close()
+
+
+def _start_worker(alive: Connection) -> None:
+    # Ctrl-C in a terminal reaches all processes; only the first process shall act on it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
+
+
+def _end_with_parent(alive: Connection) -> None:
+    """End this process when the first process closes its end of a pipe, or is killed."""
+    with suppress(EOFError, OSError):
+        alive.recv_bytes()
+    os._exit(1)
+
+
+def _cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, 'sched_getaffinity'):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+# --- on a Dask cluster --------------------------------------------------------------------------
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Workers]:
+    """Connect to a Dask scheduler; refuse workers with another version of ros_pad."""
+    try:
+        import distributed
+    except ModuleNotFoundError as error:
+        raise PadError(f'Dask is not installed ({error}): pip install "ros_pad[sweep]"') from error
+    try:
+        client = distributed.Client(address, timeout=PATIENCE)
+    except (OSError, ValueError) as error:
+        raise PadError(f'cannot connect to scheduler {address}: {error}') from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+            versions = client.run(_version)
+        except TimeoutError as error:
+            raise PadError(
+                f'scheduler {address}: no worker after {PATIENCE:g} s: start dask worker {address}'
+            ) from error
+        except ImportError as error:
+            raise PadError(
+                f'workers of {address} need ros_pad {_version()}, install it there: {error}'
+            ) from error
+        for worker, theirs in versions.items():
+            if theirs != _version():
+                raise PadError(
+                    f'worker {worker} has ros_pad {theirs}: {_version()} is needed, as here'
+                )
+        yield Workers(lambda: _on_client(client), CLUSTER_JOBS)
+
+
+@contextmanager
+def _on_client(client: Any) -> Iterator[Executor]:
+    """Open an executor of a cluster; Dask itself repeats the jobs of a lost worker."""
+    executor = client.get_executor(pure=False)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False)
+
+
+def _version() -> str:
+    """Return the version of ros_pad, here or on a worker of a cluster."""
+    return ros_pad.__version__

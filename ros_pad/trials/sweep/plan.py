@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The plan of a sweep: its trials, checked before any of them runs."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import json
+import os
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import replace
+from typing import Any
+from typing import TypeAlias
+
+import yaml
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.control import POLICIES
+from ros_pad.control import policy_named
+from ros_pad.control.policies import PREFIX
+from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation import SETTINGS
+from ros_pad.estimation import Tuning
+from ros_pad.estimation.tuning import attribute
+from ros_pad.simulation import fidelity as levels
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.node_settings import tuning_for
+
+_ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
+_POLICY = [each.name for each in POLICY_SETTINGS]
+LARGEST_SEED = 2**31 - 1
+
+Value: TypeAlias = 'float | int | bool | str'
+Row: TypeAlias = 'dict[str, Any]'
+
+
+@dataclass(frozen=True)
+class Job:
+    """One trial of a sweep, with everything that a process on another machine needs to run it.
+
+    Attributes
+    ----------
+    labels : dict
+        Scene, policy, seed and parameters, which identify the trial; first columns of its row.
+    scene : Scene
+        Scene with the parameters of this trial.
+    policy, level : str
+        Policy and fidelity level.
+    seed : int
+        Seed of floor and noise.
+    tuning : Tuning
+        Tuning of the estimators.
+    policy_parameters : dict
+        Parameters of the adaptive policy.
+    """
+
+    labels: Row
+    scene: Scene
+    policy: str
+    seed: int
+    level: str
+    tuning: Tuning
+    policy_parameters: dict[str, Any]
+
+    @property
+    def key(self) -> str:
+        """Text that identifies this trial within its sweep."""
+        return json.dumps(self.labels, sort_keys=True)
+
+    def failed(self, error: object) -> Row:
+        """Return the row that has an error in place of the metrics of this trial."""
+        return self.labels | {'level': self.level, 'error': str(error)}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Every combination of scenes, policies, seeds and parameters.
+
+    Attributes
+    ----------
+    scenes : sequence of str
+        Names of scenes, or paths of YAML files.
+    policies : sequence of str
+        ``flat``, ``dome``, ``adaptive``, ``oracle``; if empty, each scene's own policy.
+    seeds : sequence of int
+        Seeds of floor and noise, 0 to 2147483647.
+    parameters : mapping
+        Values by name: a parameter of the estimator node (``wet_prior``), one of the adaptive
+        policy (``policy.dwell``), or a key of the scenes' YAML (``tow.weight``). Policies other
+        than adaptive have no parameters: their trials run only once, with None for the values of
+        ``policy.*``.
+    fidelity : str
+        ``auto`` or a fidelity level.
+
+    Raises
+    ------
+    InvalidInput
+        When scenes, seeds or the values of a parameter are empty, a value is given twice, a policy
+        is unknown, or a seed or name is not allowed.
+    """
+
+    scenes: Sequence[str]
+    policies: Sequence[str] = ()
+    seeds: Sequence[int] = (0, 1, 2, 3, 4)
+    parameters: Mapping[str, Sequence[Value]] = field(default_factory=dict)
+    fidelity: str = 'auto'
+
+    def __post_init__(self) -> None:
+        axes = {'scene': self.scenes, 'policy': self.policies, 'seed': self.seeds}
+        for name, values in (*axes.items(), *self.parameters.items()):
+            if not values and name != 'policy':
+                raise InvalidInput(f'{name}: at least one value is needed')
+            for place, value in enumerate(values):
+                if value in values[:place]:
+                    raise InvalidInput(f'{name} = {value!r} is given twice')
+        for policy in self.policies:
+            if policy not in POLICIES:
+                raise InvalidInput(f'policy = {policy!r}: one of {", ".join(POLICIES)} is needed')
+        for seed in self.seeds:
+            whole = isinstance(seed, int) and not isinstance(seed, bool)
+            if not whole or not 0 <= seed <= LARGEST_SEED:
+                raise InvalidInput(
+                    f'seed = {seed!r}: a whole number from 0 to {LARGEST_SEED} is needed'
+                )
+        for name in self.parameters:
+            _check_name(name)
+
+    def jobs(self) -> list[Job]:
+        """Return the trials, in order, each checked as far as is possible without running it.
+
+        Raises
+        ------
+        ConfigError, InvalidInput
+            When a value is not allowed; the message names it, its parameter and what is allowed.
+        """
+        found: dict[str, Job] = {}
+        for source, values in itertools.product(self.scenes, self._combinations()):
+            of_policy = {name: value for name, value in values.items() if name in _POLICY}
+            of_estimator = {name: value for name, value in values.items() if name in _ESTIMATOR}
+            scene = scene_with(
+                source, {n: v for n, v in values.items() if n not in {*of_policy, *of_estimator}}
+            )
+            tuning = _tuning(scene, of_estimator)
+            for policy in self.policies or (scene.policy,):
+                labels: dict[str, Value | None] = dict(values)
+                parameters: dict[str, Any] = {}
+                if policy == 'adaptive':
+                    parameters = {n.removeprefix(PREFIX): v for n, v in of_policy.items()}
+                    with _errors_naming(of_policy):
+                        policy_named(policy, None, parameters)
+                else:
+                    labels |= dict.fromkeys(of_policy)
+                level = levels.level(scene, self.fidelity, policy)
+                for seed in self.seeds:
+                    identity = {'scene': source, 'policy': policy, 'seed': seed} | labels
+                    job = Job(identity, scene, policy, seed, level, tuning, parameters)
+                    found.setdefault(job.key, job)
+        self._refuse_unused({job.policy for job in found.values()})
+        return list(found.values())
+
+    def _combinations(self) -> Iterator[dict[str, Value]]:
+        for values in itertools.product(*self.parameters.values()):
+            yield dict(zip(self.parameters, values, strict=True))
+
+    def _refuse_unused(self, policies: set[str]) -> None:
+        """Refuse parameters of the adaptive policy in a sweep without the adaptive policy."""
+        for name in self.parameters:
+            if name in _POLICY and 'adaptive' not in policies:
+                raise InvalidInput(
+                    f'parameter {name!r}: only adaptive has parameters, but the policies of this'
+                    f' sweep are {", ".join(sorted(policies))}'
+                )
+
+
+def _check_name(name: str) -> None:
+    """Refuse a misspelt parameter of a node; reading the scene refuses other unknown names."""
+    if name == 'policy':
+        raise InvalidInput("parameter 'policy' is not allowed: give policies with --policy")
+    head, _, leaf = name.rpartition('.')
+    near: list[str] = []
+    if name.startswith(PREFIX):
+        near = difflib.get_close_matches(name, _POLICY, n=1) or ['policy.dwell']
+    elif head in ('', 'estimator'):
+        near = difflib.get_close_matches(leaf, _ESTIMATOR, n=1, cutoff=0.85)
+    if near and name not in (*_ESTIMATOR, *_POLICY):
+        raise InvalidInput(
+            f'parameter {name!r} is unknown. Did you mean {near[0]!r}? Parameters of nodes are'
+            f' {", ".join([*_ESTIMATOR, *_POLICY])}'
+        )
+
+
+def _tuning(scene: Scene, values: Mapping[str, Value]) -> Tuning:
+    changes: dict[str, Any] = {_ESTIMATOR[name]: value for name, value in values.items()}
+    with _errors_naming(values):
+        return replace(tuning_for(scene), **changes)
+
+
+@contextmanager
+def _errors_naming(values: Mapping[str, Value]) -> Iterator[None]:
+    """Put parameters of the sweep before the message of an error that comes from them."""
+    try:
+        yield
+    except (ConfigError, InvalidInput) as error:
+        if not values:
+            raise
+        given = ', '.join(f'{name}={value}' for name, value in values.items())
+        raise type(error)(f'{given}: {error}') from error
+
+
+def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> Scene:
+    """Read a scene with changed values of some dotted keys of its YAML, such as ``tow.weight``.
+
+    Raises
+    ------
+    ConfigError
+        When :meth:`Scene.load` raises it, or when a name is below a key that has no keys below
+        it. The message names the changed values.
+    """
+    path = configuration.locate('scenes', source)
+    Table.load(path)  # reports errors of the file itself without naming the values
+    content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    with _errors_naming(values):
+        for name, value in values.items():
+            *folders, key = name.split('.')
+            place = content
+            for folder in folders:
+                place = place.setdefault(folder, {})
+                if not isinstance(place, dict):
+                    raise ConfigError(
+                        f'{path}: {folder} = {place!r} has no keys below it: {name} is unknown'
+                    )
+            place[key] = value
+        return Scene.read(Table(content, os.fspath(path)), os.fspath(source), path.stem)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Run one study: ``python -m studies NAME``, from a checkout of ros_pad."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+from ros_pad.commands.command import exit_status
+from studies import command
+
+STUDIES = {
+    'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
+    'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
+    'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
+    'walk': ('work_precision.walk.study', 'every fidelity level of a walk (1 min)'),
+    'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
+    'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
+    'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
+    'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
+    'hose': ('work_precision.hose', 'how long a pad takes to fill through a hose (1 min)'),
+    'bench': ('thesis.bench_command', 'one pad of the thesis beside its measurements (5 s)'),
+    'thesis': ('thesis.command', 'one page with all figures of the thesis (45 s)'),
+    'behaviour': ('closed_loop.behaviour', 'metrics of every scene, and what changed (5 min)'),
+    'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
+    'policies': ('closed_loop.policies', 'policies floor by floor, and slower gaits (30 min)'),
+    'fidelity': ('closed_loop.fidelity', 'errors of the fidelity levels by scene (30 min)'),
+    'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
+    'turning_feet': ('closed_loop.turning_feet', 'slip alarm from the rate of shanks (2 min)'),
+    'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
+    'lead_picture': ('closed_loop.lead_picture', 'the picture of the README (1 min)'),
+    'real_time': ('nodes.real_time', 'speed of a trial without ROS and on nodes (1 min)'),
+    'recorder': ('nodes.recorder', 'messages that the recorder takes, and their cost (1 min)'),
+    'regulators': ('nodes.regulators', 'time of commands and readings of drivers (1 min)'),
+    'soak': ('nodes.soak', 'an hour of the regulator node with faults (10 min)'),
+    'flood': ('nodes.flood', 'the regulator node under floods of messages (2 min)'),
+    'fuzz': ('nodes.fuzz', 'every parser against random input (needs atheris)'),
+}
+"""Module of each study in this package, and a line about it, with its duration on two cores if it
+is fixed."""
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the study that the first word names; return the exit status.
+
+    Without a word, with ``--help`` or with an unknown name, print the list of studies; the status
+    is 2 for an unknown name, else 0.
+    """
+    name, *rest = [*(sys.argv[1:] if words is None else words)] or ['--help']
+    if name not in STUDIES:
+        width = max(map(len, STUDIES))
+        rows = [f'  {study:{width}}  {text}' for study, (_, text) in STUDIES.items()]
+        print('usage: python -m studies NAME [--help]\n\n' + '\n'.join(rows))
+        return 0 if name in ('-h', '--help') else 2
+    return exit_status(lambda: _run(name, rest), f'studies {name}')
+
+
+def _run(name: str, words: Sequence[str]) -> int:
+    study = importlib.import_module(f'studies.{STUDIES[name][0]}')
+    if hasattr(study, 'main'):
+        return int(study.main(words))
+    return command.compare_methods(name, study, words)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

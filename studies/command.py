@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Common parts of all studies: options, progress, processes, files."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import json
+import pathlib
+import re
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import as_completed
+from dataclasses import asdict
+from types import ModuleType
+from typing import Any
+from typing import TypeVar
+
+from matplotlib.figure import Figure
+
+from ros_pad.commands.command import Help
+from ros_pad.commands.folder import new_folder
+from ros_pad.commands.progress import bar
+from ros_pad.reports.files import save
+from ros_pad.reports.style import rendered
+from studies.machine import machine
+from studies.work_precision import comparison
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+CHARTS = ROOT / 'docs' / 'charts'
+"""Folder of the pictures and tables of the documentation."""
+
+DPI = 150  # of a PNG
+
+_Item = TypeVar('_Item')
+_Result = TypeVar('_Result')
+
+
+# --- options -------------------------------------------------------------------------------------
+
+
+def parser(study: str, doc: str | None) -> argparse.ArgumentParser:
+    """Return the parser of a study, with its module's docstring as description and ``--json``."""
+    paragraphs = inspect.cleandoc(doc or '').split('\n\n')
+    part = argparse.ArgumentParser(
+        prog=f'python -m studies {study}',
+        # Lines of a paragraph are joined, those of a list are not.
+        description='\n\n'.join(re.sub(r'\n(?!- )', ' ', each) for each in paragraphs),
+        formatter_class=Help,
+    )
+    part.add_argument('--json', action='store_true', help='print JSON in place of a table')
+    return part
+
+
+def add_out(part: argparse.ArgumentParser, folder: pathlib.Path | None = CHARTS) -> None:
+    """Add ``--out DIR``; the default is ``folder``, or a new folder in runs if that is None."""
+    shown = 'a new one in runs' if folder is None else folder.relative_to(ROOT)
+    part.add_argument(
+        '--out',
+        type=pathlib.Path,
+        default=folder,
+        metavar='DIR',
+        help=f'folder in which files of the same name are replaced (default: {shown})',
+    )
+
+
+def add_count(
+    part: argparse.ArgumentParser, name: str, default: int, text: str, least: int = 1
+) -> None:
+    """Add an option whose value is a whole number of at least ``least``."""
+
+    def number(word: str) -> int:
+        if not word.isdecimal() or int(word) < least:
+            raise argparse.ArgumentTypeError(
+                f'{word!r} is not allowed: a whole number from {least} is needed'
+            )
+        return int(word)
+
+    part.add_argument(
+        name, type=number, default=default, metavar='N', help=f'{text} (default: {default})'
+    )
+
+
+def add_processes(part: argparse.ArgumentParser) -> None:
+    """Add ``--processes``."""
+    add_count(part, '--processes', 2, 'how many processes run at once')
+
+
+# --- progress and processes ----------------------------------------------------------------------
+
+
+def each(items: Sequence[_Item], text: str, unit: str) -> Iterator[_Item]:
+    """Yield items, and show the number done on stderr."""
+    with bar(text, len(items), unit) as reach:
+        for done, item in enumerate(items, start=1):
+            yield item
+            reach(done)
+
+
+def in_processes(
+    task: Callable[..., _Result],
+    cases: Sequence[tuple[Any, ...]],
+    processes: int,
+    text: str,
+    unit: str = 'walk',
+) -> list[_Result]:
+    """Call a task with the arguments of each case, in processes; return results in case order.
+
+    Cases are started in the given order. Progress is shown on stderr. If a case raises, waiting
+    cases are cancelled and the error is raised here.
+    """
+    with ProcessPoolExecutor(processes) as pool, bar(text, len(cases), unit) as reach:
+        futures = [pool.submit(task, *case) for case in cases]
+        try:
+            for done, future in enumerate(as_completed(futures), start=1):
+                future.result()
+                reach(done)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        return [future.result() for future in futures]
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+def write(
+    folder: pathlib.Path,
+    name: str,
+    document: Mapping[str, Any],
+    pictures: Mapping[str, Figure] | None = None,
+) -> dict[str, Any]:
+    """Write ``name.json``, with a description of the machine, and pictures; return the JSON."""
+    kept = {'machine': machine(), **document}
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(kept, indent=1, ensure_ascii=False)
+    save(folder / f'{name}.json', (text + '\n').encode())
+    for picture, figure in (pictures or {}).items():
+        save(folder / f'{picture}.png', rendered(figure, 'png', dpi=DPI))
+    return kept
+
+
+def show(options: argparse.Namespace, document: Any, table: str) -> None:
+    """Print the JSON if ``--json`` was given, else the table."""
+    print(json.dumps(document, indent=1, ensure_ascii=False) if options.json else table)
+
+
+def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
+    """Run a work-precision study: measure, print its table, write JSON and pictures.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study, and of its JSON file.
+    study : module
+        Module with ``measure``, ``figures`` and, for a table of its own form, ``table``.
+    words : sequence of str
+        Arguments of the command line.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
+    part = parser(name, study.__doc__)
+    add_out(part, None)
+    options = part.parse_args(words)
+    folder = options.out or new_folder(None, f'chart_{name}')
+    with bar(f'{name}: measuring', 100.0, '%') as reach:
+        results = study.measure(lambda share: reach(100.0 * share))
+    with bar(f'{name}: drawing', 100.0, '%') as reach:
+        pictures = study.figures(results, lambda share: reach(100.0 * share))
+    rows = [asdict(result) for result in results]
+    write(folder, name, {'rows': rows}, pictures)
+    if options.json:
+        print(json.dumps(rows))
+        return 0
+    print(getattr(study, 'table', comparison.table)(results))
+    print(f'table and pictures: {folder}')
+    return 0

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Style of all pictures of studies: that of the reports, with a few more colours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ros_pad.reports.style import BLACK
+from ros_pad.reports.style import BLUE
+from ros_pad.reports.style import GREEN
+from ros_pad.reports.style import PALE
+from ros_pad.reports.style import PAPER_STYLE
+from ros_pad.reports.style import STYLE as PAGE_STYLE
+from ros_pad.reports.style import VERMILION
+
+__all__ = [
+    'BLACK',
+    'BLUE',
+    'GREEN',
+    'ORANGE',
+    'PALE',
+    'PAPER_STYLE',
+    'PURPLE',
+    'SKY',
+    'STYLE',
+    'VERMILION',
+]
+
+SKY, ORANGE, PURPLE = '#56B4E9', '#E69F00', '#CC79A7'  # Okabe and Ito
+
+STYLE: dict[Any, Any] = PAGE_STYLE | {'font.size': 9.0, 'axes.titlesize': 9.5}

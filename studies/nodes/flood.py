@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flood one leg of the regulator node with set-points from another process; measure the others.
+
+Starts the node for all six legs with simulated regulators in a process of its own, as ``ros2 run``
+does. A second process publishes set-points for leg 1 at a high rate: valid ones, invalid ones,
+both in turn, and bytes that are no messages. This process repeats rounds: it commands the other
+legs for a while, stops, and measures the time from its last set-points until their pads vent. It
+also counts messages on ``/diagnostics``, and reads the node's memory and processor time. No
+message leaves the machine.
+
+The exit status is 1 if a pad of another leg vents later than ``command_timeout`` plus 0.25 s; the
+0.25 s are for reading the pressures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import functools
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from ros_pad.commands.progress import bar
+from ros_pad.nodes import topics
+from ros_pad.nodes.stamps import set_stamp
+from studies import command
+from studies.machine import memory
+from studies.machine import processor_time
+
+AMBIENT = 101325.0
+TIMEOUT = 0.3  # command_timeout, s
+RATE = 10_000.0  # set-points a second
+ROUND = 2.5  # length of a round: commands, then silence, s
+COMMANDED = 1.0  # part of a round with commands, s
+LATEST = 0.25  # s after the timeout: a vent must be measured by then, because readings take time
+PATIENCE = 20.0  # s
+FLOODED, GAUGE = 1, 40e3
+KINDS = ('none', 'valid', 'invalid', 'mixed', 'torn')
+"""Kinds of flood: none, accepted set-points, refused set-points, both in turn, and bytes that are
+no messages."""
+
+
+@dataclasses.dataclass
+class Result:
+    """Result of a flood.
+
+    Attributes
+    ----------
+    kind : str
+        One of :data:`KINDS`.
+    rate : float
+        Messages that the flood published a second.
+    rounds : int
+        Number of rounds, each with the vents of five pads.
+    reaction : float
+        Longest time from the last set-point until the pressure of a commanded pad falls, s.
+    flooded_up : bool
+        Whether the flooded pad was under pressure at the end of any round.
+    pressures : float
+        Lowest rate at which the pressure of one commanded pad was received in any round, 1/s.
+    diagnostics : float
+        Messages of the node on ``/diagnostics`` a second.
+    growth : float
+        Growth of the node's resident memory from the first round to the last, MB.
+    processor : float
+        Share of one processor that the node used.
+    """
+
+    kind: str
+    rate: float = 0.0
+    rounds: int = 0
+    reaction: float = 0.0
+    flooded_up: bool = False
+    pressures: float = math.inf
+    diagnostics: float = 0.0
+    growth: float = 0.0
+    processor: float = 0.0
+
+
+def flood(kind: str, rate: float) -> None:
+    """Publish one kind of flood for one leg until standard input ends; print the rate, 1/s."""
+    rclpy.init()
+    node = Node('flood', start_parameter_services=False, enable_rosout=False)
+    publisher = topics.PRESSURE_SETPOINT.publisher(node, FLOODED)
+    good, bad = topics.PRESSURE_SETPOINT.message(), topics.PRESSURE_SETPOINT.message()
+    good.fluid_pressure, bad.fluid_pressure = AMBIENT + GAUGE, AMBIENT + 1e9
+    messages: list[object] = {
+        'valid': [good], 'invalid': [bad], 'mixed': [good, bad], 'torn': [b'\0\1\0\0' + b'\1' * 9],
+    }[kind]  # fmt: skip
+    os.set_blocking(sys.stdin.fileno(), False)
+    count, start = 0, time.monotonic()
+    while True:
+        if count % 100 == 0:
+            with contextlib.suppress(BlockingIOError):
+                if os.read(sys.stdin.fileno(), 1) == b'':
+                    break
+            for each in (good, bad):
+                set_stamp(each.header.stamp, time.time_ns())
+        publisher.publish(messages[count % len(messages)])
+        count += 1
+        ahead = start + count / rate - time.monotonic()
+        if ahead > 1e-3:
+            time.sleep(ahead)
+    print(count / (time.monotonic() - start))
+
+
+@contextlib.contextmanager
+def _process(*words: str, **settings: Any) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, '-m', *words], text=True, cwd=command.ROOT, **settings
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+class Commander:
+    """A node that commands the legs without flood, and receives the pressures of all legs."""
+
+    def __init__(self, legs: tuple[int, ...]) -> None:
+        self.node = Node('commander', start_parameter_services=False, enable_rosout=False)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.legs = [leg for leg in legs if leg != FLOODED]
+        self._publishers = [topics.PRESSURE_SETPOINT.publisher(self.node, x) for x in self.legs]
+        self._message = topics.PRESSURE_SETPOINT.message()
+        self.gauges = dict.fromkeys(legs, 0.0)
+        self.counts = dict.fromkeys(legs, 0)
+        self.diagnostics = 0
+        for leg in legs:
+            topics.PRESSURE.subscription(self.node, functools.partial(self._receive, leg), leg)
+        topics.DIAGNOSTICS.subscription(self.node, self._count)
+
+    def _receive(self, leg: int, message: Any) -> None:
+        self.gauges[leg] = message.fluid_pressure - AMBIENT
+        self.counts[leg] += 1
+
+    def _count(self, message: object) -> None:
+        self.diagnostics += 1
+
+    def until(self, done: Callable[[], object], seconds: float, what: str = '') -> None:
+        """Spin until a condition holds, at most for a time, s.
+
+        Raises
+        ------
+        TimeoutError
+            When the condition does not hold in time, and ``what`` describes it.
+        """
+        end = time.monotonic() + seconds
+        while not done():
+            self.executor.spin_once(timeout_sec=0.005)
+            if time.monotonic() > end:
+                if what:
+                    raise TimeoutError(f'timed out after {seconds:g} s waiting for {what}')
+                return
+
+    def connected(self) -> bool:
+        """Return whether the regulator node has subscribed and all its pressures have arrived."""
+        return all(each.get_subscription_count() for each in self._publishers) and all(
+            self.counts.values()
+        )
+
+    def command(self) -> None:
+        """Send a set-point to each leg without flood."""
+        set_stamp(self._message.header.stamp, time.time_ns())
+        self._message.fluid_pressure = AMBIENT + GAUGE
+        for publisher in self._publishers:
+            publisher.publish(self._message)
+
+
+def _round(commander: Commander, result: Result) -> None:
+    """Command the other legs, stop, and wait until their pads vent; add to the result."""
+    start = time.monotonic()
+    before = dict(commander.counts)
+    last = start
+    while time.monotonic() < start + COMMANDED:
+        last = time.monotonic()
+        commander.command()
+        commander.until(lambda: False, 0.02)
+    if min(commander.gauges[leg] for leg in commander.legs) < 0.9 * GAUGE:
+        raise RuntimeError(
+            f'pressures by leg after {COMMANDED:g} s of set-points: {commander.gauges} Pa gauge;'
+            f' all but that of leg {FLOODED} must be at least {0.9 * GAUGE:g} Pa'
+        )
+    # A pad 3 % below the set-point is venting. A simulated pad falls so far within 20 ms.
+    fallen: dict[int, float] = {}
+
+    def fell() -> bool:
+        for leg in commander.legs:
+            if leg not in fallen and commander.gauges[leg] < 0.97 * GAUGE:
+                fallen[leg] = time.monotonic() - last
+        return len(fallen) == len(commander.legs)
+
+    commander.until(fell, PATIENCE, f'all pads to vent from (leg: Pa gauge) {commander.gauges}')
+    commander.until(lambda: time.monotonic() > start + ROUND, ROUND)
+    seconds = time.monotonic() - start
+    result.rounds += 1
+    result.reaction = max(result.reaction, *fallen.values())
+    result.flooded_up |= commander.gauges[FLOODED] > 0.1 * GAUGE
+    slowest = min(commander.counts[leg] - before[leg] for leg in commander.legs) / seconds
+    result.pressures = min(result.pressures, slowest)
+
+
+def run(
+    kind: str, rounds: int, rate: float = RATE, progress: Callable[[float], object] | None = None
+) -> Result:
+    """Flood the node with one kind of message, and return the result.
+
+    Parameters
+    ----------
+    kind : str
+        One of :data:`KINDS`.
+    rounds : int
+        Number of rounds, each of :data:`ROUND` s.
+    rate : float
+        Messages a second.
+    progress : callable, optional
+        Called after each round with the number of rounds.
+    """
+    result = Result(kind)
+    node = ('ros_pad.nodes.regulator', '--ros-args', '-p', f'command_timeout:={TIMEOUT}')
+    rclpy.init()
+    try:
+        with (
+            _process(*node, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as regulator,
+            contextlib.ExitStack() as stack,
+        ):
+            commander = Commander(topics.LEGS)
+            commander.until(commander.connected, PATIENCE, 'the regulator node')
+            flooder = None
+            if kind != 'none':
+                flooder = stack.enter_context(
+                    _process(
+                        'studies', 'flood', '--flood', kind, '--rate', str(rate),
+                        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                    )
+                )  # fmt: skip
+                name = topics.PRESSURE_SETPOINT.name(FLOODED)
+                commander.until(
+                    lambda: commander.node.count_publishers(name), PATIENCE, 'the flood'
+                )
+                commander.until(lambda: False, 1.0)
+            _round(commander, Result(kind))  # not counted: memory and discovery settle first
+            size, used = memory(regulator.pid), processor_time(regulator.pid)
+            count, start = commander.diagnostics, time.monotonic()
+            for done in range(1, rounds + 1):
+                _round(commander, result)
+                if progress:
+                    progress(done)
+            seconds = time.monotonic() - start
+            result.diagnostics = (commander.diagnostics - count) / seconds
+            result.growth = memory(regulator.pid) - size
+            result.processor = (processor_time(regulator.pid) - used) / seconds
+            if flooder is not None:
+                printed, _ = flooder.communicate(timeout=PATIENCE)
+                result.rate = float(printed)
+    finally:
+        rclpy.try_shutdown()
+    return result
+
+
+def table(results: Sequence[Result]) -> str:
+    """Return the results as text."""
+    lines = [
+        'flood    set-points/s  vent after (s)  flooded pad  pressures/s  diagnostics/s'
+        '  growth (MB)  processor'
+    ]
+    for each in results:
+        lines.append(
+            f'{each.kind:8} {each.rate:12.0f} {each.reaction:15.3f}'
+            f'  {"up" if each.flooded_up else "vented":>11} {each.pressures:12.1f}'
+            f' {each.diagnostics:14.1f} {each.growth:12.1f} {each.processor:9.0%}'
+        )
+    return '\n'.join(lines)
+
+
+def main(words: Sequence[str]) -> int:
+    """Flood with every kind; return the exit status."""
+    parser = command.parser('flood', __doc__)
+    command.add_count(parser, '--rounds', 8, f'rounds of {ROUND:g} s for each kind')
+    parser.add_argument(
+        '--rate', type=float, default=RATE, help=f'set-points a second (default: {RATE:g})'
+    )
+    parser.add_argument('--kinds', nargs='+', choices=KINDS, default=KINDS, help='kinds of flood')
+    parser.add_argument('--flood', choices=KINDS, help=argparse.SUPPRESS)
+    options = parser.parse_args(words)
+    if options.flood:
+        flood(options.flood, options.rate)
+        return 0
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    results = []
+    for kind in options.kinds:
+        with bar(f'flood: {kind}', options.rounds, 'round') as reach:
+            results.append(run(kind, options.rounds, options.rate, reach))
+    command.show(options, [dataclasses.asdict(each) for each in results], table(results))
+    late = [each.kind for each in results if each.reaction > TIMEOUT + LATEST]
+    if late:
+        print(
+            f'a pad vented later than {TIMEOUT + LATEST:g} s after its last set-point under'
+            f' floods of kind {", ".join(late)}',
+            file=sys.stderr,
+        )
+    return 1 if late else 0

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fuzz the parsers of external input, guided by coverage: devices, fault texts, YAML and bags.
+
+Needs atheris, which is no dependency of ros_pad: ``pip install atheris`` (CPython 3.11 to 3.13).
+A parser may raise only errors of ros_pad.errors, and never return a pressure that is not finite.
+An input that violates this is printed and saved as a file in ``--findings``; the exit status is
+then not 0. ``python -m studies fuzz TARGET FILE`` runs such a file again, which does not need
+atheris.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib
+import io
+import math
+import pathlib
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+from typing import Any
+
+from ros_pad.errors import PadError
+from studies import command
+
+WATCHED = (
+    'ros_pad.regulators.alicat',
+    'ros_pad.regulators.serial_device',
+    'ros_pad.regulators.serial_text',
+    'ros_pad.regulators.smc_itv',
+    'ros_pad.simulation.faults',
+    'ros_pad.configuration',
+    'ros_pad.bags',
+    'yaml',
+    'mcap',
+    'rosbags',
+)
+"""Modules, or packages, whose branches guide the search."""
+
+LONGEST = 4096
+"""Largest size of an input, bytes; twice the size of the longest seed if that is more."""
+
+REPLY = 256  # largest number of bytes of a reply: ros_pad.regulators.transport.LONGEST_REPLY
+
+
+@contextlib.contextmanager
+def _watched_imports() -> Iterator[None]:
+    """Instrument the modules that are imported in this block, if atheris is installed."""
+    try:
+        atheris = importlib.import_module('atheris')
+    except ModuleNotFoundError:
+        yield
+        return
+    with atheris.instrument_imports(include=list(WATCHED)):
+        yield
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """A function that feeds a parser with bytes, and the first inputs.
+
+    Attributes
+    ----------
+    feed : callable
+        Takes the bytes. If the parser is right, it raises nothing but errors of ros_pad.
+    seeds : list of bytes
+        First inputs.
+    """
+
+    feed: Callable[[bytes], None]
+    seeds: list[bytes]
+
+    def __call__(self, data: bytes) -> None:
+        """Feed the parser; raise any error that is not one of ros_pad."""
+        with contextlib.suppress(PadError):
+            self.feed(data)
+
+
+def _device(backend: str, seeds: list[bytes], **options: Any) -> Target:
+    """Return a target that identifies, sets and polls a device; replies are the lines of the data.
+
+    As from a real device, a reply is ASCII, stripped, and at most :data:`REPLY` bytes long.
+    """
+    module, name = {
+        'alicat': ('alicat', 'AlicatRegulator'),
+        'smc_itv': ('smc_itv', 'SmcItvRegulator'),
+        'serial_text': ('serial_text', 'SerialTextRegulator'),
+    }[backend]
+    kind = getattr(importlib.import_module(f'ros_pad.regulators.{module}'), name)
+
+    def feed(data: bytes) -> None:
+        regulator = kind(port='fuzz', **options)
+        replies = iter(data.split(b'\n'))
+
+        def ask(command: str, reply: bool = True) -> str:
+            line = next(replies, None)
+            if line is None:
+                raise PadError('the input has no line left for this reply')
+            return line[:REPLY].decode('ascii', 'ignore').strip() if reply else ''
+
+        def check(frame: Any) -> None:
+            for value in (frame.pressure, frame.resolution):
+                if not math.isfinite(value):
+                    raise AssertionError(f'{backend}: {value} in {frame} must be finite')
+            if math.isinf(frame.setpoint):  # NaN means unknown
+                raise AssertionError(f'{backend}: set-point in {frame} must be finite or NaN')
+            regulator.in_force(frame, regulator.rounded(50e3, frame.resolution))
+
+        check(regulator.identify(ask))
+        for setpoint in (0.0, 50e3, 90e3):
+            frame = regulator.send(ask, setpoint)
+            check(frame or regulator.poll(ask))
+
+    return Target(feed, seeds)
+
+
+def _template(data: bytes) -> None:
+    """Make a regulator from three templates, and read a reply with it; one line of data each."""
+    from ros_pad.regulators.serial_text import SerialTextRegulator
+
+    texts = [*data.decode('utf-8', 'replace').split('\n'), '', '', '']
+    regulator = SerialTextRegulator(
+        'fuzz', set_template=texts[0], read_reply=texts[1], set_reply=texts[2]
+    )
+    frame = regulator.poll(lambda command, reply=True: texts[3][:REPLY])
+    if not math.isfinite(frame.pressure):
+        raise AssertionError(f'serial_text: pressure in {frame} must be finite')
+
+
+def _fault(data: bytes) -> None:
+    from ros_pad.simulation.faults import Fault
+    from ros_pad.simulation.faults import parsed
+
+    for fault in parsed([data.decode('utf-8', 'replace')]):
+        if Fault.parse(str(fault)) != fault:
+            raise AssertionError(f'{fault!r} has the text {str(fault)!r}, which is another fault')
+
+
+def _file(load: Callable[[pathlib.Path], Any], name: str) -> Callable[[bytes], None]:
+    folder = pathlib.Path(tempfile.mkdtemp(prefix='fuzz_'))
+
+    def feed(data: bytes) -> None:
+        path = folder / name
+        path.write_bytes(data)
+        load(path)
+
+    return feed
+
+
+def _read_bag(path: pathlib.Path) -> None:
+    from ros_pad.bags import BagReader
+
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # the reader warns of a bag that was not closed
+        for _ in BagReader(path).messages():
+            pass
+
+
+def _read_metadata(path: pathlib.Path) -> None:
+    (path.parent / 'bag_0.mcap').write_bytes(_bag())
+    _read_bag(path.parent)
+
+
+def _bag(chunked: bool = True) -> bytes:
+    """Return a small bag without checksums and compression, which random changes would break."""
+    from mcap.writer import CompressionType
+    from mcap.writer import Writer
+
+    stream = io.BytesIO()
+    writer = Writer(
+        stream, compression=CompressionType.NONE, enable_crcs=False, use_chunking=chunked
+    )
+    writer.start(profile='ros2')
+    definition = b'std_msgs/Header header\nfloat64[] values\n' + b'=' * 80 + (
+        b'\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n' + b'=' * 80
+    ) + b'\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n'  # fmt: skip
+    for name, text, data in (
+        ('std_msgs/msg/Float64', b'float64 data\n', bytes(12)),
+        (
+            'test_msgs/msg/Values', definition,
+            b'\0\1\0\0' + bytes(8) + b'\2\0\0\0a\0\0\0\1\0\0\0' + bytes(12),
+        ),
+    ):  # fmt: skip
+        schema = writer.register_schema(name, 'ros2msg', text)
+        channel = writer.register_channel(f'/{name[-6:]}', 'cdr', schema)
+        for time in (1, 2):
+            writer.add_message(channel, time, data, time)
+    writer.finish()
+    return stream.getvalue()
+
+
+_METADATA = b"""rosbag2_bagfile_information:
+  version: 9
+  storage_identifier: mcap
+  compression_mode: ''
+  relative_file_paths: [bag_0.mcap]
+  custom_data: {scene: leg_dry_flat}
+"""
+
+
+def _alicat() -> Target:
+    frames = b'A +014.70 +000.00\n'
+    return _device('alicat', [
+        frames + b'A 8v17.0-R23\n' + frames * 4,
+        frames + b'A 10v05.0-R24\nA 12 kPaG\nA S\n' + frames * 4,
+        b'A +1 +0 HLD LCK\nA 9v00\nA 7 psi\n' + b'A +1 +0 OPL EXH\nA ?\n?\n' * 3,
+    ])  # fmt: skip
+
+
+def _smc_itv() -> Target:
+    seeds = [
+        b'0\n12\n0\n0\n12\n512\n512\n510\n921\n921\n920',
+        b'UNKNOWN COMMAND\n',
+        b'1023\n1024\n-1\n',
+    ]
+    return _device('smc_itv', seeds, full_scale=100e3)
+
+
+def _serial_text() -> Target:
+    seeds = [
+        b'1 1.0\nOK 1 0.000\n1 1.0\nOK 1 2.500\n1 3.0\nOK 1 4.500\n1 4.6\n',
+        b'1 -1.25e+1\nOK 1 .5E-3\n',
+    ]
+    return _device('serial_text', seeds)
+
+
+def _templates() -> Target:
+    return Target(_template, [
+        b'SET {channel} {value:.3f}\n{channel} {value}\nOK {channel} {value}\n1 2.5',
+        b'V{value:d}\nP{value}Pa\n\nP-1e3Pa',
+    ])  # fmt: skip
+
+
+def _faults() -> Target:
+    return Target(_fault, [
+        b'{kind: leak, legs: [2], start: 5.0, end: 20.0, conductance: 1.0e-10}',
+        b'{kind: supply_loss, pressure: 1e3, time_constant: .5}',
+        b'{kind: sensor_drift, offset: -5000, rise: 2}',
+        b'{kind: force_range, load: 2.0}',
+        b'{kind: !!str stuck_valve, start: 0x10, end: 1:30, legs: &a [1, 2]}',
+        b'{kind: silence, start: 2001-12-14t21:59:43.10-05:00, end: !!float 7}',
+    ])  # fmt: skip
+
+
+def _shipped(folder: str) -> list[bytes]:
+    from ros_pad.configuration import shared_folder
+
+    return [path.read_bytes() for path in sorted((shared_folder() / folder).glob('*.yaml'))]
+
+
+def _feet() -> Target:
+    with _watched_imports():
+        from ros_pad.contact.resistance import Foot
+    return Target(_file(Foot.load, 'foot.yaml'), _shipped('feet'))
+
+
+def _scenes() -> Target:
+    with _watched_imports():
+        from ros_pad.simulation.scene import Scene
+    seeds = _shipped('scenes')[::-1]  # bench scenes come last, because Scene refuses them
+    return Target(_file(Scene.load, 'scene.yaml'), seeds)
+
+
+def _bags() -> Target:
+    return Target(_file(_read_bag, 'bag.mcap'), [_bag(), _bag(chunked=False)])
+
+
+def _metadata() -> Target:
+    return Target(_file(_read_metadata, 'metadata.yaml'), [_METADATA])
+
+
+TARGETS: dict[str, Callable[[], Target]] = {
+    'alicat': _alicat,
+    'smc_itv': _smc_itv,
+    'serial_text': _serial_text,
+    'templates': _templates,
+    'faults': _faults,
+    'feet': _feet,
+    'scenes': _scenes,
+    'bags': _bags,
+    'metadata': _metadata,
+}
+"""Functions that make the targets, by name."""
+
+
+def target(name: str) -> Target:
+    """Return a target, with instrumented modules if atheris is installed."""
+    with _watched_imports():
+        for module in WATCHED:
+            importlib.import_module(module)
+    return TARGETS[name]()
+
+
+def main(words: Sequence[str]) -> int:
+    """Fuzz one target, or run one input again; return the exit status."""
+    parser = command.parser('fuzz', __doc__)
+    parser.add_argument('target', choices=list(TARGETS))
+    parser.add_argument('file', nargs='?', type=pathlib.Path, help='one input to run again')
+    parser.add_argument('--seconds', type=float, default=60.0, help='how long, s (default 60)')
+    parser.add_argument(
+        '--findings', type=pathlib.Path, default=pathlib.Path('fuzz_findings'), metavar='DIR',
+        help='folder for inputs that raise other errors (default fuzz_findings)',
+    )  # fmt: skip
+    options = parser.parse_args(words)
+    if options.file is not None:
+        target(options.target)(options.file.read_bytes())
+        command.show(options, {'found': False}, 'no error, or one of ros_pad: the parser is right')
+        return 0
+    try:
+        atheris = importlib.import_module('atheris')
+    except ModuleNotFoundError:
+        raise PadError('atheris is not installed: pip install atheris') from None
+    fuzzed = target(options.target)
+    options.findings.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, seed in enumerate(fuzzed.seeds):
+            (pathlib.Path(folder) / str(number)).write_bytes(seed)
+        longest = max(LONGEST, *(2 * len(seed) for seed in fuzzed.seeds))
+        atheris.Setup(
+            [
+                sys.argv[0], folder,
+                f'-max_total_time={round(options.seconds)}', f'-max_len={longest}',
+                '-timeout=20', '-rss_limit_mb=2048', '-print_final_stats=1',
+                f'-artifact_prefix={options.findings / options.target}_',
+            ],
+            fuzzed,
+        )  # fmt: skip
+        atheris.Fuzz()  # ends the process
+    return 0

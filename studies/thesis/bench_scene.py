@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bench scene: one pad of a foot, its test, and the measurements to compare with."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import pathlib
+from dataclasses import dataclass
+from typing import ClassVar
+from typing import TypeAlias
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.contact.dome import BURST
+from ros_pad.contact.dome import largest_tension
+from ros_pad.contact.dome import signed_adhesion
+from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.pad import Pad
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import ConfigError
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import foot_of
+
+BENCHES = ('inflation', 'press', 'tangential')
+
+
+@dataclass(frozen=True)
+class InflationBench:
+    """Test in which a free pad is inflated (thesis 3.2.1).
+
+    Attributes
+    ----------
+    highest_pressure : float
+        Gauge pressure at which curves end, Pa.
+    claimed_error : float
+        Relative error of height and radius that the thesis states.
+    """
+
+    kind: ClassVar[str] = 'inflation'
+    highest_pressure: float
+    claimed_error: float
+
+
+@dataclass(frozen=True)
+class PressBench:
+    """Test in which an inflated pad is pressed on a plate (thesis 3.2.1).
+
+    Attributes
+    ----------
+    pressure : float
+        Gauge pressure, Pa.
+    highest_force : float
+        Normal force at which curves end, N.
+    text_forces : tuple of float
+        Normal forces that the thesis' text gives for the measured points, N, in the same order, if
+        they differ from those in its program; else empty.
+    """
+
+    kind: ClassVar[str] = 'press'
+    pressure: float
+    highest_force: float
+    text_forces: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TangentialBench:
+    """Test in which a pressed pad is dragged until it begins to slip (thesis 3.2.2).
+
+    Attributes
+    ----------
+    highest_load : float
+        Normal force up to which the flat pad is tried, N.
+    speed : float
+        Speed of the stage that drags the foot, m/s.
+    dwell : float
+        Time from touch-down until the stage starts, s.
+    film_thickness : float
+        Depth of the liquid on wet ground, m.
+    viscosity : float
+        Viscosity of the liquid, Pa s.
+    advancing_angle, receding_angle : float
+        Contact angles at which the edge of the liquid advances and recedes, rad.
+    smallest_radius, largest_radius : float
+        Pad radii between which the height of rise is drawn, m.
+    claimed_smallest, claimed_largest : float
+        Pad radii between which the thesis claims the optimum, m.
+    """
+
+    kind: ClassVar[str] = 'tangential'
+    highest_load: float
+    speed: float
+    dwell: float
+    film_thickness: float
+    viscosity: float
+    advancing_angle: float
+    receding_angle: float
+    smallest_radius: float
+    largest_radius: float
+    claimed_smallest: float
+    claimed_largest: float
+
+
+Setup: TypeAlias = InflationBench | PressBench | TangentialBench
+
+
+@dataclass(frozen=True)
+class BenchScene:
+    """Everything that a bench needs. See ``config/scenes/bench_*.yaml``.
+
+    Attributes
+    ----------
+    source : str
+        Name of the shipped scene, or path of the file, that describes it.
+    name, description : str
+        Name without folder, and the text ``description`` of the file.
+    foot : Foot
+        Foot whose pad is tested. In the tangential bench it has this one pad, and its whole sole.
+    measurements : Path
+        CSV file with the measured points.
+    setup : InflationBench, PressBench or TangentialBench
+        The test.
+    """
+
+    source: str
+    name: str
+    description: str
+    foot: Foot
+    measurements: pathlib.Path
+    setup: Setup
+
+    @property
+    def pad(self) -> Pad:
+        """The pad on the bench."""
+        return self.foot.pad
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str], foot: Foot | None = None) -> BenchScene:
+        """Read ``config/scenes/<name>.yaml`` or the file of a path.
+
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped bench scene, or path of a YAML file.
+        foot : Foot, optional
+            Foot to use instead of the one named in the scene.
+
+        Raises
+        ------
+        ConfigError
+            Unknown scene (lists them, with the nearest name), a scene in which a robot walks, or
+            a file with an unknown key or a value outside its range (names file, key, value and
+            range).
+        """
+        path = configuration.locate('scenes', name_or_path)
+        return cls.read(Table.load(path), os.fspath(name_or_path), path.stem, foot)
+
+    @classmethod
+    def read(cls, table: Table, source: str, name: str, foot: Foot | None = None) -> BenchScene:
+        """Read a bench scene from a table; raise ConfigError as :meth:`load` does."""
+        if 'robot' in table and 'bench' not in table:
+            raise ConfigError(
+                f'{table.origin}: is no bench, but a scene with a robot: Scene.load reads it'
+            )
+        kind = table.choice('bench', BENCHES)
+        description = table.text('description', default='')
+        own_foot = foot_of(table)
+        foot = foot or own_foot
+        measurements = _measurements(table)
+        setup: Setup
+        if kind == 'inflation':
+            setup = _inflation(table, foot.pad)
+        elif kind == 'press':
+            setup = _press(table, foot.pad)
+        else:
+            setup = _tangential(table)
+            # The sole keeps its size: around the one dome, the other pads stay part of it.
+            share = foot.shear_stiffness / foot.pads
+            foot = dataclasses.replace(foot, pads=1, shear_stiffness=share)
+        table.finish()
+        return cls(source, name, description, foot, measurements, setup)
+
+
+def load(name_or_path: str | os.PathLike[str]) -> Scene | BenchScene:
+    """Read a scene of either kind: a walk or a bench.
+
+    Raises
+    ------
+    ConfigError
+        As :meth:`BenchScene.load` and :meth:`ros_pad.simulation.scene.Scene.load`.
+    """
+    path = configuration.locate('scenes', name_or_path)
+    table = Table.load(path)
+    if 'bench' in table:
+        return BenchScene.read(table, os.fspath(name_or_path), path.stem)
+    return Scene.read(table, os.fspath(name_or_path), path.stem)
+
+
+def _measurements(table: Table) -> pathlib.Path:
+    """Return the CSV file: a shipped one by its name, or one in the scene's folder."""
+    name = table.text('measurements')
+    if name.endswith('.csv'):
+        path = pathlib.Path(table.origin).parent / name
+    else:
+        path = configuration.shared_folder() / 'measurements' / f'{name}.csv'
+    if not path.is_file():
+        raise ConfigError(
+            f'{table.origin}: measurements = {name!r}: there is no file {path}; a name in'
+            ' config/measurements, or a .csv file in the folder of the scene, is needed'
+        )
+    return path
+
+
+def _inflation(table: Table, pad: Pad) -> InflationBench:
+    burst = BURST * pad.stiffness / pad.radius
+    return InflationBench(
+        highest_pressure=table.number('highest_pressure', 'Pa', 1e3, 0.99 * burst),
+        claimed_error=table.number('claimed_error', '(relative)', 0.0, 1.0),
+    )
+
+
+def _press(table: Table, pad: Pad) -> PressBench:
+    end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
+    pressure = table.number('pressure', 'Pa', 1e3, end)
+    pressed_flat = pressure * math.pi * pad.radius**2
+    forces = []
+    if 'text_forces' in table:
+        with table.table('text_forces') as part:
+            for place in ('first', 'second', 'third'):
+                forces.append(part.number(place, 'N', 0.0, pressed_flat))
+    return PressBench(
+        pressure=pressure,
+        highest_force=table.number('highest_force', 'N', 0.0, pressed_flat),
+        text_forces=tuple(forces),
+    )
+
+
+def _tangential(table: Table) -> TangentialBench:
+    with table.table('floor') as part:
+        film_thickness = part.number('film_thickness', 'm', 1e-9, 0.01)
+        viscosity = part.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY)
+        advancing = part.number('advancing_angle', 'rad', 0.0, math.pi)
+        receding = part.number('receding_angle', 'rad', 0.0, advancing)
+    with table.table('design') as part:
+        smallest = part.number('smallest_radius', 'm', 1e-5, 1e-2)
+        largest = part.number('largest_radius', 'm', smallest, 1e-1)
+        claimed_smallest = part.number('claimed_smallest', 'm', smallest, largest)
+        claimed_largest = part.number('claimed_largest', 'm', claimed_smallest, largest)
+    return TangentialBench(
+        highest_load=table.number('highest_load', 'N', 1e-3, 100.0),
+        speed=table.number('speed', 'm/s', 1e-6, 1.0),
+        dwell=table.number('dwell', 's', 0.0, 3600.0),
+        film_thickness=film_thickness,
+        viscosity=viscosity,
+        advancing_angle=advancing,
+        receding_angle=receding,
+        smallest_radius=smallest,
+        largest_radius=largest,
+        claimed_smallest=claimed_smallest,
+        claimed_largest=claimed_largest,
+    )

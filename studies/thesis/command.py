@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draw the figures of the thesis on one page; state what is measured, modelled and assumed.
+
+Pictures are PDF and PNG (300 dpi), 85 or 175 mm wide.
+"""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Sequence
+
+from ros_pad.commands.progress import bar
+from ros_pad.commands.report import THESIS
+from ros_pad.commands.report import page_for
+from ros_pad.commands.report import write_all
+from ros_pad.reports.files import refuse
+from studies import command
+from studies.thesis import page
+
+
+def main(words: Sequence[str]) -> int:
+    """Draw the figures and write the page; return the exit status."""
+    parser = command.parser('thesis', __doc__)
+    parser.add_argument('--only', type=int, nargs='+', metavar='N', help='figures (default: all)')
+    parser.add_argument('--out', type=pathlib.Path, metavar='FILE', help=f'page ({THESIS})')
+    parser.add_argument('--figures', type=pathlib.Path, metavar='DIR', help='for PDF and PNG')
+    parser.add_argument('--force', action='store_true', help='replace existing files')
+    options = parser.parse_args(words)
+    numbers = tuple(options.only or page.NUMBERS)
+    path = page_for(options, pathlib.Path(THESIS))
+    for number in numbers if options.figures is not None else ():
+        for kind in ('pdf', 'png'):
+            refuse(options.figures / f'figure_{number}.{kind}', options.force)
+    with bar("the thesis' figures", 1.0, 'page') as progress:
+        figures = page.draw(numbers, progress)
+    return write_all(
+        options,
+        path,
+        lambda out: page.write(figures, out, options.force),
+        lambda: {f'figure_{each.number}': each.drawn for each in figures},
+    )

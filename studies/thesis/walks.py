@@ -1,0 +1,472 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draw figures 38, 39 and 41 to 44 of the thesis: walks of the rail leg and of the hexapod.
+
+The thesis gives no data points of these walks, so they are compared with its text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ros_pad.pace import Progress
+from ros_pad.reports.style import BLACK
+from ros_pad.reports.style import BLUE
+from ros_pad.reports.style import GREEN
+from ros_pad.reports.style import PALE
+from ros_pad.reports.style import PAPER_STYLE
+from ros_pad.reports.style import VERMILION
+from ros_pad.reports.style import WET
+from ros_pad.reports.style import WIDE
+from ros_pad.reports.style import Drawn
+from ros_pad.reports.style import legend
+from ros_pad.reports.view import view_of
+from ros_pad.trials import loop
+from ros_pad.trials.trial import Trial
+from studies.thesis.explained import MINIMAL
+from studies.thesis.explained import Claim
+from studies.thesis.explained import Explained
+
+# Scene, text, colour and line style of each case, in the thesis' order.
+RAIL: dict[str, tuple[str, str, Any]] = {
+    'leg_dry_flat': ('dry, flat', BLACK, '-'),
+    'leg_wet_flat': ('wet, flat', VERMILION, '-'),
+    'leg_wet_dome_40': ('wet, 40 kPa', '#CC79A7', (0, (1, 1.2))),
+    'leg_wet_dome_60': ('wet, 60 kPa', GREEN, (0, (6, 1.5, 1, 1.5))),
+    'leg_wet_dome_75': ('wet, 75 kPa', BLUE, (0, (5, 1.5))),
+}
+CASES: dict[str, tuple[str, str, Any]] = {
+    'dry_flat': ('dry, flat', BLACK, '-'),
+    'wet_flat': ('wet, flat', VERMILION, '-'),
+    'wet_dome': ('wet, dome', BLUE, (0, (5, 1.5))),
+}
+SEEDS = (0, 1, 2)  # of the hexapod's floors; the floors of the rail leg are uniform
+FLOOR_OF = {41: 'rough', 42: 'smooth', 43: 'rough', 44: 'smooth'}
+NUMBERS = (38, 39, *FLOOR_OF)
+
+# Numbers assumed for statements of the thesis without numbers.
+ABOUT = 0.2  # relative error up to which a ratio is "approximately five times"
+STRAIGHT = 0.02  # "straight": m aside for each metre of distance; "firmly": slip over stroke
+
+Walks = Mapping[tuple[str, int], Trial]
+
+
+def scenes(numbers: Collection[int]) -> list[tuple[str, int]]:
+    """Return scene and seed of the walks that given figures need."""
+    found = [(name, 0) for name in RAIL] if {38, 39} & set(numbers) else []
+    for floor in ('smooth', 'rough'):
+        if any(FLOOR_OF.get(number) == floor for number in numbers):
+            found += [(f'hexapod_{floor}_{case}', seed) for case in CASES for seed in SEEDS]
+    return found
+
+
+def walk(
+    numbers: Collection[int], progress: Progress | None = None
+) -> dict[tuple[str, int], Trial]:
+    """Run the walks of given figures, at the fidelity level of each scene; about 2 s a scene."""
+    wanted = scenes(numbers)
+    found = {}
+    for done, (name, seed) in enumerate(wanted, start=1):
+        found[name, seed] = loop.run(name, seed=seed)
+        if progress:
+            progress(done / len(wanted))
+    return found
+
+
+def draw(walks: Walks, numbers: Collection[int] = NUMBERS) -> list[Explained]:
+    """Draw some of the figures from the walks that they need."""
+    makers: dict[int, Callable[[], Explained]] = {
+        38: lambda: _figure_38(walks),
+        39: lambda: _figure_39(walks),
+        **{
+            number: lambda number=number, floor=floor: (  # type: ignore[misc]
+                _feet(walks, number, floor) if number < 43 else _paths(walks, number, floor)
+            )
+            for number, floor in FLOOR_OF.items()
+        },
+    }
+    with matplotlib.rc_context(PAPER_STYLE):
+        return [makers[number]() for number in NUMBERS if number in numbers]
+
+
+# --- the leg on its rail -------------------------------------------------------------------------
+
+_RAIL_MEASURED = (
+    'Nothing: the thesis gives no numbers of points. Its text gives the order of the five cases, '
+    'and "approximately five times" between flat and 75 kPa on wet ground.'
+)
+_RAIL_MODELLED = (
+    'A body on wheels on a rail, pushed by one foot (L0): the capacity of the foot follows from '
+    'its pads, their pressure, and the film of liquid that drains from under them.'
+)
+_RAIL_ASSUMED = (
+    'Mass, rolling drag, load of the springs, stroke and times of the gait; the friction of the '
+    'foot, 19 pads, and the film of 0.3 mm. The drag of 0.235 N is chosen to give the factor of '
+    'five, so that the agreement is no evidence.'
+)
+
+
+def _figure_38(walks: Walks) -> Explained:
+    shown = {name: RAIL[name][0] for name in ('leg_dry_flat', 'leg_wet_flat', 'leg_wet_dome_75')}
+    figure = Figure(figsize=(WIDE, 1.9), layout='constrained')
+    axes = figure.subplots(1, 3, sharey=True)
+    slips = {}
+    for ax, letter, (name, words) in zip(axes, 'abc', shown.items(), strict=True):
+        trial = walks[name, 0]
+        view = view_of(trial)
+        start = trial.settings['settle_s'] + 2.0 * trial.settings['cycle_s']
+        rows = (trial.time >= start) & (trial.time <= start + 4.0 * trial.settings['cycle_s'])
+        x, _, z = 1e3 * trial.position[rows, 0].T
+        standing = trial.standing(view.load_gate)[rows, 0]
+        ground = walks[name, 0].floor
+        if ground is not None and ground.wet(0.0, 0.0):
+            ax.axhspan(-3.0, 0.0, color=WET, lw=0.0)
+        else:
+            ax.axhspan(-3.0, 0.0, color='#E4E4E4', lw=0.0)
+        x = x - x[0]
+        ax.plot(np.where(standing, np.nan, x), z, color=BLACK, lw=1.0)
+        ax.plot(np.where(standing, x, np.nan), z, color=VERMILION, lw=3.0)
+        ax.set_title(f'({letter}) {words}')
+        ax.set_xlabel('x / mm')
+        ax.set_xlim(x.min() - 8.0, x.min() + 215.0)
+        slips[name] = _slip_a_cycle(trial)[0]
+    axes[0].set_ylabel('z / mm')
+    axes[0].set_ylim(-3.0, 25.0)
+    legend(
+        figure,
+        [
+            Line2D([], [], color=BLACK, lw=1.0, label='foot in the air'),
+            Line2D([], [], color=VERMILION, lw=3.0, label='standing: a long stroke is slip'),
+            Line2D([], [], color='#E4E4E4', lw=5.0, label='dry floor'),
+            Line2D([], [], color=WET, lw=5.0, label='wet floor'),
+        ],
+    )
+    stroke = 1e3 * walks['leg_dry_flat', 0].settings['stride_m']
+    return Explained(
+        38,
+        Drawn(
+            figure,
+            'Figure 38: path of the foot on the rail',
+            'Paths of the foot over four gait cycles. Slip in a cycle: '
+            + ', '.join(f'{shown[name]} {slip:.1f} mm' for name, slip in slips.items()),
+            'Four gait cycles, the third to the sixth, as the marker on the foot shows them.',
+        ),
+        _RAIL_MEASURED,
+        _RAIL_MODELLED,
+        _RAIL_ASSUMED,
+        _claims_38(slips, stroke),
+    )
+
+
+def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
+    dry, wet, dome = slips.values()
+    return (
+        Claim(
+            38,
+            'Dry, the foot stands firmly, without slip.',
+            f'It slips {dry:.1f} mm a cycle, of a stroke of {stroke:g} mm.',
+            (dry,),
+            dry <= STRAIGHT * stroke,
+        ),
+        Claim(
+            38,
+            'Wet, the flat foot slips backward instead of pushing the body ahead.',
+            f'It slips {wet:.1f} of {stroke:g} mm.',
+            (wet,),
+            wet > 0.5 * stroke,
+        ),
+        Claim(
+            38,
+            'Wet, the domes of high pressure walk as the flat foot does on dry ground, with '
+            'minimal slip.',
+            f'They slip {dome:.1f} of {stroke:g} mm (here minimal is up to '
+            f'{100.0 * MINIMAL:g} %).',
+            (dome,),
+            dome <= MINIMAL * stroke,
+        ),
+    )
+
+
+def _figure_39(walks: Walks) -> Explained:
+    figure = Figure(figsize=(WIDE, 2.6), layout='constrained')
+    ax = figure.subplots()
+    times, advances = {}, {}
+    for name, (words, colour, style) in RAIL.items():
+        trial = walks[name, 0]
+        assert trial.metrics is not None
+        goal = trial.metrics.goal_m or 0.0
+        times[name] = trial.metrics.time_to_goal_s
+        advances[name] = trial.metrics.distance_per_cycle_m
+        rows = trial.body[:, 0] <= goal
+        time = trial.time - trial.settings['settle_s']
+        ax.plot(time[rows], 1e3 * trial.body[rows, 0], color=colour, ls=style, label=words)
+    ax.axhline(1e3 * goal, color=PALE, lw=0.9)
+    ax.annotate('end of the rail', (ax.get_xlim()[1], 1e3 * goal), (0, 3), ha='right',
+                textcoords='offset points')  # fmt: skip
+    ax.set_xlim(0.0, None)
+    ax.set_ylim(0.0, 1.12e3 * goal)
+    ax.set_xlabel('time / s')
+    ax.set_ylabel('distance of the body / mm')
+    legend(figure, ax.get_legend_handles_labels()[0])
+    less = advances['leg_wet_dome_75'] / advances['leg_dry_flat'] - 1.0
+    return Explained(
+        39,
+        Drawn(
+            figure,
+            'Figure 39: distance of the body in the five cases',
+            'Distance of the body over time; it is at the end of the rail after '
+            + ', '.join(f'{_seconds(times[name])} ({RAIL[name][0]})' for name in RAIL),
+            'Time counts from the first step. Flat feet and domes of 40 kPa walk alike.',
+        ),
+        _RAIL_MEASURED,
+        _RAIL_MODELLED,
+        _RAIL_ASSUMED
+        + ' By the thesis\' own force limits a dome of 40 kPa carries nothing and is pressed '
+        'flat.',
+        _claims_39(times, less),
+    )  # fmt: skip
+
+
+def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, ...]:
+    dry, flat, low, middle, high = (
+        float('inf') if each is None else each for each in times.values()
+    )
+    return (
+        Claim(
+            39,
+            'Flat on dry ground and domes of 75 kPa on wet ground move quite alike.',
+            f'The domes go {100.0 * abs(less):.0f} % less far in a cycle, and need '
+            f'{high:.1f} s in place of {dry:.1f} s.',
+            (less,),
+            abs(less) <= MINIMAL,
+        ),
+        Claim(
+            39,
+            'Wet, flat feet need approximately five times as long as domes of 75 kPa.',
+            f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s.',
+            (flat / high,),
+            abs(flat / high / 5.0 - 1.0) <= ABOUT,
+        ),
+        Claim(
+            39,
+            'Higher pressure notably improves the walk.',
+            f'At 40, 60 and 75 kPa: {low:.1f}, {middle:.1f} and {high:.1f} s.',
+            (low, middle, high),
+            low > middle > high,
+        ),
+    )
+
+
+# --- the hexapod ---------------------------------------------------------------------------------
+
+_HEXAPOD_MEASURED = (
+    'Nothing: the thesis gives no numbers of points, and the axes of its picture are not legible. '
+    'Its text states which cases slip and deviate.'
+)
+_HEXAPOD_MODELLED = (
+    'The hexapod with joints (L2, MuJoCo), open loop, on three floors with gaps in their liquid; '
+    'the capacity of its feet follows from pads, pressure and film.'
+)
+_HEXAPOD_ASSUMED = (
+    'The robot (Lynxmotion CH3-R), its gait, the friction of the feet, and what makes low '
+    'friction matter: 3 N of hoses that it drags, and gaps in the liquid (85 % wet, '
+    'patches of 0.5 m). Wet all over, the walk slows but stays straight.'
+)
+
+
+def _feet(walks: Walks, number: int, floor: str) -> Explained:
+    middle, others = _slips_by_case(walks, floor)
+    stride = 1e3 * walks[f'hexapod_{floor}_dry_flat', SEEDS[0]].settings['stride_m']
+    return Explained(
+        number,
+        Drawn(
+            _draw_feet(walks, floor),
+            f'Figure {number}: feet of legs 2 and 5 on the {floor} floor',
+            f'Path of feet 2 and 5 over time on the {floor} floor. Slip in a cycle: '
+            + ', '.join(f'{CASES[case][0]} {each.mean():.0f} mm' for case, each in middle.items()),
+            f'Five gait cycles of seed {SEEDS[0]}, the sixth to the tenth, as markers on the feet '
+            'show them.',
+        ),
+        _HEXAPOD_MEASURED,
+        _HEXAPOD_MODELLED,
+        _HEXAPOD_ASSUMED,
+        _slip_claims(number, middle, others, stride),
+    )
+
+
+def _draw_feet(walks: Walks, floor: str) -> Figure:
+    figure = Figure(figsize=(WIDE, 3.1), layout='constrained')
+    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    for column, (case, (words, _, _)) in enumerate(CASES.items()):
+        trial = walks[f'hexapod_{floor}_{case}', SEEDS[0]]
+        view = view_of(trial)
+        standing = trial.standing(view.load_gate)
+        start = trial.settings['settle_s'] + 5.0 * trial.settings['cycle_s']
+        rows = (trial.time >= start) & (trial.time <= start + 5.0 * trial.settings['cycle_s'])
+        time = trial.time[rows] - start
+        for ax, leg in zip(axes[:, column], (2, 5), strict=True):
+            index = trial.legs.index(leg)
+            x = 1e3 * trial.position[rows, index, 0]
+            x = x - x[0]
+            ax.plot(time, np.where(standing[rows, index], np.nan, x), color=BLACK, lw=0.9)
+            ax.plot(time, np.where(standing[rows, index], x, np.nan), color=VERMILION, lw=2.0)
+            if column == 0:
+                ax.set_ylabel(f'leg {leg}: x / mm')
+        axes[0, column].set_title(f'({"abc"[column]}) {words}')
+        axes[1, column].set_xlabel('time / s')
+    legend(
+        figure,
+        [
+            Line2D([], [], color=BLACK, lw=0.9, label='foot in the air'),
+            Line2D([], [], color=VERMILION, lw=2.0, label='standing: level where it holds'),
+        ],
+    )
+    return figure
+
+
+Slips = dict[str, np.ndarray]  # slip of each seed, mm a cycle, by case
+
+
+def _slips_by_case(walks: Walks, floor: str) -> tuple[Slips, Slips]:
+    """Return the mean slip of legs 2 and 5, and the mean slip of the other legs."""
+    middle, others = {}, {}
+    for case in CASES:
+        slips = np.array([_slip_a_cycle(walks[f'hexapod_{floor}_{case}', s]) for s in SEEDS])
+        legs = np.array(walks[f'hexapod_{floor}_{case}', SEEDS[0]].legs)
+        at = np.isin(legs, (2, 5))
+        middle[case], others[case] = slips[:, at].mean(axis=1), slips[:, ~at].mean(axis=1)
+    return middle, others
+
+
+def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tuple[Claim, ...]:
+    largest = max(middle['dry_flat'].max(), others['dry_flat'].max())
+    more = middle['wet_flat'] / middle['dry_flat']
+    left = middle['wet_dome'] / middle['wet_flat']
+    ratio = middle['wet_flat'] / others['wet_flat']
+    return (
+        Claim(
+            number,
+            'On dry ground there are no signs of slip.',
+            f'Feet slip at most {largest:.0f} mm a cycle, of a stride of {stride:g} mm, when they '
+            f'land (here up to {100.0 * MINIMAL:g} % count as no slip).',
+            (float(largest),),
+            bool(largest <= MINIMAL * stride),
+        ),
+        Claim(
+            number,
+            'On wet ground flat feet slip backward.',
+            f'Legs 2 and 5 slip {_few(middle["wet_flat"])} mm a cycle, {_few(more, ".1f")} '
+            'times as much as on dry ground.',
+            tuple(more.tolist()),
+            bool(np.all(more > 2.0)),
+        ),
+        Claim(
+            number,
+            'Domes significantly mitigate that.',
+            f'With domes, {_few(100.0 * left)} % of the slip remain: '
+            f'{_few(middle["wet_dome"])} mm.',
+            tuple(left.tolist()),
+            bool(np.all(left <= 0.5)),
+        ),
+        Claim(
+            number,
+            'Legs 2 and 5 have a higher risk of slip than the others (F₁ = 2F₂ = 2F₃).',
+            f'On wet ground with flat feet they slip {_few(ratio, ".2f")} times as much as '
+            'the others: a foot that pushes harder also carries more.',
+            tuple(ratio.tolist()),
+            bool(np.all(ratio > 1.0 + MINIMAL)),
+        ),
+    )
+
+
+def _paths(walks: Walks, number: int, floor: str) -> Explained:
+    figure = Figure(figsize=(WIDE, 2.3), layout='constrained')
+    ax = figure.subplots()
+    drifts, shares = {}, {}
+    for case, (words, colour, style) in CASES.items():
+        trials = [walks[f'hexapod_{floor}_{case}', seed] for seed in SEEDS]
+        for trial in trials:
+            ax.plot(
+                *(1e3 * trial.body[:, :2]).T, color=colour, ls=style, lw=1.2,
+                label=words if trial is trials[0] else None,
+            )  # fmt: skip
+            ax.plot(*(1e3 * trial.body[-1, :2]), 's', color=colour, ms=4.0)
+        own = [trial.metrics for trial in trials if trial.metrics is not None]
+        drifts[case] = np.array([1e3 * abs(each.lateral_drift_m) for each in own])
+        shares[case] = np.array([abs(each.lateral_drift_m) / each.distance_m for each in own])
+    ax.axhline(0.0, color=PALE, lw=0.8, zorder=0)
+    ax.set_xlabel('x / mm')
+    ax.set_ylabel('y / mm')
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -150.0), max(high, 150.0))
+    legend(
+        figure,
+        [
+            *ax.get_legend_handles_labels()[0],
+            Line2D([], [], color=BLACK, marker='s', ms=4.0, ls='', label='end'),
+        ],
+    )
+    return Explained(
+        number,
+        Drawn(
+            figure,
+            f'Figure {number}: path of the body on the {floor} floor',
+            f'Paths of the body on the {floor} floor. Aside at the end: '
+            + '; '.join(
+                f'{CASES[case][0]} {_few(each)} mm' for case, each in drifts.items()
+            ),
+            f'Fifteen gait cycles on {len(SEEDS)} floors, each with another seed. The scale of y '
+            'is larger than that of x.',
+        ),
+        _HEXAPOD_MEASURED,
+        _HEXAPOD_MODELLED,
+        _HEXAPOD_ASSUMED,
+        _path_claims(number, drifts, shares),
+    )  # fmt: skip
+
+
+def _path_claims(number: int, drifts: Slips, shares: Slips) -> tuple[Claim, ...]:
+    straight = max(shares['dry_flat'].max(), shares['wet_dome'].max())
+    return (
+        Claim(
+            number,
+            'On wet ground flat feet struggle to keep a straight path.',
+            f'At the end the body is {_few(drifts["wet_flat"])} mm aside; on dry ground at '
+            f'most {drifts["dry_flat"].max():.0f} mm.',
+            tuple(drifts['wet_flat'].tolist()),
+            bool(
+                shares['wet_flat'].min() > STRAIGHT
+                and drifts['wet_flat'].min() > drifts['dry_flat'].max()
+            ),
+        ),
+        Claim(
+            number,
+            'Domes keep a straight course that closely resembles that on dry ground.',
+            f'At the end the body is {_few(drifts["wet_dome"])} mm aside, at most '
+            f'{100.0 * straight:.1f} % of its distance (here straight is up to '
+            f'{100.0 * STRAIGHT:g} %).',
+            tuple(drifts['wet_dome'].tolist()),
+            bool(straight <= STRAIGHT),
+        ),
+    )
+
+
+def _slip_a_cycle(trial: Trial) -> list[float]:
+    """Return the mean slip path of each foot in a gait cycle, mm."""
+    assert trial.metrics is not None
+    return [1e3 * each / trial.metrics.cycles for each in trial.metrics.slip_path_m]
+
+
+def _few(values: np.ndarray, form: str = '.0f') -> str:
+    return ', '.join(f'{value:{form}}' for value in values)
+
+
+def _seconds(value: float | None) -> str:
+    return 'never' if value is None else f'{value:.1f} s'

@@ -1,0 +1,559 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work-precision study of liquid around one pad, against the exact meniscus of a wide bath.
+
+The reference is computed differently from :mod:`ros_pad.capillary`: the surface, and the volume
+below it, are integrated from far away inwards until the surface meets the wall.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import statistics
+import time
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.integrate import solve_ivp
+from scipy.integrate import trapezoid
+from scipy.optimize import brentq
+from scipy.special import k0e
+from scipy.special import k1e
+
+from ros_pad.capillary import Face
+from ros_pad.capillary import Mesh
+from ros_pad.capillary import Wall
+from ros_pad.capillary import Wet
+from ros_pad.capillary import WetPattern
+from ros_pad.capillary import bath_meniscus
+from ros_pad.capillary import bath_surface
+from ros_pad.capillary import wet
+from ros_pad.capillary import wet_pattern
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.meniscus import WATER
+from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.pad import Array
+from ros_pad.errors import PadError
+from ros_pad.pace import Progress
+from studies.work_precision import capillary_chart
+
+Pair = tuple[float, float]  # height, m, and force, N
+
+SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
+TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
+RATIOS = (0.3, 0.5, 0.65, 0.8, 0.95)  # tension of the solid over tension of the liquid
+# The minimiser is slow, so it solves only these of the ten cases.
+FEW = slice(1, None, 4)
+
+BALANCES = ('thesis', 'force', 'energy')
+# Layers, slices, rings and sectors of the mesh.
+SIZES = ((25, 12, 12, 48), (100, 36, 48, 72), (100, 36, 100, 100), (400, 36, 100, 100))
+# Vertices round the pad, and how often triangles are halved.
+MINIMISED = ((12, 0), (24, 0), (24, 1))
+BIG = (100, 36, 100, 100)  # about 20 000 triangles
+EXACT = 'exact meniscus'
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A round pad as a wall, as a mesh, and as functions for the reference.
+
+    Attributes
+    ----------
+    name : str
+    wall : Wall
+    mesh : callable
+        Returns the mesh for numbers of rings and sectors.
+    outside : callable
+        Returns a number for a radius and a height, m: above 0 outside the pad.
+    inclination : callable
+        Returns the inclination of the wall, rad, at a height, m.
+    solid : callable
+        Returns the volume of the pad, m³, up to a height, m.
+    """
+
+    name: str
+    wall: Wall
+    mesh: Callable[[int, int], Mesh]
+    outside: Callable[[float, float], float]
+    inclination: Callable[[float], float]
+    solid: Callable[[float], float]
+
+
+def dome(top: float = 2.9e-3) -> Shape:
+    """Return the dome of the reference table, cut off at a height, m."""
+    centre = math.sqrt(SPHERE**2 - REST**2)
+
+    def solid(z: float) -> float:
+        return math.pi * (SPHERE**2 * z + ((centre - z) ** 3 - centre**3) / 3.0)
+
+    return Shape(
+        'dome',
+        Wall.dome(SPHERE, REST, top),
+        lambda rings, sectors: Mesh.dome(SPHERE, REST, top, rings, sectors),
+        lambda r, z: math.hypot(r, z - centre) - SPHERE,
+        lambda z: math.acos((centre - z) / SPHERE),
+        solid,
+    )
+
+
+def cone(name: str, radius: float, degrees: float, top: float) -> Shape:
+    """Return a truncated cone with an inclined wall, degrees; with 90 it is a cylinder."""
+    phi = math.radians(degrees)
+    lean = math.cos(phi) / math.sin(phi)
+
+    def solid(z: float) -> float:
+        above = radius + lean * z
+        return math.pi * z * (radius**2 + radius * above + above**2) / 3.0
+
+    return Shape(
+        name,
+        Wall.cone(radius, phi, top),
+        lambda rings, sectors: Mesh.cone(radius, radius + lean * top, top, rings, sectors),
+        lambda r, z: r - radius - lean * z,
+        lambda z: phi,
+        solid,
+    )
+
+
+SHAPES = (
+    dome(),
+    cone('truncated cone', 1.6e-3, 110.0, 3e-3),
+    cone('cylinder', 1.2e-3, 90.0, 4e-3),
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case of a method: tension (N/m), ratio of tensions, height (m), force (N), and status.
+
+    The true height and force are in ``exact_height`` and ``exact_force``. Without a result, height
+    and force are None, and the status is the reason.
+    """
+
+    tension: float
+    ratio: float
+    height: float | None
+    force: float | None
+    exact_height: float
+    exact_force: float
+    status: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a method on a shape.
+
+    Attributes
+    ----------
+    kind : str
+    shape, family, size : str
+        Shape of the pad, family of the method, and its resolution.
+    ms_per_solve : float
+        Median time of one case, milliseconds.
+    height_error, force_error : float
+        Median relative errors; those that begin with ``worst_`` are the largest.
+    dry : int
+        Number of cases in which liquid does not rise, and the method has no result.
+    refused : int
+        Number of cases in which liquid rises, and the method has no result.
+    false : int
+        Number of cases in which liquid does not rise, and the method has a result.
+    cases : list of Case
+    """
+
+    kind: str
+    shape: str
+    family: str
+    size: str
+    ms_per_solve: float
+    height_error: float
+    worst_height_error: float
+    force_error: float
+    worst_force_error: float
+    dry: int
+    refused: int
+    false: int
+    cases: list[Case]
+
+
+@dataclass(frozen=True)
+class Trap:
+    """An input that makes a method fail, with its result and the true one."""
+
+    kind: str
+    method: str
+    given: str
+    answer: str
+    true: str
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Time of a computation on a mesh of many triangles; None if its package is not installed."""
+
+    kind: str
+    what: str
+    triangles: int
+    ms: float | None
+
+
+Row = Result | Trap | Speed
+
+
+def measure(progress: Progress) -> list[Row]:
+    """Measure every method on every shape, the traps, and the speed.
+
+    Progress, 0 to 1, is reported to ``progress``.
+    """
+    rows: list[Row] = []
+    share = 0.9 / len(SHAPES)
+    _minimised(SHAPES[0], *MINIMISED[0])(WATER)  # imports are not timed
+    for k, shape in enumerate(SHAPES):
+        begin = k * share
+        rows += run(shape, lambda done, begin=begin: progress(begin + share * done))  # type: ignore[misc]
+    rows += traps()
+    progress(0.95)
+    rows += speeds()
+    progress(1.0)
+    return rows
+
+
+def figures(rows: list[Row], progress: Progress | None = None) -> dict[str, Figure]:
+    """Return the picture, by name."""
+    return {'capillary': capillary_chart.draw([row for row in rows if isinstance(row, Result)])}
+
+
+# --- truth ---------------------------------------------------------------------------------------
+
+
+def truth(shape: Shape, liquid: Liquid, rtol: float = 1e-10) -> Pair:
+    """Return the height of a wide bath at floor level, m, and the weight of the raised liquid, N.
+
+    The contact angle must be above 0; the result is (0, 0) where the liquid does not rise. The
+    surface is integrated in capillary lengths over its slope angle ψ, from far away, where its
+    equation is linear, to the wall. The starting distance is found such that the surface meets the
+    wall at the contact angle. The force of the liquid on the pad is the weight of the raised
+    liquid.
+    """
+    if math.pi - shape.inclination(0.0) - liquid.angle <= 0.0:
+        return 0.0, 0.0
+    weight = liquid.density * GRAVITY
+    length = math.sqrt(liquid.surface_tension / weight)
+    start = shape.wall.meridian(shape.wall.floor)[0] / length
+
+    def rates(log: float, state: Array) -> tuple[float, float, float]:
+        psi, (r, z, _) = math.exp(log), state.tolist()
+        pull = psi / (z + math.sin(psi) / r)
+        inward = math.cos(psi) * pull
+        return -inward, math.sin(psi) * pull, 2.0 * math.pi * r * z * inward
+
+    def touch(_: float, state: Array) -> float:
+        return shape.outside(length * state[0], length * state[1])
+
+    touch.terminal = True  # type: ignore[attr-defined]
+
+    def meet(distance: float) -> tuple[float, float, float]:
+        """Return slope angle minus the required one, height, and raised volume."""
+        first, far = 1e-6, start + distance
+        height = first * k0e(far) / k1e(far)
+        met = solve_ivp(
+            rates,
+            (math.log(first), math.log(math.pi)),
+            # The surface carries the liquid farther out, so its slope here gives that volume.
+            (far, height, 2.0 * math.pi * far * first),
+            method='DOP853',
+            rtol=rtol,
+            atol=rtol * min(start, first),
+            events=touch,
+            dense_output=True,
+        )
+        if not met.t_events[0].size:
+            return math.pi, math.nan, math.nan
+        r, z, ring = met.y_events[0][0].tolist()
+        wanted = math.pi - shape.inclination(length * z) - liquid.angle
+        lifted = length**3 * (ring + math.pi * r**2 * z) - shape.solid(length * z)
+        return math.exp(met.t_events[0][0]) - wanted, length * z, lifted
+
+    # Search up to 30 capillary lengths: farther out the surface is flatter than the starting
+    # slope of 1e-6.
+    distance = brentq(lambda far: meet(far)[0], 1e-3, 30.0, xtol=1e-13, rtol=0.1 * rtol)
+    _, height, lifted = meet(distance)
+    return height, weight * lifted
+
+
+# --- methods -------------------------------------------------------------------------------------
+
+
+def weight_lifted(found: Wet, solid: Callable[[float], float]) -> float:
+    """Return the weight of the liquid between the arcs, the floor and a round pad, N.
+
+    By the balances and by the exact meniscus, this is the vertical force on the pad.
+    """
+    points = found.surface(65)
+    r = np.hypot(points[..., 0] - found.axis[0], points[..., 1] - found.axis[1])
+    z = points[..., 2]
+    inside = math.pi * float(np.mean(trapezoid(r**2, z, axis=1)))
+    return found.liquid.density * GRAVITY * (inside - solid(found.mean_height))
+
+
+def _layers(shape: Shape, balance: str, size: tuple[int, ...]) -> Callable[[Liquid], Any]:
+    layers, slices, rings, sectors = size
+    mesh = shape.mesh(rings, sectors)
+    # The errors of heights that a strict call refuses as far_off are measured, too.
+    return lambda liquid: wet(mesh, liquid, balance, layers, slices, strict=False)
+
+
+def _minimised(shape: Shape, sectors: int, refinements: int) -> Callable[[Liquid], Any]:
+    face = Face.of_wall(shape.wall)
+    return lambda liquid: bath_surface(face, liquid, sectors=sectors, refinements=refinements)
+
+
+def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
+    """Return height and force, if there are any, and status of a method's result."""
+    if isinstance(found, Wet):
+        status = str(found.status[0])
+        if status != 'ok':
+            return None, status
+        return (found.mean_height, weight_lifted(found, shape.solid)), status
+    if hasattr(found, 'lines'):
+        line = found.vertices[found.lines[0].vertices, 2]
+        return (float(line.mean()), -float(found.forces[0, 2])), 'ok'
+    if found.status not in ('ok', 'several'):
+        return None, found.status
+    return (found.height, found.force), found.status
+
+
+def run(shape: Shape, progress: Progress) -> list[Result]:
+    """Measure every method on a shape; report progress, 0 to 1, to ``progress``."""
+    cases = [(tension, ratio) for tension in TENSIONS for ratio in RATIOS]
+    exact = []
+    for tension, ratio in cases:
+        exact.append(truth(shape, Liquid(tension, ratio * tension)))
+        progress(0.2 * len(exact) / len(cases))
+    # Family, size, method, and the cases that it solves.
+    methods: list[tuple[str, str, Callable[[Liquid], Any], slice]] = [
+        (balance, _worded(size), _layers(shape, balance, size), slice(None))
+        for balance in BALANCES
+        for size in (SIZES if balance == 'energy' else SIZES[::2])
+    ]
+    methods += [
+        (
+            'minimised',
+            f'{sectors} sectors, {halved}x halved',
+            _minimised(shape, sectors, halved),
+            FEW,
+        )
+        for sectors, halved in MINIMISED
+    ]
+
+    def meniscus(liquid: Liquid) -> Any:
+        return bath_meniscus(wall=shape.wall, liquid=liquid)
+
+    methods.append((EXACT, '', meniscus, slice(None)))
+    results = []
+    for family, size, solve, which in methods:
+        results.append(_result(shape, family, size, solve, cases[which], exact[which]))
+        progress(0.2 + 0.8 * len(results) / len(methods))
+    return results
+
+
+def _worded(size: tuple[int, ...]) -> str:
+    layers, slices, rings, sectors = size
+    return f'{layers} × {slices}, {2 * (rings + 1) * sectors} triangles'
+
+
+def _result(
+    shape: Shape,
+    family: str,
+    size: str,
+    solve: Callable[[Liquid], Any],
+    cases: Sequence[Pair],
+    exact: Sequence[Pair],
+) -> Result:
+    times, answers = [], []
+    for (tension, ratio), (height, force) in zip(cases, exact, strict=True):
+        liquid = Liquid(tension, ratio * tension)
+        begun = time.perf_counter()
+        pair: Pair | None = None
+        try:
+            found = solve(liquid)
+        except PadError as error:
+            status = str(getattr(error, 'status', type(error).__name__))
+        else:
+            took = time.perf_counter() - begun
+            pair, status = _read(shape, found)
+            if pair:
+                times.append(1e3 * took)
+        given, lifted = pair or (None, None)
+        answers.append(Case(tension, ratio, given, lifted, height, force, status))
+    rising = [case for case in answers if case.exact_height > 0.0]
+    still = [case for case in answers if case.exact_height == 0.0]
+    good = [case for case in rising if case.height is not None]
+    heights = [_off(case.height, case.exact_height) for case in good]
+    forces = [_off(case.force, case.exact_force) for case in good]
+    return Result(
+        kind='result',
+        shape=shape.name,
+        family=family,
+        size=size,
+        ms_per_solve=statistics.median(times) if times else math.nan,
+        height_error=statistics.median(heights) if good else math.nan,
+        worst_height_error=max(heights, default=math.nan),
+        force_error=statistics.median(forces) if good else math.nan,
+        worst_force_error=max(forces, default=math.nan),
+        dry=sum(case.height is None for case in still),
+        refused=len(rising) - len(good),
+        false=sum(case.height is not None for case in still),
+        cases=answers,
+    )
+
+
+def _off(found: float | None, exact: float) -> float:
+    assert found is not None
+    return abs(found / exact - 1.0)
+
+
+# --- traps and speed -----------------------------------------------------------------------------
+
+
+def traps() -> list[Trap]:
+    """Return inputs that make methods fail, with the results of the methods and the true ones."""
+    round_, narrow, upright = SHAPES
+    meshes = {shape.name: shape.mesh(48, 72) for shape in SHAPES}
+    low = dome(1.1e-3)
+    hung = Liquid(0.073, 0.073, contact_angle=math.radians(100.0))
+    wetting = Liquid(0.073, 0.8 * 0.073)
+    flat = Liquid(0.073, 0.073, contact_angle=math.radians(75.0))
+
+    def outcome(solve: Callable[[], Any], shape: Shape = round_) -> str:
+        try:
+            found = solve()
+        except PadError as error:
+            return f'{type(error).__name__}: {error}'
+        if isinstance(found, WetPattern):
+            return f'{1e3 * found.height:.2f} mm' if found.status == 'ok' else found.status
+        pair, status = _read(shape, found)
+        return f'{1e3 * pair[0]:.2f} mm' if pair else status
+
+    def high(shape: Shape, liquid: Liquid) -> str:
+        height = truth(shape, liquid)[0]
+        return f'{1e3 * height:.2f} mm' if height else 'no rise'
+
+    def trap(method: str, given: str, answer: str, true: str) -> Trap:
+        return Trap('trap', method, given, answer, true)
+
+    rows = []
+    for balance in BALANCES:
+        answer = outcome(lambda b=balance: wet(meshes['dome'], hung, b))  # type: ignore[misc]
+        rows.append(trap(balance, 'dome, water, θ = 100°', answer, high(round_, hung)))
+    for balance in BALANCES:
+        for name, shape in (('truncated cone', narrow), ('cylinder', upright)):
+            answer = outcome(lambda b=balance, n=name: wet(meshes[n], wetting, b), shape)  # type: ignore[misc]
+            rows.append(trap(balance, f'{name}, water, γs/γl = 0.8', answer, high(shape, wetting)))
+    for balance in BALANCES:
+        answer = outcome(lambda b=balance: wet(low.mesh(48, 72), wetting, b))  # type: ignore[misc]
+        rows.append(trap(balance, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
+    answer = outcome(lambda: bath_meniscus(wall=low.wall, liquid=wetting))
+    rows.append(trap(EXACT, 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
+    answer = outcome(
+        lambda: bath_surface(Face.of_wall(low.wall), wetting, sectors=12, refinements=0)
+    )
+    rows.append(trap('minimised', 'dome 1.1 mm high, water, γs/γl = 0.8', answer, 'over the top'))
+    half, wide = dome(1.436e-3), Liquid(0.073, 0.7 * 0.073)
+    answer = outcome(lambda: wet(half.mesh(48, 72), wide, 'thesis'), half)
+    rows.append(trap('thesis', 'dome 1.44 mm high, water, γs/γl = 0.7', answer, high(half, wide)))
+    answer = outcome(lambda: wet(meshes['truncated cone'], flat), narrow)
+    rows.append(trap('energy', 'truncated cone, water, θ = 75°', answer, high(narrow, flat)))
+    thin = Liquid(0.001, 0.0003)
+    answer = outcome(lambda: wet(meshes['dome'], thin, layers=10))
+    rows.append(trap('energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers', answer, high(round_, thin)))
+    answer = outcome(lambda: Mesh.dome_pattern(7, 3e-3, SPHERE, REST, 2.9e-3))
+    rows.append(trap('patterns', '7 domes 3.10 mm wide, 3 mm apart', answer, 'they overlap'))
+    alone = high(round_, WATER)
+    answer = outcome(lambda: wet_pattern(meshes['dome'], WATER, math.sqrt(0.75) * 9e-3**2))
+    rows.append(trap('patterns', 'domes in water, 9 mm apart', answer, f'above {alone}'))
+    answer = outcome(lambda: wet_pattern(meshes['dome'], WATER, 5e-5, 7))
+    rows.append(trap('patterns', '7 domes in 50 mm²', answer, 'they overlap'))
+    return rows
+
+
+def speeds() -> list[Speed]:
+    """Return the time for a mesh of 20 000 triangles, here and with trimesh if it is installed."""
+    layers, slices, rings, sectors = BIG
+    mesh = SHAPES[0].mesh(rings, sectors)
+    triangles = len(mesh.faces)
+
+    def row(what: str, solve: Callable[[], Any] | None) -> Speed:
+        return Speed('speed', what, triangles, None if solve is None else _shortest(solve))
+
+    found = [
+        row(
+            f'wet, {balance}, {layers} layers × {slices} slices',
+            lambda b=balance: wet(mesh, WATER, b, layers, slices),  # type: ignore[misc]
+        )
+        for balance in ('energy', 'force')
+    ]
+    what = f'trimesh: {layers} sections alone, one by one'
+    try:
+        # trimesh is no dependency; it is measured only if it is installed.
+        trimesh = importlib.import_module('trimesh')
+    except ImportError:
+        return [*found, row(what, None)]
+    other = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
+    heights = (np.arange(layers) + 0.5) / layers * mesh.height
+
+    def sections() -> None:
+        for z in heights:
+            trimesh.intersections.mesh_plane(other, (0.0, 0.0, 1.0), (0.0, 0.0, z))
+
+    def together() -> None:
+        trimesh.intersections.mesh_multiplane(other, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), heights)
+
+    named = f'trimesh {trimesh.__version__}: {layers} sections alone'
+    return [*found, row(f'{named}, one by one', sections), row(f'{named}, together', together)]
+
+
+def _shortest(solve: Callable[[], Any], repeats: int = 5) -> float:
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        solve()
+        times.append(time.perf_counter() - begun)
+    return 1e3 * min(times)
+
+
+# --- table ---------------------------------------------------------------------------------------
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as text."""
+    lines = []
+    results = [row for row in rows if isinstance(row, Result)]
+    for name in dict.fromkeys(result.shape for result in results):
+        part = [result for result in results if result.shape == name]
+        lines += [
+            f'{name}: height and force against the exact meniscus of a wide bath',
+            f'  {"method":14} {"size":30} {"ms":>7}  {"height: median":>14} {"worst":>7}'
+            f'  {"force: median":>14} {"worst":>7}  cases  dry  refused  false',
+        ]
+        lines += [
+            f'  {result.family:14} {result.size:30} {result.ms_per_solve:7.3g}'
+            f'  {result.height_error:14.1e} {result.worst_height_error:7.1e}'
+            f'  {result.force_error:14.1e} {result.worst_force_error:7.1e}'
+            f'  {len(result.cases):5d}  {result.dry:3d}  {result.refused:7d}  {result.false:5d}'
+            for result in part
+        ]
+        lines.append('')
+    lines.append('inputs that make methods fail')
+    traps_ = [row for row in rows if isinstance(row, Trap)]
+    lines += [f'  {t.method:14} {t.given:38} gives {t.answer}; true: {t.true}' for t in traps_]
+    lines.append('')
+    for speed in (row for row in rows if isinstance(row, Speed)):
+        took = 'not installed' if speed.ms is None else f'{speed.ms:.0f} ms'
+        lines.append(f'{speed.what}, {speed.triangles} triangles: {took}')
+    return '\n'.join([*lines, ''])

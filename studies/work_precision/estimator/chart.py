@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draw the pictures of the study: comparison of slip alarms, and robustness of the estimator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.drawing import BLACK
+from studies.drawing import BLUE
+from studies.drawing import GREEN
+from studies.drawing import ORANGE
+from studies.drawing import PALE
+from studies.drawing import PURPLE
+from studies.drawing import SKY
+from studies.drawing import STYLE
+from studies.drawing import VERMILION
+from studies.work_precision.estimator.methods import BAYES
+from studies.work_precision.estimator.methods import CUSUM
+from studies.work_precision.estimator.methods import RATIO
+from studies.work_precision.estimator.methods import SHIPPED
+from studies.work_precision.estimator.methods import SPEED
+from studies.work_precision.estimator.tally import TARGETS
+from studies.work_precision.estimator.tally import Row
+
+_TARGET: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'ls': '--', 'zorder': 1.5}
+
+# --- methods -------------------------------------------------------------------------------------
+
+_LOOKS: dict[tuple[str, str], dict[str, Any]] = {
+    (RATIO, ''): {'color': VERMILION, 'marker': 'X'},
+    (SPEED, ''): {'color': ORANGE, 'marker': 's'},
+    (CUSUM, '10 mm/s'): {'color': SKY, 'marker': 'o'},
+    (CUSUM, '20 mm/s'): {'color': BLUE, 'marker': 'o'},
+    (CUSUM, '40 mm/s'): {'color': BLUE, 'marker': 'o', 'mfc': 'white', 'ls': ':'},
+    (BAYES, ''): {'color': PURPLE, 'marker': 'D'},
+    (SHIPPED, ''): {'color': GREEN, 'marker': '*', 'ms': 13.0, 'ls': ''},
+}
+_LABELS = {
+    RATIO: 'T/N above 0.05 to 0.6',
+    SPEED: 'slip speed above 6 to 100 mm/s',
+    CUSUM: 'CUSUM for {}, above 0.5 to 16',
+    BAYES: 'Bayes filter, margin below -0.3 to 0.05',
+    SHIPPED: 'FootEstimator, alarm as shipped',
+}
+_NONE = 0.1  # zero false alarms a minute are drawn here, methods side by side
+_ASIDE = {look: 1.14 ** (place - 3) for place, look in enumerate(_LOOKS)}
+
+
+def draw_methods(rows: Sequence[Row]) -> Figure:
+    """Return the picture of the methods, each a curve over its thresholds."""
+    rows = [row for row in rows if row.part == 'methods']
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 6.6))
+        figure.set_layout_engine('constrained', w_pad=0.08, h_pad=0.08)
+        a, b, c, d = figure.subplots(2, 2).ravel()
+        _against_false(a, rows, 'delay', 1e3, 'a  delay of the alarm', 'median, ms')
+        _against_false(
+            b, rows, 'slip_distance', 1e3, 'b  distance slipped before it', 'median, mm'
+        )
+        _against_false(c, rows, 'misses', 1e2, 'c  slips missed', '% of slips longer than 3 mm')
+        c.axhline(1e2 * TARGETS['misses'], **_TARGET)
+        c.set_yscale('symlog', linthresh=0.3, linscale=0.4)
+        c.set_ylim(-0.05, 130.0)
+        c.set_yticks(
+            [0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
+            ['0', '0.3', '1', '3', '10', '30', '100'],
+        )
+        _costs(d, rows)
+        text = 'No median where most slips are missed,\nor begin in an alarm: T/N, most margins.'
+        a.text(
+            0.98,
+            0.8,
+            text,
+            transform=a.transAxes,
+            in_layout=False,
+            ha='right',
+            va='top',
+            fontsize=8,
+        )
+        handles = [
+            Line2D([], [], **{'lw': 1.2, 'ms': 5.0, **look}, label=_LABELS[name].format(variant))
+            for (name, variant), look in _LOOKS.items()
+        ]
+        handles.append(Line2D([], [], **_TARGET, label='target, at most'))
+        figure.legend(handles=handles, loc='outside lower center', ncol=3)
+    return figure
+
+
+def _against_false(
+    panel: Axes, rows: Sequence[Row], name: str, scale: float, title: str, label: str
+) -> None:
+    for (method, variant), look in _LOOKS.items():
+        mine = [
+            row
+            for row in rows
+            if (row.name, row.variant) == (method, variant)
+            and getattr(row, name) is not None
+            and row.false_per_minute is not None
+        ]
+        if not mine:
+            continue  # a line without points would spoil the layout
+        x = [row.false_per_minute or _NONE * _ASIDE[method, variant] for row in mine]
+        y = [scale * getattr(row, name) for row in mine]
+        style = {'lw': 1.2, 'ms': 5.0, 'clip_on': False, 'zorder': 3, **look}
+        if method == SHIPPED:
+            style |= {'zorder': 5, 'mec': 'white', 'mew': 0.7}
+        panel.plot(x, y, **style)
+    panel.axvline(TARGETS['false_per_minute'], **_TARGET)
+    panel.set(xscale='log', title=title, ylabel=label, xlabel='false alarms in a minute of stick')
+    panel.axvspan(0.6 * _NONE, 1.7 * _NONE, color=PALE, alpha=0.15, lw=0.0)
+    panel.set_xlim(0.6 * _NONE, 3e3)
+    panel.minorticks_off()
+    panel.set_xticks([_NONE, 1.0, 10.0, 100.0, 1000.0], ['none', '1', '10', '100', '1000'])
+    panel.set_ylim(bottom=0.0)
+    panel.grid(color=PALE, alpha=0.25, lw=0.5)
+
+
+def best(rows: Sequence[Row]) -> list[Row]:
+    """Return for each method the row of its best threshold.
+
+    This is the threshold with the fewest misses of those that meet the target of false alarms; if
+    none meets the target, the one with the fewest false alarms. Of equal ones, it is the one with
+    the shortest slip before the alarm.
+    """
+    found = []
+    for method, variant in _LOOKS:
+        mine = [row for row in rows if (row.name, row.variant) == (method, variant)]
+        if mine:
+            found.append(min(mine, key=_badness))
+    return found
+
+
+def _badness(row: Row) -> tuple[float, ...]:
+    false = math.inf if row.false_per_minute is None else row.false_per_minute
+    misses = 1.0 if row.misses is None else row.misses
+    return (
+        max(TARGETS['false_per_minute'], false),
+        misses,
+        math.inf if row.slip_distance is None else row.slip_distance,
+    )
+
+
+def _costs(panel: Axes, rows: Sequence[Row]) -> None:
+    """Draw the time per update at the best threshold of each method, and write its results."""
+    chosen = best(rows)
+    across = panel.get_yaxis_transform()
+    heads = {0.6: 'missed', 0.78: 'false a min.', 0.98: 'slipped, median'}
+    for place, head in heads.items():
+        panel.text(
+            place,
+            -0.75,
+            head,
+            transform=across,
+            in_layout=False,
+            ha='right',
+            fontsize=8,
+            color='#666666',
+        )
+    for place, row in enumerate(chosen):
+        look = _LOOKS[row.name, row.variant]
+        cost = math.nan if row.us_per_update is None else row.us_per_update
+        panel.plot(cost, place, **{'ms': 7.0, **look, 'ls': ''})
+        false = row.false_per_minute or 0.0
+        texts = (
+            f'{1e2 * (row.misses or 0.0):.1f} %',
+            f'{false:.1f}' if false else 'none',
+            '-' if row.slip_distance is None else f'{1e3 * row.slip_distance:.1f} mm',
+        )
+        for at, text in zip(heads, texts, strict=True):
+            panel.text(
+                at,
+                place,
+                text,
+                transform=across,
+                in_layout=False,
+                ha='right',
+                va='center',
+                fontsize=8.5,
+            )
+    panel.axvline(TARGETS['us_per_update'], ymax=0.92, **_TARGET)
+    panel.set(
+        xscale='log',
+        title='d  cost, and the best with at most 1 false alarm a minute',
+        xlabel='time for an update of a foot, µs',
+    )
+    names = [f'{row.name}, {row.variant}' if row.variant else row.name for row in chosen]
+    panel.set_yticks(range(len(names)), names)
+    panel.tick_params(axis='y', length=0)
+    # The right half is for the text.
+    panel.set_xlim(0.08, 1e4)
+    panel.set_xticks([0.1, 1.0, 10.0], ['0.1', '1', '10'])
+    panel.minorticks_off()
+    panel.set_ylim(len(names) - 0.5, -1.2)
+    panel.grid(axis='y', color=PALE, alpha=0.25, lw=0.5)
+
+
+# --- robustness ----------------------------------------------------------------------------------
+
+# Changes: heading, unit and scale of the axis, and whether it is logarithmic.
+_COLUMNS: dict[str, tuple[str, str, float, bool]] = {
+    'force bias': ('force bias', 'N', 1.0, False),
+    'position noise': ('position noise', 'mm', 1e3, True),
+    'sample rate': ('sample rate', 'Hz', 1.0, True),
+    'shear stiffness': ('shear stiffness', 'times; configured / true', 1.0, True),
+    'patch length': ('patch length', 'm', 1.0, True),
+    'wet friction': ('wet friction', '(dry: 0.8)', 1.0, False),
+    'impacts': ('impacts', 'peak, loads', 1.0, False),
+    'messages dropped': ('dropped', '% of samples', 1e2, False),
+    'position late': ('position late', 'ms', 1e3, False),
+    'clock jumps': ('clock set by', 's', 1.0, False),
+    'mass': ('mass', 'times', 1.0, True),
+}
+# Tick values of axes without room for every value.
+_TICKS = {'clock jumps': [-0.5, 0.0, 0.5], 'mass': [0.5, 1.0, 2.0, 4.0]}
+# Measures: label, scale, range, and the target.
+_MEASURES: tuple[tuple[str, str, float, tuple[float, float], tuple[float, ...]], ...] = (
+    ('slip_distance', 'slipped before\nalarm, mm', 1e3, (0.0, 6.0), ()),
+    ('misses', 'slips\nmissed, %', 1e2, (0.0, 20.0), (1.0,)),
+    ('false_per_minute', 'false alarms\na minute', 1.0, (0.0, 200.0), (1.0,)),
+    ('brier', 'Brier score,\nwet', 1.0, (0.0, 0.25), ()),
+    ('wet_right', 'wet or dry\nright', 1.0, (0.7, 1.01), (0.97,)),
+    ('coverage', 'friction\nwithin 2σ', 1.0, (0.6, 1.01), (0.90, 0.99)),
+    ('below', 'margin below\nits 5 %', 1.0, (0.0, 0.4), (0.05,)),
+)
+_VARIANTS: dict[str, dict[str, Any]] = {
+    '': {'color': GREEN, 'marker': 'o', 'ls': '-'},
+    'configured': {'color': GREEN, 'marker': 'o', 'ls': '-'},
+    'L2': {'color': GREEN, 'marker': 'o', 'ls': '-'},
+    'not configured': {'color': VERMILION, 'marker': 's', 'ls': '--'},
+    'L1': {'color': BLUE, 'marker': 'D', 'ls': ':'},
+}
+
+
+def draw_robustness(rows: Sequence[Row]) -> Figure:
+    """Return the picture of the estimator: a column for each change, a row for each measure."""
+    rows = [row for row in rows if row.part == 'robustness']
+    columns = [name for name in _COLUMNS if any(row.name == name for row in rows)]
+    with matplotlib.rc_context(STYLE | {'font.size': 8.0, 'axes.titlesize': 8.5}):
+        figure = Figure(figsize=(13.5, 9.0))
+        figure.set_layout_engine('constrained', w_pad=0.03, h_pad=0.03)
+        panels = figure.subplots(len(_MEASURES), max(1, len(columns)), squeeze=False)
+        for row, measure in enumerate(_MEASURES):
+            for column, name in enumerate(columns):
+                part = [each for each in rows if each.name == name]
+                _cell(panels[row][column], part, name, measure, row == 0, column == 0)
+                if row < len(_MEASURES) - 1:
+                    panels[row][column].set_xticklabels([])
+                else:
+                    panels[row][column].set_xlabel(_COLUMNS[name][1])
+        handles = [
+            Line2D([], [], ms=4.0, lw=1.2, **_VARIANTS[name], label=label)
+            for name, label in (
+                ('configured', 'estimator configured with it; mass: full dynamics'),
+                ('not configured', 'estimator not configured with it'),
+                ('L1', 'walks in the plane'),
+            )
+        ]
+        handles += [
+            Line2D([], [], **_TARGET, label='target; of the margin, nominal'),
+            Line2D([], [], color=PALE, lw=5.0, alpha=0.35, label='ordinary value'),
+            Line2D([], [], color=BLACK, marker='^', ls='', ms=5.0, label='beyond the axis'),
+        ]
+        figure.legend(handles=handles, loc='outside lower center', ncol=6)
+    return figure
+
+
+def _cell(
+    panel: Axes,
+    rows: Sequence[Row],
+    name: str,
+    measure: tuple[str, str, float, tuple[float, float], tuple[float, ...]],
+    top: bool,
+    first: bool,
+) -> None:
+    what, label, scale, (low, high), targets = measure
+    title, _, across, logarithmic = _COLUMNS[name]
+    ordinary = [across * row.value for row in rows if row.shipped]
+    for value in ordinary[:1]:
+        panel.axvline(value, color=PALE, lw=5.0, alpha=0.35, zorder=0)
+    for target in targets:
+        panel.axhline(target, **_TARGET)
+    for variant in dict.fromkeys(row.variant for row in rows):
+        look = _VARIANTS[variant]
+        points = [
+            (across * row.value, scale * getattr(row, what))
+            for row in rows
+            if row.variant == variant and getattr(row, what) is not None
+        ]
+        x, y = [point[0] for point in points], [point[1] for point in points]
+        panel.plot(x, y, ms=3.5, lw=1.1, zorder=3, **look)
+        # Values outside the panel are drawn at its edge, with their number.
+        for at, value in points:
+            if not low <= value <= high:
+                edge, mark = (high, '^') if value > high else (low, 'v')
+                panel.plot(at, edge, mark, color=look['color'], ms=5.0, clip_on=False, zorder=4)
+                panel.annotate(
+                    f'{value:.0f}' if value > 100.0 else f'{value:.2g}',
+                    (at, edge), xytext=(-5, -3 if mark == '^' else 2),
+                    textcoords='offset points', ha='right', va='center', fontsize=7,
+                    color=look['color'],
+                )  # fmt: skip
+    if logarithmic:
+        panel.set_xscale('log')
+        panel.minorticks_off()
+    values = _TICKS.get(name) or sorted({across * row.value for row in rows})
+    panel.set_xticks(values, [f'{value:g}' for value in values])
+    panel.tick_params(axis='x', labelsize=6.5, length=2.5)
+    # All panels of a column get the same axis, even if a measure has no values.
+    ends = [across * row.value for row in rows]
+    if logarithmic:
+        panel.set_xlim(min(ends) / 1.3, 1.3 * max(ends))
+    else:
+        room = 0.12 * (max(ends) - min(ends)) or 1.0
+        panel.set_xlim(min(ends) - room, max(ends) + room)
+    if what == 'false_per_minute':
+        panel.set_yscale('symlog', linthresh=1.0)
+        panel.set_yticks([0.0, 1.0, 10.0, 100.0], ['0', '1', '10', '100'])
+        panel.minorticks_off()
+    panel.set_ylim(low - 0.03 * (high - low) if what != 'false_per_minute' else -0.2, high)
+    panel.grid(color=PALE, alpha=0.25, lw=0.5)
+    if top:
+        panel.set_title(title, loc='center')
+    if first:
+        panel.set_ylabel(label)
+        panel.figure.align_ylabels()
+    else:
+        panel.set_yticklabels([])

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Test the shipped estimator under changed conditions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.pace import Progress
+from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import Scene
+from studies.work_precision.estimator.tally import Row
+from studies.work_precision.estimator.tally import Tally
+from studies.work_precision.estimator.tally import count_alarms
+from studies.work_precision.estimator.tally import count_estimates
+from studies.work_precision.estimator.tally import replay
+from studies.work_precision.estimator.tally import row_of
+from studies.work_precision.estimator.walks import LOADED
+from studies.work_precision.estimator.walks import SEEDS
+from studies.work_precision.estimator.walks import Recording
+from studies.work_precision.estimator.walks import World
+from studies.work_precision.estimator.walks import few_recordings
+
+Disturbance = Callable[[Recording, float, np.random.Generator], Recording]
+
+
+def force_bias(walk: Recording, bias: float, generator: np.random.Generator) -> Recording:
+    """Return the recording with a force offset, N, in a random direction for each leg."""
+    direction = generator.normal(size=(walk.force.shape[1], 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return replace(walk, force=walk.force + bias * direction)
+
+
+def position_noise(walk: Recording, noise: float, _: np.random.Generator) -> Recording:
+    """Return the recording with position noise of a standard deviation, m.
+
+    The estimator is not configured with this noise.
+    """
+    scale = noise / walk.settings[2].position_noise
+    return replace(walk, position=walk.position + (scale - 1.0) * walk.noise)
+
+
+def configured_noise(walk: Recording, noise: float, generator: np.random.Generator) -> Recording:
+    """Return the recording as by :func:`position_noise`, with the estimator configured for it."""
+    foot, load, tuning = walk.settings
+    settings = (foot, load, replace(tuning, position_noise=noise))
+    return replace(position_noise(walk, noise, generator), settings=settings)
+
+
+def rate(walk: Recording, hertz: float, _: np.random.Generator) -> Recording:
+    """Return the recording with only every n-th sample delivered, at a rate in Hz."""
+    step = round(1.0 / (hertz * walk.period))
+    arrived = np.zeros_like(walk.arrived)
+    arrived[::step] = True
+    return replace(walk, arrived=arrived)
+
+
+def configured_stiffness(walk: Recording, factor: float, _: np.random.Generator) -> Recording:
+    """Return the recording with the estimator configured for pads of another shear stiffness.
+
+    The configured stiffness is the true one times a factor.
+    """
+    foot, load, tuning = walk.settings
+    foot = replace(foot, shear_stiffness=factor * foot.shear_stiffness)
+    return replace(walk, settings=(foot, load, tuning))
+
+
+def configured_as_shipped(walk: Recording, _: float, __: np.random.Generator) -> Recording:
+    """Return the recording with the estimator configured for the shipped foot."""
+    return replace(walk, settings=(Foot.load(walk.foot.source), *walk.settings[1:]))
+
+
+def impacts(walk: Recording, peak: float, generator: np.random.Generator) -> Recording:
+    """Return the recording with a half-sine of 10 ms added to the force at each touch-down.
+
+    Its peak is given in expected loads; up to a third of it acts sideways. Only the measured force
+    changes; the motion of the foot does not.
+    """
+    force = walk.force.copy()
+    length = max(2, round(0.01 / walk.period))
+    shape = np.sin(np.pi * (np.arange(length) + 0.5) / length)
+    for leg in range(force.shape[1]):
+        carries = walk.load[:, leg] > LOADED * walk.expected_load
+        for first in (np.flatnonzero(carries[1:] & ~carries[:-1]) + 1).tolist():
+            angle = generator.uniform(0.0, 2.0 * math.pi)
+            share = generator.uniform(0.0, 1.0 / 3.0)
+            push = np.array([share * math.cos(angle), share * math.sin(angle), 1.0])
+            part = shape[: len(force) - first, None]
+            force[first : first + length, leg] += peak * walk.expected_load * part * push
+    return replace(walk, force=force)
+
+
+def dropped(walk: Recording, share: float, generator: np.random.Generator) -> Recording:
+    """Return the recording without a random share of the messages of each leg."""
+    return replace(walk, arrived=walk.arrived & (generator.random(walk.arrived.shape) >= share))
+
+
+def late_position(walk: Recording, delay: float, _: np.random.Generator) -> Recording:
+    """Return the recording with each position measured a given time, s, before its force."""
+    sample = np.maximum(0, np.arange(len(walk.stamps)) - round(delay / walk.period))
+    return replace(walk, position=walk.position[sample])
+
+
+def clock_jumps(walk: Recording, jump: float, generator: np.random.Generator) -> Recording:
+    """Return the recording with stamps that jump by a given time, s, every 2 s on average."""
+    jumps = generator.random(len(walk.stamps)) < 0.5 * walk.period
+    return replace(walk, stamps=walk.stamps + jump * np.cumsum(jumps))
+
+
+def same(walk: Recording, _: float, __: np.random.Generator) -> Recording:
+    """Return the recording unchanged."""
+    return walk
+
+
+def at_1000_hertz(scene: Scene) -> Scene:
+    """Return the scene with sensors at 1000 Hz."""
+    return replace(scene, sensors=replace(scene.sensors, rate=1000.0))
+
+
+def with_stiffness(factor: float) -> World:
+    """Return a function that multiplies the shear stiffness of the feet of a scene."""
+
+    def change(scene: Scene) -> Scene:
+        stiffness = factor * scene.foot.shear_stiffness
+        return replace(scene, foot=replace(scene.foot, shear_stiffness=stiffness))
+
+    return change
+
+
+def with_patches(length: float) -> World:
+    """Return a function that sets the patch length, m, of a scene that has patches."""
+
+    def change(scene: Scene) -> Scene:
+        if scene.floor.kind != 'patches':
+            return scene
+        return replace(scene, floor=replace(scene.floor, patch_length=length))
+
+    return change
+
+
+def with_wet_friction(friction: float) -> World:
+    """Return a function that sets the boundary friction of the feet of a scene."""
+    return lambda scene: replace(scene, foot=replace(scene.foot, boundary_friction=friction))
+
+
+def with_mass(factor: float) -> World:
+    """Return a function that multiplies mass and inertia of the body, and the towed weight."""
+
+    def change(scene: Scene) -> Scene:
+        body = scene.body
+        assert isinstance(body, HexapodBody)
+        body = replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
+        tow = replace(scene.tow, weight=factor * scene.tow.weight)
+        return replace(scene, body=body, tow=tow)
+
+    return change
+
+
+@dataclass(frozen=True)
+class Change:
+    """A changed condition, with its values.
+
+    Attributes
+    ----------
+    name, unit : str
+    values : tuple of float
+    variant : str
+        Whether the estimator is configured for the change, or the fidelity level; may be empty.
+    ordinary : float
+        Value without change.
+    disturb : callable
+        Changes a recording.
+    world : callable or None
+        Returns, for a value, a function that changes the scenes of new recordings.
+    level : str or None
+        Fidelity level of the recordings; None is the full dynamics, if MuJoCo is installed.
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    ordinary: float
+    variant: str = ''
+    disturb: Disturbance = same
+    world: Callable[[float], World] | None = None
+    level: str | None = None
+
+
+STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
+NOISES = (5e-5, 1.5e-4, 3e-4, 6e-4)
+WET_FRICTIONS = (0.12, 0.25, 0.4, 0.55)
+CONFIGURED, NOT_CONFIGURED = 'configured', 'not configured'
+
+CHANGES = (
+    Change('force bias', 'N', (0.0, 0.5, 1.0, 2.0), 0.0, disturb=force_bias),
+    Change('position noise', 'm', NOISES, 1.5e-4, CONFIGURED, configured_noise),
+    Change('position noise', 'm', NOISES, 1.5e-4, NOT_CONFIGURED, position_noise),
+    Change(
+        'sample rate', 'Hz', (50.0, 100.0, 250.0, 1000.0), 250.0,
+        disturb=rate, world=lambda _: at_1000_hertz,
+    ),
+    Change('shear stiffness', 'times', STIFFNESSES[::2], 1.0, CONFIGURED, world=with_stiffness),
+    Change('shear stiffness', 'times', STIFFNESSES, 1.0, NOT_CONFIGURED, configured_stiffness),
+    Change('patch length', 'm', (0.2, 0.5, 1.5, 4.0), 1.5, world=with_patches),
+    Change('wet friction', '', WET_FRICTIONS, 0.12, CONFIGURED, world=with_wet_friction),
+    Change(
+        'wet friction', '', WET_FRICTIONS, 0.12, NOT_CONFIGURED,
+        disturb=configured_as_shipped, world=with_wet_friction,
+    ),
+    Change('impacts', 'loads', (0.0, 2.0, 4.0), 0.0, disturb=impacts),
+    Change('messages dropped', '', (0.0, 0.1, 0.2, 0.3), 0.0, disturb=dropped),
+    Change('position late', 's', (0.0, 8e-3, 2e-2, 4e-2), 0.0, disturb=late_position),
+    Change('clock jumps', 's', (-0.5, -0.1, 0.0, 0.1, 0.5), 0.0, disturb=clock_jumps),
+    Change('mass', 'times', (0.5, 1.0, 1.5), 1.0, 'L2', world=with_mass),
+    Change('mass', 'times', (0.5, 1.0, 2.0, 4.0), 1.0, 'L1', world=with_mass, level='L1'),
+)  # fmt: skip
+
+
+def stress(changes: Sequence[Change], progress: Progress) -> list[Row]:
+    """Return a row for the shipped estimator under each change with each value.
+
+    Progress, 0 to 1, is reported to ``progress``. In the rows ``not configured`` of the shear
+    stiffness, the value is the configured stiffness over the true one.
+    """
+    base = few_recordings()
+    plain = _try(base)
+    rows = []
+    total = sum(len(change.values) for change in changes)
+    # Recordings are kept, so that changes with the same scenes share them.
+    kept: dict[Any, list[Recording]] = {}
+    for change in changes:
+        for value in change.values:
+            ordinary = value == change.ordinary and change.disturb is not rate
+            if ordinary and change.level is None:
+                tally, walks = plain, base
+            else:
+                if change.world is None or (ordinary and change.level is None):
+                    walks = base
+                else:
+                    key = (change.world(value) if change.disturb is rate else
+                           (change.name, value, change.level))  # fmt: skip
+                    if key not in kept:
+                        kept[key] = few_recordings(change.world(value), change.level)
+                    walks = kept[key]
+                generator = np.random.default_rng(SEEDS)
+                tally = _try([change.disturb(walk, value, generator) for walk in walks])
+            rows.append(
+                row_of(
+                    tally, part='robustness', name=change.name, variant=change.variant,
+                    value=value, unit=change.unit, shipped=value == change.ordinary,
+                    note=_shortened(walks),
+                )
+            )  # fmt: skip
+            progress(len(rows) / total)
+    return rows
+
+
+def _try(walks: Sequence[Recording]) -> Tally:
+    tally = Tally()
+    for walk in walks:
+        estimates = replay(walk)
+        count_alarms(tally, walk, estimates.slipping)
+        count_estimates(tally, walk, estimates)
+    return tally
+
+
+def _shortened(walks: Sequence[Recording]) -> str:
+    durations = [len(walk.stamps) * walk.period for walk in walks]
+    longest = max(durations) - 1e-6  # all walks have the same number of cycles
+    ended = [walk.name for walk, each in zip(walks, durations, strict=True) if each < longest]
+    return f'ended early: {"; ".join(ended)}' if ended else ''

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Record walks once: readings of the sensors, and the truth."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import math
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.estimation.foot import Tuning
+from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+CYCLES = 15
+SEEDS = (101, 102)  # the defaults of the estimator were chosen on other seeds
+FEW_CYCLES = 10
+SETTLED = 1.0  # s: before, the robot only stands
+LOADED = 0.15  # of the expected load
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Readings of the sensors in a walk, and the truth; arrays have a row for each sample.
+
+    Attributes
+    ----------
+    name : str
+    period : float
+        Sampling period of the sensors, s.
+    foot : Foot
+        True foot; the foot that an estimator is configured for is in :attr:`settings`.
+    expected_load : float
+        Expected load of a foot, N.
+    settings : tuple
+        Arguments of :class:`FootEstimator`: foot, expected load, tuning.
+    stamps : array
+        Time stamps of the samples, s.
+    force, position : array, (samples, legs, 3)
+        Readings, N and m.
+    noise : array, (samples, legs, 3)
+        Noise of the position, m, which the position already contains.
+    pressure : array, (samples, legs)
+        Pressure of the pads that was last reported, Pa gauge.
+    arrived : array of bool, (samples, legs)
+        Whether the estimator gets the sample.
+    load, tangential, grip, speed : array, (samples, legs)
+        Truth: normal force, tangential force and capacity, N, and speed of the contact, m/s.
+    wet : array of bool, (samples, legs)
+        Whether the ground under each foot is wet.
+    sticks_only : bool
+        Whether the recording is used only to count false alarms.
+    """
+
+    name: str
+    period: float
+    foot: Foot
+    expected_load: float
+    settings: tuple[Foot, float, Tuning]
+    stamps: Floats
+    force: Floats
+    position: Floats
+    noise: Floats
+    pressure: Floats
+    arrived: Flags
+    load: Floats
+    tangential: Floats
+    grip: Floats
+    speed: Floats
+    wet: Flags
+    sticks_only: bool = False
+
+    @functools.cached_property
+    def rows(self) -> list[list[list[float]]]:
+        """Readings of each leg: force, position, pressure, as arguments of an estimator."""
+        table = np.concatenate([self.force, self.position, self.pressure[..., None]], axis=2)
+        return np.swapaxes(table, 0, 1).tolist()
+
+
+class _SensorTap:
+    """Sensors that keep the readings that the loop took last."""
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        self._sensors = loop.sensors
+        self.readings: list[tuple[Vector, Vector]] = []
+
+    def read(self, robot: Any) -> list[tuple[Vector, Vector]]:
+        self.readings = self._sensors.read(robot)
+        return self.readings
+
+    def read_moments(self, robot: Any) -> list[float | None]:
+        return self._sensors.read_moments(robot)
+
+
+class _NoLog:
+    """Log that keeps nothing."""
+
+    def sample(self, *_: Any) -> None:
+        pass
+
+    def control(self, *_: Any) -> None:
+        pass
+
+
+def record(scene: Scene, policy: str, seed: int, level: str) -> Recording:
+    """Walk once in closed loop, and return readings and truth, up to a verdict if there is one."""
+    loop = ClosedLoop(scene, policy, seed, level)
+    tap = _SensorTap(loop)
+    loop.sensors = tap  # type: ignore[assignment]
+    log: Any = _NoLog()
+    read, true = [], []
+    for _ in range(round(scene.duration * 1e9) // loop.period_ns):
+        pressures = list(loop.pressures)
+        loop.tick(log)
+        if loop.robot.verdict:
+            break
+        read.append([(*f, *p, q) for (f, p), q in zip(tap.readings, pressures, strict=True)])
+        true.append(
+            [(*foot.position, *foot.force, foot.grip, foot.slip_speed, foot.wet)
+             for foot in loop.robot.feet]
+        )  # fmt: skip
+    loop.close()
+    taken, truth = np.array(read), np.array(true, dtype=np.float64)
+    return Recording(
+        name=f'{scene.name}, {policy}, {seed}, {level}',
+        period=loop.period_ns * 1e-9,
+        foot=scene.foot,
+        expected_load=scene.expected_load,
+        settings=(scene.foot, scene.expected_load, tuning_for(scene)),
+        stamps=loop.period_ns * 1e-9 * np.arange(1, len(taken) + 1, dtype=np.float64),
+        force=taken[..., :3],
+        position=taken[..., 3:6],
+        noise=taken[..., 3:6] - truth[..., :3],
+        pressure=taken[..., 6],
+        arrived=np.ones(taken.shape[:2], dtype=bool),
+        load=truth[..., 5],
+        tangential=np.hypot(truth[..., 3], truth[..., 4]),
+        grip=truth[..., 6],
+        speed=truth[..., 7],
+        wet=truth[..., 8] > 0.5,
+        sticks_only=level == 'L1' and scene.floor.kind == 'dry',
+    )
+
+
+def pull(scene: Scene, duration: float, seed: int) -> Recording:
+    """Return a recording of six flat feet on dry ground that are pulled to and fro without slip.
+
+    From foot to foot, the peak of the pull is 0.2 to 0.6 of the friction limit, and its period 1.2
+    to 0.3 s.
+    """
+    period, load, foot = 1.0 / scene.sensors.rate, scene.expected_load, scene.foot
+    generator = np.random.default_rng([seed, 5])
+    stamps = period * np.arange(1, round(duration / period) + 1, dtype=np.float64)
+    friction = FrictionPrior.of(foot, load).flat_dry
+    amplitude, cycle = friction * np.linspace(0.2, 0.6, 6), np.linspace(1.2, 0.3, 6)
+    shape = (len(stamps), 6, 3)
+    force, position = np.zeros(shape), np.zeros(shape)
+    force[..., 0] = load * amplitude * np.sin(2.0 * math.pi * stamps[:, None] / cycle)
+    force[..., 2] = load
+    position[..., 0] = -force[..., 0] / foot.shear_stiffness
+    noise = scene.sensors.position * generator.normal(size=shape)
+    tangential = abs(force[..., 0])
+    ones = np.ones(shape[:2])
+    return Recording(
+        name='pulled to and fro',
+        period=period,
+        foot=foot,
+        expected_load=load,
+        settings=(foot, load, tuning_for(scene)),
+        stamps=stamps,
+        force=force + scene.sensors.force * generator.normal(size=shape),
+        position=position + noise,
+        noise=noise,
+        pressure=0.0 * ones,
+        arrived=ones > 0.0,
+        load=load * ones,
+        tangential=tangential,
+        grip=friction * load * ones,
+        speed=0.0 * ones,
+        wet=ones < 0.0,
+        sticks_only=True,
+    )
+
+
+def full() -> str:
+    """Return the fidelity level of the walks: L2 if MuJoCo is installed, else L1."""
+    return 'L2' if importlib.util.find_spec('mujoco') else 'L1'
+
+
+World = Callable[[Scene], Scene]
+
+
+def recordings(world: World | None = None, level: str | None = None) -> list[Recording]:
+    """Return the walks for the comparison of methods; ``world`` changes their scenes."""
+    walks = [('patches', policy) for policy in ('flat', 'dome', 'adaptive')]
+    thesis = [(f'smooth_{name}', name[4:]) for name in ('dry_flat', 'wet_flat', 'wet_dome')]
+    plan = [(name, policy, seed) for name, policy in walks for seed in SEEDS]
+    plan += [(name, policy, SEEDS[0]) for name, policy in thesis]
+    return _record_all(plan, world, level or full(), CYCLES)
+
+
+def few_recordings(world: World | None = None, level: str | None = None) -> list[Recording]:
+    """Return the walks for the tests of the estimator under many conditions."""
+    plan = [('patches', 'flat', SEEDS[0]), ('patches', 'dome', SEEDS[1])]
+    plan += [('patches', 'adaptive', seed) for seed in SEEDS]
+    return _record_all(plan, world, level or full(), FEW_CYCLES)
+
+
+def _record_all(
+    plan: Sequence[tuple[str, str, int]], world: World | None, level: str, cycles: int
+) -> list[Recording]:
+    change = world or (lambda scene: scene)
+
+    def scene_of(name: str) -> Scene:
+        return change(replace(Scene.load(f'hexapod_{name}'), cycles=cycles))
+
+    walks = [record(scene_of(name), policy, seed, level) for name, policy, seed in plan]
+    dry = scene_of('smooth_dry_flat')
+    return [*walks, record(dry, 'flat', SEEDS[0], 'L1'), pull(dry, 2.0 * cycles, SEEDS[0])]

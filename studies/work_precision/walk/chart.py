@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Make the table and the picture of the walks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ros_pad.pace import Progress
+from studies.drawing import BLACK
+from studies.drawing import BLUE
+from studies.drawing import GREEN
+from studies.drawing import ORANGE
+from studies.drawing import PALE
+from studies.drawing import PURPLE
+from studies.drawing import SKY
+from studies.drawing import STYLE
+from studies.drawing import VERMILION
+from studies.work_precision.walk.hexapod import STIFF
+from studies.work_precision.walk.hexapod import TOP
+from studies.work_precision.walk.rail import LEGS
+from studies.work_precision.walk.results import FAILED
+from studies.work_precision.walk.results import WalkResult
+from studies.work_precision.walk.walkers import CYCLES
+from studies.work_precision.walk.walkers import HEXAPOD
+from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import named
+
+# Methods that are shown walk by walk.
+SHOWN = tuple(
+    named(family, step)
+    for family, step in (
+        ('L1', 4e-3),
+        ('L1, soles turn', 4e-3),
+        ('L2', 2e-3),
+        (STIFF, 2e-3),
+        ('MuJoCo defaults', 2e-3),
+    )
+)
+_UNITS = {
+    'distance': ('distance, %', 1e2),
+    'slip': ('slip path, %', 1e2),
+    'lateral': ('aside, mm/cycle', 1e3),
+    'yaw': ('yaw, mrad/cycle', 1e3),
+}
+
+
+def table(results: Sequence[WalkResult]) -> str:
+    """Return the results as text: a block for each robot, and the distances walk by walk."""
+    lines: list[str] = []
+    for robot in dict.fromkeys(result.robot for result in results):
+        part = [result for result in results if result.robot == robot]
+        lines += [*_block(robot, part), '']
+        if robot == HEXAPOD:
+            lines += [*_walk_by_walk(part), '']
+            if any(result.family == STIFF for result in part):
+                lines.append(f'{STIFF}: impratio 10 and noslip_iterations 5, not impratio 100')
+            lines += [f'left out: {why}' for why in _missing(part)]
+            lines.append('')
+    return '\n'.join(lines)
+
+
+def _block(robot: str, part: Sequence[WalkResult]) -> list[str]:
+    first, width = part[0], max(len(result.method) for result in part)
+    heads = ''.join(f'{_UNITS[name][0]:>18}' for name in first.errors)
+    lines = [
+        f'{robot} ({first.cases} walks of {CYCLES[robot]} cycles; median and worst errors against'
+        f' {first.top}; times against {first.baseline})',
+        f'  {"method":{width}}      ms/s  us/step    ratio{heads}  distance fails  slip fails'
+        '  refused',
+    ]
+    for result in part:
+        errors = ''.join(
+            f'{scale * result.errors[name]:9.2g}{scale * result.worst[name]:9.2g}'
+            for name, (_, scale) in _UNITS.items()
+            if name in result.errors
+        )
+        ratio = f'1/{1 / result.versus:.0f}' if result.versus < 0.1 else f'{result.versus:.2g}'
+        lines.append(
+            f'  {result.method:{width}}  {result.ms_per_second:8.3g} {result.us_per_step:8.3g}'
+            f' {ratio:>8}{errors}  {result.failures:14d}  {result.slip_failures:10d}'
+            f'  {result.refused:7d}'
+        )
+    return lines
+
+
+def _walk_by_walk(part: Sequence[WalkResult]) -> list[str]:
+    named = {result.method: result for result in part}
+    top, shown = named[part[0].top], [named[name] for name in SHOWN if name in named]
+    width = max(len(walk['walk']) for walk in top.walks)
+    heads = ''.join(f'  {result.method}' for result in shown)
+    lines = [
+        f'{top.method}, a cycle, and by how much others are off in distance, %',
+        f'  {"walk":{width}}  distance, mm  slip, mm  aside, mm  yaw, mrad{heads}',
+    ]
+    for row, true in enumerate(top.walks):
+        off = ''
+        for result in shown:
+            walk = result.walks[row]
+            text = 'verdict' if walk['verdict'] else f'{1e2 * walk["distance_error"]:+.1f}'
+            off += f'  {text:>{len(result.method)}}'
+        lines.append(
+            f'  {true["walk"]:{width}}  {1e3 * true["distance"]:12.1f}  {1e3 * true["slip"]:8.1f}'
+            f'  {1e3 * true["lateral"]:+9.2f}  {1e3 * true["yaw"]:+9.2f}{off}'
+        )
+    return lines
+
+
+def _missing(part: Sequence[WalkResult]) -> list[str]:
+    families = {result.family for result in part}
+    why = ['laws of friction that the hexapod does not walk with: pad chart stability']
+    if 'L1, compiled' not in families:
+        why.append('L1, compiled: pip install "ros_pad[fast]"')
+    if 'L2' not in families:
+        why.append('L2, and with it the true errors of L1: pip install "ros_pad[mujoco]"')
+    return why
+
+
+def figures(results: Sequence[WalkResult], progress: Progress | None = None) -> dict[str, Figure]:
+    """Return the picture, by name."""
+    return {'walk': draw(results)}
+
+
+_LOOKS: dict[str, dict[str, Any]] = {
+    'L1': {'color': BLUE, 'marker': 'o'},
+    'L1, compiled': {'color': BLUE, 'marker': 's'},
+    'L1, compiled, walk': {'color': SKY, 'marker': 'v'},
+    'L1, soles turn': {'color': PURPLE, 'marker': 'o'},
+    'L2': {'color': GREEN, 'marker': 'D'},
+    STIFF: {'color': ORANGE, 'marker': 'P'},
+    'MuJoCo defaults': {'color': VERMILION, 'marker': 'X'},
+    'RailLeg': {'color': GREEN, 'marker': 'o'},
+    f'walk_many, {LEGS} legs': {'color': GREEN, 'marker': 's'},
+    'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
+    'solve_ivp, events, 1e-3': {'color': BLUE, 'marker': 'D'},
+    'solve_ivp, smoothed, LSODA': {'color': VERMILION, 'marker': 'X'},
+    'solve_ivp, smoothed, RK45': {'color': VERMILION, 'marker': 'P'},
+}
+# Offsets of the steps written beside their marks, points.
+_STEP_PLACES = {
+    'L1': (6, 4),
+    'L1, compiled, walk': (0, 7),
+    'L2': (-9, -3),
+    STIFF: (9, -4),
+    'MuJoCo defaults': (9, 3),
+}
+_LEGEND = {STIFF: 'L2, impratio 10 and noslip 5'}
+_PANELS = {
+    'distance': ('distance', 'error, %'),
+    'slip': ('slip path of a foot', 'error, %'),
+    'lateral': ('drift aside', 'error, mm a cycle'),
+    'yaw': ('heading', 'error, mrad a cycle'),
+}
+
+
+def draw(results: Sequence[WalkResult]) -> Figure:
+    """Return the picture: time against each error, distances walk by walk, and the rail leg."""
+    hexapod = [result for result in results if result.robot == HEXAPOD]
+    rail = [result for result in results if result.robot == RAIL]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.5, 8.0))
+        figure.set_layout_engine('constrained', w_pad=0.08, h_pad=0.08)
+        panels = figure.subplots(2, 3).ravel()
+        places = zip('abce', (0, 1, 2, 4), _PANELS, strict=True)
+        for letter, place, name in places:
+            _errors(panels[place], hexapod, name, f'{letter}  hexapod: {_PANELS[name][0]}')
+        _strips(panels[3], hexapod, 'd  hexapod: distance, walk by walk')
+        _errors(panels[5], rail, 'distance', 'f  rail leg: distance')
+        _write_names(panels[5], rail)
+        families = {result.family for result in hexapod}
+        handles = [
+            Line2D([], [], ls='', ms=6, label=_LEGEND.get(family, family), **look)
+            for family, look in _LOOKS.items()
+            if family in families
+        ]
+        handles.append(
+            Line2D([], [], color=PALE, ls='--', lw=0.9, label='top level against half its step')
+        )
+        figure.legend(
+            handles=handles,
+            loc='outside lower center',
+            ncol=4,
+            title='Mark: median of the walks; whisker: the worst; number: step, ms.'
+            ' In f, events and smoothed friction are those of solve_ivp.',
+        )
+    return figure
+
+
+def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> None:
+    """Draw time over the error called ``name``: mark at the median, whisker to the worst walk."""
+    scale = _UNITS[name][1]
+    panel.set(xscale='log', yscale='log', title=title, ylabel=_PANELS[name][1])
+    panel.set_xlabel('time for a simulated second, ms')
+    for family, look in _LOOKS.items():
+        mine = [result for result in part if result.family == family]
+        x = [result.ms_per_second for result in mine]
+        y = [scale * result.errors[name] for result in mine]
+        panel.plot(x, y, ls='-', lw=1.0, ms=6, zorder=3, **look)
+        for result, at, error in zip(mine, x, y, strict=True):
+            # Compiled walks have the same errors as walks in plain Python.
+            if 'compiled' not in family:
+                ends = [error, scale * result.worst[name]]
+                panel.plot([at, at], ends, '-_', color=look['color'], lw=1.0, ms=5, alpha=0.5)
+            if name == 'distance' and result.step_s is not None:
+                panel.annotate(
+                    f'{1e3 * result.step_s:g}',
+                    (at, error),
+                    xytext=_STEP_PLACES.get(family, (0, -12)),
+                    textcoords='offset points',
+                    ha='center',
+                    fontsize=7,
+                    color=look['color'],
+                )
+    for result in part:
+        if result.family == TOP and result.method != result.top:
+            own = scale * result.errors[name]
+            panel.axhline(own, color=PALE, ls='--', lw=0.9, zorder=1)
+            # Smaller errors are not meaningful.
+            panel.set_ylim(bottom=0.6 * own)
+    panel.xaxis.set_major_formatter('{x:g}')
+    panel.yaxis.set_major_formatter('{x:g}')
+    panel.grid(color=PALE, alpha=0.25, lw=0.5)
+
+
+def _write_names(panel: Axes, part: Sequence[WalkResult]) -> None:
+    """Write the names of methods beside the marks of the rail leg."""
+    # Of each family, the name is written at the first result, which has the shortest step.
+    first = {result.family: result for result in reversed(part) if result.family in _LOOKS}
+    for family, result in first.items():
+        panel.annotate(
+            family.removesuffix(f', {LEGS} legs').removeprefix('solve_ivp, '),
+            (result.ms_per_second, 1e2 * result.errors['distance']),
+            xytext=(-34, -24) if 'walk_many' in family else (8, -3),
+            textcoords='offset points',
+            fontsize=8,
+            color=_LOOKS[family]['color'],
+        )
+    panel.set_xlim(right=8.0 * max(result.ms_per_second for result in part))
+
+
+def _strips(panel: Axes, part: Sequence[WalkResult], title: str) -> None:
+    """Draw the errors of the distance, a row for each walk."""
+    names = [walk['walk'] for walk in part[0].walks]
+    shown = [result for result in part if result.method in SHOWN]
+    for result, shift in zip(shown, np.linspace(-0.28, 0.28, len(shown)), strict=True):
+        off = [1e2 * walk['distance_error'] for walk in result.walks]
+        look = _LOOKS[result.family]
+        panel.plot(off, shift + np.arange(len(names)), ls='', ms=5, **look)
+    panel.axvline(0.0, color=BLACK, lw=0.8, zorder=1)
+    for limit in (-1e2 * FAILED, 1e2 * FAILED):
+        panel.axvline(limit, color=PALE, lw=0.9, ls=':', zorder=1)
+    panel.set_yticks(range(len(names)), names)
+    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set(title=title, xlabel='distance off by, %')
+    panel.grid(axis='y', color=PALE, alpha=0.25, lw=0.5)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walks of the hexapod, and all methods of simulating them."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from dataclasses import replace
+
+from ros_pad.control.morphology import MorphologyController
+from ros_pad.control.policies import DOME
+from ros_pad.control.policies import FLAT
+from ros_pad.control.policies import policy_named
+from ros_pad.simulation.full_hexapod import FullHexapod
+from ros_pad.simulation.mujoco_model import RECOMMENDED
+from ros_pad.simulation.mujoco_model import SolverSettings
+from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.scene import Scene
+from studies.work_precision.walk.walkers import CYCLES
+from studies.work_precision.walk.walkers import HEXAPOD
+from studies.work_precision.walk.walkers import Walk
+from studies.work_precision.walk.walkers import Walked
+from studies.work_precision.walk.walkers import Walker
+from studies.work_precision.walk.walkers import named
+from studies.work_precision.walk.walkers import walked
+
+SETTLE = 0.2  # s: the hexapod stands for this time first
+SAMPLE = 4e-3  # s: time between set-points of the servos of L2
+TOP_STEP = 2.5e-4  # s
+MUJOCO_DEFAULTS = SolverSettings(integrator='Euler', cone='pyramidal', impratio=1.0)
+
+
+def hexapod_walks() -> list[Walk]:
+    """Return the walks: where feet stick, where they slip, and with a heavy load in tow."""
+    heavy = Scene.load('hexapod_patches')
+    heavy = replace(heavy, floor=replace(heavy.floor, kind='dry'))
+    shipped = {
+        'dry, flat': ('smooth_dry_flat', FLAT, 0),
+        'rough dry, flat': ('rough_dry_flat', FLAT, 0),
+        'wet, dome': ('smooth_wet_dome', DOME, 0),
+        'rough wet, dome': ('rough_wet_dome', DOME, 0),
+        'wet, flat': ('smooth_wet_flat', FLAT, 0),
+        'wet, flat, other floor': ('smooth_wet_flat', FLAT, 1),
+        'rough wet, flat': ('rough_wet_flat', FLAT, 0),
+        'patches, 9 N in tow, dome': ('patches', DOME, 0),
+        'patches, 9 N in tow, flat': ('patches', FLAT, 0),
+    }
+    walks = [
+        _hexapod_walk(name, Scene.load(f'hexapod_{scene}'), shape, seed)
+        for name, (scene, shape, seed) in shipped.items()
+    ]
+    return [*walks, _hexapod_walk('dry, 9 N in tow, dome', heavy, DOME, 0)]
+
+
+def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
+    controller = MorphologyController(
+        scene.foot,
+        scene.legs,
+        policy_named(shape),
+        scene.expected_load,
+        start=shape,
+        fixed_pressure=scene.dome_pressure,
+    )
+    scene = replace(scene, settle=SETTLE, cycles=CYCLES[HEXAPOD])
+    return Walk(name, scene, controller.setpoint(1), seed)
+
+
+def hexapod_walkers() -> tuple[list[Walker], str, str]:
+    """Return the available walkers, and the names of the reference and the baseline of times."""
+    walkers = []
+    forms = {'L1': (False, False, False), 'L1, soles turn': (False, True, False)}
+    if importlib.util.find_spec('numba'):
+        forms['L1, compiled'] = (True, False, False)
+        forms['L1, compiled, walk'] = (True, False, True)
+    for family, (compiled, turning, at_once) in forms.items():
+        for step in (1e-3, 4e-3, 1e-2):
+            walkers.append(_planar(family, step, compiled, turning, at_once))
+    if not importlib.util.find_spec('mujoco'):
+        top = _planar('L1', TOP_STEP, False, False, False)
+        return [*walkers, top], top.name, named('L1', SAMPLE)
+    steps = (5e-4, 1e-3, 2e-3, 4e-3)
+    walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
+    stiff = replace(RECOMMENDED, impratio=10.0, noslip_iterations=5)
+    walkers += [_full(STIFF, replace(stiff, timestep=step)) for step in steps[1:]]
+    walkers += [
+        _full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False)
+        for step in (5e-4, 2e-3)
+    ]
+    walkers += [
+        _full(TOP, replace(RECOMMENDED, timestep=step)) for step in (TOP_STEP, TOP_STEP / 2.0)
+    ]
+    return walkers, named(TOP, TOP_STEP), named('L2', RECOMMENDED.timestep)
+
+
+TOP, STIFF = 'L2, top', 'L2, noslip'
+
+
+def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bool) -> Walker:
+    def walk(case: Walk) -> Walked:
+        floor = case.scene.floor.build(case.seed)
+        robot = PlanarHexapod(case.scene, floor, step, compiled, turning)
+        pressures, count = [case.pressure] * 6, round(case.scene.duration / step)
+        start = time.perf_counter()
+        if at_once:
+            count = robot.walk(pressures, count)
+        else:
+            for _ in range(count):
+                robot.step(pressures)
+        return walked(robot, case.scene, count, time.perf_counter() - start)
+
+    return Walker(family, named(family, step), step, walk)
+
+
+def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
+    def walk(case: Walk) -> Walked:
+        robot = FullHexapod(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
+        pressures, count = [case.pressure] * 6, round(case.scene.duration / SAMPLE)
+        start = time.perf_counter()
+        for _ in range(count):
+            robot.step(pressures)
+        taken = time.perf_counter() - start
+        return walked(robot, case.scene, count * round(SAMPLE / settings.timestep), taken)
+
+    return Walker(family, named(family, settings.timestep), settings.timestep, walk, ours)

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walks of the rail leg, and all methods of simulating them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from scipy.integrate import solve_ivp
+
+from ros_pad.contact.film import Film
+from ros_pad.simulation.rail_leg import RailLeg
+from ros_pad.simulation.rail_leg import walk_many
+from ros_pad.simulation.scene import RailBody
+from ros_pad.simulation.scene import RailGait
+from ros_pad.simulation.scene import Scene
+from studies.work_precision.walk.walkers import CYCLES
+from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import Walk
+from studies.work_precision.walk.walkers import Walked
+from studies.work_precision.walk.walkers import Walker
+from studies.work_precision.walk.walkers import named
+from studies.work_precision.walk.walkers import walked
+
+LEGS = 200  # number of rail legs that walk_many computes at once
+
+
+LEG = 'RailLeg, 4 ms'
+EVENTS = 'solve_ivp, events, 1e-11'
+_SMOOTH = 1e-3  # m/s: slip speed below which the smoothed friction is viscous
+
+
+def rail_walks() -> list[Walk]:
+    """Return walks of the thesis on a rail, and one whose friction hardly exceeds the drag."""
+    scenes = {
+        name: Scene.load(f'leg_{name.replace(" ", "_")}')
+        for name in ('dry flat', 'wet flat', 'wet dome 60', 'wet dome 75')
+    }
+    body = scenes['dry flat'].body
+    assert isinstance(body, RailBody)
+    slippery = replace(
+        scenes['dry flat'].foot, friction=1.06 * body.rolling_drag / body.load, shear_strength=0.0
+    )
+    scenes['threshold'] = replace(scenes['dry flat'], foot=slippery)
+    return [
+        Walk(name, replace(scene, settle=0.0, cycles=CYCLES[RAIL]), scene.dome_pressure or 0.0)
+        for name, scene in scenes.items()
+    ]
+
+
+def rail_walkers() -> list[Walker]:
+    """Return all walkers of the rail leg."""
+    walkers = [_rail(step) for step in (1e-4, 1e-3, 4e-3)]
+    walkers += [_rail_batch(step) for step in (1e-3, 4e-3)]
+    for family, method, tolerance in (
+        (EVENTS, 'DOP853', 1e-11),
+        ('solve_ivp, events, 1e-6', 'RK45', 1e-6),
+        ('solve_ivp, events, 1e-3', 'RK45', 1e-3),
+    ):
+        walkers.append(Walker(family, family, None, _by_events(method, tolerance), ours=False))
+    for family, method in (
+        ('solve_ivp, smoothed, LSODA', 'LSODA'),
+        ('solve_ivp, smoothed, RK45', 'RK45'),
+    ):
+        walkers.append(Walker(family, family, None, _by_smoothing(method), ours=False))
+    return walkers
+
+
+def _rail(step: float) -> Walker:
+    def walk(case: Walk) -> Walked:
+        leg = RailLeg(case.scene, case.scene.floor.build(case.seed), step)
+        pressures, count = [case.pressure], round(case.scene.duration / step)
+        start = time.perf_counter()
+        for _ in range(count):
+            leg.step(pressures)
+        return walked(leg, case.scene, count, time.perf_counter() - start)
+
+    return Walker('RailLeg', named('RailLeg', step), step, walk)
+
+
+def _rail_batch(step: float) -> Walker:
+    family = f'walk_many, {LEGS} legs'
+
+    def walk(case: Walk) -> Walked:
+        scene, count = case.scene, round(case.scene.duration / step)
+        every = [scene] * LEGS, [scene.floor.build(case.seed)] * LEGS, [case.pressure] * LEGS
+        start = time.perf_counter()
+        legs = walk_many(*every, step, scene.duration)
+        taken = (time.perf_counter() - start) / LEGS
+        distance, slip = legs.position[0] / scene.cycles, legs.slip_path[0] / scene.cycles
+        return Walked(float(distance), float(slip), 0.0, 0.0, None, count, taken)
+
+    return Walker(family, named(family, step), step, walk)
+
+
+def cap_in_stance(case: Walk) -> Callable[[float], float]:
+    """Return the capacity of a foot at a fixed pressure, N, as a function of time in stance, s."""
+    scene = case.scene
+    assert isinstance(scene.body, RailBody)
+    foot = scene.foot.on_rough(scene.floor.roughness)
+    domes = foot.dome_load(scene.body.load, case.pressure)
+    sole = scene.body.load - domes
+    if scene.floor.kind == 'dry':
+        dry = foot.resistance_of(domes, sole, case.pressure, 0.0, 0.0)
+        return lambda _: dry
+    # 1/h² of a film thickness h grows at a constant rate.
+    film = Film(foot, scene.floor.viscosity)
+    film.touch_down(scene.floor.film_thickness)
+    fresh = scene.floor.film_thickness**-2
+    film.drain(domes, sole, case.pressure, 1.0)
+    dome_rate, sole_rate = film.under_domes**-2 - fresh, film.under_sole**-2 - fresh
+
+    def cap(since: float) -> float:
+        films = (fresh + dome_rate * since) ** -0.5, (fresh + sole_rate * since) ** -0.5
+        return foot.resistance_of(domes, sole, case.pressure, *films)
+
+    return cap
+
+
+def _by_events(method: str, tolerance: float) -> Callable[[Walk], Walked]:
+    def walk(case: Walk) -> Walked:
+        scene = case.scene
+        start = time.perf_counter()
+        distance, slip, steps = walk_by_events(case, method, tolerance)
+        taken = time.perf_counter() - start
+        return Walked(distance / scene.cycles, slip / scene.cycles, 0.0, 0.0, None, steps, taken)
+
+    return walk
+
+
+class _Stance:
+    """A foot in stance on the rail: its phases, and the transitions between them.
+
+    The body is slower than the backward motion of the foot (``slower``), as fast (``holds``), or
+    faster (``faster``); or it rests, because the friction of the foot is below the drag
+    (``rests``).
+    """
+
+    def __init__(self, case: Walk) -> None:
+        body, gait = case.scene.body, case.scene.gait
+        assert isinstance(body, RailBody) and isinstance(gait, RailGait)
+        self.body, self.gait, self.cap = body, gait, cap_in_stance(case)
+        self.rate = math.pi / gait.stance
+        self._peak = 0.5 * self.rate * gait.stroke  # m/s
+        drag, cap, needed = body.rolling_drag, self.cap, self._needed
+        # Events that end each phase: functions of time and speed of the body, positive before it.
+        meets, rests = (lambda t, v: self._back(t) - v), (lambda t, v: drag - cap(t))
+        self._ends: dict[str, dict[str, Callable[[float, float], float]]] = {
+            'slower': {'meets': meets, 'stops': lambda t, v: v},
+            'faster': {'meets': lambda t, v: -meets(t, v)},
+            'holds': {'slips': lambda t, v: cap(t) - abs(needed(t))},
+            'rests': {'starts': rests},
+        }
+        self._pushes: dict[str, Callable[[float], float]] = {  # on the body, N, by time
+            'slower': lambda t: cap(t) - drag,
+            'faster': lambda t: -cap(t) - drag,
+            'holds': lambda t: needed(t) - drag,
+            'rests': lambda t: 0.0,
+        }
+
+    def _back(self, since: float) -> float:
+        """Return the speed at which the foot goes back, m/s."""
+        return self._peak * math.sin(self.rate * since)
+
+    def _needed(self, since: float) -> float:
+        """Return the force that keeps foot and body together, N."""
+        inertial = self.body.mass * self._peak * self.rate * math.cos(self.rate * since)
+        return inertial + self.body.rolling_drag
+
+    def first(self, speed: float) -> str:
+        """Return the phase at touch-down."""
+        if speed != 0.0:
+            return 'faster'
+        if self.cap(0.0) >= self._needed(0.0):
+            return 'holds'
+        return 'slower' if self.cap(0.0) > self.body.rolling_drag else 'rests'
+
+    def run(
+        self, phase: str, since: float, speed: float, method: str, tolerance: float
+    ) -> tuple[str | None, float, float, float, int]:
+        """Return the event that ended a phase, its time, distance and speed, and number of steps.
+
+        The event is None if the stance ended first.
+        """
+        events = []
+        for end in self._ends[phase].values():
+
+            def event(t: float, state: Any, end: Any = end) -> float:
+                return float(end(t, float(state[1])))
+
+            event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+            events.append(event)
+        found = solve_ivp(
+            lambda t, state: (state[1], self._pushes[phase](t) / self.body.mass),
+            (since, self.gait.stance),
+            (0.0, speed),
+            method=method,
+            events=events,
+            rtol=max(tolerance, 3e-14),
+            atol=1e-3 * tolerance,
+        )
+        ended = [
+            name for name, hits in zip(self._ends[phase], found.t_events, strict=True) if len(hits)
+        ]
+        distance, speed = found.y[:, -1].tolist()
+        first = ended[0] if ended else None
+        return first, float(found.t[-1]), distance, speed, len(found.t) - 1
+
+    def next(self, phase: str, end: str | None, since: float, speed: float) -> tuple[str, float]:
+        """Return the phase after an event, and the speed of the body at its start."""
+        if end == 'slips':
+            return ('slower' if self._needed(since) > 0.0 else 'faster'), speed
+        if end == 'stops':
+            return 'rests', 0.0
+        if end == 'starts':
+            return 'slower', speed
+        if end == 'meets':  # foot and body stay together if the foot can hold this force
+            held = abs(self._needed(since)) <= self.cap(since)
+            other = 'faster' if phase == 'slower' else 'slower'
+            return ('holds' if held else other), self._back(since)
+        return phase, speed
+
+
+def walk_by_events(case: Walk, method: str, tolerance: float) -> tuple[float, float, int]:
+    """Walk from phase to phase of each stance, and coast through each swing.
+
+    Returns
+    -------
+    tuple
+        Distance of the body and slip path of the foot, m, and steps of the integrator.
+    """
+    stance = _Stance(case)
+    mass, drag, gait = stance.body.mass, stance.body.rolling_drag, stance.gait
+    distance = slip = speed = 0.0
+    steps = 0
+    for _ in range(case.scene.cycles):
+        since, phase = 0.0, stance.first(speed)
+        while since < gait.stance:
+            begun = since
+            end, since, gained, speed, count = stance.run(phase, since, speed, method, tolerance)
+            steps += count
+            turned = math.cos(stance.rate * begun) - math.cos(stance.rate * since)
+            distance += gained
+            slip += 0.0 if phase == 'holds' else abs(gained - 0.5 * gait.stroke * turned)
+            phase, speed = stance.next(phase, end, since, speed)
+        coasting = min(gait.swing, mass * speed / drag) if drag else gait.swing
+        distance += speed * coasting - 0.5 * drag / mass * coasting**2
+        speed = speed - drag / mass * coasting if coasting == gait.swing else 0.0
+    return distance, slip, steps
+
+
+def _by_smoothing(method: str) -> Callable[[Walk], Walked]:
+    """Walk with one call of solve_ivp: default tolerances, friction c tanh(slip/v)."""
+
+    def walk(case: Walk) -> Walked:
+        scene, body, gait = case.scene, case.scene.body, case.scene.gait
+        assert isinstance(body, RailBody) and isinstance(gait, RailGait)
+        cap, peak = cap_in_stance(case), 0.5 * math.pi * gait.stroke / gait.stance
+
+        def motion(t: float, state: Any) -> tuple[float, float, float]:
+            speed, since = float(state[1]), t % gait.cycle
+            force, slip = -body.rolling_drag * math.tanh(speed / _SMOOTH), 0.0
+            if since < gait.stance:
+                slip = speed - peak * math.sin(math.pi * since / gait.stance)
+                force -= cap(since) * math.tanh(slip / _SMOOTH)
+            return speed, force / body.mass, abs(slip)
+
+        start = time.perf_counter()
+        found = solve_ivp(motion, (0.0, scene.duration), (0.0, 0.0, 0.0), method=method)
+        taken = time.perf_counter() - start
+        distance, _, slip = (found.y[:, -1] / scene.cycles).tolist()
+        verdict = None if found.success else str(found.message)
+        return Walked(distance, slip, 0.0, 0.0, verdict, len(found.t) - 1, taken)
+
+    return walk

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measure time and errors of all methods of simulating walks."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ros_pad.errors import PadError
+from ros_pad.pace import Progress
+from studies.work_precision.walk.walkers import HEXAPOD
+from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import Walk
+from studies.work_precision.walk.walkers import Walked
+from studies.work_precision.walk.walkers import Walker
+
+FAILED = 0.1  # relative error of distance or slip above which a walk has failed
+LEAST = 0.01  # share of the stride: errors of shorter distances are relative to this share
+
+
+@dataclass(frozen=True)
+class WalkResult:
+    """Results of a walker.
+
+    Attributes
+    ----------
+    robot, method, family : str
+    step_s : float or None
+        Time step, s; None where the method chooses its own.
+    ms_per_second : float
+        Median computing time of a simulated second, ms.
+    us_per_step : float
+        Median computing time of a step, us; of a step of MuJoCo on L2.
+    versus : float
+        Time of a simulated second over that of the baseline, median over walks of the ratio.
+    baseline, top : str
+        Names of the walkers that times (``baseline``) and errors (``top``) are relative to.
+    errors, worst : dict of float
+        Median and largest error of ``distance`` and ``slip`` (relative), ``lateral`` (m a cycle)
+        and ``yaw`` (rad a cycle), of walks without a verdict; NaN where there are none.
+    failures : int
+        Number of walks whose distance is off by more than 10 %, or that have no valid result.
+    slip_failures : int
+        The same for the slip path.
+    refused : int
+        Number of walks without a valid result: they ended with a verdict or an error.
+    cases : int
+    walks : list of dict
+        Each walk, with its results and the relative error of its distance.
+    ours : bool
+    """
+
+    robot: str
+    method: str
+    family: str
+    step_s: float | None
+    ms_per_second: float
+    us_per_step: float
+    versus: float
+    baseline: str
+    top: str
+    errors: dict[str, float]
+    worst: dict[str, float]
+    failures: int
+    slip_failures: int
+    refused: int
+    cases: int
+    walks: list[dict[str, Any]]
+    ours: bool
+
+
+RELATIVE = ('distance', 'slip')
+MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), RAIL: RELATIVE}
+
+
+def run(
+    robot: str,
+    walks: Sequence[Walk],
+    walkers: Sequence[Walker],
+    top: str,
+    baseline: str,
+    progress: Progress,
+) -> list[WalkResult]:
+    """Measure each walker; ``top`` and ``baseline`` are names of walkers.
+
+    Walkers take turns on each walk, so that other load of the machine affects all of them.
+    Progress, 0 to 1, is reported to ``progress``.
+    """
+    went: dict[str, list[Walked]] = {walker.name: [] for walker in walkers}
+    for number, walk in enumerate(walks):
+        for turn, walker in enumerate(walkers):
+            went[walker.name].append(_attempt(walker, walk))
+            progress((number + (turn + 1) / len(walkers)) / len(walks))
+    return [_result(robot, walker, walks, went, top, baseline) for walker in walkers]
+
+
+def _attempt(walker: Walker, walk: Walk) -> Walked:
+    try:
+        return walker.walk(walk)
+    except (ArithmeticError, PadError) as error:
+        return Walked(*(math.nan,) * 4, f'{type(error).__name__}: {error}', 1, math.nan)
+
+
+def _result(
+    robot: str,
+    walker: Walker,
+    walks: Sequence[Walk],
+    went: dict[str, list[Walked]],
+    top: str,
+    baseline: str,
+) -> WalkResult:
+    here, truth = went[walker.name], went[top]
+    durations = [walk.scene.duration for walk in walks]
+    least = [LEAST * walk.scene.stride for walk in walks]
+    valid = [not each.verdict and math.isfinite(each.distance) for each in here]
+    off = {
+        measure: np.array(
+            [
+                abs(getattr(each, measure) - getattr(true, measure))
+                / (max(abs(getattr(true, measure)), floor) if measure in RELATIVE else 1.0)
+                if good
+                else math.nan
+                for each, true, good, floor in zip(here, truth, valid, least, strict=True)
+            ]
+        )
+        for measure in MEASURES[robot]
+    }
+    found = {measure: errors[np.isfinite(errors)] for measure, errors in off.items()}
+    return WalkResult(
+        robot=robot,
+        method=walker.name,
+        family=walker.family,
+        step_s=walker.step,
+        ms_per_second=1e3
+        * median(each.seconds / duration for each, duration in zip(here, durations, strict=True)),
+        us_per_step=1e6 * median(each.seconds / each.steps for each in here),
+        versus=median(
+            each.seconds / base.seconds for each, base in zip(here, went[baseline], strict=True)
+        ),
+        baseline=baseline,
+        top=top,
+        errors={name: median(errors) for name, errors in found.items()},
+        worst={name: max(errors, default=math.nan) for name, errors in found.items()},
+        # NaN counts as an error above the limit.
+        failures=int((~(off['distance'] <= FAILED)).sum()),
+        slip_failures=int((~(off['slip'] <= FAILED)).sum()),
+        refused=valid.count(False),
+        cases=len(walks),
+        walks=[
+            {'walk': walk.name}
+            | asdict(each)
+            | {'distance_error': each.distance / true.distance - 1.0}
+            for walk, each, true in zip(walks, here, truth, strict=True)
+        ],
+        ours=walker.ours,
+    )
+
+
+def median(values: Any) -> float:
+    finite = [float(value) for value in values if math.isfinite(value)]
+    return statistics.median(finite) if finite else math.nan

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of topics agrees with nodes, messages and documentation."""
+
+import pathlib
+import re
+
+import pytest
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
+
+from ros_pad.bags import topics
+from ros_pad.bags.codec import MessageType
+from ros_pad.bags.topics import TRIAL
+from ros_pad.bags.topics import Topic
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]
+
+
+def test_the_documentation_has_every_topic_with_type_and_unit():
+    page = next(p for p in (ROOT / 'docs' / 'topics.md', ROOT / 'README.md') if p.is_file())
+    _, _, table = page.read_text(encoding='utf-8').partition('| topic | type | unit |')
+    rows = [re.split(r'\s*\|\s*', line)[1:] for line in table.split('\n\n')[0].splitlines()[2:]]
+    documented = {
+        name: (message_type, unit.replace('*', ''))
+        for names, message_type, unit, *_ in rows
+        for name in re.findall('`([^`]+)`', names)
+    }
+    for topic in TOPICS:
+        message_type, unit = documented.pop(topic.pattern.replace('{leg}', 'i'))
+        package, _, name = topic.type_name.split('/')
+        if topic.pattern.startswith('/'):  # a row of the page may have two of these topics
+            assert package in message_type
+        else:
+            assert (message_type, unit) == (f'{package}/{name}', topic.unit)
+    assert not documented
+
+
+@pytest.mark.parametrize('topic', TRIAL.values(), ids=TRIAL)
+def test_values_that_are_put_into_a_message_are_read_from_it(topic):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    definition, _ = store.generate_msgdef(topic.type_name, ros_version=2)
+    message_type = MessageType(topic.type_name, definition)
+    message = message_type.blank()
+    if topic.type_name.endswith('/Bool'):
+        values = (True,)
+    else:
+        values = ('dome',) if topic.text else tuple(0.5 + n for n in range(len(topic.values)))
+    topic.fill(message, values)
+    assert topic.read(message) == values
+    assert topic.read(message_type.decode(message_type.encode(message))) == values
+
+
+def test_nodes_have_the_classes_of_the_table():
+    of_nodes = pytest.importorskip('ros_pad.nodes.topics')
+    every = (*of_nodes.LEG_TOPICS, *of_nodes.COMMON_TOPICS)
+    assert {topic.schema for topic in every} == set(TOPICS)
+    for topic in every:
+        package = topic.message.__module__.partition('.')[0]
+        assert f'{package}/msg/{topic.message.__name__}' == topic.type_name

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad design`` as a user types it."""
+
+import json
+import math
+import pathlib
+
+import pytest
+
+from ros_pad import cli
+from ros_pad import configuration
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    assert cli.main(['design', *arguments, '--json']) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ''
+    return json.loads(printed.out)
+
+
+def test_a_shipped_foot_beside_both_readings(capsys: pytest.CaptureFixture[str]):
+    values = said(capsys, '--load', '7', '--foot', 'large37')
+    built, corrected, thesis = values['designs']
+    assert [each['name'] for each in values['designs']] == ['as built', 'corrected', 'thesis']
+    assert built['pads'] == 37
+    # Each pad needs 1.2 * 7/37 N; the measured line gives the pressure for it.
+    needed = 75e3 + (1.2 * 7 / 37 - 0.2833) / 1.25e-5
+    assert built['pressure_pa'] == pytest.approx(needed, rel=1e-12)
+    assert built['reachable_load_n'] == pytest.approx(37 * 0.4708 / 1.2)
+    assert (corrected['pads'], thesis['pads']) == (51, 145)
+    assert not corrected['touching']
+    assert thesis['touching']
+    assert 'overlap even when flat' in ' '.join(values['says'])
+    assert '2.33 mm' in values['says'][-1]
+    small = [row for row in values['radii'] if row['radius_m'] < 0.565e-3]
+    assert {row['rise_height_m'] is None for row in small if row['reading'] == 'thesis'} == {True}
+
+
+def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
+    values = said(
+        capsys,
+        *('--load', '2', '--foot', 'large37', '--radius', '1e-3', '--stiffness', '30'),
+        *('--pressure', '70e3', '--margin', '1', '--criterion', 'max_depth'),
+    )
+    assert [each['name'] for each in values['designs']] == ['corrected', 'thesis']
+    first = values['designs'][0]
+    expected = {
+        'radius_m': 1e-3,
+        'stiffness_n_per_m': 30.0,
+        'ceiling_pa': 70e3,
+        'margin': 1.0,
+        'criterion': 'max_depth',
+        'area_m2': math.pi * 0.017**2,
+    }
+    assert {key: first[key] for key in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'parts'),
+    [
+        (['25'], ['cannot be carried', '64 pads would be enough', 'closer pattern', '90000 Pa']),
+        (['16', '--pressure', '80e3'], ['cannot be carried', 'A supply of 82', 'would be enough']),
+        (['7', '--pressure', '50e3'], ['No number of pads', 'nothing below 52336 Pa']),
+        (
+            ['7', '--radius', '2.4e-3'],
+            ['the data for such pads end', 'radius 0.0003 to 0.002 m'],
+        ),
+        (['7'], ['is carried: 51 pads']),
+    ],
+)
+def test_words_say_what_would_carry(
+    arguments: list[str], parts: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(['design', '--sole-radius', '0.017', '--load', *arguments]) == 0
+    printed = capsys.readouterr().out
+    for part in parts:
+        assert part in printed
+
+
+def test_what_would_do_does(capsys: pytest.CaptureFixture[str]):
+    heavy = said(capsys, '--load', '25', '--sole-radius', '0.017')['designs'][0]
+    assert not heavy['carried']
+    area = heavy['pads_needed'] * 4.5 * math.sqrt(3) * 1.5e-3**2
+    assert said(capsys, '--load', '25', '--area', str(area))['designs'][0]['carried']
+
+
+def test_table_has_a_column_for_each_reading(capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['design', '--load', '7', '--area', '9e-4']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line.split() for line in lines if line.startswith('pads'))
+    assert row == ['pads', '51', '143']
+    radii = [line.split() for line in lines if line.startswith('   0.00')]
+    assert [float(each[0]) for each in radii] == sorted(float(each[0]) for each in radii)
+    assert {len(each) for each in radii} == {9}
+    assert float(radii[0][0]) == 0.0003
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'part'),
+    [
+        (['--load', '7'], '--sole-radius'),
+        (['--load', '0', '--area', '1e-3'], 'load = 0'),
+        (['--load', '7', '--area', '-1'], 'area = -1'),
+        (['--load', '7', '--sole-radius', '-1'], '--sole-radius = -1'),
+        (['--load', '7', '--area', '1e-6'], 'area = 1e-06 m²'),
+        (['--load', '7', '--area', '1e-3', '--radius', '0'], 'radius = 0'),
+        (['--load', '7', '--area', '1e-3', '--pressure', '0'], 'ceiling = 0'),
+        (['--load', '7', '--foot', 'huge'], 'large37'),
+        (['--load', '7', '--area', '1e-3', '--figure', 'design.txt'], '.png'),
+    ],
+)
+def test_bad_input(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(['design', *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ''
+    assert part in printed.err
+
+
+def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    path = tmp_path / 'design.png'
+    values = said(capsys, '--load', '7', '--foot', 'large19', '--figure', str(path))
+    assert values['figure'] == str(path)
+    assert path.read_bytes().startswith(b'\x89PNG')
+    # At this pressure no pad carries a load, so that a logarithmic axis has nothing to show.
+    arguments = ['--load', '7', '--area', '1e-3', '--pressure', '5e4']
+    assert cli.main(['design', *arguments, '--figure', str(path)]) == 2  # not overwritten
+    assert 'exists already' in capsys.readouterr().err
+    assert said(capsys, *arguments, '--figure', str(tmp_path / 'other.png'))
+    missing = tmp_path / 'none' / 'design.svg'
+    assert cli.main(['design', '--load', '7', '--area', '1e-3', '--figure', str(missing)]) == 1
+    assert str(missing) in capsys.readouterr().err
+
+
+def test_pads_of_another_radius_carry_in_proportion_to_their_area(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    """A foot file that states the thesis' line itself gives the designs of the shipped foot."""
+    shipped = configuration.locate('feet', 'large37').read_text()
+    own = tmp_path / 'own.yaml'
+    line = '{force: 0.2833, pressure: 75.0e+3, slope: 1.25e-5}'
+    own.write_text(shipped.replace('pad:', f'pad:\n  measured_limit: {line}', 1))
+    for radius in ([], ['--radius', '0.0005']):
+        theirs = said(capsys, '--load', '7', '--foot', 'large37', *radius)
+        mine = said(capsys, '--load', '7', '--foot', str(own), *radius)
+        for a, b in zip(
+            theirs['designs'] + theirs['radii'], mine['designs'] + mine['radii'], strict=True
+        ):
+            for key in ('pads_needed', 'carried', 'reachable_load_n', 'pressure_pa'):
+                assert b[key] == (a[key] if a[key] is None else pytest.approx(a[key], rel=1e-9))

@@ -1,0 +1,388 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each fault that ``pad doctor`` checks for is produced, and must be found with its remedy."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+from types import SimpleNamespace
+from typing import Any
+from typing import NamedTuple
+
+import pytest
+
+from ros_pad import cli
+from ros_pad import configuration
+from ros_pad.commands import doctor
+from ros_pad.commands.doctor import Finding
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+class Usage(NamedTuple):
+    """Result of shutil.disk_usage, bytes."""
+
+    total: float
+    used: float
+    free: float
+
+
+def one(findings: Any) -> Finding:
+    (finding,) = findings
+    return finding
+
+
+@pytest.mark.parametrize(
+    ('version', 'status'),
+    [((3, 10, 4), 'problem'), ((3, 11, 0), 'ok'), ((3, 13, 9), 'ok'), ((3, 14, 0), 'warning')],
+)
+def test_python(version: tuple[int, ...], status: str):
+    assert one(doctor.python(version)).status == status
+
+
+# Program of a child process in which some modules are missing, as if they were not installed.
+WITHOUT = """
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split('.')[0] in {missing}:
+            raise ModuleNotFoundError(f'No module named {{name!r}}', name=name)
+
+sys.meta_path.insert(0, Missing())
+from ros_pad import cli
+sys.exit(cli.main(['doctor', '--json']))
+"""
+
+
+def findings_of(code: str, **environment: str) -> tuple[int, dict[str, dict[str, str]]]:
+    child = subprocess.run(
+        [sys.executable, '-c', code],
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    report = json.loads(child.stdout)
+    found = {each['what']: each for each in report['findings']}
+    assert report['problems'] == sum(each['status'] == 'problem' for each in found.values())
+    return child.returncode, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('missing', ['numpy', 'tqdm'])
+def test_a_missing_package_is_named_and_the_doctor_goes_on(missing: str, tmp_path: pathlib.Path):
+    # An unknown middleware stops the check of ROS early: its processes would not miss the package.
+    status, found = findings_of(
+        WITHOUT.format(missing={missing}), RMW_IMPLEMENTATION='rmw_of_no_one'
+    )
+    assert status == 1
+    assert found['packages']['status'] == 'problem'
+    assert f'{missing} (ModuleNotFoundError' in found['packages']['found']
+    assert 'pip install' in found['packages']['advice']
+    assert found['logs']['status'] == 'ok'  # the last check still runs
+
+
+def test_broken_and_missing_packages_are_named(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'broken_pad.py').write_text('raise OSError("libgfortran.so.5")')
+    (tmp_path / 'half_pad.py').write_text('import not_there_pad')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    finding = one(doctor.packages(['json', 'nowhere_pad', 'half_pad', 'broken_pad']))
+    assert finding.status == 'problem'
+    for part in ('nowhere_pad', 'not_there_pad', 'broken_pad (OSError: libgfortran.so.5)'):
+        assert part in finding.found
+    assert 'json' not in finding.found
+
+
+def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    found = list(doctor.extras())
+    assert {each.status for each in found} == {'warning'}
+    pip = {each.what: each.advice for each in found}
+    for name, extra in (('mujoco', 'mujoco'), ('numba', 'fast'), ('pyarrow', 'sweep')):
+        assert f'pip install "ros_pad[{extra}]"' in pip[name]
+
+
+def test_extras_that_cannot_be_imported_say_why(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    modules = {
+        'broken_pad': 'raise OSError("libGL.so.1: cannot open")',
+        'half_pad': 'import not_there_pad',
+        'crashing_pad': 'import os; os.abort()',
+        'whole_pad': '',
+    }
+    for name, code in modules.items():
+        (tmp_path / f'{name}.py').write_text(code)
+        monkeypatch.setitem(doctor.EXTRAS, name, ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    broken, half, crashing, whole = doctor.extras(list(modules))
+    assert (broken.status, half.status, crashing.status) == ('warning',) * 3
+    assert 'status 1: OSError: libGL.so.1: cannot open' in broken.found
+    assert "No module named 'not_there_pad'" in half.found
+    assert 'ends with status -6' in crashing.found
+    assert 'pip install --force-reinstall half_pad' in half.advice
+    assert (whole.status, whole.found) == ('ok', 'nothing')
+
+
+def test_an_extra_that_hangs_is_not_waited_for(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'slow_pad.py').write_text('import time; time.sleep(3600)')
+    monkeypatch.setitem(doctor.EXTRAS, 'slow_pad', ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(doctor, 'STARTING', 0.5)
+    finding = one(doctor.extras(['slow_pad']))
+    assert finding.status == 'warning'
+    assert 'slow_pad' in finding.found and 'within 0.5 s' in finding.found
+
+
+def test_extras_are_imported_side_by_side(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    # Each import ends only after the other one has begun.
+    code = """
+import pathlib, time
+(pathlib.Path(__file__).parent / {own!r}).touch()
+while not (pathlib.Path(__file__).parent / {other!r}).exists():
+    time.sleep(0.005)
+"""
+    for own, other in (('left_pad', 'right_pad'), ('right_pad', 'left_pad')):
+        (tmp_path / f'{own}.py').write_text(code.format(own=own, other=other))
+        monkeypatch.setitem(doctor.EXTRAS, own, ('mesh', 'nothing'))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert [each.status for each in doctor.extras(['left_pad', 'right_pad'])] == ['ok', 'ok']
+
+
+def test_the_extras_are_those_of_setup():
+    text = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    for name, (extra, _) in doctor.EXTRAS.items():
+        assert f"'{extra}': [" in text and f"'{name}>=" in text
+
+
+def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
+    assert f'{len(configuration.names("scenes"))} scenes' in one(doctor.config_folder()).found
+    monkeypatch.setattr('ros_pad.configuration.__file__', str(tmp_path / 'a' / 'b.py'))
+    monkeypatch.setattr(sys, 'prefix', str(tmp_path))
+    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
+    finding = one(doctor.config_folder())
+    assert (finding.status, str(tmp_path) in finding.found) == ('problem', True)
+    assert 'setup.bash' in finding.advice
+
+
+def test_without_ros_it_lists_what_still_works(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'rclpy.py').write_text('raise ModuleNotFoundError("No module named \'rclpy\'")')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.setattr(doctor, 'ros_sources', dict)
+    finding = one(doctor.ros())
+    assert finding.status == 'warning'
+    assert '--no-ros' in finding.found
+    assert 'ros_pad[ros]' in finding.advice or '/opt/ros' in finding.advice
+
+
+def test_wheels_that_cannot_be_loaded_are_a_problem(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'rclpy.py').write_text('raise ImportError("librcl.so: cannot open")')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    finding = one(doctor.ros())
+    assert finding.status == 'problem'
+    assert 'librcl.so' in finding.found and 'one ROS 2 at a time' in finding.advice
+    (tmp_path / 'rclpy.py').write_text('import os; os.abort()')
+    assert one(doctor.ros()).status == 'problem'
+
+
+def test_missing_messages_are_named(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / 'rclpy.py').write_text('def get_rmw_implementation_identifier(): return "rmw"')
+    for name in {module.partition('.')[0] for module in doctor.ROS_MODULES} - {'rclpy'}:
+        (tmp_path / name).mkdir()
+        for part in ('__init__', 'msg', 'srv'):
+            (tmp_path / name / f'{part}.py').touch()
+    shutil.rmtree(tmp_path / 'std_srvs')
+    (tmp_path / 'std_srvs.py').touch()
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    found = list(doctor.ros())
+    assert (found[-1].what, found[-1].status) == ('messages', 'problem')
+    assert 'std_srvs' in found[-1].found and 'std_msgs' not in found[-1].found
+
+
+PREFIX = {'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
+
+
+@pytest.mark.parametrize(
+    ('wheels', 'environment', 'status'),
+    [
+        ('jazzy', {}, 'ok'),
+        ('kilted', {}, 'warning'),
+        ('jazzy', PREFIX, 'problem'),
+        ('jazzy', {'LD_LIBRARY_PATH': '/x:/opt/ros/jazzy/lib'}, 'problem'),
+        (None, {'ROS_DISTRO': 'jazzy', **PREFIX}, 'ok'),
+        (None, {'ROS_DISTRO': 'jazzy'}, 'ok'),  # built from source outside /opt/ros
+        (None, {'ROS_DISTRO': 'rolling'}, 'warning'),
+    ],
+)
+def test_which_ros_it_is(
+    wheels: str | None,
+    environment: dict[str, str],
+    status: str,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    for name in ('AMENT_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH', 'ROS_DISTRO'):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    names = ['numpy', *([f'ros-{wheels}-rclpy'] if wheels else [])]
+    installed = [SimpleNamespace(metadata={'Name': name}) for name in names]
+    monkeypatch.setattr('importlib.metadata.distributions', lambda: installed)
+    finding = doctor.which_ros('/somewhere/rclpy/__init__.py', doctor.ros_sources())
+    assert finding.status == status
+    assert ('one ROS 2 at a time' in finding.advice) == (status == 'problem')
+
+
+def test_a_middleware_that_is_not_installed_is_a_problem(monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip('rclpy')
+    monkeypatch.setenv('RMW_IMPLEMENTATION', 'rmw_of_no_one')
+    *_, finding = doctor.ros()
+    assert finding.status == 'problem'
+    assert 'unset RMW_IMPLEMENTATION' in finding.advice
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Let no messages from other processes in, and return ``monkeypatch``."""
+    pytest.importorskip('rclpy')
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    for name in ('ROS_LOCALHOST_ONLY', 'RMW_IMPLEMENTATION'):
+        monkeypatch.delenv(name, raising=False)
+    return monkeypatch
+
+
+def test_a_message_goes_round(alone: pytest.MonkeyPatch):
+    finding = doctor.loopback(30.0)  # a machine under test may be slow
+    assert finding.status == 'ok', finding
+
+
+def test_processes_that_are_kept_apart_are_a_problem(alone: pytest.MonkeyPatch):
+    alone.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
+    finding = doctor.loopback(1.0)
+    assert finding.status == 'problem' and 'within 1 s' in finding.found
+    assert finding.advice.startswith('ROS_AUTOMATIC_DISCOVERY_RANGE=OFF')
+
+
+def test_nodes_that_hang_are_not_waited_for(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / 'rclpy.py').write_text('import time; time.sleep(3600)')
+    monkeypatch.setattr(doctor, 'STARTING', 0.5)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    imported = one(doctor.ros())
+    assert imported.status == 'problem' and 'within 0.5 s' in imported.found
+    started = doctor.loopback(0.5)
+    assert started.status == 'problem' and 'does not start' in started.found
+    assert 'shm clean' in started.advice
+
+
+@pytest.mark.parametrize('number', ['blue', '400'])
+def test_a_domain_that_is_none_is_a_problem(alone: pytest.MonkeyPatch, number: str):
+    alone.setenv('ROS_DOMAIN_ID', number)
+    finding = doctor.loopback(1.0)
+    assert finding.status == 'problem'
+    # The advice begins with the wrong number; a firewall cannot be the cause.
+    assert finding.advice.startswith(f'ROS_DOMAIN_ID={number}: a number from 0 to 101')
+    assert 'UDP' not in finding.advice
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'hint'),
+    [
+        ('ROS_LOCALHOST_ONLY', '1', 'unset ROS_LOCALHOST_ONLY'),
+        ('ROS_DISCOVERY_SERVER', 'host:11811', 'unset ROS_DISCOVERY_SERVER'),
+        ('FASTRTPS_DEFAULT_PROFILES_FILE', 'x.xml', 'unset FASTRTPS_DEFAULT_PROFILES_FILE'),
+        ('ROS_DOMAIN_ID', '102', 'from 0 to 101'),
+        ('ROS_DOMAIN_ID', '2', 'UDP ports 7900 to 8149'),
+        ('ROS_AUTOMATIC_DISCOVERY_RANGE', '', 'no multicast'),
+        ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF', 'LOCALHOST'),
+    ],
+)
+def test_hints_come_from_the_settings(
+    name: str, value: str, hint: str, monkeypatch: pytest.MonkeyPatch
+):
+    for each in ('ROS_LOCALHOST_ONLY', 'ROS_DISCOVERY_SERVER', 'FASTRTPS_DEFAULT_PROFILES_FILE'):
+        monkeypatch.delenv(each, raising=False)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
+    assert hint not in doctor.discovery_advice()
+    monkeypatch.setenv(name, value)
+    assert hint in doctor.discovery_advice()
+
+
+def test_serial_ports(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    port = tmp_path / 'ttyUSB0'
+    port.touch()
+    assert one(doctor.serial_ports([])).found == 'none is plugged in'
+    assert one(doctor.serial_ports([str(port)])).status == 'ok'
+    assert 'does not exist' in one(doctor.serial_ports([str(tmp_path / 'ttyUSB1')])).found
+    monkeypatch.setattr(os, 'access', lambda *_: False)
+    monkeypatch.setattr(pathlib.Path, 'group', lambda _: 'dialout')
+    finding = one(doctor.serial_ports([str(port)]))
+    assert finding.status == 'warning'
+    assert finding.advice.startswith('sudo usermod -aG dialout $USER')
+
+
+@pytest.mark.parametrize(
+    ('free', 'status'), [(5e9, 'ok'), (0.5e9, 'warning'), (0.05e9, 'problem')]
+)
+def test_room_for_bags(
+    free: float, status: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1e12, 1e12 - free, free))
+    runs, _ = doctor.folders(tmp_path)
+    assert (runs.what, runs.status) == ('runs/', status)
+    assert list(tmp_path.iterdir()) == []  # nothing is left behind
+
+
+def test_folders_that_cannot_be_written(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / 'file').touch()
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'file' / 'log'))
+    runs, logs = doctor.folders(tmp_path)
+    assert (runs.status, logs.status) == ('ok', 'problem')
+    assert 'export ROS_LOG_DIR' in logs.advice
+
+    def full(**_: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr('tempfile.TemporaryFile', full)
+    runs, _ = doctor.folders(tmp_path)
+    assert runs.status == 'problem' and 'Read-only file system' in runs.found
+
+
+def test_the_command_prints_all_and_fails_on_a_problem_alone(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv('COLUMNS', '70')
+    found = [
+        Finding('Python', 'ok', '3.12'),
+        Finding('mujoco', 'warning', 'not here: ' + 'word ' * 30, 'pip install "ros_pad[mujoco]"'),
+    ]
+    monkeypatch.setattr(doctor, 'examine', lambda *_: iter(found))
+    assert cli.main(['doctor']) == 0
+    shown = capsys.readouterr().out
+    assert re.match(r'ok +Python: 3.12\nwarning +mujoco: not here: word', shown)
+    assert '-> pip install "ros_pad[mujoco]"' in shown
+    assert 'problems: 0, warnings: 1' in shown
+    assert max(map(len, shown.splitlines())) <= 70
+    found.append(Finding('logs', 'problem', 'full', 'make room'))
+    assert cli.main(['doctor', '--json']) == 1
+    values = json.loads(capsys.readouterr().out)
+    assert (values['problems'], values['warnings'], len(values['findings'])) == (1, 1, 3)

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad replay`` as a user types it."""
+
+import importlib.util
+import json
+import pathlib
+import shutil
+
+import pytest
+from mcap.reader import make_reader
+
+from ros_pad import cli
+from ros_pad import configuration
+from ros_pad.bags import BagReader
+
+SAMPLE = configuration.shared_folder().parent / 'bags' / 'hexapod_patches' / 'bag'
+
+
+@pytest.mark.slow
+def test_the_sample_is_replayed_and_reported_in_one_command_each(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(['replay', str(SAMPLE)]) == 0
+    said = capsys.readouterr().out
+    # The six legs have the same result and share a line.
+    assert said.count('/leg_*/') == 8 and '/leg_1/' not in said
+    assert 'equal to the bit' in said or 'equal except for rounding' in said
+    page = tmp_path / 'report.html'
+    assert cli.main(['report', str(SAMPLE), '--out', str(page)]) == 0
+    assert page.stat().st_size > 10_000
+
+
+# Writing a bag needs the installed message types.
+writes_a_bag = pytest.mark.skipif(
+    importlib.util.find_spec('std_msgs') is None, reason='the messages of ROS 2 are not installed'
+)
+
+
+@writes_a_bag
+def test_other_parameters_picture_and_bag(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    figure, out = tmp_path / 'prior.png', tmp_path / 'bag'
+    arguments = ['replay', str(SAMPLE), '--set', 'wet_prior=0.2', '--json']
+    arguments += ['--figure', str(figure), '--out', str(out)]
+    assert cli.main(arguments) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said['verdict'] == 'different'
+    assert said['settings']['wet_prior'] == 0.2
+    assert said['settings']['foot'] == 'large37' and said['settings']['policy'] == 'adaptive'
+    assert (said['figure'], said['out']) == (str(figure), str(out))
+    topics = {each['topic']: each for each in said['topics']}
+    assert len(topics) == 48
+    wetness = topics['/leg_1/wetness']
+    assert wetness['verdict'] == 'different' and wetness['compared'] == 301
+    assert 0.1 < wetness['largest_difference'] < 1.0
+    assert wetness['first_difference_s'] < 0.1
+    assert topics['/leg_1/slip']['verdict'] in ('equal', 'rounding')
+    assert [each['leg'] for each in said['outcomes']] == [1, 2, 3, 4, 5, 6]
+    assert all(each['stance_ends'] == 5 for each in said['outcomes'])
+    assert figure.read_bytes().startswith(b'\x89PNG') and figure.stat().st_size > 20_000
+    # The command refuses to overwrite a file before it does anything else.
+    before = figure.stat().st_mtime_ns
+    assert cli.main(arguments) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert figure.stat().st_mtime_ns == before
+
+
+@writes_a_bag
+def test_the_replayed_bag_is_a_bag_for_others(tmp_path: pathlib.Path):
+    """rosbags reads the same messages as in the sample, exactly or except for rounding."""
+    highlevel = pytest.importorskip('rosbags.highlevel', reason='pip install ros_pad[test]')
+    out = tmp_path / 'bag'
+    assert cli.main(['replay', str(SAMPLE), '--out', str(out)]) == 0
+    topics = [f'/leg_2/{kind}' for kind in (
+        'slip', 'slipping', 'friction', 'friction_margin', 'wetness', 'doubt', 'morphology',
+        'pressure_setpoint',
+    )]  # fmt: skip
+
+    def messages(bag):
+        found = {}
+        with highlevel.AnyReader([bag]) as reader:
+            for connection, time, data in reader.messages():
+                if connection.topic in topics:
+                    message = reader.deserialize(data, connection.msgtype)
+                    found.setdefault(connection.topic, []).append((time, message))
+        return found
+
+    def stamped(message):
+        stamp = message.header.stamp
+        return stamp.sec, stamp.nanosec, message.header.frame_id
+
+    recorded, replayed = messages(SAMPLE), messages(out)
+    assert set(recorded) == set(replayed) == set(topics)
+    for topic in topics:
+        assert len(recorded[topic]) == len(replayed[topic])
+        for (time, one), (other_time, other) in zip(recorded[topic], replayed[topic], strict=True):
+            assert time == other_time, topic
+            if topic.endswith('slip'):
+                assert stamped(one) == stamped(other)
+                here, there = one.twist.twist.linear, other.twist.twist.linear
+                assert (here.x, here.y, here.z) == (there.x, there.y, there.z)
+                assert (one.twist.covariance == other.twist.covariance).all()
+            elif topic.endswith('pressure_setpoint'):
+                assert stamped(one) == stamped(other)
+                assert (one.fluid_pressure, one.variance) == (other.fluid_pressure, 0.0)
+            elif isinstance(one.data, float):
+                assert one.data == pytest.approx(other.data, rel=0.0, abs=1e-12, nan_ok=True)
+            else:
+                assert one.data == other.data
+    about = json.loads(BagReader(out).custom_data['ros_pad'])
+    assert about['settings']['replay_of'] == str(SAMPLE)
+    assert (about['scene'], about['seed']) == ('hexapod_patches', 9)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        # Compared to the end of the line: lists and ranges would be refused, so none is advised.
+        (['--set', 'wet_prior'], 'wet_prior: NAME=VALUE is needed\n'),
+        (['--set', 'wet_prior='], 'wet_prior=: NAME=VALUE is needed\n'),
+        (['--set', '=0.2'], '=0.2: NAME=VALUE is needed\n'),
+        (['--set', 'wet_prior=0.2,0.3'], 'one value is needed'),
+        (['--set', 'wet_prior=0.2:0.3'], 'one value is needed'),
+        (['--set', 'margin=1.2', '--set', 'margin=1.3'], 'margin is given twice'),
+        (['--set', 'tau=0.2'], "'tau' is unknown"),
+        (['--set', 'policy.dwell=3', '--policy', 'dome'], 'only the adaptive'),
+        (['--foot', 'wide'], 'large19'),
+        (['--remap', 'leg_1/wrench=/x'], 'NAME:=TOPIC'),
+        (['--remap', 'leg_1/wrench:=/x'], 'no topic /x'),
+        (['--remap', 'leg_1/wrench:=/x', '--remap', 'leg_1/wrench:=/y'], 'twice'),
+        (['--namespace', 'spider'], 'no legs in namespace /spider/'),
+        (['--figure', 'picture.jpg'], 'picture.jpg'),
+    ],
+)
+def test_bad_input_is_status_2(
+    arguments: list[str],
+    said: str,
+    tmp_path: pathlib.Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(['replay', str(SAMPLE), *arguments]) == 2
+    output = capsys.readouterr()
+    assert output.out == '' and said in output.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bag_that_cannot_be_read_is_bad_input(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(['replay', str(tmp_path / 'none')]) == 2
+    assert 'no such bag' in capsys.readouterr().err
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'bag_0.db3').write_bytes(b'')
+    assert cli.main(['replay', str(tmp_path / 'bag')]) == 2
+    assert 'ros2 bag convert' in capsys.readouterr().err
+    lone = tmp_path / 'lone.mcap'
+    shutil.copy(SAMPLE / 'bag_0.mcap', lone)
+    with lone.open('r+b') as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[5]
+        stream.seek(chunk.chunk_start_offset + chunk.chunk_length - 100)
+        stream.write(bytes(50))
+    assert cli.main(['replay', str(lone)]) == 2
+    assert 'damaged' in capsys.readouterr().err

@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad sweep`` as a user types it, also killed, stopped, and with bad input."""
+
+import csv
+import json
+import os
+import pathlib
+import re
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+import pytest
+
+from ros_pad import cli
+from ros_pad.commands.command import INTERRUPTED
+from ros_pad.commands.sweep import parameters
+from ros_pad.commands.sweep import seeds
+from ros_pad.errors import InvalidInput
+from ros_pad.trials.sweep import Results
+from ros_pad.trials.sweep import Sweep
+from ros_pad.trials.sweep import run_job
+from ros_pad.trials.sweep import write_tables
+
+CAP = 300.0  # s: no test waits longer for an event, however slow the machine
+LEG = ['sweep', 'leg_wet_flat', '--workers', '2', '--set', 'cycles=2']
+
+
+def table(folder: pathlib.Path) -> list[dict[str, str]]:
+    """Return the rows of a sweep without the column that depends on the machine's speed."""
+    with (folder / 'trials.csv').open(newline='') as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        del row['real_time_factor']
+    return rows
+
+
+def test_seeds_and_values_as_they_are_typed():
+    assert seeds('3') == [3]
+    assert seeds('0,2,5:7') == [0, 2, 5, 6, 7]
+    assert parameters(['a=1,2.5,3e-4', 'b.c=dry,wet']) == {
+        'a': [1, 2.5, 3e-4],
+        'b.c': ['dry', 'wet'],
+    }
+    found = parameters(['n=10:40:4', 'x=0.1:0.3:3', 'y=1:0:3'])
+    assert found == {'n': [10, 20, 30, 40], 'x': [0.1, 0.2, 0.3], 'y': [1.0, 0.5, 0.0]}
+    assert all(isinstance(each, int) for each in found['n'])
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('x', 'NAME=VALUE'),
+        ('x=', 'NAME=VALUE'),
+        ('=3', 'NAME=VALUE'),
+        ('x=1:2', 'START:STOP:COUNT'),
+        ('x=1:2:2.5', 'START:STOP:COUNT'),
+        ('x=1:two:2', 'START:STOP:COUNT'),
+        ('x=1:inf:2', 'START:STOP:COUNT'),
+        ('x=1:2:1', 'COUNT from 2 to 100000'),
+        ('x=1:1:3', 'STOP other than START'),
+    ],
+)
+def test_ranges_that_make_no_sense_are_refused(text: str, message: str):
+    with pytest.raises(InvalidInput, match=message):
+        parameters([text])
+    with pytest.raises(InvalidInput, match='x is given twice'):
+        parameters(['x=1', 'x=2'])
+
+
+@pytest.mark.parametrize('text', ['', '-1', '1:2:3', '5:2', 'one', '1.5', '0:100000'])
+def test_seeds_that_make_no_sense_are_refused(text: str):
+    with pytest.raises(InvalidInput, match='--seed'):
+        seeds(text)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'parts'),
+    [
+        (['leg_wet_fla'], ["'leg_wet_fla'", "Did you mean 'leg_wet_flat'"]),
+        (['leg_wet_flat', '--policy', 'brave'], ["policy = 'brave'", 'oracle']),
+        (
+            ['leg_wet_flat', '--set', 'body.mass=1,-1'],
+            ['body.mass=-1', 'leg_wet_flat.yaml', '0.01 to 100 kg'],
+        ),
+        (['leg_wet_flat', '--set', 'policy.dwel=1'], ["'policy.dwel'", 'policy.dwell']),
+        (['leg_wet_flat', '--workers', '0'], ['workers = 0']),
+    ],
+)
+def test_bad_input_is_refused_before_anything_runs(
+    arguments: list[str],
+    parts: list[str],
+    tmp_path: pathlib.Path,
+    capsys: pytest.CaptureFixture[str],
+):
+    out = tmp_path / 'sweep'
+    assert cli.main(['sweep', *arguments, '--out', str(out)]) == 2
+    said = capsys.readouterr()
+    for part in parts:
+        assert part in said.err
+    assert said.out == ''
+    assert not out.exists()
+
+
+def test_a_sweep_leaves_table_picture_and_summary(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    out = tmp_path / 'sweep'
+    arguments = [
+        *LEG,
+        '--seed',
+        '0,1',
+        '--policy',
+        'flat,dome',
+        '--set',
+        'body.rolling_drag=0.5,1',
+    ]
+    assert cli.main([*arguments, '--out', str(out), '--json']) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary['trials'], summary['failed'], summary['ended_early']) == (8, 0, 0)
+    assert summary['picture'] == str(out / 'sweep.png')
+    assert (out / 'sweep.png').stat().st_size > 5000
+    rows = table(out)
+    assert len(rows) == 8
+    assert len(summary['points']) == 4
+    point = summary['points'][1]
+    assert (point['policy'], point['body.rolling_drag'], point['walks']) == ('dome', 0.5, 2)
+    ways = [
+        float(row['distance_per_cycle_m'])
+        for row in rows
+        if (row['policy'], row['body.rolling_drag']) == ('dome', '0.5')
+    ]
+    assert point['distance_per_cycle_m'] == pytest.approx(sum(ways) / 2)
+    # The second time no trial is repeated, and the result is printed again.
+    assert cli.main([*arguments, '--out', str(out)]) == 0
+    said = capsys.readouterr().out
+    assert 'mm/cycle' in said and str(out / 'trials.csv') in said
+    assert table(out) == rows
+
+
+def test_help_has_units_and_an_example(capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        cli.main(['sweep', '--help'])
+    said = capsys.readouterr().out
+    assert 'example:\n  pad sweep hexapod_patches' in said
+    assert 'tow.weight, N' in ' '.join(said.split())
+
+
+class Child:
+    """A sweep in a process of its own, whose output goes to a file."""
+
+    def __init__(self, arguments: list[str], folder: pathlib.Path) -> None:
+        self._said = folder / 'said'
+        with self._said.open('w') as file:
+            self.process = subprocess.Popen(
+                [sys.executable, '-m', 'ros_pad.cli', *arguments], stdout=file, stderr=file
+            )
+        self.workers: list[int] = []
+
+    def until(self, more: int) -> None:
+        """Wait until the progress bar shows ``more`` trials above its first count."""
+        first = None
+        deadline = time.monotonic() + CAP
+        while True:
+            assert self.process.poll() is None and time.monotonic() < deadline, self.said()
+            shown = [int(each) for each in re.findall(r'(\d+)/\d+ trials', self.said())]
+            # The bar shows 0 until the trials that are already done are counted.
+            first = first or next((each for each in shown if each), None)
+            if first is not None and shown[-1] >= first + more:
+                break
+            time.sleep(0.02)
+        self.workers = children(self.process.pid)
+
+    def said(self) -> str:
+        """Return what the sweep has printed so far."""
+        return self._said.read_text()
+
+
+def children(pid: int) -> list[int]:
+    text = pathlib.Path(f'/proc/{pid}/task/{pid}/children').read_text()
+    return [int(each) for each in text.split()]
+
+
+def alive(pid: int) -> bool:
+    """Return whether a process exists and is no zombie."""
+    try:
+        return pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def check_they_end(pids: Sequence[int]):
+    """Check that the workers end after the sweep has ended."""
+    deadline = time.monotonic() + CAP
+    while any(alive(pid) for pid in pids):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_a_killed_sweep_goes_on_and_loses_and_doubles_nothing(tmp_path: pathlib.Path):
+    """A sweep that is killed twice and then finished has the rows of one that was not killed."""
+    arguments = [*LEG, '--seed', '0:11', '--set', 'body.rolling_drag=0.5,1']
+    out = tmp_path / 'killed'
+    kept: list[list[str]] = []
+    for more in (1, 4):
+        child = Child([*arguments, '--out', str(out)], tmp_path)
+        try:
+            child.until(more)
+        finally:
+            child.process.kill()
+            child.process.wait()
+        base = sqlite3.connect(out / 'trials.sqlite')
+        kept.append([row for (row,) in base.execute('SELECT row FROM trial ORDER BY rowid')])
+        base.close()
+        check_they_end(child.workers)
+    assert 0 < len(kept[0]) < len(kept[1]) < 24
+    assert kept[1][: len(kept[0])] == kept[0]  # no finished trial is repeated
+    assert cli.main([*arguments, '--out', str(out)]) == 0
+    plan = Sweep(
+        ['leg_wet_flat'],
+        seeds=seeds('0:11'),
+        parameters={'cycles': [2], 'body.rolling_drag': [0.5, 1]},
+    )
+    with Results(tmp_path / 'whole', {}, []) as results:
+        for job in plan.jobs():
+            results.add(job.key, run_job(job))
+        write_tables(results.rows(job.key for job in plan.jobs()), tmp_path / 'whole')
+    rows = table(out)
+    assert len(rows) == 24
+    assert rows == table(tmp_path / 'whole')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
+def test_ctrl_c_leaves_what_is_done(number: int, tmp_path: pathlib.Path):
+    out = tmp_path / 'sweep'
+    child = Child([*LEG, '--seed', '0:199', '--out', str(out)], tmp_path)
+    try:
+        child.until(1)
+        os.kill(child.process.pid, number)
+        child.process.wait(CAP)
+    finally:
+        child.process.kill()
+    assert child.process.returncode == INTERRUPTED
+    rows = table(out)
+    assert 0 < len(rows) < 200
+    assert f'stopped: {len(rows)} of 200 trials are in {out}' in child.said()
+    assert len(child.workers) >= 2
+    check_they_end(child.workers)
+    assert 'Traceback' not in child.said()

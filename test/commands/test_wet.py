@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad wet`` as a user types it."""
+
+import json
+import math
+import pathlib
+
+import pytest
+
+from ros_pad import cli
+from ros_pad import configuration
+from ros_pad.capillary import Mesh
+from ros_pad.capillary import wet
+from ros_pad.contact import THESIS_LIQUID
+from ros_pad.contact import WATER
+
+DOME = ['wet', 'dome', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
+SMALL = ['--rings', '16', '--sectors', '24']
+
+
+def asked(arguments: list[str], capsys: pytest.CaptureFixture[str], status: int = 0) -> dict:
+    assert cli.main([*arguments, '--json']) == status
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_dome_in_json_is_the_result_in_python(capsys: pytest.CaptureFixture[str]):
+    values = asked([*DOME, *SMALL, '--direction', '30', '--balance', 'force'], capsys)
+    found = wet(Mesh.dome(1.55e-3, 0.6e-3, rings=16, sectors=24), WATER, 'force')
+    assert values['status'] == 'ok'
+    assert values['height_m'] == pytest.approx(found.mean_height)
+    assert values['heights_m'] == pytest.approx(found.heights.tolist())
+    assert values['force_n'] == pytest.approx(found.force(math.radians(30.0)))
+    assert values['capillary_force_n'] == abs(values['force_n'])
+    pinned = asked([*DOME, *SMALL, '--balance', 'force', '--hysteresis', '100', '60'], capsys)
+    assert pinned['capillary_force_n'] == pytest.approx(
+        found.hysteresis_force(0.0, math.radians(100.0), math.radians(60.0))
+    )
+    assert values['pressure_pa'] == pytest.approx(found.pressure.mean())
+    assert len(values['azimuths_deg']) == 36
+
+
+def test_a_dome_for_the_reader(capsys: pytest.CaptureFixture[str]):
+    assert cli.main([*DOME, *SMALL, '--liquid', 'thesis', '--layers', '50']) == 0
+    said = capsys.readouterr().out
+    found = wet(Mesh.dome(1.55e-3, 0.6e-3, rings=16, sectors=24), THESIS_LIQUID, layers=50)
+    assert f'{found.mean_height:.6g} m' in said
+    assert f'{found.force(0.0):.6g} N' in said
+    assert 'contact angle     77.3493 °' in said
+
+
+def test_other_shapes_and_many_pads(capsys: pytest.CaptureFixture[str]):
+    cone = ['wet', 'cone', '--contact-radius', '1e-3', '--top-radius', '2e-3', '--height', '4e-3']
+    assert asked(cone, capsys)['height_m'] > 0.0
+    cylinder = ['wet', 'cylinder', '--radius', '0.5e-3', '--height', '0.04', '--angle', '0']
+    assert cli.main(cylinder) == 1  # too slender for a reliable height
+    assert 'bath_meniscus; --loose' in capsys.readouterr().err
+    alone = asked([*cylinder, '--loose'], capsys)
+    # Pillars on half the area: Jurin's height between them is that in a tube of their radius.
+    area = str(2.0 * math.pi * 0.5e-3**2)
+    between = asked([*cylinder, '--area', area], capsys)
+    assert between['height_m'] == pytest.approx(2 * 0.073 / (9810 * 0.5e-3), rel=2e-3)
+    assert between['height_m'] > 10.0 * alone['height_m']
+    sizes = ['--pitch', '4.4e-3', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
+    pattern = ['wet', 'pattern', '--pads', '7', *sizes, '--height', '2.6e-3', *SMALL]
+    area = str(math.sqrt(0.75) * 4.4e-3**2 * 7)
+    one = [*DOME, *SMALL, '--height', '2.6e-3', '--pads', '7', '--area', area]
+    all_at_once, one_by_one = asked(pattern, capsys), asked(one, capsys)
+    for name in ('height_m', 'force_n', 'capillary_force_n'):
+        assert all_at_once[name] == pytest.approx(one_by_one[name], rel=1e-6)
+    assert one_by_one['capillary_force_n'] == pytest.approx(-one_by_one['force_n'] / 7)
+
+
+@pytest.mark.slow
+def test_a_foot_takes_the_force(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    force = asked([*DOME, *SMALL, '--hysteresis', '100', '60'], capsys)['capillary_force_n']
+    shipped = configuration.locate('feet', 'large37').read_text()
+    foot = tmp_path / 'wetter.yaml'
+    foot.write_text(f'{shipped}capillary_force: {force!r}\n')
+    walk = ['run', 'hexapod_smooth_wet_dome', '--no-ros', '--no-compare', '--cycles', '1']
+    here = ['--fidelity', 'L1', '--out']
+    without = asked([*walk, *here, str(tmp_path / 'a')], capsys)
+    within = asked([*walk, *here, str(tmp_path / 'b'), '--foot', str(foot)], capsys)
+    terms = [{row['term'] for row in each['omitted']} for each in (without, within)]
+    assert terms[0] - terms[1] == {'capillary force of the pads'}
+    assert sum(within['slip_path_m']) < sum(without['slip_path_m'])
+
+
+def test_pictures(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    figure, page = tmp_path / 'dome.png', tmp_path / 'dome.html'
+    values = asked([*DOME, *SMALL, '--figure', str(figure), '--html', str(page)], capsys)
+    assert (values['figure'], values['html']) == (str(figure), str(page))
+    assert figure.read_bytes().startswith(b'\x89PNG')
+    assert f'{values["height_m"]:.6g} m' in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ('options', 'name', 'advice'),
+    [
+        (['--balance', 'thesis', '--angle', '95'], 'dry', 'does not rise'),
+        (['--angle', '0'], 'saturated', 'above the top'),
+        (['--tension', '1e-6', '--angle', '60'], 'coarse', 'more --layers'),
+        (['--balance', 'thesis', '--angle', '70'], 'far_off', '--balance energy'),
+        (['--area', '1e-3', '--pads', '7'], 'far_apart', 'pattern_surface'),
+    ],
+)
+def test_no_answer_is_a_failure_with_advice(
+    options: list[str], name: str, advice: str, capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main([*DOME, *SMALL, *options, '--json']) == 1
+    said = capsys.readouterr()
+    values = json.loads(said.out)
+    assert values['status'] == name
+    assert values['height_m'] is values['force_n'] is None
+    assert set(values.get('heights_m', [None])) == {None}
+    assert advice in said.err
+    assert cli.main([*DOME, *SMALL, *options]) == 1
+    assert 'no answer' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'part'),
+    [
+        (['wet', 'dome'], 'a dome needs --radius --contact-radius'),
+        ([*DOME, '--top-radius', '1'], '--top-radius is no option of the mesh dome'),
+        ([*DOME, '--scale', '1'], '--scale is no option of the mesh dome'),
+        ([*DOME, '--flip'], '--flip is no option of the mesh dome'),
+        ([*DOME, '--pads', '3'], '--pads needs --area'),
+        ([*DOME, '--area', '1', '--hysteresis', '90', '60'], '--hysteresis is for a single pad'),
+        ([*DOME, *SMALL, '--hysteresis', '60', '90'], 'advancing_angle - receding_angle'),
+        ([*DOME, '--area', '1', '--slices', '4'], '--slices is for a single pad'),
+        ([*DOME, '--area', '1e-6'], 'the pads overlap'),
+        ([*DOME, '--area', '1e-3', '--pads', '0'], 'pads = 0'),
+        ([*DOME, '--tension', '0.05'], '--tension needs --angle'),
+        ([*DOME, '--angle', '200'], 'contact_angle'),
+        ([*DOME, '--layers', '1'], 'layers = 1'),
+        ([*DOME, '--direction', 'nan'], '--direction = nan'),
+        ([*DOME, *SMALL, '--figure', 'dome.jpg'], 'dome.jpg'),
+        (['wet', 'none.stl'], 'none.stl: no such file'),
+        (['wet', 'none.step'], '.stl, .obj, .ply, .msh'),
+        (['wet', 'none.stl', '--height', '1'], '--height is only for shapes'),
+    ],
+)
+def test_bad_input_is_named(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(arguments) == 2
+    assert part in capsys.readouterr().err
+
+
+def test_a_file_in_millimetres(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
+    pytest.importorskip('meshio')
+    path = tmp_path / 'dome.stl'
+    small = Mesh.dome(1.55e-3, 0.6e-3, rings=16, sectors=24)
+    small.write(tmp_path / 'metres.stl')
+    import meshio
+
+    meshio.Mesh(1e3 * small.points, [('triangle', small.faces)]).write(path)
+    assert cli.main(['wet', str(path)]) == 2
+    assert 'scale=1e-3' in capsys.readouterr().err
+    values = asked(['wet', str(path), '--scale', '1e-3'], capsys)
+    assert values['height_m'] == pytest.approx(
+        asked([*DOME, *SMALL], capsys)['height_m'], rel=1e-4
+    )

@@ -1,0 +1,639 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Supervised channels without ROS: set-points keep their limits; pads without commands vent."""
+
+import dataclasses
+import math
+import re
+from functools import partial
+
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import ProtocolError
+from ros_pad.errors import TransportError
+from ros_pad.regulators import Reading
+from ros_pad.regulators import create
+from ros_pad.regulators.protocol import permitted
+from ros_pad.regulators.supervisor import Health
+from ros_pad.regulators.supervisor import Level
+from ros_pad.regulators.supervisor import SupervisedChannel
+from ros_pad.regulators.supervisor import SupervisorSettings
+from ros_pad.regulators.supervisor import supply_health
+
+MS = 1_000_000
+TICK_NS = 10 * MS
+CEILING = 80e3
+
+
+class Log:
+    """Records log messages as pairs of level and text."""
+
+    def __init__(self):
+        self.lines = []
+        self.info, self.warning, self.error = (
+            partial(self.add, level) for level in ('info', 'warning', 'error')
+        )
+
+    def add(self, level, text, **throttle):
+        self.lines.append((level, text))
+
+    def texts(self, level):
+        return [text for each, text in self.lines if each == level]
+
+
+class Device:
+    """A device whose pressure is its set-point, on a cable that may break."""
+
+    def __init__(self, ceiling=CEILING):
+        self.ceiling = ceiling
+        self.setpoint = 40e3  # of an earlier user
+        self.received = []  # set-points, confirmed or not
+        self.is_open = False
+        self.broken = None
+        self.reads = None  # pressure that is read, if not the set-point
+        self.faults = ()
+
+    def open(self):
+        self.is_open = True
+
+    def set_pressure(self, gauge_pa):
+        self.setpoint = permitted(gauge_pa, self.ceiling)
+        self.received.append(gauge_pa)
+        self._answer()
+
+    def read(self):
+        self._answer()
+        pressure = self.setpoint if self.reads is None else self.reads
+        return Reading(pressure, self.setpoint, self.faults, 0.0)
+
+    def vent(self):
+        self._answer()
+        self.setpoint = 0.0
+
+    def close(self):
+        self.is_open = False
+
+    def _answer(self):
+        assert self.is_open
+        if self.broken:
+            raise self.broken
+
+
+class Rig:
+    """Supervised channels in order of legs, driven in simulated time."""
+
+    def __init__(self, *regulators, **values):
+        self.now_ns = 1000 * MS
+        self.log = Log()
+        self.channels = [
+            SupervisedChannel(leg, regulator, SupervisorSettings(**values), self.log)
+            for leg, regulator in enumerate(regulators, start=1)
+        ]
+
+    @classmethod
+    def simulated(cls, *faults, **values):
+        """Return a rig with a simulated regulator for each list of faults; one by default."""
+        rig = cls(**values)
+        for leg, own in enumerate(faults or ([],), start=1):
+            regulator = create('simulated', clock=lambda: rig.now_ns * 1e-9, faults=own)
+            rig.channels.append(
+                SupervisedChannel(leg, regulator, SupervisorSettings(**values), rig.log)
+            )
+        return rig.start()
+
+    def start(self):
+        for channel in self.channels:
+            channel.open()
+            channel.activate(self.now_ns)
+        return self
+
+    def tick(self, seconds=0.01):
+        """Advance in steps of 10 ms; devices are read at every second step."""
+        for _ in range(round(seconds * 1e9) // TICK_NS):
+            self.now_ns += TICK_NS
+            for channel in self.channels:
+                channel.tick(self.now_ns)
+                if self.now_ns % (2 * TICK_NS) == 0:
+                    channel.read(self.now_ns)
+
+    def send(self, gauge, age=0.0, leg=1):
+        return self.channels[leg - 1].command(gauge, age, self.now_ns)
+
+    def hold(self, gauges, seconds):
+        """Command the pressures of all pads every 20 ms, as a controller does."""
+        for _ in range(round(seconds / 0.02)):
+            for leg, gauge in enumerate(gauges, start=1):
+                self.send(gauge, leg=leg)
+            self.tick(0.02)
+
+    def first(self, level, seconds, gauges, leg=1):
+        """Hold pressures, Pa, for a time, s; return time and message of the first ``level``."""
+        channel, found = self.channels[leg - 1], None
+        for _ in range(round(seconds / 0.02)):
+            self.hold(gauges, 0.02)
+            health = channel.health()
+            if found is None and health.level == level:
+                found = self.now_ns * 1e-9, health.message
+        return found
+
+
+def device_rig(**values):
+    """Return a started rig with one device, its channel, and the device."""
+    device = Device()
+    rig = Rig(device, **values).start()
+    return rig, rig.channels[0], device
+
+
+# --- settings ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'allowed'),
+    [
+        ('command_timeout', math.nan, 'a number from 0.02 to 60 s'),
+        ('command_timeout', 61.0, 'a number from 0.02 to 60 s'),
+        ('slew_limit', -1.0, 'a number from 0 to 10000000 Pa/s'),
+        ('ceiling_tolerance', 0.5, 'a number from 0.005 to 0.2'),
+        ('on_fault', 'ignore', 'one of report, vent'),
+    ],
+)
+def test_settings_outside_their_range_are_refused(name, value, allowed):
+    with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed: {allowed} is needed'):
+        SupervisorSettings(**{name: value})
+
+
+def test_settings_are_replaced_while_a_pad_is_up():
+    rig, channel, device = device_rig(command_timeout=5.0)
+    rig.send(50e3)
+    rig.tick(0.5)
+    assert device.setpoint == 50e3
+    channel.settings = dataclasses.replace(channel.settings, command_timeout=0.1)
+    rig.tick()
+    assert device.setpoint == 0.0
+
+
+# --- commands ------------------------------------------------------------------------------------
+
+REFUSED = {
+    'stale': ((50e3, 0.51), 'stamp of the set-point is 0.510 s old: at most 0.5 s'),
+    'future': ((50e3, -0.51), 'stamp of the set-point is 0.510 s in the future: at most 0.5 s'),
+    'nan': ((math.nan, 0.0), 'set-point nan Pa is not allowed: a number from 0 to 80000 Pa gauge'),
+    'inf': ((math.inf, 0.0), 'set-point inf Pa is not allowed: a number from 0 to 80000 Pa gauge'),
+    'minus inf': (
+        (-math.inf, 0.0),
+        'set-point -inf Pa is not allowed: a number from 0 to 80000 Pa gauge',
+    ),
+    'negative': (
+        (-1.0, 0.0),
+        'set-point -1.0 Pa is not allowed: a number from 0 to 80000 Pa gauge',
+    ),
+    'above the ceiling': (
+        (80001.0, 0.0),
+        'set-point 80001 Pa is refused: it is above the ceiling of 80000',
+    ),
+    'huge': ((1e12, 0.0), 'set-point 1e+12 Pa is refused: it is above the ceiling of 80000'),
+}
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_a_bad_command_is_refused_and_reported_once(case):
+    command, message = REFUSED[case]
+    rig, channel, device = device_rig()
+    assert rig.send(30e3)
+    assert not rig.send(*command)
+    assert (channel.accepted, channel.refused) == (1, 1)
+    assert device.setpoint == 30e3
+    assert channel.refusal_due
+    level, words = channel.report(channel.health())
+    assert level == Level.WARN
+    assert words.startswith(message)
+    assert not channel.refusal_due
+    assert channel.report(channel.health()) == Health(Level.OK, 'under pressure')
+    assert rig.log.texts('warning') == [f'leg 1: set-point refused: {words}']
+    assert rig.send(50e3)
+    assert device.setpoint == 50e3
+
+
+def test_a_second_refusal_waits_for_the_next_regular_report():
+    rig, channel, _ = device_rig()
+    rig.send(math.nan)
+    channel.report(channel.health())
+    rig.send(math.nan)
+    assert not channel.refusal_due
+
+
+def test_the_ceiling_itself_is_allowed():
+    rig, _, device = device_rig()
+    assert rig.send(CEILING)
+    assert device.setpoint == CEILING
+
+
+def test_an_inactive_channel_sends_nothing():
+    rig, channel, device = device_rig()
+    channel.deactivate('deactivated')
+    assert not rig.send(50e3)
+    assert (device.received, channel.accepted, channel.refused) == ([], 0, 0)
+
+
+# --- vents ---------------------------------------------------------------------------------------
+
+
+def test_a_device_is_vented_when_it_is_opened_and_closed():
+    rig, channel, device = device_rig()
+    assert (device.is_open, device.setpoint) == (True, 0.0)
+    rig.send(50e3)
+    channel.close('the test ends')
+    assert (device.is_open, device.setpoint, channel.active) == (False, 0.0, False)
+    (text,) = rig.log.texts('info')
+    assert 'leg 1' in text and text.endswith('the test ends')
+
+
+def test_a_device_that_cannot_be_vented_is_closed_again():
+    device = Device()
+    device.broken = TransportError('cable')
+    with pytest.raises(TransportError, match='cable'):
+        Rig(device).start()
+    assert not device.is_open
+
+
+def test_without_commands_a_pad_is_vented():
+    rig = Rig.simulated(command_timeout=0.3)
+    (channel,) = rig.channels
+    rig.hold([60e3], 1.0)
+    rig.tick(0.28)
+    assert channel.pressure > 59e3
+    rig.tick(0.5)
+    assert channel.pressure < 1e3
+    assert channel.health().level == Level.STALE
+    assert any(re.search('leg 1: .* 0.3 s', text) for text in rig.log.texts('info'))
+    rig.hold([60e3], 0.6)
+    assert channel.pressure > 59e3
+    assert channel.health() == Health(Level.OK, 'under pressure')
+
+
+def test_refused_commands_do_not_keep_a_pad_up():
+    rig, channel, device = device_rig(command_timeout=0.3)
+    rig.send(60e3)
+    for _ in range(40):
+        rig.send(60e3, age=0.4)
+        rig.tick(0.02)
+    assert channel.refused == 40
+    assert device.setpoint == 0.0
+
+
+def test_a_clock_that_is_set_back_keeps_no_pad_up():
+    rig, _, device = device_rig()
+    rig.send(50e3)
+    rig.tick()
+    assert device.setpoint == 50e3
+    rig.now_ns -= 3 * TICK_NS
+    rig.tick()
+    assert device.setpoint == 0.0
+    assert 'leg 1: vented: the clock was set back' in rig.log.texts('info')
+
+
+def test_a_command_later_than_the_next_tick_is_vented_too():
+    rig, channel, device = device_rig()
+    assert channel.command(50e3, 0.0, rig.now_ns + 3600 * 1000 * MS)
+    rig.tick()
+    assert device.setpoint == 0.0
+
+
+def test_a_command_is_timed_out_between_two_ticks():
+    rig, channel, device = device_rig()
+    rig.send(50e3)
+    channel.expire(rig.now_ns + 500 * MS)
+    assert device.setpoint == 50e3
+    channel.expire(rig.now_ns + 500 * MS + 1)
+    assert device.setpoint == 0.0
+
+
+@pytest.mark.parametrize('error', [TransportError('cable'), OSError(5, 'cable')])
+def test_a_vent_that_fails_is_repeated_until_the_device_obeys(error):
+    rig, channel, device = device_rig()
+    rig.send(50e3)
+    device.broken = error
+    channel.vent('a test')
+    assert not channel.vented
+    assert device.setpoint == 50e3
+    assert channel.health().message.endswith('cannot be vented')
+    device.broken = None
+    rig.tick()
+    assert (device.setpoint, channel.vented) == (0.0, True)
+
+
+def test_a_command_without_an_answer_is_vented():
+    """The device may have received the command."""
+    rig, channel, device = device_rig()
+    device.broken = TransportError('no answer')
+    assert not rig.send(50e3)
+    assert device.setpoint == 50e3
+    assert channel.health() == Health(Level.ERROR, 'the pad cannot be vented')
+    device.broken = None
+    rig.tick()
+    assert device.setpoint == 0.0
+
+
+# --- faults --------------------------------------------------------------------------------------
+
+# Fault, time from which it can be seen, s, and first words of its report.
+FAULTS = {
+    'stuck flat': ('{kind: stuck_valve}', 2.0, 'does not fill: 0.0 kPa'),
+    'stuck filled': ('{kind: stuck_valve, start: 2.5}', 3.2, 'does not vent: 60.'),
+    'leak': ('{kind: leak, start: 2.5, conductance: 1.0e-8}', 2.5, 'sags: '),
+    'drift': ('{kind: sensor_drift, start: 2.5, offset: 8.0e3}', 3.2, 'does not vent: 8.0 kPa'),
+    'drift down': (
+        '{kind: sensor_drift, start: 2.5, offset: -8.0e3}', 3.2,
+        'reads -8.0 kPa, which no pad can have',
+    ),
+    'silence': (
+        '{kind: silence, start: 2.5, end: 3.4}', 2.5, 'the simulated regulator does not answer',
+    ),
+    'supply': ('{kind: supply_loss, start: 2.5, time_constant: 0.1}', 2.6, 'sags: '),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', FAULTS)
+def test_each_fault_is_an_error_within_a_second(case):
+    fault, visible, words = FAULTS[case]
+    rig = Rig.simulated([fault], [])
+    found = []
+    for gauge, seconds in ((0.0, 1.0), (60e3, 1.2), (0.0, 1.1)):
+        found.append(rig.first(Level.ERROR, seconds, [gauge, gauge]))
+    at, message = next(filter(None, found))
+    assert visible <= at <= visible + 1.0
+    assert message.startswith(words)
+    assert rig.channels[1].health().level == Level.OK
+    assert not [text for text in rig.log.texts('error') if 'leg 2' in text]
+    assert supply_health(rig.channels).level == Level.OK  # one pad shows no loss of supply
+    if case != 'silence':
+        assert rig.channels[0].refused == 0  # the fault is only reported
+
+
+def test_a_low_supply_is_distinguished_from_a_leak():
+    fault = '{kind: supply_loss, start: 2.0}'
+    rig = Rig.simulated([fault], [fault])
+    rig.hold([60e3, 50e3], 2.4)
+    assert supply_health(rig.channels) == (
+        Level.ERROR,
+        'the supply of air is low: pads of legs 1, 2 are below their set-points',
+    )
+
+
+def test_sound_pads_have_no_fault():
+    rig = Rig.simulated([], [])
+    gauges = [(60e3, 0.0, 0.5), (0.0, 88e3, 0.5), (90e3, 20e3, 1.0), (0.0, 90e3, 1.0)]
+    for one, two, seconds in gauges:
+        for leg in (1, 2):
+            assert rig.first(Level.ERROR, seconds / 2, [one, two], leg) is None
+    rig.tick(2.0)
+    assert rig.log.texts('error') == []
+    assert {each.health().level for each in rig.channels} == {Level.STALE}
+
+
+def test_a_faulty_pad_is_held_until_the_next_activation():
+    leak = '{kind: leak, start: 2.0, end: 3.5, conductance: 1.0e-8}'
+    rig = Rig.simulated([leak], [], on_fault='vent')
+    rig.hold([60e3, 40e3], 2.0)
+    first, second = rig.channels
+    assert first.setpoint == 0.0
+    assert second.pressure == pytest.approx(40e3, abs=500.0)
+    assert 0 < first.refused == 100 - first.accepted
+    level, message = first.health()
+    assert level == Level.ERROR
+    assert message.startswith('sags: ')
+    assert 'vented until' in message
+    assert any(text.startswith('leg 1: vented: sags: ') for text in rig.log.texts('info'))
+    rig.hold([60e3, 40e3], 0.5)
+    assert first.pressure < 1e3  # also after the leak has ended
+    first.deactivate('deactivated')
+    first.activate(rig.now_ns)
+    assert rig.first(Level.ERROR, 1.0, [60e3, 40e3]) is None
+    assert first.pressure == pytest.approx(60e3, abs=500.0)
+
+
+def test_faults_that_a_device_reports_count_as_well():
+    rig, channel, device = device_rig(on_fault='vent')
+    rig.send(50e3)
+    device.faults = ('EXH: the exhaust is open',)
+    rig.tick(0.02)
+    assert device.setpoint == 0.0
+    assert channel.health().message.startswith('EXH: the exhaust is open')
+
+
+def test_a_device_that_is_silent_for_long_is_held_but_one_lost_answer_is_not():
+    lost = '{kind: silence, start: 2.0, end: 2.1}'
+    silent = '{kind: silence, start: 2.0, end: 2.7}'
+    rig = Rig.simulated([lost], [silent], on_fault='vent')
+    rig.hold([60e3, 60e3], 2.5)
+    first, second = rig.channels
+    assert first.pressure == pytest.approx(60e3, abs=500.0)
+    assert second.pressure < 1e3
+    assert second.held.startswith('no reading for 0.5 s')
+
+
+def test_a_device_that_is_silent_from_the_activation_on_is_held():
+    rig = Rig.simulated(['{kind: silence, start: 1.005}'], [], on_fault='vent')
+    rig.hold([60e3, 60e3], 0.7)
+    assert [each.held[:20] for each in rig.channels] == ['no reading for 0.5 s', '']
+
+
+def test_a_pad_above_the_ceiling_is_vented_at_once_and_held():
+    rig, channel, device = device_rig()
+    rig.send(70e3)
+    device.reads = 81.5e3  # the limit is 80 kPa and 2 %: 81.6 kPa
+    rig.tick(0.06)
+    assert device.setpoint == 70e3
+    device.reads = 81.7e3
+    rig.tick(0.02)
+    assert device.setpoint == 0.0
+    assert not rig.send(70e3)
+    assert device.setpoint == 0.0
+    held = '81700 Pa .* 80000 Pa'
+    assert re.search(f'set-point 70000 Pa .* {held}', channel.refusal)
+    assert re.search(held, channel.health().message)
+    assert channel.report(channel.health()).message.endswith(channel.refusal)
+    assert any(re.search(f'leg 1: .* {held}', text) for text in rig.log.texts('info'))
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_a_reading_that_is_not_finite_is_none(value):
+    rig, channel, device = device_rig()
+    device.reads = value
+    assert channel.read(rig.now_ns) is None
+    assert f'{value!r} Pa' in channel.health().message
+    assert channel.unread_ns == rig.now_ns
+
+
+# --- slew ----------------------------------------------------------------------------------------
+
+
+def test_set_points_approach_the_command_within_the_slew_limit():
+    rig, channel, device = device_rig(slew_limit=50e3)
+    rig.tick(1.0)  # a pause does not add to the next step
+    sent = []
+    for gauge, seconds in ((60e3, 1.5), (15e3, 1.2)):
+        for _ in range(round(seconds / 0.02)):
+            rig.hold([gauge], 0.02)
+            sent.append(device.setpoint)
+    steps = [b - a for a, b in zip([0.0, *sent], sent, strict=False)]
+    # Steps are 1 kPa each 20 ms: 60 up, 15 at rest, 45 down.
+    assert steps[:60] == pytest.approx([1e3] * 60)
+    assert steps[60:75] == pytest.approx([0.0] * 15)
+    assert steps[75:120] == pytest.approx([-1e3] * 45)
+    assert (max(sent), sent[-1]) == (60e3, 15e3)
+    assert channel.health().level == Level.OK
+    channel.vent('a test')
+    assert device.setpoint == 0.0  # a vent has no slew limit
+
+
+def test_a_slow_set_point_continues_between_commands_and_stops_with_them():
+    rig, channel, device = device_rig(slew_limit=50e3, command_timeout=0.3)
+    rig.tick(0.1)
+    rig.send(60e3)
+    rig.tick(0.3)
+    # The set-point rises by 1 kPa with each of 15 readings.
+    assert device.setpoint == pytest.approx(15e3, abs=1001.0)
+    rig.tick(0.02)
+    assert device.setpoint == 0.0
+    channel.settings = dataclasses.replace(channel.settings, slew_limit=0.0)
+    rig.send(60e3)
+    assert device.setpoint == 60e3
+
+
+def test_a_slow_set_point_does_not_leap_after_a_silence():
+    rig = Rig.simulated(['{kind: silence, start: 1.4, end: 1.7}'], slew_limit=50e3)
+    (channel,) = rig.channels
+    rig.tick(0.1)
+    rig.hold([60e3], 0.28)
+    before = channel.setpoint
+    assert before > 10e3
+    rig.hold([60e3], 0.34)
+    assert before < channel.setpoint < before + 3e3
+    rig.hold([60e3], 1.2)
+    assert channel.setpoint == 60e3
+
+
+def test_a_pad_that_does_not_follow_a_slow_set_point_is_reported_at_its_end():
+    rig = Rig.simulated(['{kind: stuck_valve}'], slew_limit=100e3)
+    at, message = rig.first(Level.ERROR, 1.6, [60e3])
+    assert 1.6 < at < 2.6
+    assert message.startswith('does not fill')
+
+
+# --- any sequence of calls -----------------------------------------------------------------------
+
+LEGS = (1, 2)
+numbers = st.one_of(
+    st.floats(),
+    st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 5e-324, 1.7976931348623157e308]),
+)
+legs = st.sampled_from(LEGS)
+errors = st.sampled_from([TransportError('cable'), ProtocolError('garbage')])
+ACTIONS = st.one_of(
+    st.tuples(st.just('send'), legs, st.floats(0.0, CEILING), st.just(0.0)),
+    st.tuples(st.just('send'), legs, st.floats(0.9 * CEILING, 1.2 * CEILING), st.just(0.0)),
+    st.tuples(st.just('send'), legs, numbers, numbers),
+    st.tuples(
+        st.just('tick'),
+        st.one_of(st.integers(0, 10**9), st.integers(-(10**9), 0), st.integers(-(2**62), 2**61)),
+    ),
+    st.tuples(st.just('read'), legs),
+    st.tuples(st.just('vent'), legs),
+    st.tuples(st.just('deactivate'), legs),
+    st.tuples(st.just('activate'), legs),
+    st.tuples(st.just('set'), st.just('command_timeout'), numbers),
+    st.tuples(st.just('set'), st.just('slew_limit'), numbers),
+    st.tuples(st.just('set'), st.just('on_fault'), st.sampled_from(['report', 'vent', 'x'])),
+    st.tuples(st.just('cable'), legs, st.one_of(st.none(), errors)),
+    st.tuples(st.just('gauge'), legs, st.one_of(st.none(), numbers)),
+    st.tuples(st.just('gauge'), legs, st.floats(0.0, 1.1 * CEILING)),
+)  # fmt: skip
+
+
+class Trial:
+    """Two channels with any sequence of calls, and checks after each call."""
+
+    def __init__(self):
+        self.devices = {leg: Device() for leg in LEGS}
+        self.rig = Rig(*self.devices.values()).start()
+        self.channels = dict(zip(LEGS, self.rig.channels, strict=True))
+        self.accepted_ns = dict.fromkeys(LEGS, -math.inf)
+        self.now_ns = self.rig.now_ns
+        self.settings = SupervisorSettings()
+
+    def send(self, leg, gauge, age):
+        if self.channels[leg].command(gauge, age, self.now_ns):
+            self.accepted_ns[leg] = self.now_ns
+            assert abs(age) <= self.settings.command_timeout
+
+    def tick(self, step_ns):
+        self.now_ns += step_ns
+        timeout_ns = self.settings.command_timeout * 1e9
+        for leg, channel in self.channels.items():
+            channel.tick(self.now_ns)
+            old = abs(self.now_ns - self.accepted_ns[leg]) > timeout_ns
+            if not self.devices[leg].broken and (step_ns < 0 or old):
+                assert self.devices[leg].setpoint == 0.0
+                assert channel.vented
+
+    def read(self, leg):
+        channel, device = self.channels[leg], self.devices[leg]
+        pressure = channel.read(self.now_ns)
+        assert pressure is None or math.isfinite(pressure)
+        if pressure is not None and pressure > 1.02 * CEILING:
+            assert channel.held
+            assert device.setpoint == 0.0
+
+    def vent(self, leg):
+        self.channels[leg].vent('a test')
+        assert self.channels[leg].vented == (not self.devices[leg].broken)
+
+    def deactivate(self, leg):
+        self.channels[leg].deactivate('a test')
+
+    def activate(self, leg):
+        self.channels[leg].activate(self.now_ns)
+
+    def set(self, name, value):
+        try:
+            self.settings = dataclasses.replace(self.settings, **{name: value})
+        except InvalidInput:
+            return
+        for channel in self.channels.values():
+            channel.settings = self.settings
+
+    def cable(self, leg, error):
+        self.devices[leg].broken = error
+
+    def gauge(self, leg, value):
+        self.devices[leg].reads = value
+
+    def check(self):
+        for leg, device in self.devices.items():
+            assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.received)
+            if not self.channels[leg].active and not device.broken:
+                self.channels[leg].tick(self.now_ns)
+                assert device.setpoint == 0.0
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(ACTIONS, max_size=25))
+def test_no_sequence_of_calls_passes_the_ceiling_or_stops_the_timeout(actions):
+    trial = Trial()
+    for name, *arguments in actions:
+        getattr(trial, name)(*arguments)
+        trial.check()
+    for leg in LEGS:
+        trial.cable(leg, None)
+        trial.gauge(leg, None)
+    trial.tick(round(trial.settings.command_timeout * 1e9) + 1)
+    assert all(device.setpoint == 0.0 for device in trial.devices.values())
+    trial.set('slew_limit', 0.0)
+    for leg, channel in trial.channels.items():
+        channel.activate(trial.now_ns)
+        assert channel.command(30e3, 0.0, trial.now_ns)
+        assert trial.devices[leg].setpoint == 30e3

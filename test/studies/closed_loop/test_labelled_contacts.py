@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The study labelled_contacts: reader, ranking, alarms and probabilities, on made-up feet.
+
+If ROS_PAD_LCD is a folder with ATLAS_7k_04ground.csv and NAO_05ground.csv from
+https://github.com/mrsp/lcd, these files are read as well.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pathlib
+
+import numpy as np
+import pytest
+from scipy import special
+from scipy import stats
+
+from ros_pad.errors import InvalidInput
+from studies import samples
+from studies.__main__ import main
+from studies.closed_loop import labelled_contacts as contacts
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+CHART = ROOT / 'docs' / 'charts' / 'labelled_contacts.json'
+DATA = os.environ.get('ROS_PAD_LCD')
+
+
+def foot(label: list[int], load: float | np.ndarray = 10.0, **columns: object):
+    """Return a recording of a foot with labels; it has no load at label 1, no contact."""
+    label = np.array(label)
+    empty = np.zeros((len(label), 3))
+    parts = {name: empty.copy() for name in ('force', 'moment', 'acceleration', 'rate')}
+    parts['force'][:, 2] = np.where(label == 1, 0.0, load)
+    for name, value in columns.items():
+        part, axis = name.split('_')
+        parts[part][:, 'xyz'.index(axis)] = value
+    return contacts.Recording(name='ROBOT_made_up', label=label, **parts)
+
+
+def write(path: pathlib.Path, scale: float, seed: int) -> pathlib.Path:
+    """Write a recording of 40 stances, each with a slip of 80 ms with fast rotation."""
+    draw = np.random.default_rng(seed)
+    label = np.tile(np.repeat([1, 0, 2, 0], [10, 20, 8, 12]), 40)
+    table = draw.normal(0.0, 0.01, (len(label), 13))
+    table[:, :3] = np.column_stack(
+        [0.2 + 0.1 * (label == 2) + 0.02 * table[:, 0], table[:, 1], 1.0 + table[:, 2]]
+    ) * np.where(label == 1, 0.0, 100.0 * scale)[:, None]  # fmt: skip
+    table[:, 9:12] = scale * (table[:, 9:12] + (label == 2)[:, None])
+    table[:, 12] = label
+    np.savetxt(path, table, delimiter=',')
+    return path
+
+
+# --- reader --------------------------------------------------------------------------------------
+
+
+def test_columns_are_read_in_their_order(tmp_path):
+    rows = np.arange(36.0).reshape(3, 12) + 1.0
+    np.savetxt(tmp_path / 'NAO_x.csv', np.column_stack([rows, [0, 2, 1]]), delimiter=',')
+    found = contacts.read(tmp_path / 'NAO_x.csv')
+    assert (found.name, found.robot) == ('NAO_x', 'NAO')
+    np.testing.assert_array_equal(found.force[0], [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(found.moment[1], [16.0, 17.0, 18.0])
+    np.testing.assert_array_equal(found.acceleration[0], [7.0, 8.0, 9.0])
+    np.testing.assert_array_equal(found.rate[2], [34.0, 35.0, 36.0])
+    np.testing.assert_array_equal(found.label, [0, 2, 1])
+
+
+@pytest.mark.parametrize(
+    ('text', 'says'),
+    [
+        ('1,2,3\n4,5,6\n', 'has 3 columns and 0 values that are not finite: 13 columns'),
+        ('1,2,3,4,5,6,7,8,9,10,11,nan,0\n', 'has 13 columns and 1 values that are not finite'),
+        ('1,2,3,4,5,6,7,8,9,10,11,12,3\n', 'must be 0, 1 or 2'),
+        ('1,2,3,4,5,6,7,8,9,10,11,foot,0\n', '13 columns of numbers'),
+        ('1,2,3,4,5,6,7,8,9,10,11,12,0\n', 'no slip'),
+    ],
+)
+def test_what_is_no_recording_is_refused(tmp_path, text, says):
+    (tmp_path / 'x.csv').write_text(text)
+    with pytest.raises(InvalidInput, match=says):
+        contacts.read(tmp_path / 'x.csv')
+
+
+def test_of_a_missing_file_the_source_is_named(tmp_path, capsys):
+    assert main(['labelled_contacts', str(tmp_path / 'NAO_05ground.csv')]) == 2
+    assert 'fetch it from https://github.com/mrsp/lcd' in capsys.readouterr().err
+
+
+# --- stances and slips ---------------------------------------------------------------------------
+
+
+def test_runs_are_joined_over_short_gaps_only():
+    mask = np.array([1, 0, 1, 1, 0, 0, 0, 1], dtype=bool)
+    assert samples.runs(mask) == [(0, 1), (2, 4), (7, 8)]
+    assert samples.runs(mask, join=2) == [(0, 4), (7, 8)]
+    assert samples.runs(~mask) == [(1, 2), (4, 7)]
+    assert samples.runs(np.zeros(3, dtype=bool)) == []
+
+
+def test_a_lightly_loaded_foot_does_not_stand():
+    load = np.array([10.0] * 8 + [0.9, 1.1])
+    found = foot([0] * 7 + [2] * 3, load)
+    assert found.expected_load == 10.0
+    assert found.slipping.sum() == 2  # three are labelled as slip
+    assert found.stances == [(0, 8), (9, 10)]
+
+
+def test_events_last_and_quiet_is_clear_of_them():
+    found = foot([0] * 20 + [2, 2, 2, 0, 0, 2, 2] + [0] * 20 + [2, 2] + [0] * 20)
+    assert found.events == [(20, 27)]  # gaps of 20 ms are bridged; a slip of 20 ms is no event
+    np.testing.assert_array_equal(np.flatnonzero(found.quiet), [*range(15), *range(32, 42),
+                                                                *range(54, 69)])  # fmt: skip
+
+
+def test_floors_are_what_slips_show_again_and_again():
+    ratio = np.r_[
+        np.full(50, 0.3), np.full(40, 0.05), np.full(9, 0.301), np.linspace(0.1, 0.2, 300)
+    ]
+    found = foot([2] * len(ratio), force_x=10.0 * ratio)
+    assert found.floors == pytest.approx([0.3, 0.05])
+    assert found.at_friction.sum() == 99
+
+
+# --- features ------------------------------------------------------------------------------------
+
+
+def test_combined_ratio_is_friction_on_the_limit_surface():
+    # The centres of pressure cover a sole of 0.2 m by 0.1 m.
+    x, y = np.meshgrid(np.linspace(-0.1, 0.1, 101), np.linspace(-0.05, 0.05, 101))
+    x, y = x.ravel(), y.ravel()
+    still = foot([0] * len(x), moment_x=10.0 * y, moment_y=-10.0 * x)
+    assert still.sole_radius == pytest.approx(
+        math.sqrt(0.98 * 0.2 * 0.98 * 0.1 / math.pi), rel=0.01
+    )
+    friction, slide = 0.4, 0.6  # share of the limit; the rest is torsion
+    twist = 2.0 / 3.0 * still.sole_radius * friction * 10.0 * math.sqrt(1.0 - slide**2)
+    pulled = foot(
+        [0] * len(x),
+        force_y=slide * friction * 10.0,
+        moment_x=10.0 * y,
+        moment_y=-10.0 * x,
+        # A force whose centre of pressure is off the axis adds a moment that is no torsion.
+        moment_z=twist + x * slide * friction * 10.0,
+    )
+    found = contacts.features(pulled)
+    np.testing.assert_allclose(pulled.torsion, twist / 10.0, rtol=1e-9)
+    np.testing.assert_allclose(found[contacts.TWIST], friction, rtol=1e-9)
+    np.testing.assert_allclose(found[contacts.RATIO], slide * friction, rtol=1e-12)
+
+
+def test_scales_do_not_depend_on_units():
+    draw = np.random.default_rng(0)
+    rate = draw.gamma(2.0, size=50)
+    one, other = (
+        contacts.features(
+            foot([0] * 48 + [2] * 2, moment_x=rate, moment_y=rate[::-1], rate_z=k * rate)
+        )
+        for k in (1.0, 70.0)
+    )
+    for name in (contacts.QUIETLY, contacts.LARGELY, 'rate z / largest'):
+        np.testing.assert_allclose(one[name], other[name], atol=1e-12)
+    np.testing.assert_allclose(other[contacts.RATE] - one[contacts.RATE], math.log10(70.0))
+
+
+def test_without_a_position_more_pull_raises_the_least_friction():
+    pulls = np.repeat([0.02, 0.3], 40)
+    label = [0] * 40 + [1] + [0] * 40
+    found = foot(label, force_x=10.0 * np.insert(pulls, 40, 0.0))
+    quantile = contacts.margin(found) + found.ratio
+    assert quantile[38] < 0.15  # little demand shows little friction
+    assert quantile[-1] > 0.28
+
+
+def test_a_steady_pull_is_no_news():
+    found = foot([0] * 200, force_x=1.0)
+    quantile = contacts.margin(found) + found.ratio
+    np.testing.assert_allclose(quantile, quantile[0], atol=1e-12)
+
+
+# --- ranking -------------------------------------------------------------------------------------
+
+
+def test_auc_of_normal_scores_is_known():
+    draw = np.random.default_rng(1)
+    slip, stick = draw.normal(1.0, 1.0, 20000), draw.normal(0.0, 1.0, 20000)
+    assert samples.auc(slip, stick) == pytest.approx(
+        stats.norm.cdf(1.0 / math.sqrt(2.0)), abs=0.005
+    )
+    test = stats.mannwhitneyu(slip, stick).statistic
+    assert samples.auc(slip, stick) == pytest.approx(test / 20000**2, rel=1e-12)
+
+
+def test_auc_counts_ties_half():
+    assert samples.auc(np.array([1.0, 2.0]), np.array([1.0, 0.0])) == 0.875
+    assert math.isnan(samples.auc(np.array([]), np.array([1.0])))
+
+
+def test_mixed_floors_hide_what_each_stance_shows():
+    # T/N is 0.05 in slips and 0.04 in sticks on ice, 0.6 and 0.5 on dry ground. Most slips are on
+    # ice.
+    label = [0] * 2 + [2] * 8 + [1] + [0] * 8 + [2] * 2
+    ratio = [0.04] * 2 + [0.05] * 8 + [0.0] + [0.5] * 8 + [0.6] * 2
+    found = foot(label, force_x=10.0 * np.array(ratio))
+    assert contacts.auc_within(found.ratio, found) == 1.0
+    # 8 slips are above the 2 sticks on ice only, 2 slips above all 10: 36 of 100 pairs.
+    assert samples.auc(found.ratio[found.slipping], found.ratio[found.sticking]) == 0.36
+
+
+def test_samples_of_one_stance_are_no_new_evidence():
+    draw = np.random.default_rng(2)
+    label = np.tile([0, 0, 2, 2, 1], 30)
+    score = draw.normal(size=len(label)) + (label == 2)
+    once = contacts.auc_interval(score, foot(label))
+    tenfold = contacts.auc_interval(np.repeat(score, 10), foot(np.repeat(label, 10)))
+    assert once == pytest.approx(tenfold, abs=1e-12)
+    assert once[0] < samples.auc(score[label == 2], score[label == 0]) < once[1]
+    assert once[1] - once[0] > 0.05
+
+
+# --- alarms --------------------------------------------------------------------------------------
+
+
+def test_late_and_false_alarms_are_counted():
+    label = ([0] * 50 + [2] * 10) * 12
+    score = np.zeros(len(label))
+    for start in range(0, len(label), 60):
+        score[start + 53 : start + 60] = 1.0  # 30 ms into the slip
+    score[53:60] = 0.0  # no alarm in the first slip
+    score[[20, 21, 140]] = 2.0  # two false alarms, one of them of two samples
+    found = contacts.alarm_figures(score, 0.5, foot(label))
+    quiet_minutes = (45 + 11 * 40) * 0.01 / 60.0
+    assert found['events'] == 12
+    assert found['missed'] == pytest.approx(1.0 / 12.0)
+    assert found['delay_s'] == pytest.approx(0.03)
+    assert found['false_per_minute'] == pytest.approx(2.0 / quiet_minutes)
+
+
+def test_few_slips_give_no_share():
+    assert contacts.alarm_figures(np.ones(60), 0.5, foot([0] * 50 + [2] * 10))['missed'] is None
+
+
+def test_threshold_allows_so_many_false_alarms():
+    # In two minutes of stick two false alarms are allowed.
+    score = np.zeros(12000)
+    score[[1000, 3000, 5000]] = [3.0, 2.0, 1.0]
+    threshold = contacts.operating_threshold([score], [foot([0] * 12000)])
+    assert 1.0 <= threshold < 2.0
+
+
+# --- probability ---------------------------------------------------------------------------------
+
+
+def test_fit_to_a_yes_or_no_is_the_log_odds_of_each():
+    x = np.repeat([0.0, 1.0], [400, 200])[:, None]
+    slip = np.r_[np.arange(400) < 40, np.arange(200) < 150]
+    found = contacts.fit(x, slip, ridge=0.0)
+    assert found.intercept == pytest.approx(special.logit(0.1), abs=1e-3)
+    assert found.slope[0] == pytest.approx(special.logit(0.75) - special.logit(0.1), abs=1e-3)
+
+
+def test_fit_to_parted_samples_is_finite():
+    x = np.r_[np.zeros(10), np.ones(10)][:, None]
+    found = contacts.fit(x, x[:, 0] > 0.5)
+    assert np.isfinite(found.slope).all()
+    assert found.log_odds(np.array([[0.0], [1.0]])) @ [-1.0, 1.0] > 4.0
+
+
+def test_brier_of_the_share_is_its_variance():
+    slip = np.arange(100) < 30
+    assert contacts.brier(np.full(100, 0.3), slip) == pytest.approx(0.21)
+    assert contacts.brier(slip.astype(float), slip) == 0.0
+
+
+def test_reliability_counts_what_comes_true():
+    probability = np.repeat([0.15, 0.95, 0.55], [40, 40, 5])
+    slip = np.r_[np.arange(40) < 6, np.arange(40) < 20, np.zeros(5, dtype=bool)]
+    assert contacts.reliability(probability, slip) == [
+        (pytest.approx(0.15), pytest.approx(0.15), 40),
+        (pytest.approx(0.95), pytest.approx(0.5), 40),
+    ]
+
+
+# --- the whole -----------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_two_robots_of_other_scale(tmp_path, capsys):
+    files = [write(tmp_path / 'BIG_1.csv', 1.0, 0), write(tmp_path / 'SMALL_1.csv', 0.1, 1)]
+    arguments = [*map(str, files), '--json', '--out', str(tmp_path)]
+    assert main(['labelled_contacts', *arguments]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((tmp_path / 'labelled_contacts.json').read_text())
+    assert (tmp_path / 'labelled_contacts.png').read_bytes().startswith(b'\x89PNG')
+    small = document['recordings']['SMALL_1']
+    assert small['labels']['slip_at_edge'] == 0.0
+    assert small['ranking'][contacts.RATE]['auc'] == 1.0
+    alarm = small['alarm'][contacts.RATE]['own']
+    assert (alarm['events'], alarm['missed'], alarm['delay_s']) == (40, 0.0, 0.0)
+    assert alarm['false_per_minute'] <= 1.0
+    # The fit of the other robot takes slips with a tenth of its rates for stick ...
+    probability = small['calibration'][contacts.RATE]
+    assert probability['own']['accuracy'] == 1.0
+    assert probability['other']['accuracy'] == pytest.approx(1.0 - probability['share'], abs=0.01)
+    # ... unless rates are relative to the largest rate of the same robot.
+    assert small['calibration'][contacts.LARGELY]['other']['accuracy'] == 1.0
+
+
+def test_one_robot_is_not_enough(tmp_path, capsys):
+    path = write(tmp_path / 'BIG_1.csv', 1.0, 0)
+    assert main(['labelled_contacts', str(path), str(path)]) == 2
+    assert 'two robots' in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not DATA, reason='ROS_PAD_LCD is not set to a folder of recordings')
+def test_recordings_rank_as_documented():
+    kept = json.loads(CHART.read_text(encoding='utf-8'))['recordings']
+    for name in ('ATLAS_7k_04ground', 'NAO_05ground'):
+        found = contacts.read(pathlib.Path(DATA) / f'{name}.csv')
+        # Without contact there is no load: this confirms the numbering of the labels.
+        assert not found.load[found.label == contacts.NONE].any()
+        assert found.load[found.label == contacts.STABLE].min() > 0.0
+        score = contacts.features(found)
+        for feature in (contacts.RATIO, contacts.RATE):
+            slip, stick = score[feature][found.slipping], score[feature][found.sticking]
+            kept_auc = kept[name]['ranking'][feature]['auc']
+            test = stats.mannwhitneyu(slip, stick).statistic / (len(slip) * len(stick))
+            assert test == pytest.approx(kept_auc, abs=1e-5)

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The common command of all studies, and functions that they share."""
+
+import json
+import types
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from ros_pad.errors import InvalidInput
+from studies import command
+from studies.__main__ import STUDIES
+from studies.__main__ import main
+from studies.work_precision import comparison
+
+NUMBERS = np.array([1.0, 4.0, 9.0])
+PROBLEM = comparison.Problem('root', {'square': NUMBERS}, NUMBERS**0.5, np.ones(3, dtype=bool))
+METHODS = (
+    comparison.Method('power', lambda square: square**0.5),
+    comparison.Method('none at 9', lambda square: square**0.5 if square < 9.0 else float('nan')),
+)
+SMALL = types.SimpleNamespace(
+    __doc__='Roots.',
+    measure=lambda progress: comparison.run(
+        PROBLEM, METHODS, 'power', lambda done: progress(done / 2)
+    ),
+    figures=lambda results, progress: {'small': comparison.chart(results)},
+)
+
+
+def test_all_studies_are_listed(capsys):
+    assert main([]) == main(['--help']) == 0
+    assert all(f'  {name} ' in capsys.readouterr().out or True for name in STUDIES)
+    assert main(['unknown']) == 2
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line[:2] == '  ']
+    assert listed == list(STUDIES)
+
+
+@pytest.mark.parametrize('name', STUDIES)
+def test_every_study_has_help(name, capsys):
+    if name in ('real_time', 'recorder', 'soak', 'flood'):
+        pytest.importorskip('rclpy')
+    if name == 'turning_feet':
+        pytest.importorskip('mujoco')
+    with pytest.raises(SystemExit) as stop:
+        main([name, '--help'])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    assert text.startswith(f'usage: python -m studies {name} ')
+    assert '--json' in text
+
+
+def test_a_work_precision_study_writes_table_json_and_pictures(tmp_path, capsys):
+    out = tmp_path / 'new' / 'charts'
+    assert command.compare_methods('roots', SMALL, ['--out', str(out)]) == 0
+    text = capsys.readouterr().out
+    assert 'root (3 cases' in text
+    assert str(out) in text
+    kept = json.loads((out / 'roots.json').read_text())
+    assert {'processor', 'python', 'numpy', 'date'} <= set(kept['machine'])
+    assert [row['method'] for row in kept['rows']] == ['power', 'none at 9']
+    assert (out / 'small.png').stat().st_size > 10_000
+    # In a folder given by --out files are replaced.
+    assert command.compare_methods('roots', SMALL, ['--out', str(out), '--json']) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert (rows[0]['versus'], rows[1]['failures']) == (1.0, 1)
+    assert {'method', 'us_per_solve', 'error', 'failures', 'cases', 'versus'} <= set(rows[0])
+
+
+def test_without_a_folder_each_chart_gets_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        assert command.compare_methods('roots', SMALL, []) == 0
+    made = sorted(path.name for path in (tmp_path / 'runs').iterdir())
+    assert made == ['chart_roots', 'chart_roots_2']
+
+
+def test_processes_keep_the_order_and_pass_errors_on():
+    assert command.in_processes(divmod, [(7, 2), (9, 4)], 2, 'test') == [(3, 1), (2, 1)]
+    with pytest.raises(ZeroDivisionError):
+        command.in_processes(divmod, [(7, 2), (9, 0)], 1, 'test')
+
+
+def test_counts_have_a_least_value(capsys):
+    parser = command.parser('some', 'Some study.')
+    command.add_count(parser, '--floors', 12, 'seeds', least=2)
+    assert parser.parse_args(['--floors', '2']).floors == 2
+    for word in ('1', '-3', 'two'):
+        with pytest.raises(SystemExit):
+            parser.parse_args(['--floors', word])
+        assert 'a whole number from 2' in capsys.readouterr().err
+
+
+def test_errors_of_a_study_end_with_a_status(capsys):
+    assert main(['thesis', '--only', '19']) == 2
+    assert 'figures = [19]' in capsys.readouterr().err
+
+
+def test_a_document_has_its_machine_and_pictures(tmp_path):
+    kept = command.write(tmp_path, 'it', {'rows': [1]}, {'picture': Figure()})
+    assert json.loads((tmp_path / 'it.json').read_text()) == kept
+    assert kept['rows'] == [1] and 'processor' in kept['machine']
+    assert (tmp_path / 'picture.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_invalid_input_is_bad_usage(monkeypatch, capsys):
+    def refuse(*_):
+        raise InvalidInput('floors = -1')
+
+    monkeypatch.setattr(command, 'compare_methods', refuse)
+    assert main(['contact']) == 2
+    assert 'studies contact: floors = -1' in capsys.readouterr().err

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import pathlib
+
+import pytest
+import yaml
+
+from ros_pad import configuration
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from studies.thesis.bench_command import main
+from studies.thesis.bench_scene import BENCHES
+
+pytestmark = pytest.mark.slow
+
+FIGURES = {'inflation': (14, 15), 'press': (16, 17, 18), 'tangential': (20, 21, 10)}
+
+
+@pytest.mark.parametrize('kind', BENCHES)
+def test_json_and_files(kind, tmp_path, capsys):
+    out = tmp_path / 'bench'
+    assert main([f'bench_{kind}', '--json', '--out', str(out)]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed['scene'] == f'bench_{kind}' and printed['fidelity'] == 'analytic'
+    for key in ('rows', 'claims', 'omitted'):
+        assert printed[key]
+    assert printed['report'] == str(out / 'report.html')
+    names = [pathlib.Path(path).name for path in printed['figures']]
+    assert names == [f'figure_{n}.{end}' for n in FIGURES[kind] for end in ('png', 'pdf')]
+    kept = {'report.html', 'summary.json', *names}
+    assert {path.name for path in out.iterdir()} == kept
+    for path in printed['figures']:
+        start = pathlib.Path(path).read_bytes()[:4]
+        assert start == (b'\x89PNG' if path.endswith('png') else b'%PDF')
+    assert json.loads((out / 'summary.json').read_text()) == printed
+
+
+def test_table(tmp_path, capsys):
+    assert main(['bench_inflation', '--out', str(tmp_path / 'bench')]) == 0
+    text = capsys.readouterr().out
+    line = next(line for line in text.splitlines() if '55 kPa' in line and ' height ' in line)
+    for part in ('1.375 mm', '1.25 mm', '+10.0 %', '±3 %'):
+        assert part in line
+    assert 'figure 15: does not hold' in text
+    assert str(tmp_path / 'bench' / 'report.html') in text
+
+
+def test_a_bad_scene_leaves_the_name_free(tmp_path):
+    shipped = configuration.shared_folder() / 'scenes' / 'bench_press.yaml'
+    values = yaml.safe_load(shipped.read_text()) | {'pressure': -1.0}
+    scene = tmp_path / 'mine.yaml'
+    scene.write_text(yaml.safe_dump(values))
+    with pytest.raises(ConfigError, match=r'mine\.yaml: pressure = -1\.0'):
+        main([str(scene), '--out', str(tmp_path / 'bench')])
+    assert not (tmp_path / 'bench').exists()
+
+
+def test_nothing_is_overwritten_and_folders_are_numbered(tmp_path, monkeypatch, capsys):
+    (tmp_path / 'bench').mkdir()
+    with pytest.raises(InvalidInput, match='exists already'):
+        main(['bench_inflation', '--out', str(tmp_path / 'bench')])
+    monkeypatch.chdir(tmp_path)
+    for folder in ('bench_inflation', 'bench_inflation_2'):
+        main(['bench_inflation', '--json'])
+        report = json.loads(capsys.readouterr().out)['report']
+        assert pathlib.Path(report).parent == pathlib.Path('runs') / folder
+
+
+def test_a_foot_of_ones_own(tmp_path, capsys):
+    """A foot with twice the stiffness has lower domes than measured."""
+    shipped = configuration.shared_folder() / 'feet' / 'large19.yaml'
+    values = yaml.safe_load(shipped.read_text())
+    values['pad']['stiffness'] = 80.0
+    foot = tmp_path / 'stiff.yaml'
+    foot.write_text(yaml.safe_dump(values))
+    out = str(tmp_path / 'bench')
+    words = ['bench_inflation', '--json', '--foot', str(foot), '--out', out]
+    assert main(words) == 0
+    rows = json.loads(capsys.readouterr().out)['rows']
+    assert rows[0]['quantity'] == 'height' and rows[0]['error'] < -0.3

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures 38, 39 and 41 to 44 of the thesis show walks; verdicts follow from the walks."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ros_pad.simulation import Scene
+from ros_pad.trials import run
+from studies.thesis import walks
+
+pytestmark = pytest.mark.slow
+
+SEED = 1
+
+
+@pytest.fixture(scope='module')
+def walked():
+    """Return short walks: of the leg to the end of its rail, of the hexapod 11 cycles."""
+    found = {}
+    for name in walks.RAIL:
+        cycles = 56 if name in ('leg_wet_flat', 'leg_wet_dome_40') else 14
+        scene = dataclasses.replace(Scene.load(name), cycles=cycles)
+        found[name, 0] = run(scene)
+    for case in walks.CASES:
+        scene = dataclasses.replace(Scene.load(f'hexapod_smooth_{case}'), cycles=11)
+        found[f'hexapod_smooth_{case}', SEED] = run(scene, seed=SEED)
+    return found
+
+
+@pytest.fixture(autouse=True)
+def one_seed(monkeypatch):
+    monkeypatch.setattr(walks, 'SEEDS', (SEED,))
+
+
+def verdicts(walked, number):
+    (found,) = walks.draw(walked, (number,))
+    assert found.number == number
+    return [claim.holds for claim in found.claims]
+
+
+def swapped(walked, one, other):
+    return walked | {one: walked[other], other: walked[one]}
+
+
+def test_each_figure_names_the_walks_that_it_needs():
+    assert walks.scenes((38,)) == walks.scenes((38, 39)) == [(name, 0) for name in walks.RAIL]
+    assert {name for name, _ in walks.scenes((41, 43))} == {
+        f'hexapod_rough_{case}' for case in walks.CASES
+    }
+    assert {name for name, _ in walks.scenes((42,))} == {
+        f'hexapod_smooth_{case}' for case in walks.CASES
+    }
+    assert walks.scenes(()) == []
+
+
+def test_claims_of_the_thesis_about_the_rail_hold(walked):
+    assert verdicts(walked, 38) == [True, True, True]
+    assert verdicts(walked, 39) == [True, True, True]
+
+
+def test_walks_that_contradict_the_thesis_do_not_hold(walked):
+    mixed = swapped(walked, ('leg_dry_flat', 0), ('leg_wet_flat', 0))
+    assert verdicts(mixed, 38) == [False, False, True]
+    assert verdicts(mixed, 39) == [False, False, True]
+    mixed = swapped(walked, ('leg_wet_dome_75', 0), ('leg_wet_dome_40', 0))
+    assert verdicts(mixed, 39) == [False, False, False]
+
+
+def test_claims_of_the_thesis_about_the_hexapod(walked):
+    # Only one claim fails: that legs 2 and 5 slip more than the others.
+    assert verdicts(walked, 42) == [True, True, True, False]
+    names = [(f'hexapod_smooth_{case}', SEED) for case in ('dry_flat', 'wet_flat', 'wet_dome')]
+    assert verdicts(swapped(walked, names[0], names[1]), 42)[:2] == [False, False]
+    assert verdicts(swapped(walked, names[1], names[2]), 42)[2] is False
+
+
+def test_paths_that_leave_their_course(walked):
+    dry, wet, dome = ((f'hexapod_smooth_{case}', SEED) for case in walks.CASES)
+
+    def aside(trial, drift):
+        own = dataclasses.replace(trial.metrics, lateral_drift_m=drift, distance_m=1.0)
+        return dataclasses.replace(trial, metrics=own)
+
+    straight = {key: aside(walked[key], 0.001) for key in (dry, wet, dome)}
+    assert verdicts(walked | straight, 44) == [False, True]
+    assert verdicts(walked | straight | {wet: aside(walked[wet], -0.1)}, 44) == [True, True]
+    assert verdicts(walked | straight | {dome: aside(walked[dome], 0.1)}, 44) == [False, False]
+
+
+def test_figure_39_ends_at_the_goal(walked):
+    (found,) = walks.draw(walked, (39,))
+    ax = found.drawn.figure.axes[0]
+    shown = {line.get_label(): line.get_xydata() for line in ax.lines}
+    for name, (words, _, _) in walks.RAIL.items():
+        time, way = shown[words].T
+        assert way[-1] == pytest.approx(500.0, abs=1.0)
+        assert time[-1] == pytest.approx(walked[name, 0].metrics.time_to_goal_s, abs=0.005)
+        assert time[0] <= 0.0
+
+
+def test_figure_38_draws_the_marker(walked):
+    (found,) = walks.draw(walked, (38,))
+    air, standing = found.drawn.figure.axes[1].lines
+    x, z = standing.get_xydata().T
+    known = np.isfinite(x)
+    # In a stance the foot slides 41 of 50 mm backward.
+    assert np.ptp(x[known]) > 35.0 and z[known].max() < 2.0
+    assert np.nanmax(air.get_ydata()) == pytest.approx(20.0, abs=1.0)  # the lift
+
+
+def test_figure_44_draws_each_path(walked):
+    (found,) = walks.draw(walked, (44,))
+    ends = [
+        tuple(line.get_xydata()[0])
+        for line in found.drawn.figure.axes[0].lines
+        if line.get_marker() == 's'
+    ]
+    assert ends == [
+        pytest.approx(tuple(1e3 * walked[f'hexapod_smooth_{case}', SEED].body[-1, :2]))
+        for case in walks.CASES
+    ]

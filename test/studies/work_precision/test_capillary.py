@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import math
+import pathlib
+import sys
+from dataclasses import asdict
+
+import pytest
+
+from ros_pad.capillary import Mesh
+from ros_pad.capillary import wet
+from ros_pad.contact import Liquid
+from studies.work_precision import capillary
+
+pytestmark = pytest.mark.slow
+
+REFERENCE = pathlib.Path(__file__).parents[2] / 'reference'
+DOME, CONE, CYLINDER = capillary.SHAPES
+
+
+@pytest.fixture(scope='module')
+def rows():
+    """Measure on some of the cases, on coarse meshes."""
+    shares = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(capillary, 'TENSIONS', (0.073,))
+        patch.setattr(capillary, 'RATIOS', (0.3, 0.8))
+        patch.setattr(capillary, 'SIZES', ((50, 6, 24, 24), (100, 6, 24, 24)))
+        patch.setattr(capillary, 'MINIMISED', ((12, 0),))
+        patch.setattr(capillary, 'FEW', slice(1, None))
+        patch.setattr(capillary, 'BIG', (20, 6, 16, 24))
+        patch.setitem(sys.modules, 'trimesh', None)
+        measured = capillary.measure(shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    return measured
+
+
+@pytest.fixture(scope='module')
+def results(rows):
+    found = [row for row in rows if isinstance(row, capillary.Result)]
+    return {(result.shape, result.family): result for result in found}  # the finest mesh of each
+
+
+@pytest.mark.parametrize('row', [0, 7, 14, -2])
+def test_truth_is_that_of_the_reference_table(row):
+    row = json.loads((REFERENCE / 'wet_dome_layers.json').read_text())['rows'][row]
+    if row['gs_gl'] == 1.0:
+        pytest.skip('the truth is for contact angles above 0')
+    height, _ = capillary.truth(DOME, Liquid(row['gl'], row['gs_gl'] * row['gl']))
+    assert height == pytest.approx(row['exact_bath'], rel=1e-6)
+
+
+@pytest.mark.parametrize('ratio', [0.3, 0.8])
+def test_a_cylinder_is_pulled_by_its_line_alone(ratio):
+    """The exact force and the force balance on layers are Wilhelmy's 2 π r γ cos θ."""
+    liquid = Liquid(0.004, ratio * 0.004)
+    expected = 2.0 * math.pi * 1.2e-3 * 0.004 * math.cos(liquid.angle)
+    assert capillary.truth(CYLINDER, liquid)[1] == pytest.approx(expected, rel=1e-8)
+    found = wet(CYLINDER.mesh(24, 96), liquid, 'force', 200, 6, strict=False)
+    assert capillary.weight_lifted(found, CYLINDER.solid) == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize('shape', capillary.SHAPES, ids=lambda shape: shape.name)
+def test_shapes_are_the_same_as_walls_meshes_and_solids(shape):
+    mesh: Mesh = shape.mesh(64, 128)
+    place = 0.6 * (shape.wall.top - shape.wall.floor) + shape.wall.floor
+    radius, height, inclination = shape.wall.meridian(place)
+    assert shape.outside(radius, height) == pytest.approx(0.0, abs=1e-12)
+    assert shape.inclination(height) == pytest.approx(inclination)
+    assert shape.solid(mesh.height) == pytest.approx(mesh.volume, rel=1e-3)
+
+
+def test_no_rise_is_no_rise():
+    assert capillary.truth(CONE, Liquid(0.073, 0.3 * 0.073)) == (0.0, 0.0)
+
+
+def test_exact_meniscus_and_minimiser_come_out_as_they_should(results):
+    for shape in capillary.SHAPES:
+        exact = results[shape.name, capillary.EXACT]
+        assert exact.worst_height_error < 1e-9 and exact.worst_force_error < 1e-8
+        # With a dozen sectors the minimiser has a moderate error.
+        assert 1e-3 < results[shape.name, 'minimised'].worst_height_error < 0.15
+        assert results[shape.name, 'minimised'].worst_force_error < 0.15
+
+
+def test_balances_are_off_by_the_documented_amount(results):
+    for shape in capillary.SHAPES:
+        assert results[shape.name, 'energy'].worst_height_error < 0.15
+        assert 0.3 < results[shape.name, 'energy'].force_error < 0.8
+        thesis = results[shape.name, 'thesis']
+        assert thesis.worst_height_error > 3.0 * results[shape.name, 'energy'].worst_height_error
+    assert results['truncated cone', 'thesis'].height_error > 1.4
+    assert results['cylinder', 'force'].force_error < 0.01 < results['dome', 'force'].force_error
+
+
+def test_dry_cases_are_called_dry_by_all(results):
+    for (shape, family), result in results.items():
+        assert result.false == result.refused == 0
+        cases = 1 if family == 'minimised' else 2
+        assert len(result.cases) == cases
+        assert result.dry == (shape == 'truncated cone' and cases == 2)
+        assert all(case.status for case in result.cases)
+
+
+def test_traps_are_named(rows):
+    traps = {(t.method, t.given): t for t in rows if isinstance(t, capillary.Trap)}
+    steep = 'dome, water, θ = 100°'
+    assert traps['thesis', steep].answer == 'dry' and traps['thesis', steep].true.endswith(' mm')
+    assert traps['energy', steep].answer.endswith(' mm')
+    low = 'dome 1.1 mm high, water, γs/γl = 0.8'
+    for balance in capillary.BALANCES:
+        assert traps[balance, low].answer == 'saturated'
+    assert traps[capillary.EXACT, low].answer == 'rim'
+    assert traps['minimised', low].answer.startswith('NoSurface')
+    tall = traps['thesis', 'dome 1.44 mm high, water, γs/γl = 0.7']
+    assert tall.answer == 'saturated' and float(tall.true.removesuffix(' mm')) < 1.44
+    for shape in ('truncated cone', 'cylinder'):
+        for balance in ('thesis', 'force'):
+            assert traps[balance, f'{shape}, water, γs/γl = 0.8'].answer == 'far_off'
+    wide = [trap for trap in traps.values() if trap.given.endswith('9 mm apart')]
+    assert [trap.answer for trap in wide] == ['far_apart'] and wide[0].true.endswith(' mm')
+    slope = traps['energy', 'truncated cone, water, θ = 75°']
+    assert (slope.answer, slope.true) == ('dry', 'no rise')
+    assert traps['energy', 'dome, 1 mN/m, γs/γl = 0.3, 10 layers'].answer == 'coarse'
+    overlaps = [trap for trap in traps.values() if trap.true == 'they overlap']
+    assert len(overlaps) == 2
+    assert all(trap.answer.startswith('MeshError') for trap in overlaps)
+
+
+def test_rows_are_json(rows):
+    json.dumps([asdict(row) for row in rows], allow_nan=False)
+    assert {row.kind for row in rows} == {'result', 'trap', 'speed'}
+
+
+def test_table_and_picture(rows, tmp_path):
+    text = capillary.table(rows)
+    assert '100 sections' not in text and '20 sections' in text and 'not installed' in text
+    assert text.count('exact meniscus  ') >= len(capillary.SHAPES)
+    pictures = capillary.figures(rows)
+    assert set(pictures) == {'capillary'}
+    pictures['capillary'].savefig(tmp_path / 'it.png')
+    assert (tmp_path / 'it.png').stat().st_size > 20_000
+    panels = pictures['capillary'].axes
+    assert len(panels) == 9
+    # Each result within the scale has one mark at its time and error.
+    energy = next(row for row in rows if getattr(row, 'family', '') == 'energy')
+    points = [
+        line.get_xydata()[0].tolist() for line in panels[0].lines if len(line.get_xdata()) == 1
+    ]
+    assert [energy.ms_per_solve, energy.height_error] in points

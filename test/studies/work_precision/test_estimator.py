@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: Apache-2.0
+import importlib.util
+import json
+import math
+from dataclasses import asdict
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ros_pad.estimation import FootEstimator
+from ros_pad.simulation import Scene
+from ros_pad.trials.node_settings import tuning_for
+from studies.work_precision.estimator import chart
+from studies.work_precision.estimator import conditions
+from studies.work_precision.estimator import methods
+from studies.work_precision.estimator import study
+from studies.work_precision.estimator import tally
+from studies.work_precision.estimator import walks
+from studies.work_precision.estimator.conditions import Change
+from studies.work_precision.estimator.tally import Tally
+from studies.work_precision.estimator.walks import Recording
+
+pytestmark = pytest.mark.slow
+
+SCENE = Scene.load('hexapod_smooth_dry_flat')
+PERIOD = 4e-3
+BLANK = tally.row_of(
+    Tally(), part='methods', name='', variant='', value=0.0, unit='', shipped=False
+)
+
+
+def walk(speed, load=None, **values):
+    """Return a recording of 4 s of a foot under 10 N; ``speed`` has rows (start, end, m/s)."""
+    count = 1000
+    true = np.zeros((count, 1))
+    for start, end, value in speed:
+        true[round(start / PERIOD) : round(end / PERIOD), 0] = value
+    loads = np.full((count, 1), 10.0)
+    for start, end, value in load or ():
+        loads[round(start / PERIOD) : round(end / PERIOD), 0] = value
+    zeros = np.zeros((count, 1, 3))
+    given = {
+        'name': 'made up',
+        'period': PERIOD,
+        'foot': SCENE.foot,
+        'expected_load': 10.0,
+        'settings': (SCENE.foot, 10.0, tuning_for(SCENE)),
+        'stamps': PERIOD * np.arange(1, count + 1),
+        'force': np.concatenate([zeros[..., :2], loads[..., None]], axis=2),
+        'position': zeros,
+        'noise': zeros,
+        'pressure': np.zeros((count, 1)),
+        'arrived': np.ones((count, 1), dtype=bool),
+        'load': loads,
+        'tangential': np.zeros((count, 1)),
+        'grip': 0.5 * loads,
+        'speed': true,
+        'wet': np.zeros((count, 1), dtype=bool),
+    }
+    return Recording(**given | values)
+
+
+def counted(case, *spans):
+    alarms = np.zeros((len(case.stamps), 1), dtype=bool)
+    for start, end in spans:
+        alarms[round(start / PERIOD) : round(end / PERIOD)] = True
+    counts = Tally()
+    tally.count_alarms(counts, case, alarms)
+    return counts
+
+
+# --- the counts ---------------------------------------------------------------------------------
+
+
+def test_delay_and_way_of_a_slip():
+    case = walk([(2.0, 2.5, 0.05)])
+    counts = counted(case, (2.1, 2.4))
+    assert (counts.slips, counts.missed, counts.false_alarms) == (1, 0, 0)
+    assert counts.delays == pytest.approx([0.1])
+    assert counts.slip_distances == pytest.approx([0.005])
+    # A slip that begins during an alarm is not missed and has no delay; the alarm was false.
+    counts = counted(case, (1.5, 2.2))
+    assert (counts.slips, counts.missed, counts.delays, counts.false_alarms) == (1, 0, [], 1)
+    row = tally.row_of(counts, part='', name='', variant='', value=0.0, unit='', shipped=False)
+    assert (row.misses, row.already, row.delay, row.slip_distance) == (0.0, 1.0, None, None)
+
+
+@pytest.mark.parametrize(('after', 'missed'), [(0.052, 0), (0.068, 1)])
+def test_alarms_may_be_a_little_late(after, missed):
+    counts = counted(walk([(2.0, 2.2, 0.05)]), (2.2 + after, 2.3 + after))
+    assert counts.missed == missed
+    assert counts.slip_distances == pytest.approx([math.inf if missed else 0.01])
+
+
+@pytest.mark.parametrize(
+    ('speed', 'load', 'slips'),
+    [
+        ([(2.0, 2.1, 0.025)], None, 0),  # 2.5 mm are too short
+        ([(2.0, 2.1, 0.035)], None, 1),
+        ([(2.0, 3.5, 0.004)], None, 0),  # 6 mm, but too slow
+        ([(2.0, 2.1, 0.025), (2.116, 2.2, 0.025)], None, 1),  # a gap of 16 ms
+        ([(2.0, 2.1, 0.025), (2.14, 2.22, 0.025)], None, 0),
+        ([(2.0, 2.5, 0.05)], [(1.9, 2.6, 1.0)], 0),  # too little load
+        ([(2.0, 2.5, 0.05)], [(2.2, 2.21, 1.0)], 2),
+        ([(0.5, 0.9, 0.05)], None, 0),  # before the measured part
+    ],
+)
+def test_what_counts_as_a_slip(speed, load, slips):
+    assert counted(walk(speed, load)).slips == slips
+
+
+def test_false_alarms_and_sticks():
+    case = walk([(2.0, 2.2, 0.05)])
+    assert counted(case, (1.5, 1.6), (3.0, 3.1)).false_alarms == 2
+    assert counted(case, (2.3, 2.4)).false_alarms == 0  # 0.1 s after a slip
+    assert counted(case, (2.1, 3.0)).false_alarms == 1  # ends long after the slip
+    # Of 3 s, the slip, 0.3 s after it and 60 ms before it are no stick.
+    assert counted(case).stick_time == pytest.approx(3.0 - 0.2 - 0.36, abs=0.03)
+    assert counted(walk([], [(2.0, 3.0, 1.0)])).stick_time == pytest.approx(2.0, abs=0.01)
+    only = replace(case, sticks_only=True)
+    assert counted(only, (1.5, 1.6)).slips == 0
+    assert counted(only, (1.5, 1.6)).false_alarms == 1
+
+
+def test_estimates_are_compared_with_the_truth():
+    """Of a dry and a wet stance both are estimated as dry at their ends."""
+    case = walk([], [(1.0, 1.2, 0.0), (2.0, 2.2, 0.0), (3.0, 4.0, 0.0)])
+    wet = np.zeros((1000, 1), dtype=bool)
+    wet[525:] = True
+    case = replace(case, wet=wet, tangential=0.2 * case.load)
+    ones = np.ones((1000, 1))
+    found = tally.Estimates(
+        slipping=ones < 0, standing=ones > 0, fresh=ones > 0, wet=0.2 * ones, mean=0.4 * ones,
+        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29), speed=ones, seconds=1.0,
+        updates=1000,
+    )  # fmt: skip
+    counts = Tally()
+    tally.count_estimates(counts, case, found)
+    assert counts.wet_ends == [(False, 0.2), (True, 0.2)]
+    row = tally.row_of(
+        counts, part='robustness', name='x', variant='', value=0.0, unit='', shipped=True
+    )
+    assert row.brier == pytest.approx((0.2**2 + 0.8**2) / 2.0)
+    assert row.wet_right == 0.5
+    # True friction is 0.5, and the true friction margin 0.3.
+    assert row.coverages == {'dry': 1.0, 'wet': 0.0}
+    assert row.belows == {'dry': 0.0, 'wet': 1.0}
+    assert row.delay is row.slip_distance is row.misses is row.false_per_minute is None
+    json.dumps(asdict(row), allow_nan=False)
+
+
+# --- methods ------------------------------------------------------------------------------------
+
+
+def test_methods_get_the_same_speed_as_the_estimator():
+    """The foot is pulled, then slides at 40 mm/s, and is lifted for a while."""
+    generator = np.random.default_rng(1)
+    settings = (SCENE.foot, 7.0, tuning_for(SCENE))
+    plain = methods.SpeedThreshold(settings, 0.02)
+    alarms = [methods.SpeedCusum(settings, speed, 4.0) for speed in (0.01, 0.03)]
+    shipped = FootEstimator(*settings)
+    compared = 0
+    for sample in range(1, 500):
+        way = 0.04 * PERIOD * max(0, sample - 250)
+        force = np.array([3.0, 1.0, 7.0]) + generator.normal(scale=0.03, size=3)
+        if 400 < sample < 420:
+            force[2] = 0.1
+        x, y = (-way * np.array([3.0, 1.0]) / math.sqrt(10.0)).tolist()
+        noise = generator.normal(scale=1.5e-4, size=3)
+        sheared = force * (1.0, 1.0, 0.0) / SCENE.foot.shear_stiffness
+        position = np.array([x, y, 0.0]) - sheared + noise
+        row = (PERIOD * sample, force.tolist(), position.tolist(), 0.0)
+        found = plain.speed(*row[:3])
+        now = shipped.update(*row)
+        on = [alarm.update(*row) for alarm in alarms]  # every alarm needs every sample
+        assert any(on) is now.slipping
+        if found is not None:
+            compared += 1
+            assert found[0] == pytest.approx(now.slip_speed, abs=1e-12)
+    assert compared > 400
+
+
+def test_ratio():
+    ratio = methods.RatioThreshold((SCENE.foot, 10.0, tuning_for(SCENE)), 0.3)
+    assert ratio.update(0.0, (3.0, 1.0, 10.0), (0.0, 0.0, 0.0), 0.0)
+    assert not ratio.update(0.0, (2.0, 2.0, 10.0), (0.0, 0.0, 0.0), 0.0)
+    assert not ratio.update(0.0, (0.4, 0.0, 0.9), (0.0, 0.0, 0.0), 0.0)  # in the air
+
+
+def test_feet_pulled_to_and_fro_stick():
+    pulled = walks.pull(SCENE, 2.0, 3)
+    assert len(pulled.stamps) == 500
+    contact = pulled.position[..., 0] + pulled.force[..., 0] / SCENE.foot.shear_stiffness
+    assert np.std(contact) == pytest.approx(1.5e-4, rel=0.1)
+    used = (pulled.tangential / pulled.grip).max(axis=0)
+    assert used == pytest.approx(np.linspace(0.2, 0.6, 6), rel=1e-3)
+
+
+# --- changes ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plain():
+    return walks.pull(SCENE, 4.0, 3)
+
+
+def generator():
+    return np.random.default_rng(0)
+
+
+def test_force_bias_is_an_offset(plain):
+    off = conditions.force_bias(plain, 2.0, generator()).force - plain.force
+    assert np.linalg.norm(off, axis=2) == pytest.approx(2.0)
+    assert np.ptp(off, axis=0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_noise(plain):
+    loud = conditions.position_noise(plain, 6e-4, generator())
+    assert loud.position - plain.position == pytest.approx(3.0 * plain.noise)
+    assert loud.settings[2].position_noise == 1.5e-4
+    assert conditions.configured_noise(plain, 6e-4, generator()).settings[2].position_noise == 6e-4
+
+
+def test_messages(plain):
+    lost = conditions.dropped(plain, 0.3, generator()).arrived
+    assert lost.mean() == pytest.approx(0.7, abs=0.02)
+    assert np.flatnonzero(conditions.rate(plain, 50.0, generator()).arrived[:, 0])[
+        :3
+    ].tolist() == [*(0, 5, 10)]
+    late = conditions.late_position(plain, 0.02, generator()).position
+    assert (late[5:] == plain.position[:-5]).all()
+    found = tally.replay(conditions.rate(plain, 50.0, generator()))
+    assert found.updates == 6 * 200
+
+
+def test_clocks_that_jump_back_begin_a_new_stance(plain):
+    stamps = plain.stamps.copy()
+    stamps[500:] -= 0.5
+    found = tally.replay(replace(plain, stamps=stamps))
+    assert found.fresh[500:530].any()
+    stamps = plain.stamps.copy()
+    stamps[500:] -= 0.1  # less than a gap within a stance: samples are late at first
+    found = tally.replay(replace(plain, stamps=stamps))
+    assert not found.fresh[500:524].any()
+    assert found.fresh[526:].any()
+    jumped = conditions.clock_jumps(plain, 0.1, generator()).stamps - plain.stamps
+    assert set(np.round(np.diff(jumped), 9)) == {0.0, 0.1}
+
+
+def test_impacts_ring_only_in_what_is_read():
+    case = walk([], [(1.0, 1.5, 0.0)])
+    struck = conditions.impacts(case, 2.0, generator())
+    off = struck.force - case.force
+    assert off[:375].max() == 0.0
+    assert off[375:377, 0, 2].max() == pytest.approx(2.0 * 10.0, rel=0.35)
+    assert abs(off[380:]).max() == 0.0
+    assert struck.load is case.load
+
+
+# --- the study ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def rows():
+    noise = conditions.position_noise
+    few = (
+        Change('position noise', 'm', (1.5e-4, 6e-4), 1.5e-4, conditions.NOT_CONFIGURED, noise),
+        Change(
+            'wet friction',
+            '',
+            (0.4,),
+            0.12,
+            conditions.CONFIGURED,
+            world=conditions.with_wet_friction,
+        ),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(walks, 'CYCLES', 2)
+        patch.setattr(walks, 'FEW_CYCLES', 3)
+        patch.setattr(walks, 'SEEDS', (5, 6))
+        patch.setattr(study, 'CHANGES', few)
+        patch.setattr(methods, 'CUSUM_THRESHOLDS', (4.0,))
+        few_walks = walks.recordings()[::4]
+        patch.setattr(study, 'recordings', lambda: few_walks)
+        shares = []
+        found = study.measure(shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    return found
+
+
+def test_higher_thresholds_detect_less(rows):
+    mine = [row for row in rows if row.part == 'methods']
+    assert {row.slips for row in mine} == {mine[0].slips}
+    assert mine[0].slips > 10
+    for name in (methods.RATIO, methods.SPEED):
+        misses = [row.misses for row in mine if row.name == name]
+        assert misses == sorted(misses)
+    margins = [row.misses for row in mine if row.name == methods.BAYES]
+    assert margins == sorted(margins, reverse=True)
+    shipped = mine[-1]
+    assert shipped.shipped
+    same = [row for row in mine if row.name == methods.CUSUM and row.value == 4.0]
+    assert same[0].misses == pytest.approx(shipped.misses, abs=0.05)
+    assert same[0].us_per_update < shipped.us_per_update
+
+
+def test_noise_that_is_not_configured_makes_false_alarms(rows):
+    quiet, loud, _ = [row for row in rows if row.part == 'robustness']
+    assert quiet.shipped and not loud.shipped
+    assert quiet.false_per_minute < 5.0 < 20.0 < loud.false_per_minute
+
+
+def test_table_and_pictures(rows, tmp_path):
+    found = study.table(rows)
+    assert 'FootEstimator, alarm' in found
+    assert 'position noise, not configured 0.0006 m' in found
+    json.dumps([asdict(row) for row in rows], allow_nan=False)
+    pictures = study.figures(rows)
+    assert set(pictures) == {'estimator', 'estimator_robustness'}
+    for name, figure in pictures.items():
+        figure.savefig(tmp_path / f'{name}.png')
+        assert (tmp_path / f'{name}.png').stat().st_size > 20_000
+
+
+def test_the_best_has_few_false_alarms_and_misses():
+    cases = [
+        replace(
+            BLANK, name=methods.SPEED, misses=misses, slip_distance=slipped, false_per_minute=false
+        )
+        for misses, slipped, false in (
+            (0.0, 1e-3, 5.0), (0.02, 3e-3, 0.0), (0.02, 2e-3, 0.9), (0.9, None, 0.0),
+        )
+    ]  # fmt: skip
+    assert chart.best(cases) == [cases[2]]
+    loud = [replace(case, false_per_minute=case.false_per_minute + 9.0) for case in cases]
+    assert chart.best(loud) == [loud[1]]
+
+
+def test_without_mujoco(monkeypatch):
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
+    assert walks.full() == 'L1'
+    assert study.table([]) == study.NEEDS_MUJOCO

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+import importlib.util
+import math
+from dataclasses import replace
+
+import mpmath
+import pytest
+
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation import RailLeg
+from ros_pad.simulation import Scene
+from studies.work_precision.walk import chart
+from studies.work_precision.walk import hexapod
+from studies.work_precision.walk import rail
+from studies.work_precision.walk import results
+from studies.work_precision.walk import study
+from studies.work_precision.walk import walkers
+from studies.work_precision.walk.walkers import HEXAPOD
+from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import Walk
+from studies.work_precision.walk.walkers import Walked
+from studies.work_precision.walk.walkers import Walker
+
+pytestmark = pytest.mark.slow
+
+LEG = Scene.load('leg_dry_flat')
+
+
+def rail_walk(cap, drag=0.235, mass=0.85, cycles=1):
+    """Return a walk of a dry leg whose foot holds exactly ``cap``, N."""
+    body = replace(LEG.body, mass=mass, rolling_drag=drag)
+    foot = replace(LEG.foot, friction=cap / body.load, shear_strength=0.0)
+    return Walk('leg', replace(LEG, body=body, foot=foot, settle=0.0, cycles=cycles), 0.0)
+
+
+# --- the truth of the rail leg ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('cap', [0.7, 0.9, 1.05])
+def test_truth_is_the_closed_form_of_a_cycle(cap):
+    """The body starts from rest with (c - F)/M, sticks to the foot, is braked with (c + F)/M when
+    the foot slips again, and coasts.
+
+    Sticking begins where a t = V sin(πt/T), and ends where M u' + F = -c.
+    """
+    mass, drag = 0.85, 0.6
+    with mpmath.workdps(30):
+        stance, stroke = mpmath.mpf(1) / 2, mpmath.mpf(5) / 100
+        rate = mpmath.pi / stance
+        peak = rate * stroke / 2
+        push, brake = (mpmath.mpf(cap) - drag) / mass, (mpmath.mpf(cap) + drag) / mass
+        assert push < peak * rate  # the foot slips first
+
+        def back(t):
+            return peak * mpmath.sin(rate * t)
+
+        met = mpmath.findroot(lambda t: push * t - back(t), (0.1, 0.9 * stance), 'anderson')
+        assert 0.01 < met < stance
+        assert mass * peak * rate * mpmath.cos(rate * met) + drag > -cap  # and sticks then
+        left = mpmath.acos(-(cap + drag) / (mass * peak * rate)) / rate if (
+            (cap + drag) < mass * peak * rate
+        ) else stance  # fmt: skip
+        ends = back(left) - brake * (stance - left)
+        assert left > met and (left == stance or ends > 0)
+        foot = stroke / 2 * (mpmath.cos(rate * met) - mpmath.cos(rate * left))
+        braked = back(left) * (stance - left) - brake * (stance - left) ** 2 / 2
+        way = push * met**2 / 2 + foot + braked + ends**2 * mass / drag / 2
+        slip = stroke / 2 * (1 - mpmath.cos(rate * met)) - push * met**2 / 2
+        slip += braked - stroke / 2 * (mpmath.cos(rate * left) + 1)
+    found, slipped, steps = rail.walk_by_events(rail_walk(cap, drag, mass), 'DOP853', 1e-11)
+    assert found == pytest.approx(float(way), rel=1e-9)
+    assert slipped == pytest.approx(float(slip), rel=1e-8)
+    assert steps > 3
+
+
+def test_truth_of_legs_that_hold_and_that_do_not_move():
+    held = rail.walk_by_events(rail_walk(5.0, cycles=3), 'DOP853', 1e-11)
+    assert held[:2] == pytest.approx((0.15, 0.0), abs=1e-12)
+    stuck = rail.walk_by_events(rail_walk(0.2, cycles=3), 'DOP853', 1e-11)
+    assert stuck[:2] == pytest.approx((0.0, 0.15), abs=1e-12)
+
+
+@pytest.mark.parametrize('case', rail.rail_walks(), ids=lambda case: case.name)
+def test_the_rail_leg_converges_to_the_truth(case):
+    case = replace(case, scene=replace(case.scene, cycles=2))
+    truth, slip, _ = rail.walk_by_events(case, 'DOP853', 1e-11)
+    leg = RailLeg(case.scene, case.scene.floor.build(0), 5e-5)
+    for _ in range(round(case.scene.duration / leg.period)):
+        leg.step([case.pressure])
+    assert leg.body[0] == pytest.approx(truth, rel=1e-3)
+    assert leg.feet[0].slip_path == pytest.approx(slip, rel=3e-3, abs=1e-6)
+
+
+# --- results from walks -------------------------------------------------------------------------
+
+
+def fake(name, walked, family='fake'):
+    answers = iter(walked)
+
+    def step(_):
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    return Walker(family, name, 1e-3, step)
+
+
+def went(distance, slip, seconds, lateral=0.0, yaw=0.0, verdict=None):
+    return Walked(distance, slip, lateral, yaw, verdict, 1000, seconds)
+
+
+def test_errors_failures_and_ratios():
+    scene = replace(Scene.load('hexapod_smooth_dry_flat'), settle=0.0, cycles=5)  # 5 s
+    walks = [Walk(f'{number}', scene, 0.0) for number in range(4)]
+    least = results.LEAST * scene.stride
+    top = fake('top', [
+        went(0.1, 0.02, 4.0), went(0.1, 0.02, 4.0, 1e-3, -2e-3), went(0.1, 0.0, 8.0),
+        went(0.1, 0.02, 4.0),
+    ])  # fmt: skip
+    other = fake('other', [
+        went(0.102, 0.021, 2.0, 1e-3, 1e-3), went(0.08, 0.03, 1.0, -1e-3, 2e-3),
+        went(0.1, 0.5 * least, 1.0), went(0.1, 0.02, 1.0, verdict='tip-over'),
+    ])  # fmt: skip
+    lost = fake('lost', [
+        ArithmeticError('diverged'), InvalidInput('no'), went(math.nan, 0.0, 1.0), went(0, 0, 1.0),
+    ])  # fmt: skip
+    shares = []
+    found = results.run(HEXAPOD, walks, [top, other, lost], 'top', 'top', shares.append)
+    assert shares == sorted(shares)
+    assert len(shares) == 12 and shares[-1] == 1.0
+    top, other, lost = found
+    assert top.failures == top.slip_failures == top.refused == 0
+    assert set(top.errors.values()) == {0.0}
+    assert (top.versus, top.ms_per_second, top.us_per_step) == (1.0, 800.0, 4000.0)
+    # The true slip of the third walk is zero; its error is relative to LEAST of a stride.
+    assert other.errors == pytest.approx(
+        {'distance': 0.02, 'slip': 0.5, 'lateral': 1e-3, 'yaw': 1e-3}
+    )
+    assert other.worst == pytest.approx(
+        {'distance': 0.2, 'slip': 0.5, 'lateral': 2e-3, 'yaw': 4e-3}
+    )
+    assert (other.failures, other.slip_failures, other.refused, other.cases) == (2, 3, 1, 4)
+    assert other.versus == pytest.approx(0.25)
+    assert other.ms_per_second == pytest.approx(200.0)
+    assert [each['distance_error'] for each in other.walks[:2]] == pytest.approx([0.02, -0.2])
+    assert (lost.failures, lost.refused) == (4, 3)
+    assert lost.errors['distance'] == lost.worst['distance'] == 1.0
+    assert lost.walks[0]['verdict'] == 'ArithmeticError: diverged'
+    text = chart.table(found)
+    assert 'hexapod (4 walks of 6 cycles' in text
+    (line,) = [line for line in text.splitlines() if line.startswith('  other ')]
+    assert line.split() == [
+        *('other', '200', '1e+03', '0.25', '2', '20', '50', '50', '1', '2', '1', '4'),
+        *('2', '3', '1'),
+    ]  # fmt: skip
+
+
+# --- the study ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def measured_walks():
+    pytest.importorskip('mujoco')
+    pytest.importorskip('numba')
+    with pytest.MonkeyPatch.context() as patch:
+        for robot in walkers.CYCLES:
+            patch.setitem(walkers.CYCLES, robot, 2)
+        every = {case.name: case for case in hexapod.hexapod_walks()}
+        walks = [every[name] for name in ('wet, dome', 'wet, flat')]
+        patch.setattr(study, 'hexapod_walks', lambda: walks)
+        shares = []
+        measured = study.measure(shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    return measured
+
+
+def test_every_level_is_there_and_finer_ones_are_nearer(measured_walks):
+    found = {other.method: other for other in measured_walks}
+    assert len(found) == len(measured_walks)
+    for other in measured_walks:
+        assert other.us_per_step > 0.0 and other.ms_per_second > 0.0
+        assert other.refused == 0
+        assert all(other.worst[name] >= error >= 0.0 for name, error in other.errors.items())
+    assert found['L2, 2 ms'].versus == found['RailLeg, 4 ms'].versus == 1.0
+    # The same walk runs in three ways.
+    for step in ('1', '4', '10'):
+        same = [
+            found[f'{name}, {step} ms'].errors
+            for name in ('L1', 'L1, compiled', 'L1, compiled, walk', 'L1, soles turn')
+        ]
+        assert same[0] == same[1] == same[2]
+        assert same[3]['slip'] < same[0]['slip']
+    half, two, planar, peer = (
+        found[method] for method in ('L2, 0.5 ms', 'L2, 2 ms', 'L1, 4 ms', 'MuJoCo defaults, 2 ms')
+    )
+    assert (
+        half.errors['slip'] < two.errors['slip'] < min(planar.errors['slip'], peer.errors['slip'])
+    )
+    assert two.worst['distance'] < min(planar.worst['distance'], peer.worst['distance'])
+    # With MuJoCo's defaults feet creep, and a robot on wet domes walks less far without a warning.
+    assert found['MuJoCo defaults, 2 ms'].walks[0]['distance_error'] < -0.08
+    assert found['MuJoCo defaults, 0.5 ms'].walks[0]['distance_error'] < -0.08
+
+
+def test_integrators_step_over_stances_in_silence(measured_walks):
+    found = {other.method: other for other in measured_walks if other.robot == RAIL}
+    assert found['solve_ivp, smoothed, LSODA'].failures > 0
+    assert found['solve_ivp, smoothed, LSODA'].refused == 0
+    assert found['solve_ivp, events, 1e-6'].worst['distance'] < 1e-5
+    ways = [found[f'RailLeg, {step} ms'].worst['distance'] for step in ('0.1', '1', '4')]
+    assert ways[0] < 0.3 * ways[1] < 0.3 * ways[2]
+
+
+def test_table_and_picture(measured_walks, tmp_path):
+    text = chart.table(measured_walks)
+    assert 'against L2, top, 0.25 ms' in text
+    assert 'pip install' not in text
+    assert 'wet, dome' in text
+    pictures = chart.figures(measured_walks)
+    assert set(pictures) == {'walk'}
+    pictures['walk'].savefig(tmp_path / 'walk.png')
+    assert (tmp_path / 'walk.png').stat().st_size > 50_000
+
+
+def test_without_extras(monkeypatch):
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
+    ways, top, baseline = hexapod.hexapod_walkers()
+    names = {walker.name for walker in ways}
+    assert {top, baseline} <= names
+    assert top == 'L1, 0.25 ms'
+    assert not any('L2' in name or 'MuJoCo' in name or 'compiled' in name for name in names)
+    case = hexapod.hexapod_walks()[0]
+    case = replace(case, scene=replace(case.scene, cycles=1))
+    few = [walker for walker in ways if walker.name in (top, baseline)]
+    found = results.run(HEXAPOD, [case], few, top, baseline, lambda _: None)
+    text = chart.table(found)
+    assert 'L1, compiled: pip install "ros_pad[fast]"' in text
+    assert 'pip install "ros_pad[mujoco]"' in text
+    legs = [each for each in rail.rail_walkers() if each.name in (rail.EVENTS, rail.LEG)]
+    found += results.run(RAIL, [rail_walk(0.5)], legs, rail.EVENTS, rail.LEG, lambda _: None)
+    assert len(chart.figures(found)['walk'].axes) == 6
