@@ -215,14 +215,14 @@ def _walk_on_nodes(
             ' pip install "ros_pad[ros]", or run without ROS: --no-ros'
         ) from error
     with (
-        contextlib.nullcontext() if live else _alone(),
+        contextlib.nullcontext() if live else alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
         return composed.run(scene, policy, seed, level, bag=bag, progress=progress)
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
     """Hide the topics of this process, so that no real regulator receives the set-points."""
     before = os.environ.get(_DISCOVERY)
     os.environ[_DISCOVERY] = 'OFF'

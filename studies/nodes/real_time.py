@@ -8,19 +8,16 @@ kind, and its ratio to the speed without ROS.
 from __future__ import annotations
 
 import dataclasses
-import os
 import pathlib
 import statistics
 import tempfile
 from collections.abc import Sequence
 
+from ros_pad.commands.run import alone
+from ros_pad.nodes import composed
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import run
 from studies import command
-
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'OFF'  # read when rclpy is imported
-
-from ros_pad.nodes import composed
 
 
 def main(words: Sequence[str]) -> int:
@@ -31,7 +28,7 @@ def main(words: Sequence[str]) -> int:
     options = parser.parse_args(words)
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=options.cycles)
     factors: dict[str, list[float]] = {'without ROS': [], 'nodes, recorded': []}
-    with tempfile.TemporaryDirectory() as folder:
+    with alone(), tempfile.TemporaryDirectory() as folder:
         for repeat in command.each(range(options.repeats), 'real_time', 'pair'):
             bag = pathlib.Path(folder) / f'bag{repeat}'
             trials = (run(scene), composed.run(scene, bag=bag))

@@ -28,8 +28,6 @@ import tempfile
 import time
 from collections.abc import Sequence
 
-os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-
 import rclpy
 from geometry_msgs.msg import WrenchStamped
 from rclpy.experimental import EventsExecutor
@@ -62,6 +60,7 @@ def main(words: Sequence[str]) -> int:
     options = parser.parse_args(words)
     if options.receive:
         return receive()
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     rclpy.init()
     rows = [
         measured(name, rate, options.seconds)

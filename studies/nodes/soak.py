@@ -19,7 +19,6 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-import os
 import pathlib
 import random
 import time
@@ -39,6 +38,7 @@ from std_srvs.srv import Trigger
 
 from ros_pad import regulators
 from ros_pad.commands.progress import bar
+from ros_pad.commands.run import alone
 from ros_pad.nodes import topics
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.stamps import set_stamp
@@ -456,8 +456,7 @@ def main(words: Sequence[str]) -> int:
     )
     command.add_count(parser, '--seed', 0, 'seed of faults and commands', least=0)
     options = parser.parse_args(words)
-    # Regulators on the network must not receive these set-points.
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'OFF'
-    result = run(options.duration, options.seed)
+    with alone():
+        result = run(options.duration, options.seed)
     command.show(options, dataclasses.asdict(result), table(result, options.seed))
     return 1 if result.missed else 0
