@@ -96,3 +96,11 @@ class LimitError(PadError):
 
 class BagError(PadError):
     """A bag cannot be written or read."""
+
+
+class BadMessage(PadError):
+    """The bytes of a message are too few, or do not fit its type."""
+
+
+class UnknownEncoding(BadMessage):
+    """Messages of a type or encapsulation whose fields cannot be read one by one."""

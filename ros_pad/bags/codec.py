@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read and write CDR, the bytes in which ROS 2 sends messages.
+"""Read and write whole messages of any type from its definition, with ``rosbags``.
 
-:class:`MessageType` reads and writes messages of any type from its definition, with ``rosbags``.
-The functions read single values from the bytes of a message, which is faster than decoding it.
-
-Source: OMG, Common Object Request Broker Architecture, part 2, section 9.3 (CDR). A message starts
-with four bytes of encapsulation, of which the second gives the byte order; after them each number
-is at a multiple of its size.
+`ros_pad.bags.fields` reads and writes single fields, which is faster.
 """
 
 from __future__ import annotations
 
 import functools
-import math
-import struct
 from typing import Any
 
 import numpy as np
@@ -27,13 +20,6 @@ _LONGEST_ARRAY = 65536
 """Largest number of elements of a fixed-length array: rosbags generates code for each one."""
 
 _DTYPE = {'byte': 'uint8', 'char': 'uint8', 'octet': 'uint8'}  # NumPy has other names for these
-
-# Big-endian first: the byte-order flag of a message (0 or 1) is the index.
-_TIME = struct.Struct('>iI'), struct.Struct('<iI')
-_LENGTH = struct.Struct('>I'), struct.Struct('<I')
-_VECTOR = struct.Struct('>3d'), struct.Struct('<3d')
-_HEADER_LENGTH_AT = 12  # after encapsulation and stamp: the length of ``frame_id``
-_NO_VECTOR = (math.nan, math.nan, math.nan)
 
 
 class MessageType:
@@ -83,6 +69,10 @@ class MessageType:
         """Return the bytes of a message, little-endian."""
         return bytes(self._store.serialize_cdr(message, self.name, little_endian=True))
 
+    def fields(self, name: str) -> Any:
+        """Return the fields of this type or of one inside it: pairs of name and description."""
+        return self._store.fielddefs[name][1]
+
     def blank(self) -> Any:
         """Return a message of zeros, empty texts and empty lists."""
         return self._blank(self.name)
@@ -109,35 +99,4 @@ def message_type(name: str, definition: str) -> MessageType:
     return MessageType(name, definition)
 
 
-def clock_time(data: bytes) -> int | None:
-    """Return the time, ns, of a ``rosgraph_msgs/Clock``; None when there are too few bytes."""
-    try:
-        seconds, nanoseconds = _TIME[data[1] & 1].unpack_from(data, _ENCAPSULATION_SIZE)
-    except (IndexError, struct.error):
-        return None
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
-
-
-def _first_vector(data: bytes) -> tuple[float, float, float]:
-    """Return the three doubles after the header; NaN when there are too few bytes."""
-    try:
-        order = data[1] & 1
-        (length,) = _LENGTH[order].unpack_from(data, _HEADER_LENGTH_AT)
-        place = (_HEADER_LENGTH_AT + length + 7) // 8 * 8 + _ENCAPSULATION_SIZE
-        x, y, z = _VECTOR[order].unpack_from(data, place)
-    except (IndexError, struct.error):
-        return _NO_VECTOR
-    return x, y, z
-
-
-def normal_force(data: bytes) -> float:
-    """Return force.z, N, of a ``geometry_msgs/WrenchStamped``; NaN if there are too few bytes."""
-    return _first_vector(data)[2]
-
-
-def horizontal_position(data: bytes) -> tuple[float, float]:
-    """Return x and y, m, of a ``geometry_msgs/PointStamped``; NaN if there are too few bytes."""
-    return _first_vector(data)[:2]
-
-
-__all__ = ['MessageType', 'clock_time', 'horizontal_position', 'message_type', 'normal_force']
+__all__ = ['MessageType', 'message_type']
