@@ -3,7 +3,7 @@
 
 Where the fields are in the bytes follows from the definition of the message type. A reader knows
 messages that have fields of fixed size and at most one text, as most messages with a header are.
-A writer knows every message, because texts and lengths of lists are the same in all that it writes.
+A writer knows every message, because texts and lengths of lists stay the same in what it writes.
 
 Source: OMG, Common Object Request Broker Architecture, part 2, section 9.3 (CDR). A message starts
 with four bytes of encapsulation, of which the second gives the byte order; after them each number
@@ -100,7 +100,7 @@ class FieldReader:
         return values if self._text_at is None else self._decoded(values, self._text_at)
 
     def _plan(self, order: int, size: int, available: int) -> Callable[[bytes], tuple[Any, ...]]:
-        """Return a function that unpacks the wanted fields of messages with a text of this size."""
+        """Return a function that unpacks messages with a text of this size, bytes."""
         if size > available:
             raise BadMessage(f'{available} bytes are too few for a text of {size} bytes')
         fields = self._sized(size)
@@ -210,7 +210,9 @@ class FieldWriter:
         template = message_type.encode(message)
         places = _places(fields)
         # Numbers that differ, and the bytes between them, in the order of the message.
-        form, order, between, end = '<', [], [], 0
+        form, end = '<', 0
+        order: list[int] = []
+        between: list[bytes] = []
         for place in (*sorted(wanted), None):
             start = len(template) if place is None else places[place]
             form += f'{start - end}s'

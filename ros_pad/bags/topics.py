@@ -13,6 +13,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
+FRAME = 'header.frame_id'
+
 
 @dataclass(frozen=True)
 class Topic:
@@ -131,6 +134,14 @@ SLIP = Topic(
         *('twist.covariance[0]', 'twist.covariance[7]'),  # variances; the matrix has rows of 6
     ),
 )
+CONTACT_LOAD = Topic('leg_{leg}/contact_load', 'std_msgs/msg/Float64', 'N', values=('data',))
+CONTACT_POSITION = Topic(
+    'leg_{leg}/contact_position',
+    'geometry_msgs/msg/PointStamped',
+    'm',
+    'world',
+    ('point.x', 'point.y', 'point.z'),
+)
 SLIPPING = Topic('leg_{leg}/slipping', 'std_msgs/msg/Bool', values=('data',))
 # The last topic of each estimate: it triggers a decision.
 WETNESS = Topic('leg_{leg}/wetness', 'std_msgs/msg/Float64', '0 to 1', values=('data',))
@@ -140,7 +151,7 @@ DOUBT = Topic('leg_{leg}/doubt', 'std_msgs/msg/String', values=('data',), text=T
 MORPHOLOGY = Topic('leg_{leg}/morphology', 'std_msgs/msg/String', values=('data',), text=True)
 JOINT_STATES = Topic('joint_states', 'sensor_msgs/msg/JointState', 'rad')
 MARKERS = Topic('markers', 'visualization_msgs/msg/MarkerArray', 'm')
-CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's')
+CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
 
 TRIAL = {

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 from typing import NamedTuple
 
 from ros_pad.control.morphology import FootState
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import sensor_fault
+from ros_pad.estimation.stage import Emission
 from ros_pad.pace import TICK_PERIOD_NS
 
 OLD = 0.2
@@ -45,7 +45,7 @@ class DecisionStage:
     """Collect loads, positions, pressures and doubts of one leg, and decide at each estimate.
 
     A decision uses the largest load since the last one, because a bounce is not a step, and the
-    last position, which is decoded only then. Each pressure is used once.
+    last position. Each pressure is used once.
 
     Parameters
     ----------
@@ -55,9 +55,6 @@ class DecisionStage:
         Number of the leg.
     reject : callable or None
         Called with the error when an estimate is rejected; no set-point follows from it.
-    decode_position : callable or None
-        Function that returns x and y, m, of an argument of :meth:`position`; None takes the first
-        two items of the argument.
     """
 
     def __init__(
@@ -65,13 +62,11 @@ class DecisionStage:
         controller: MorphologyController,
         leg: int,
         reject: Callable[[InvalidInput], None] | None = None,
-        decode_position: Callable[[Any], tuple[float, float]] | None = None,
     ) -> None:
         self.controller = controller
         self.leg = leg
         self._reject = reject
-        self._decode = decode_position or _first_two
-        self._position: Any = None
+        self._position = NOWHERE
         self._new_position = False
         self._position_time = 0.0  # time of the last estimate with a new position, s
         self._load, self._largest = math.nan, -math.inf
@@ -86,9 +81,9 @@ class DecisionStage:
         if self._largest < load < math.inf:
             self._largest = load
 
-    def position(self, position: Any) -> None:
-        """Store a position of the foot, in the form that ``decode_position`` takes."""
-        self._position = position
+    def position(self, x: float, y: float) -> None:
+        """Store a position of the foot, m."""
+        self._position = x, y
         self._new_position = True
 
     def pressure(self, gauge: float) -> None:
@@ -120,6 +115,13 @@ class DecisionStage:
             self._largest = -math.inf
         return Decision(setpoint, self._new_morphology())
 
+    def take(self, now: float, emission: Emission) -> Decision:
+        """Process an emission of the estimation stage at the present time, s, and decide."""
+        self.load(emission.load)
+        if emission.position is not None:
+            self.position(*emission.position)
+        return self.estimate(now, emission.estimate.wet_probability)
+
     def tick(self, now: float) -> Decision | None:
         """Observe a leg that has no estimates; call it every ``pace.TICK_PERIOD_NS``.
 
@@ -137,14 +139,14 @@ class DecisionStage:
         if self._new_position:
             self._new_position = False
             self._position_time = now
-        current = self._position is not None and now - self._position_time <= OLD
+        current = now - self._position_time <= OLD
         load = self._load
         return FootState(
             time=now,
             wet_probability=wet_probability,
             # If no load has arrived since the last decision, the last load is used again.
             load=max(self._largest, load) if math.isfinite(load) else load,
-            position=self._decode(self._position) if current else NOWHERE,
+            position=self._position if current else NOWHERE,
             pressure=self._take_pressure(now),
             sensor_fault=self._sensor_fault,
         )
@@ -160,7 +162,3 @@ class DecisionStage:
             return None
         self._morphology = morphology
         return morphology
-
-
-def _first_two(position: Any) -> tuple[float, float]:
-    return position[0], position[1]

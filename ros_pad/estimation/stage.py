@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.errors import InvalidInput
@@ -33,6 +34,27 @@ larger value, though finite, would spoil sums and means for ever."""
 Vector = tuple[float, float, float]
 
 
+class Emission(NamedTuple):
+    """An estimate, with what a decision needs of the samples since the last one.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Time stamp of the wrench, ns.
+    estimate : Estimate
+        The estimate.
+    load : float
+        Largest normal force since the last emission, N; NaN if the last one is not finite.
+    position : tuple of float or None
+        Last position x and y of the foot, m; None if none has arrived since the last emission.
+    """
+
+    stamp_ns: int
+    estimate: Estimate
+    load: float
+    position: tuple[float, float] | None
+
+
 class EstimationStage:
     """Pair the wrenches of a foot with its positions, and emit the estimates.
 
@@ -46,7 +68,7 @@ class EstimationStage:
     period_ns : int
         Period of the emitted estimates, ns.
     emit : callable
-        Called once a period with the time stamp of the wrench, ns, and the estimate.
+        Called once a period with an :class:`Emission`.
     emit_doubt : callable
         Called with the doubt of the foot when the kind of the doubt has changed, before the
         estimate of the same sample.
@@ -69,7 +91,7 @@ class EstimationStage:
         self,
         estimator: FootEstimator,
         period_ns: int,
-        emit: Callable[[int, Estimate], None],
+        emit: Callable[[Emission], None],
         emit_doubt: Callable[[str], None],
         reject: Callable[[InvalidInput], None],
     ) -> None:
@@ -81,6 +103,8 @@ class EstimationStage:
         self._wrench: tuple[int, Vector, float | None] | None = None
         self._position: tuple[int, Vector] | None = None
         self._used: tuple[int, Vector] | None = None  # position of the last sample
+        self._load, self._largest = math.nan, -math.inf  # last and largest since the last emission
+        self._place: tuple[float, float] | None = None  # last position since the last emission
         self._used_ns = 0  # stamp of the wrench with which that position was first used
         self._silent_since_ns: int | None = None
         self._rejection = ''
@@ -98,12 +122,16 @@ class EstimationStage:
         if self._wrench is not None and self._position is not None:
             # No position came for the last wrench: the marker is hidden or sampled more slowly.
             self._update(self._wrench, self._position)
+        self._load = load = force[2]
+        if self._largest < load < math.inf:
+            self._largest = load
         self._wrench = stamp_ns, force, moment if self._moments else None
         if self._position is not None and self._position[0] == stamp_ns:
             self._update(self._wrench, self._position)
 
     def position(self, stamp_ns: int, point: Vector) -> None:
         """Process a position of the marker: its time stamp, ns, and coordinates, m."""
+        self._place = point[0], point[1]
         # Some motion capture systems send NaN for a hidden marker: keep the last position.
         if math.isfinite(point[0] + point[1] + point[2]):
             self._position = stamp_ns, point
@@ -137,7 +165,9 @@ class EstimationStage:
         self._silent_since_ns, self._rejection = None, ''
         self._update_doubt(estimate.doubt, estimate.sound)
         if self._pace.due(stamp_ns):
-            self._emit(stamp_ns, estimate)
+            load = max(self._largest, self._load) if math.isfinite(self._load) else math.nan
+            place, self._place, self._largest = self._place, None, -math.inf
+            self._emit(Emission(stamp_ns, estimate, load, place))
 
     def reject(self, error: InvalidInput) -> None:
         """Report a rejected sample; its error becomes the doubt if no sample follows for long."""

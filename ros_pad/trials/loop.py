@@ -20,9 +20,9 @@ from ros_pad.control import policy_named
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
-from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import TICK_PERIOD_NS
@@ -80,13 +80,13 @@ class LegStages:
         self.channel = channel
         self.decision = DecisionStage(controller, leg)
         self.estimation = EstimationStage(
-            estimator, period_ns, self._take_estimate, self.decision.doubt, _ignore
+            estimator, period_ns, self._take, self.decision.doubt, _ignore
         )
         self.pressure = 0.0
-        self._wetness: float | None = None  # P(wet) of the estimate that waits for a decision
+        self._emission: Emission | None = None  # waits for a decision
 
-    def _take_estimate(self, stamp_ns: int, estimate: Estimate) -> None:
-        self._wetness = estimate.wet_probability
+    def _take(self, emission: Emission) -> None:
+        self._emission = emission
 
     def tick(self, now_ns: int) -> None:
         """Detect missing inputs; the loop calls this every ``pace.TICK_PERIOD_NS``."""
@@ -98,8 +98,6 @@ class LegStages:
         force, position = reading
         self.estimation.wrench(stamp_ns, force, moment)
         self.estimation.position(stamp_ns, position)
-        self.decision.load(force[2])
-        self.decision.position(position)
 
     def report(self, now_ns: int) -> None:
         """Read the pressure from the regulator, and pass it to estimation and decision."""
@@ -111,10 +109,10 @@ class LegStages:
 
     def decide(self, now_ns: int) -> None:
         """Pass a new estimate to the decision, and its set-point to the regulator."""
-        if self._wetness is None:
+        if self._emission is None:
             return
-        setpoint = self.decision.estimate(now_ns * 1e-9, self._wetness).setpoint
-        self._wetness = None
+        setpoint = self.decision.take(now_ns * 1e-9, self._emission).setpoint
+        self._emission = None
         if setpoint is not None:
             self.channel.command(setpoint, 0.0, now_ns)
 

@@ -22,8 +22,8 @@ from ros_pad.control.stage import Decision
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
+from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
@@ -112,7 +112,6 @@ class ReplayedLeg:
         force = message.wrench.force
         if stamp_ns >= self.first_stamp_ns:
             self.estimation.wrench(stamp_ns, (force.x, force.y, force.z), message.wrench.torque.z)
-        self.decision.load(force.z)
         self._follow_stance(log_ns)
 
     def position(self, message: Any, log_ns: int) -> None:
@@ -121,7 +120,6 @@ class ReplayedLeg:
         point = message.point
         if stamp_ns >= self.first_stamp_ns:
             self.estimation.position(stamp_ns, (point.x, point.y, point.z))
-        self.decision.position((point.x, point.y))
         self._follow_stance(log_ns)
 
     def pressure(self, message: Any, log_ns: int) -> None:
@@ -145,28 +143,28 @@ class ReplayedLeg:
             self._standing = standing
             (self.landings if standing else self.lift_offs).append(log_ns)
 
-    def _take_estimate(self, stamp_ns: int, estimate: Estimate) -> None:
+    def _take_estimate(self, emission: Emission) -> None:
         output, log_ns = self._output, self._player.log_ns
+        stamp_ns, estimate = emission.stamp_ns, emission.estimate
         variance = estimate.slip_speed_sd**2
         output['slip'].add(log_ns, (*estimate.slip_velocity, variance, variance), stamp_ns)
         output['slipping'].add(log_ns, (estimate.slipping,), stamp_ns)
         output['friction'].add(log_ns, (estimate.friction_mean,), stamp_ns)
         output['friction_margin'].add(log_ns, (estimate.margin,), stamp_ns)
-        wet = estimate.wet_probability
-        output['wetness'].add(log_ns, (wet,), stamp_ns)
-        self._player.later.append(partial(self._decide, log_ns, stamp_ns, wet))
+        output['wetness'].add(log_ns, (estimate.wet_probability,), stamp_ns)
+        self._player.later.append(partial(self._decide, log_ns, emission))
 
     def _take_doubt(self, doubt: str) -> None:
         self._output['doubt'].add_text(self._player.log_ns, doubt)
         self._player.later.append(partial(self.decision.doubt, doubt))
 
-    def _decide(self, log_ns: int, stamp_ns: int, wet: float) -> None:
+    def _decide(self, log_ns: int, emission: Emission) -> None:
         self._substitute_pressure()
-        decision = self.decision.estimate(self._player.now_ns * 1e-9, wet)
+        decision = self.decision.take(self._player.now_ns * 1e-9, emission)
         self._take_morphology(decision, log_ns)
         if decision.setpoint is not None:
             setpoint = decision.setpoint + self._ambient
-            self._output['pressure_setpoint'].add(log_ns, (setpoint,), stamp_ns)
+            self._output['pressure_setpoint'].add(log_ns, (setpoint,), emission.stamp_ns)
 
     def _substitute_pressure(self) -> None:
         """Replace the pressure by the set-point while the set-point differs from the recorded one.
