@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 from typing import TypeAlias
 
 from ros_pad.errors import InvalidInput
@@ -52,3 +53,54 @@ class Pace:
             return False
         self._last = index
         return True
+
+
+class Rate(NamedTuple):
+    """Wanted and reached samples a second, Hz, and speed, times real time."""
+
+    wanted: float
+    reached: float
+    speed: float
+
+
+class RealTime:
+    """Follow a clock in periods, and measure how well that is kept up with.
+
+    Parameters
+    ----------
+    period_ns : int
+        Period of the samples, ns.
+    now_ns : int
+        Present time, ns.
+    """
+
+    LONGEST_NS = 100_000_000
+    """Longest time to catch up with at once, ns; more is lost, so that the clock falls behind."""
+
+    def __init__(self, period_ns: int, now_ns: int) -> None:
+        self._period = period_ns
+        self._next_ns = now_ns + period_ns
+        self._since_ns = now_ns
+        self._passed = self._reached = 0
+
+    def due(self, now_ns: int) -> int:
+        """Return how many periods to advance at a time, ns: more than 1 when samples are late."""
+        due = (now_ns - self._next_ns) // self._period + 1
+        if due <= 0:
+            return 0
+        self._next_ns += due * self._period
+        due = min(due, max(1, self.LONGEST_NS // self._period))
+        self._passed += due
+        self._reached += 1
+        return due
+
+    def rate(self, now_ns: int) -> Rate:
+        """Return the rate since the last call, or since the start, at a time, ns."""
+        elapsed = max(1, now_ns - self._since_ns) * 1e-9
+        rate = Rate(
+            1e9 / self._period,
+            self._reached / elapsed,
+            self._passed * self._period * 1e-9 / elapsed,
+        )
+        self._since_ns, self._passed, self._reached = now_ns, 0, 0
+        return rate

@@ -4,7 +4,7 @@
 The simulator takes its next step only when estimator, controller and regulator have processed the
 last one. rclpy's EventsExecutor is used: it delivers messages in the order in which they were
 published, several times faster than other executors. It is safe only because all nodes publish
-from one thread.
+from one thread. The bag is recorded at the publishers.
 """
 
 from __future__ import annotations
@@ -28,12 +28,14 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from ros_pad.bags import annotate
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation.tuning import attribute
+from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
@@ -109,6 +111,7 @@ class ComposedTrial:
         self.stopped = False
         self._context = context
         self.executor = EventsExecutor(context=context)
+        self._done: Callable[[], bool] | None = None  # what _spin waits for
         self._nodes: list[Node] = []
         self._pace = Pace(CONTROL_PERIOD_NS)
         try:
@@ -118,7 +121,7 @@ class ComposedTrial:
             # The executor adds nodes only while it spins; messages that were published before
             # that would arrive in another order.
             self.executor.spin_once(timeout_sec=0.01)
-            self._spin(self._connected, 'the nodes to discover one another on DDS')
+            self._discover()
         except BaseException:
             self.close()
             raise
@@ -152,11 +155,12 @@ class ComposedTrial:
         tuning = tuning_for(scene)
 
         self.recorder = self._add(
-            partial(RecorderNode, label(scene, policy, seed, fidelity)),
+            partial(RecorderNode, label(scene, policy, seed, fidelity), False),
             use_sim_time=True,
             legs=legs,
             folder=os.fspath(bag),
         )
+        topics.hook(self._context, topics.Hooks(self.recorder.record, self._on_received))
         # The node gets the options of the scene, not its name, because the scene in memory may
         # differ from its file.
         options = {
@@ -189,6 +193,15 @@ class ComposedTrial:
             **ground,
         )
 
+    def _discover(self) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not self._connected():
+            self.executor.spin_once(timeout_sec=0.01)
+            if time.monotonic() > deadline:
+                raise PadError(
+                    f'waited more than {PATIENCE:g} s for the nodes to discover one another on DDS'
+                )
+
     def _connected(self) -> bool:
         """Return whether every publisher and subscription here has found its counterparts."""
         publishers = [publisher for node in self._nodes for publisher in node.publishers]
@@ -217,11 +230,11 @@ class ComposedTrial:
         legs = len(self.scene.legs)
         samples = now_ns // self.simulator.period_ns * legs
         control = self._pace.due(now_ns)
-        controller, estimator = self.controller, self.estimator
+        estimator = self.estimator
 
         def settled() -> bool:
             # The cheapest condition comes first, because it is evaluated after every message.
-            if controller.wrenches < samples or estimator.samples < samples:
+            if estimator.samples < samples:
                 return False
             return not control or (
                 self.regulator.answered == answered + legs and self._reported(now_ns)
@@ -244,11 +257,19 @@ class ComposedTrial:
         )
 
     def _spin(self, done: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not done():
-            self.executor.spin_once(timeout_sec=0.1)
-            if time.monotonic() > deadline:
-                raise PadError(f'waited more than {PATIENCE:g} s of wall time for {what}')
+        """Run the nodes until a condition is true, which messages make true."""
+        if done():
+            return
+        self._done, self._future = done, Future()
+        self.executor.spin_until_future_complete(self._future, timeout_sec=PATIENCE)
+        self._done = None
+        if not self._future.done():
+            raise PadError(f'waited more than {PATIENCE:g} s of wall time for {what}')
+
+    def _on_received(self) -> None:
+        if self._done and self._done():
+            self._done = None
+            self._future.set_result(None)
 
     def walk(self, progress: Progress | None = None) -> None:
         """Walk the scene to its end, to a verdict or until ``stopped`` is set; then vent the pads.
@@ -296,16 +317,10 @@ class ComposedTrial:
             )
 
     def close(self) -> None:
-        """Wait until the recorder has written everything, and close bag and nodes."""
-        recorder = getattr(self, 'recorder', None)
+        """Close bag and nodes."""
         try:
-            if recorder is not None:
-                count = -1
-                while recorder.message_count > count:
-                    count = recorder.message_count
-                    for _ in range(200):
-                        self.executor.spin_once(timeout_sec=0.001)
-                recorder.close()
+            if hasattr(self, 'recorder'):
+                self.recorder.close()
         finally:  # open nodes would continue to publish
             for node in self._nodes:
                 self.executor.remove_node(node)

@@ -22,12 +22,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
-from rclpy.time import Time
-from sensor_msgs.msg import FluidPressure
-from std_msgs.msg import Float64
 from std_msgs.msg import String
 
-from ros_pad.bags import codec
+from ros_pad.bags.topics import STAMP
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
@@ -53,8 +50,10 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
+from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.simulation.scene import Scene
@@ -115,50 +114,41 @@ class _LegTopics:
 
     def __init__(self, node: ControllerNode, leg: int) -> None:
         self._node, self.leg = node, leg
-        # Wrenches and positions come at the rate of the sensors: only the values that decisions
-        # use are decoded.
-        self.stage = DecisionStage(node.controller, leg, self._warn, codec.horizontal_position)
-        self._setpoints = topics.PRESSURE_SETPOINT.publisher(node, leg)
-        self._morphologies = topics.MORPHOLOGY.publisher(node, leg)
-        self._message = FluidPressure()
-        self._message.header.frame_id = f'leg_{leg}_pad'
-        topics.WRENCH.subscription(node, self._on_wrench, leg, raw=True)
-        topics.POSITION.subscription(node, self.stage.position, leg, raw=True)
-        topics.PRESSURE.subscription(node, self._on_pressure, leg)
-        topics.DOUBT.subscription(node, self._on_doubt, leg)
-        topics.WETNESS.subscription(node, self._on_wetness, leg)
+        self.stage = DecisionStage(node.controller, leg, self._warn)
+        self._setpoint = topics.PRESSURE_SETPOINT.sender(node, (*STAMP, 'fluid_pressure'), leg)
+        self._morphologies = topics.MORPHOLOGY.output(node, leg)
+        inputs: tuple[tuple[topics.Topic, Callable[..., None], tuple[str, ...]], ...] = (
+            (topics.CONTACT_LOAD, self.stage.load, ('data',)),
+            (topics.CONTACT_POSITION, self.stage.position, ('point.x', 'point.y')),
+            (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
+            (topics.DOUBT, self.stage.doubt, ('data',)),
+            (topics.WETNESS, self._on_wetness, ('data',)),
+        )
+        for topic, callback, paths in inputs:
+            topic.receive(node, callback, paths, node.refusals, leg)
 
-    def _on_wrench(self, data: bytes) -> None:
-        self.stage.load(codec.normal_force(data))
-        self._node.wrenches += 1
+    def _on_pressure(self, pressure: float) -> None:
+        self.stage.pressure(pressure - self._node.ambient)
 
-    def _on_pressure(self, message: FluidPressure) -> None:
-        self.stage.pressure(message.fluid_pressure - self._node.ambient)
-
-    def _on_doubt(self, message: String) -> None:
-        self.stage.doubt(message.data)
-
-    def _on_wetness(self, message: Float64) -> None:
-        stamp = self._node.get_clock().now()
-        decision = self.stage.estimate(stamp.nanoseconds * 1e-9, message.data)
+    def _on_wetness(self, wet_probability: float) -> None:
+        now_ns = self._node.get_clock().now().nanoseconds
+        decision = self.stage.estimate(now_ns * 1e-9, wet_probability)
         refusal = self._node.controller.refusals.get(self.leg)
         if refusal:
             self._node.get_logger().warning(
                 f'leg {self.leg} stays flat: {refusal}', throttle_duration_sec=10.0
             )
-        self.publish(decision, stamp)
+        self.publish(decision, now_ns)
 
     def _warn(self, error: InvalidInput) -> None:
         self._node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
 
-    def publish(self, decision: Decision, stamp: Time) -> None:
+    def publish(self, decision: Decision, now_ns: int) -> None:
         """Publish the morphology if it has changed, and the set-point if there is one."""
         if decision.morphology is not None:
-            self._morphologies.publish(String(data=decision.morphology))
+            self._morphologies(String(data=decision.morphology))
         if decision.setpoint is not None:
-            self._message.header.stamp = stamp.to_msg()
-            self._message.fluid_pressure = decision.setpoint + self._node.ambient
-            self._setpoints.publish(self._message)
+            self._setpoint(*split(now_ns), decision.setpoint + self._node.ambient)
 
 
 class ControllerNode(Node):
@@ -174,8 +164,8 @@ class ControllerNode(Node):
         Controller of all legs.
     ambient : float
         Ambient pressure, absolute Pa.
-    wrenches : int
-        Number of wrenches received so far, of all legs.
+    refusals : Refusals
+        Counts of messages that could not be read.
 
     Raises
     ------
@@ -215,8 +205,8 @@ class ControllerNode(Node):
                 f'node {self.get_name()}: {error} (parameter dome_pressure)'
             ) from error
         self.ambient: float = values['ambient_pressure']
-        self.wrenches = 0
-        self._diagnostics = topics.DIAGNOSTICS.publisher(self)
+        self.refusals = Refusals(self)
+        self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._reported_faults: list[str] = []
         self._tick_pace = Pace(TICK_PERIOD_NS)
         self._diagnostics_pace = Pace(1_000_000_000)
@@ -232,7 +222,7 @@ class ControllerNode(Node):
         self._regulator = None
         with suppress(RuntimeError):
             self._regulator = self.create_client(GetParameters, f'{regulator}/get_parameters')
-        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick)
+        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick, self.refusals)
 
     def update_policy(self) -> None:
         """Decide with the present parameters from the next lift-off on."""
@@ -276,7 +266,7 @@ class ControllerNode(Node):
         for each in self._legs:
             decision = each.stage.tick(now_ns * 1e-9)
             if decision:
-                each.publish(decision, Time(nanoseconds=now_ns))
+                each.publish(decision, now_ns)
         faults = [self.controller.fault(each.leg) for each in self._legs]
         if self._diagnostics_pace.due(now_ns) or faults != self._reported_faults:
             self._reported_faults = faults
@@ -313,7 +303,8 @@ class ControllerNode(Node):
                 ),
             ]
             array.status.append(status)
-        self._diagnostics.publish(array)
+        array.status.extend(self.refusals.statuses())
+        self._diagnostics(array)
 
 
 def main(args: list[str] | None = None) -> int:

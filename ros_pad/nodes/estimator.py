@@ -13,22 +13,18 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import TwistWithCovarianceStamped
-from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
-from sensor_msgs.msg import FluidPressure
-from std_msgs.msg import Bool
-from std_msgs.msg import Float64
 from std_msgs.msg import String
 
+from ros_pad.bags.topics import FRAME
+from ros_pad.bags.topics import STAMP
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import SETTINGS
-from ros_pad.estimation import Estimate
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
+from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
@@ -40,9 +36,10 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 
@@ -58,12 +55,17 @@ PARAMETERS = (
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
 
+_FORCE = tuple(f'wrench.force.{axis}' for axis in 'xyz')
+_POINT = ('point.x', 'point.y', 'point.z')
+_SLIP = (*STAMP, *topics.SLIP.schema.values)
+
+
 class _LegTopics:
     """Connect the topics of one leg to its estimation stage."""
 
     def __init__(
         self,
-        node: Node,
+        node: EstimatorNode,
         leg: int,
         estimator: FootEstimator,
         period_ns: int,
@@ -75,17 +77,20 @@ class _LegTopics:
         self._node = node
         self._leg = leg
         self._ambient = ambient
-        self._slip = topics.SLIP.publisher(node, leg)
-        self._slipping = topics.SLIPPING.publisher(node, leg)
-        self._friction = topics.FRICTION.publisher(node, leg)
-        self._margin = topics.FRICTION_MARGIN.publisher(node, leg)
-        self._wetness = topics.WETNESS.publisher(node, leg)
-        self._doubts = topics.DOUBT.publisher(node, leg)
-        self._slip_message = TwistWithCovarianceStamped()
-        self._slip_message.header.frame_id = 'world'
-        topics.PRESSURE.subscription(node, self._on_pressure, leg)
-        topics.WRENCH.subscription(node, self._on_wrench, leg)
-        topics.POSITION.subscription(node, self._on_position, leg)
+        self._slip = topics.SLIP.sender(node, _SLIP, leg)
+        self._slipping = topics.SLIPPING.sender(node, ('data',), leg)
+        self._friction = topics.FRICTION.sender(node, ('data',), leg)
+        self._margin = topics.FRICTION_MARGIN.sender(node, ('data',), leg)
+        self._load = topics.CONTACT_LOAD.sender(node, ('data',), leg)
+        self._position = topics.CONTACT_POSITION.sender(node, (*STAMP, *_POINT[:2]), leg)
+        self._wetness = topics.WETNESS.sender(node, ('data',), leg)
+        self._doubts = topics.DOUBT.output(node, leg)
+        for topic, callback, paths in (
+            (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
+            (topics.WRENCH, self._on_wrench, (*STAMP, *_FORCE, 'wrench.torque.z')),
+            (topics.POSITION, self._on_position, (*STAMP, *_POINT)),
+        ):
+            topic.receive(node, callback, (FRAME, *paths), node.refusals, leg)
 
     def _is_ours(self, frame: str) -> bool:
         """Return whether a frame is allowed for this leg; otherwise reject the sample."""
@@ -96,25 +101,21 @@ class _LegTopics:
             return False
         return True
 
-    def _on_pressure(self, message: FluidPressure) -> None:
-        if self._is_ours(message.header.frame_id):
-            self.stage.pressure(message.fluid_pressure - self._ambient)
+    def _on_pressure(self, frame: str, pressure: float) -> None:
+        if self._is_ours(frame):
+            self.stage.pressure(pressure - self._ambient)
 
-    def _on_wrench(self, message: WrenchStamped) -> None:
-        if not self._is_ours(message.header.frame_id):
-            return
-        force = message.wrench.force
-        self.stage.wrench(
-            nanoseconds(message.header.stamp),
-            (force.x, force.y, force.z),
-            message.wrench.torque.z,
-        )
+    def _on_wrench(
+        self, frame: str, sec: int, nanosec: int, x: float, y: float, z: float, moment: float
+    ) -> None:
+        if self._is_ours(frame):
+            self.stage.wrench(sec * 1_000_000_000 + nanosec, (x, y, z), moment)
 
-    def _on_position(self, message: PointStamped) -> None:
-        if not self._is_ours(message.header.frame_id):
-            return
-        point = message.point
-        self.stage.position(nanoseconds(message.header.stamp), (point.x, point.y, point.z))
+    def _on_position(
+        self, frame: str, sec: int, nanosec: int, x: float, y: float, z: float
+    ) -> None:
+        if self._is_ours(frame):
+            self.stage.position(sec * 1_000_000_000 + nanosec, (x, y, z))
 
     def _warn(self, error: InvalidInput) -> None:
         self._node.get_logger().warning(
@@ -122,7 +123,7 @@ class _LegTopics:
         )
 
     def _publish_doubt(self, doubt: str) -> None:
-        self._doubts.publish(String(data=doubt))
+        self._doubts(String(data=doubt))
 
     def status(self) -> DiagnosticStatus:
         """Return the health of the sensors and the estimate, for ``/diagnostics``."""
@@ -141,18 +142,18 @@ class _LegTopics:
             ],
         )
 
-    def _publish(self, stamp_ns: int, estimate: Estimate) -> None:
-        slip = self._slip_message
-        set_stamp(slip.header.stamp, stamp_ns)
-        slip.twist.twist.linear.x, slip.twist.twist.linear.y = estimate.slip_velocity
+    def _publish(self, emission: Emission) -> None:
+        estimate, stamp = emission.estimate, split(emission.stamp_ns)
         variance = estimate.slip_speed_sd**2
-        slip.twist.covariance[0] = slip.twist.covariance[7] = variance
-        self._slip.publish(slip)
-        self._slipping.publish(Bool(data=estimate.slipping))
-        self._friction.publish(Float64(data=estimate.friction_mean))
-        self._margin.publish(Float64(data=estimate.margin))
+        self._slip(*stamp, *estimate.slip_velocity, variance, variance)
+        self._slipping(estimate.slipping)
+        self._friction(estimate.friction_mean)
+        self._margin(estimate.margin)
+        self._load(emission.load)
+        if emission.position is not None:
+            self._position(*stamp, *emission.position)
         # Published last, because it triggers the controller.
-        self._wetness.publish(Float64(data=estimate.wet_probability))
+        self._wetness(estimate.wet_probability)
 
 
 class EstimatorNode(Node):
@@ -162,6 +163,8 @@ class EstimatorNode(Node):
     ----------
     legs : dict
         For each leg, its topics and its estimation stage.
+    refusals : Refusals
+        Counts of messages that could not be read.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -171,6 +174,7 @@ class EstimatorNode(Node):
         values = declare(self, PARAMETERS)
         foot: Foot = values['foot']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
+        self.refusals = Refusals(self)
         self.legs = {
             leg: _LegTopics(
                 self,
@@ -181,11 +185,11 @@ class EstimatorNode(Node):
             )
             for leg in values['legs']
         }
-        self._diagnostics = topics.DIAGNOSTICS.publisher(self)
+        self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
         self._health_pace = Pace(TICK_PERIOD_NS)
-        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick)
+        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick, self.refusals)
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):
@@ -196,8 +200,9 @@ class EstimatorNode(Node):
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
+            array.status.extend(self.refusals.statuses())
             set_stamp(array.header.stamp, now_ns)
-            self._diagnostics.publish(array)
+            self._diagnostics(array)
 
     @property
     def samples(self) -> int:

@@ -29,8 +29,9 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from ros_pad.bags import BagWriter
-from ros_pad.bags.codec import clock_time
+from ros_pad.bags.fields import FieldReader
 from ros_pad.bags.writer import FLUSH_PERIOD
+from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
@@ -73,6 +74,8 @@ class RecorderNode(Node):
     Their log time is the node's clock: with ``use_sim_time`` the time in the last ``/clock``
     message, and 0 before the first one.
 
+    Composed nodes are recorded at the publisher: they pass their messages to :meth:`record`.
+
     Messages reach the disk within about a second. The middleware counts messages that were lost
     before they arrived; the node logs these counts, and writes them into the bag under
     `ros_pad.trials.label.LOST`.
@@ -85,6 +88,8 @@ class RecorderNode(Node):
         Texts about the trial, for the bag. Without it, the bag has the versions of ros_pad and its
         libraries, the parameters of all nodes in the namespace of this one, requested as the
         nodes appear, and later changes of these parameters.
+    subscribes : bool
+        Whether the node subscribes to the topics; False where others call :meth:`record`.
     **kwargs
         Passed on to `rclpy.node.Node`.
 
@@ -97,7 +102,12 @@ class RecorderNode(Node):
         When the value of a parameter is not allowed.
     """
 
-    def __init__(self, custom_data: Mapping[str, str] | None = None, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        custom_data: Mapping[str, str] | None = None,
+        subscribes: bool = True,
+        **kwargs: Any,
+    ) -> None:
         super().__init__('recorder', **kwargs)
         try:
             values = declare(self, PARAMETERS)
@@ -107,21 +117,25 @@ class RecorderNode(Node):
             # Called for every message; replaced when the first /clock message arrives.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
             self._clock_ns = 0
-            self._bag = BagWriter(
-                folder, custom_data or {label.MADE_WITH: json.dumps(label.made_with())}
-            )
+            about = dict(custom_data or {label.MADE_WITH: json.dumps(label.made_with())})
+            about[label.RECORDED_AT] = 'receiver' if subscribes else 'publisher'
+            self._bag = BagWriter(folder, about)
         except BaseException:
             super().destroy_node()
             raise
         self._recordings: dict[str, Subscription] = {}
         self._lost: Counter[str] = Counter()
         self._failed = False  # whether writing has failed
+        self._writers: dict[str, Callable[[bytes], None]] = {}
         # The subscription to /clock is made first: an executor that finds several messages
         # waiting takes them in the order of their subscriptions.
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
-            self._record(full_name, topic, qos.recording([topic.publish]))
+            writer = self._clock_writer if topic is topics.CLOCK else self._writer
+            self._writers[full_name] = writer(full_name)
+            if subscribes:
+                self._record(full_name, topic, qos.recording([topic.publish]))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
@@ -143,6 +157,18 @@ class RecorderNode(Node):
     def lost(self) -> dict[str, int]:
         """Number of messages that were lost before they arrived, by topic, where there are any."""
         return dict(self._lost)
+
+    def record(self, name: str, data: bytes) -> None:
+        """Write a message, as bytes, on the topic with this full name.
+
+        Raises
+        ------
+        BagError
+            When the disk is full; later messages are ignored.
+        KeyError
+            When the topic is not recorded.
+        """
+        self._writers[name](data)
 
     def describe(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data about the trial to the bag."""
@@ -185,7 +211,7 @@ class RecorderNode(Node):
         self._recordings[name] = self.create_subscription(
             topic.message,
             name,
-            self._clock_writer(name) if topic is topics.CLOCK else self._writer(name),
+            self._writers[name],
             profile,
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=adapt, message_lost=self._loss_counter(name)
@@ -327,14 +353,16 @@ class RecorderNode(Node):
 
     def _clock_writer(self, name: str) -> Callable[[bytes], None]:
         write = self._writer(name)
+        read = FieldReader(topics.CLOCK.message_type, topics.CLOCK.schema.values)
 
         def callback(data: bytes) -> None:
-            now_ns = clock_time(data)
-            # A bag cannot have times before 0.
-            if now_ns is not None and now_ns >= 0:
-                self._clock_ns = now_ns
-                if self._simulated:
-                    self._now = self._simulated_time
+            with suppress(BadMessage):
+                seconds, fraction = read(data)
+                # A bag cannot have times before 0.
+                if seconds >= 0:
+                    self._clock_ns = seconds * 1_000_000_000 + fraction
+                    if self._simulated:
+                        self._now = self._simulated_time
             write(data)
 
         return callback

@@ -19,9 +19,10 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
-from sensor_msgs.msg import FluidPressure
 from std_srvs.srv import Trigger
 
+from ros_pad.bags.topics import FRAME
+from ros_pad.bags.topics import STAMP
 from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT
@@ -37,9 +38,10 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
 from ros_pad.pace import Pace
 from ros_pad.regulators import BACKENDS
 from ros_pad.regulators import create
@@ -110,6 +112,8 @@ class RegulatorNode(LifecycleNode):
         The :class:`SupervisedChannel` of each leg; empty while the devices are closed.
     tick_ns : int
         Time of the last tick, ns, on the clock of the stamps.
+    refusals : Refusals
+        Counts of messages that could not be read.
 
     Raises
     ------
@@ -139,19 +143,22 @@ class RegulatorNode(LifecycleNode):
         self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why the last configuration failed
-        self._message = FluidPressure()
-        self._diagnostics = topics.DIAGNOSTICS.publisher(self)
-        self._pressure_publishers = {
-            leg: topics.PRESSURE.publisher(self, leg) for leg in self._values['legs']
+        self.refusals = Refusals(self)
+        self._diagnostics = topics.DIAGNOSTICS.output(self)
+        paths = (*STAMP, 'fluid_pressure')
+        self._pressures = {
+            leg: topics.PRESSURE.sender(self, paths, leg) for leg in self._values['legs']
         }
         for leg in self._values['legs']:
-            topics.PRESSURE_SETPOINT.subscription(
-                self, partial(self._on_setpoint, leg), leg,
+            topics.PRESSURE_SETPOINT.receive(
+                self, partial(self._on_setpoint, leg), (FRAME, *paths), self.refusals, leg,
                 on_mismatch=partial(self._mismatches.__setitem__, leg),
             )  # fmt: skip
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
-        on_tick(self, min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick)
+        on_tick(
+            self, min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick, self.refusals
+        )
         if self._starting:
             self.trigger_configure()
             if self._problem:
@@ -325,7 +332,7 @@ class RegulatorNode(LifecycleNode):
             )
         return response
 
-    def _on_setpoint(self, leg: int, message: FluidPressure) -> None:
+    def _on_setpoint(self, leg: int, frame: str, sec: int, nanosec: int, pressure: float) -> None:
         channel = self.channels.get(leg)
         if channel is None or not channel.active:
             return
@@ -335,13 +342,13 @@ class RegulatorNode(LifecycleNode):
         for each in self.channels.values():
             each.expire(elapsed_ns)
         try:
-            check_frame(message.header.frame_id, leg)
+            check_frame(frame, leg)
         except PadError as error:
             channel.refuse(error)
             return
         # Adding and subtracting the ambient pressure leaves rounding errors below 1 uPa.
-        gauge = round(message.fluid_pressure - self._ambient, 6)
-        age = (now_ns - nanoseconds(message.header.stamp)) * 1e-9
+        gauge = round(pressure - self._ambient, 6)
+        age = (now_ns - sec * 1_000_000_000 - nanosec) * 1e-9
         if channel.command(gauge, age, elapsed_ns):
             self._mismatches.pop(leg, None)
 
@@ -366,11 +373,7 @@ class RegulatorNode(LifecycleNode):
     def _publish(self, channel: SupervisedChannel, now_ns: int) -> None:
         pressure = channel.read(self._elapsed_ns)
         if pressure is not None:
-            message = self._message
-            set_stamp(message.header.stamp, now_ns)
-            message.header.frame_id = f'leg_{channel.leg}_pad'
-            message.fluid_pressure = pressure + self._ambient
-            self._pressure_publishers[channel.leg].publish(message)
+            self._pressures[channel.leg](*split(now_ns), pressure + self._ambient)
 
     def _diagnose(self, now_ns: int) -> None:
         """Publish the health of the pads once a second, and at once when a problem changes."""
@@ -392,7 +395,8 @@ class RegulatorNode(LifecycleNode):
             array.status.append(status)
         if channels:
             array.status.append(self._status('supply', 'supply', supply))
-        self._diagnostics.publish(array)
+        array.status.extend(self.refusals.statuses())
+        self._diagnostics(array)
 
     def _health(self, channel: SupervisedChannel) -> Health:
         """Return the health of a channel; without set-points it names a mismatch of QoS."""

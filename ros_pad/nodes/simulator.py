@@ -5,20 +5,18 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from dataclasses import replace
 from typing import Any
 
-from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import PoseStamped
-from geometry_msgs.msg import WrenchStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import FluidPressure
-from sensor_msgs.msg import JointState
 
+from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
@@ -29,9 +27,11 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import nanoseconds
+from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
 from ros_pad.pace import Pace
+from ros_pad.pace import RealTime
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import Sensors
@@ -75,7 +75,8 @@ class SimulatorNode(Node):
 
     These are the wrench and position of each foot, the pose of the body, and joint positions if
     the robot has joints. Parameters are in :data:`PARAMETERS`. Pads are flat until their pressure
-    is received.
+    is received. In real time, ``/diagnostics`` tells once a second the wanted and the reached
+    rate: where the computer is too slow, samples are left out, and at last time itself.
 
     Attributes
     ----------
@@ -91,6 +92,8 @@ class SimulatorNode(Node):
         Last pressure of each pad, gauge Pa, in the order of ``scene.legs``.
     pressure_stamps : list of int
         Stamps of these pressures, ns; 0 before the first one.
+    refusals : Refusals
+        Counts of messages that could not be read.
 
     Raises
     ------
@@ -121,42 +124,58 @@ class SimulatorNode(Node):
         self.time_ns = 0
         self.pressures = [0.0] * len(self.scene.legs)
         self.pressure_stamps = [0] * len(self.scene.legs)
+        self.refusals = Refusals(self)
         for index, leg in enumerate(self.scene.legs):
-            topics.PRESSURE.subscription(self, self._pressure_callback(index), leg)
+            topics.PRESSURE.receive(
+                self,
+                self._pressure_callback(index),
+                (*STAMP, 'fluid_pressure'),
+                self.refusals,
+                leg,
+            )
         rate = values['markers_rate']
         self._markers = WalkMarkers(self.scene, self.floor) if rate else None
         self._markers_pace = Pace(round(1e9 / rate)) if rate else None
         self._simulated = values['publish_clock']
         self._advertise()
         # Without a timer, the caller of step() reports fidelity level and verdict.
-        self._alone = values['free_running']
         self._ended = False
-        if self._alone:
+        if values['free_running']:
             choice = fidelity.choose(self.scene, values['fidelity'])
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
+            self._diagnostics = topics.DIAGNOSTICS.output(self)
+            self._diagnostics_pace = Pace(1_000_000_000)
+            self._real_time = RealTime(self.period_ns, time.monotonic_ns())
             # The timer cannot follow the clock that this node publishes.
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(self.period_ns * 1e-9, self.step, clock=steady)
+            self.create_timer(self.period_ns * 1e-9, self._on_timer, clock=steady)
 
     def _advertise(self) -> None:
-        """Create the publishers and their messages, which are reused to save time."""
-        self._marker_publisher = topics.MARKERS.publisher(self) if self._markers else None
-        self._clock_publisher = topics.CLOCK.publisher(self) if self._simulated else None
-        self._pose = topics.BODY_POSE.publisher(self)
-        self._joints = topics.JOINT_STATES.publisher(self) if self.robot.joint_names else None
-        self._wrenches = [topics.WRENCH.publisher(self, leg) for leg in self.scene.legs]
-        self._positions = [topics.POSITION.publisher(self, leg) for leg in self.scene.legs]
-        self._clock_message = Clock()
-        self._pose_message = PoseStamped()
-        self._pose_message.header.frame_id = 'world'
-        self._wrench_message = WrenchStamped()
-        self._position_message = PointStamped()
-        self._position_message.header.frame_id = 'world'
-        self._joint_message = JointState(name=self.robot.joint_names)
+        """Create the publishers."""
+        legs, joints = self.scene.legs, self.robot.joint_names
+        self._marker_output = topics.MARKERS.output(self) if self._markers else None
+        clock = topics.CLOCK.sender(self, topics.CLOCK.schema.values) if self._simulated else None
+        self._clock_output = clock
+        self._pose = topics.BODY_POSE.sender(
+            self,
+            (
+                *(*STAMP, 'pose.position.x', 'pose.position.y'),
+                *('pose.orientation.z', 'pose.orientation.w'),
+            ),
+        )
+        self._joints = None
+        if joints:
+            paths = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
+            still = {'name': joints, 'position': [0.0] * len(joints)}
+            self._joints = topics.JOINT_STATES.sender(self, paths, constants=still)
+        forces = (*(f'wrench.force.{axis}' for axis in 'xyz'), 'wrench.torque.z')
+        self._wrenches = [topics.WRENCH.sender(self, (*STAMP, *forces), leg) for leg in legs]
+        points = (*STAMP, *topics.POSITION.schema.values)
+        self._positions = [topics.POSITION.sender(self, points, leg) for leg in legs]
 
     def _pressure_callback(self, index: int) -> Any:
-        def callback(message: FluidPressure) -> None:
-            gauge = message.fluid_pressure - self._ambient
+        def callback(sec: int, nanosec: int, pressure: float) -> None:
+            gauge = pressure - self._ambient
             if not math.isfinite(gauge):
                 return
             if gauge > HIGHEST:
@@ -168,61 +187,75 @@ class SimulatorNode(Node):
                 return
             # A sensor at rest may read slightly below ambient; the pad is flat then.
             self.pressures[index] = max(0.0, gauge)
-            self.pressure_stamps[index] = nanoseconds(message.header.stamp)
+            self.pressure_stamps[index] = sec * 1_000_000_000 + nanosec
 
         return callback
 
-    def step(self) -> None:
-        """Advance the robot by one sample and publish the readings of its sensors."""
-        self.robot.step(self.pressures)
-        self.tick()
-        if self._alone and self.robot.verdict and not self._ended:
+    def _on_timer(self) -> None:
+        now_ns = time.monotonic_ns()
+        due = self._real_time.due(now_ns)
+        if due:
+            self.step(due)
+        if self.robot.verdict and not self._ended:
             self._ended = True
             self.get_logger().error(
                 f'the walk is not valid after {self.robot.time:.3f} s: {self.robot.verdict}'
             )
-        stamp_ns = self.time_ns if self._simulated else self.get_clock().now().nanoseconds
-        stamp = self._publish_feet(stamp_ns)
-        pose = self._pose_message
-        pose.header.stamp = stamp
-        pose.pose.position.x, pose.pose.position.y, heading = self.robot.body
-        pose.pose.orientation.z = math.sin(0.5 * heading)
-        pose.pose.orientation.w = math.cos(0.5 * heading)
-        self._pose.publish(pose)
-        if self._joints is not None:
-            self._joint_message.header.stamp = stamp
-            self._joint_message.position = self.robot.joint_positions
-            self._joints.publish(self._joint_message)
-        self._publish_markers(stamp_ns)
+        if self._diagnostics_pace.due(now_ns):
+            self._diagnose(now_ns)
 
-    def _publish_feet(self, stamp_ns: int) -> Time:
-        readings = self._sensors.read(self.robot)
-        moments = self._sensors.read_moments(self.robot)
-        wrench, position = self._wrench_message, self._position_message
-        set_stamp(wrench.header.stamp, stamp_ns)
-        position.header.stamp = wrench.header.stamp
-        force, point = wrench.wrench.force, position.point
-        for index, leg in enumerate(self.scene.legs):
-            (force.x, force.y, force.z), (point.x, point.y, point.z) = readings[index]
-            wrench.wrench.torque.z = moments[index] or 0.0
-            wrench.header.frame_id = f'leg_{leg}_sole'
-            self._wrenches[index].publish(wrench)
-            self._positions[index].publish(position)
-        stamp: Time = wrench.header.stamp
-        return stamp
+    def _diagnose(self, now_ns: int) -> None:
+        rate = self._real_time.rate(now_ns)
+        late = rate.reached < 0.95 * rate.wanted
+        text = f'{rate.reached:.0f} of {rate.wanted:.0f} samples a second'
+        if late:
+            text = f'too slow: {text}: choose a lower rate, L1, or a faster computer'
+            self.get_logger().warning(text, throttle_duration_sec=10.0)
+        status = DiagnosticStatus(
+            name=f'{self.get_name()}: rate',
+            level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
+            message=text,
+            values=[
+                KeyValue(key='wanted rate (Hz)', value=f'{rate.wanted:.1f}'),
+                KeyValue(key='reached rate (Hz)', value=f'{rate.reached:.1f}'),
+                KeyValue(key='speed (times real time)', value=f'{rate.speed:.3f}'),
+            ],
+        )
+        array = DiagnosticArray(status=[status, *self.refusals.statuses()])
+        set_stamp(array.header.stamp, self._stamp_ns())
+        self._diagnostics(array)
 
-    def _publish_markers(self, stamp_ns: int) -> None:
+    def _stamp_ns(self) -> int:
+        """Return the time for stamps, ns."""
+        return self.time_ns if self._simulated else self.get_clock().now().nanoseconds
+
+    def step(self, samples: int = 1) -> None:
+        """Advance the robot by some samples, and publish the readings of its sensors."""
+        for _ in range(samples):
+            self.robot.step(self.pressures)
+        self.tick(samples)
+        stamp_ns = self._stamp_ns()
+        stamp = split(stamp_ns)
+        for index, ((force, point), moment) in enumerate(
+            zip(
+                self._sensors.read(self.robot), self._sensors.read_moments(self.robot), strict=True
+            )
+        ):
+            self._wrenches[index](*stamp, *force, moment or 0.0)
+            self._positions[index](*stamp, *point)
+        x, y, heading = self.robot.body
+        self._pose(*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+        if self._joints:
+            self._joints(*stamp, *self.robot.joint_positions)
         if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
-            assert self._marker_publisher
-            message = self._markers.message(self.robot, self.pressures, stamp_ns)
-            self._marker_publisher.publish(message)
+            assert self._marker_output
+            self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))
 
-    def tick(self) -> None:
-        """Advance simulated time, but not the robot, by one sample; :meth:`step` calls this."""
-        self.time_ns += self.period_ns
-        if self._clock_publisher is not None:
-            set_stamp(self._clock_message.clock, self.time_ns)
-            self._clock_publisher.publish(self._clock_message)
+    def tick(self, samples: int = 1) -> None:
+        """Advance simulated time, but not the robot; :meth:`step` calls this."""
+        self.time_ns += samples * self.period_ns
+        if self._clock_output:
+            self._clock_output(*split(self.time_ns))
 
 
 def main(args: list[str] | None = None) -> int:

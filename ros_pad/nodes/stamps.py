@@ -10,7 +10,6 @@ from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
 
-from ros_pad.bags.codec import clock_time
 from ros_pad.nodes import topics
 
 
@@ -19,26 +18,32 @@ def nanoseconds(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
+def split(time_ns: int) -> tuple[int, int]:
+    """Return a time in ns as whole seconds and the nanoseconds after them."""
+    return divmod(time_ns, 1_000_000_000)
+
+
 def set_stamp(stamp: Time, time_ns: int) -> None:
     """Write a time in ns into a stamp."""
     stamp.sec, stamp.nanosec = divmod(time_ns, 1_000_000_000)
 
 
-def on_tick(node: Node, period: float, callback: Callable[[int], None]) -> None:
+def on_tick(
+    node: Node, period: float, callback: Callable[[int], None], refuse: topics.Refuse
+) -> None:
     """Call a function again and again with the node's time, ns.
 
     In simulated time it is called at each ``/clock`` message with the time in that message, so
     that a run can be repeated exactly. Otherwise a timer calls it every ``period`` seconds; the
-    timer uses the steady clock, which keeps running when the time of day is changed.
+    timer uses the steady clock, which keeps running when the time of day is changed. A ``/clock``
+    message that cannot be read goes to ``refuse``.
     """
     if node.get_parameter('use_sim_time').value:
 
-        def tick(data: bytes) -> None:
-            now_ns = clock_time(data)
-            if now_ns is not None:
-                callback(now_ns)
+        def tick(seconds: int, fraction: int) -> None:
+            callback(seconds * 1_000_000_000 + fraction)
 
-        topics.CLOCK.subscription(node, tick, raw=True)
+        topics.CLOCK.receive(node, tick, topics.CLOCK.schema.values, refuse)
     else:
         clock = node.get_clock()
         steady = NodeClock(clock_type=ClockType.STEADY_TIME)

@@ -39,6 +39,9 @@ CHANGES = 'ros_pad_parameter_changes'
 LOST = 'ros_pad_lost'
 """Key of the number of messages on each topic that were lost before the recorder received them."""
 
+RECORDED_AT = 'recorded_at'
+"""Key of where messages were recorded: ``publisher`` or ``receiver``."""
+
 AMBIENT_PRESSURE = Setting(
     'ambient_pressure', ATMOSPHERE, 'Absolute pressure of the air around the robot.',
     'Pa', 30000.0, 120000.0,
