@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Provoke a deadlock between rclpy's EventsExecutor and events of QoS; tell a hang by its stacks.
+
+In rmw_fastrtps without the correction of its pull request 890, the executor that takes an event
+(message lost, incompatible QoS, matched) locks first the event and then the reader, and the thread
+that receives messages locks first the reader and then the event. Every topic of ros_pad registers
+such callbacks.
+
+Three processes publish and subscribe on the same topics some hundred times a second, with offered
+and requested QoS that match in part only, and with callbacks for all these events. Nodes are
+added to each executor and removed again at random; two of the processes end and are started again
+at random. The messages come in bursts into queues of depth 1, so that some are lost.
+
+A process whose executor calls nothing for 20 s prints the Python stacks of its threads and ends.
+The exit status is 1 if that happened, or if a kind of event never came, so that nothing was
+tested; 0 otherwise. No message leaves the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import contextlib
+import faulthandler
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+import rclpy
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.experimental import EventsExecutor
+from rclpy.logging import LoggingSeverity
+from rclpy.logging import set_logger_level
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_msgs.msg import String
+
+from ros_pad.commands.progress import bar
+from ros_pad.nodes import qos
+from ros_pad.nodes.process import REACTION
+from ros_pad.signals import STOP
+from studies import command
+
+HANG = 20.0  # s without a call of the executor
+PATIENCE = 3.0 * HANG  # s for the orderly end of a process
+PERIOD = 0.01  # between two bursts of one node, s
+BURST = 3  # messages on each topic
+TOPICS = ('one', 'two', 'three')
+LIVES = (3600.0, 15.0, 6.0)  # mean lives of the processes, s
+KINDS = ('message', 'lost', 'incompatible', 'matched')
+_LOSSY = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+OFFERED = (_LOSSY, qos.SENSOR_PUBLISH, qos.COMMAND, qos.STATE)
+REQUESTED = (_LOSSY, _LOSSY, qos.SENSOR, qos.RECORD, qos.STATE)
+
+
+class Worker:
+    """Nodes on one executor, and the number of messages and events that it handed over."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self.counts: collections.Counter[str] = collections.Counter()
+        self._executor = EventsExecutor()
+        self._nodes: list[Node] = []
+        self._made = 0
+        self._alarm = 0.0
+
+    def _count(self, kind: str, _: object) -> None:
+        self.counts[kind] += 1
+        if time.monotonic() > self._alarm:
+            # A thread of its own, which needs no lock of Python, prints the stacks.
+            faulthandler.dump_traceback_later(HANG, exit=True)
+            self._alarm = time.monotonic() + 1.0
+
+    def _counter(self, kind: str):  # type: ignore[no-untyped-def]
+        return lambda event: self._count(kind, event)
+
+    def add(self) -> None:
+        """Add a node with a publisher and a subscription on each topic, of random QoS."""
+        self._made += 1
+        node = Node(
+            f'worker_{os.getpid()}_{self._made}',
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        publishers = []
+        for topic in TOPICS:
+            events = {
+                'incompatible_qos': self._counter('incompatible'),
+                'matched': self._counter('matched'),
+            }
+            publishers.append(
+                node.create_publisher(
+                    String,
+                    topic,
+                    self._random.choice(OFFERED),
+                    event_callbacks=PublisherEventCallbacks(**events),
+                )
+            )
+            node.create_subscription(
+                String,
+                topic,
+                self._counter('message'),
+                self._random.choice(REQUESTED),
+                event_callbacks=SubscriptionEventCallbacks(
+                    message_lost=self._counter('lost'), **events
+                ),
+            )
+        message = String(data='x' * self._random.choice((10, 1000, 30_000)))
+
+        def publish() -> None:
+            for publisher in publishers * BURST:
+                publisher.publish(message)
+            self._count('tick', None)
+
+        node.create_timer(PERIOD, publish)
+        self._executor.add_node(node)
+        self._nodes.append(node)
+
+    def remove(self) -> None:
+        """Remove and destroy a node."""
+        node = self._nodes.pop(self._random.randrange(len(self._nodes)))
+        self._executor.remove_node(node)
+        node.destroy_node()
+
+    def run(self) -> None:
+        """Spin until SIGTERM, and add and remove nodes."""
+        never = Future()
+        self.add()
+        self._count('tick', None)
+        while not STOP.requested:
+            self._executor.spin_until_future_complete(never, timeout_sec=REACTION)
+            if self._random.random() < 0.1:
+                self.add() if len(self._nodes) < 2 else self.remove()
+        while self._nodes:
+            self.remove()
+
+
+def _work(seed: int) -> None:
+    """Run a worker in this process until SIGTERM; print its counts as JSON."""
+    set_logger_level('', LoggingSeverity.FATAL)  # a warning for each mismatch
+    with STOP.during():
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        worker = Worker(seed)
+        worker.run()
+        rclpy.shutdown()
+        faulthandler.cancel_dump_traceback_later()
+        print(json.dumps(worker.counts))
+
+
+class Process:
+    """A worker in a process of its own, which is started again when it ends."""
+
+    def __init__(self, life: float, seed: int) -> None:
+        self._life = life
+        self._random = random.Random(seed)
+        self.counts: collections.Counter[str] = collections.Counter()
+        self.starts = 0
+        self.failures: list[str] = []
+        self._start()
+
+    def _start(self) -> None:
+        self.starts += 1
+        self._end = time.monotonic() + 3.0 + self._random.expovariate(1.0 / self._life)
+        seed = self._random.randrange(2**31)
+        self._child = subprocess.Popen(
+            [sys.executable, '-m', 'studies', 'deadlock', '--worker', str(seed)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=command.ROOT,
+        )
+
+    def tend(self) -> None:
+        """Start the process again if its life is over or it ended by itself."""
+        if self._child.poll() is not None or time.monotonic() > self._end:
+            self.close()
+            self._start()
+
+    def close(self) -> None:
+        """End the process, and add its counts."""
+        self._child.terminate()
+        try:
+            printed, errors = self._child.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._child.kill()
+            printed, errors = self._child.communicate()
+        with contextlib.suppress(json.JSONDecodeError):
+            self.counts.update(json.loads(printed))
+        if self._child.returncode:
+            self.failures.append(f'exit status {self._child.returncode}\n{errors}')
+
+
+def run(minutes: float, seed: int = 0, report: bool = True) -> list[Process]:
+    """Let the processes work for a time; return them, closed.
+
+    Parameters
+    ----------
+    minutes : float
+        Duration.
+    seed : int
+        Seed of all that is random but the order of threads.
+    report : bool
+        Whether to show progress on stderr.
+    """
+    processes = [Process(life, seed + place) for place, life in enumerate(LIVES)]
+    begin = time.monotonic()
+    try:
+        with bar('deadlock', minutes, 'min') if report else contextlib.nullcontext() as reach:
+            while (passed := (time.monotonic() - begin) / 60.0) < minutes:
+                time.sleep(0.5)
+                for each in processes:
+                    each.tend()
+                if reach:
+                    reach(passed)
+    finally:
+        for each in processes:
+            each.close()
+    return processes
+
+
+def table(processes: Sequence[Process]) -> str:
+    """Return the results as text."""
+    lines = [f'life (s)  starts  failures{"".join(f"{kind:>14}" for kind in KINDS)}']
+    for life, each in zip(LIVES, processes, strict=True):
+        counts = ''.join(f'{each.counts[kind]:14}' for kind in KINDS)
+        lines.append(f'{life:8.0f} {each.starts:7} {len(each.failures):9}{counts}')
+    return '\n'.join(lines)
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the study; return the exit status."""
+    parser = command.parser('deadlock', __doc__)
+    parser.add_argument('--minutes', type=float, default=30.0, help='duration (default: 30)')
+    parser.add_argument('--seed', type=int, default=0, help='default: 0')
+    parser.add_argument('--worker', type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args(words)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    if options.worker is not None:
+        _work(options.worker)
+        return 0
+    processes = run(options.minutes, options.seed)
+    rows = [vars(each)['counts'] | {'failures': each.failures} for each in processes]
+    command.show(options, rows, table(processes))
+    for each in processes:
+        for failure in each.failures:
+            print(failure, file=sys.stderr)
+    missing = [kind for kind in KINDS if not any(each.counts[kind] for each in processes)]
+    if missing:
+        print(f'never came: {", ".join(missing)}', file=sys.stderr)
+    return int(bool(missing) or any(each.failures for each in processes))
