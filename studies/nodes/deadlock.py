@@ -7,10 +7,11 @@ that receives messages locks first the reader and then the event. Every topic of
 a callback for incompatible QoS, and the recorder one for lost messages, too.
 
 Three processes publish and subscribe on the same topics some hundred times a second, with offered
-and requested QoS that match in part only, and with callbacks for these events. Nodes are added to
-each executor and removed again at random; two of the processes end and are started again at
-random. The messages come in bursts into queues of depth 1, so that some are lost. With --renew, a
-subscription with incompatible QoS is replaced in its callback, as the recorder does.
+and requested QoS that match in part only, and with callbacks for these events. Each process makes
+and destroys a second node at random, on an executor of its own: where the executor spins on,
+rclpy 7.1 crashes if events of a removed node wait. Two of the processes end and are started again
+at random. The messages come in bursts into queues of depth 1, so that some are lost. With --renew,
+a subscription with incompatible QoS is replaced in its callback, as the recorder does.
 
 A process whose executor calls nothing for 20 s prints the Python stacks of its threads and ends.
 The exit status is 1 if that happened, if a process crashed, or if a kind of event never came, so
@@ -37,6 +38,7 @@ from typing import Any
 import rclpy
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.logging import set_logger_level
@@ -49,13 +51,12 @@ from std_msgs.msg import String
 
 from ros_pad.commands.progress import bar
 from ros_pad.nodes import qos
-from ros_pad.nodes.process import REACTION
 from ros_pad.signals import STOP
 from studies import command
 
 HANG = 20.0  # s without a call of the executor
 PATIENCE = 2.0 * HANG  # s for the orderly end of a process
-FORGETTING = 0.5  # s for an executor to forget a node
+TURN = 0.1  # of one of the executors of a process, s
 PERIOD = 0.01  # between two bursts of one node, s
 BURST = 6  # messages on each topic
 TOPICS = ('one', 'two', 'three')
@@ -67,15 +68,14 @@ REQUESTED = (_LOSSY, _LOSSY, qos.SENSOR, qos.RECORD, qos.STATE)
 
 
 class Worker:
-    """Nodes on one executor, and the number of messages and events that it handed over."""
+    """Nodes, each on an executor of its own, and the number of their messages and events."""
 
     def __init__(self, seed: int, events: Sequence[str], renew: bool) -> None:
         self._random = random.Random(seed)
         self._events = events
         self._renew = renew
         self.counts: collections.Counter[str] = collections.Counter()
-        self._executor = EventsExecutor()
-        self._nodes: list[Node] = []
+        self._nodes: list[tuple[Node, Executor]] = []
         self._made = 0
         self._alarm = 0.0
 
@@ -120,8 +120,9 @@ class Worker:
             self._count('tick')
 
         node.create_timer(PERIOD, publish)
-        self._executor.add_node(node)
-        self._nodes.append(node)
+        executor = EventsExecutor()
+        executor.add_node(node)
+        self._nodes.append((node, executor))
 
     def _subscribe(self, node: Node, topic: str) -> None:
         def renew(event: object) -> None:
@@ -142,12 +143,10 @@ class Worker:
 
     def remove(self) -> None:
         """Remove and destroy a node."""
-        node = self._nodes.pop(self._random.randrange(len(self._nodes)))
-        self._executor.remove_node(node)
-        # The executor forgets the node in its next spin. Without one, rclpy 7.1 ends with a
-        # segmentation fault when events of QoS of the destroyed node are waiting.
-        self._executor.spin_until_future_complete(Future(), timeout_sec=FORGETTING)
+        node, executor = self._nodes.pop(self._random.randrange(len(self._nodes)))
+        executor.remove_node(node)
         node.destroy_node()
+        executor.shutdown()
 
     def run(self) -> None:
         """Spin until SIGTERM, and add and remove nodes."""
@@ -155,7 +154,8 @@ class Worker:
         self.add()
         self._count('tick')
         while not STOP.requested:
-            self._executor.spin_until_future_complete(never, timeout_sec=REACTION)
+            for _, executor in self._nodes:
+                executor.spin_until_future_complete(never, timeout_sec=TURN)
             if self._random.random() < 0.1:
                 self.add() if len(self._nodes) < 2 else self.remove()
         while self._nodes:
