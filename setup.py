@@ -98,7 +98,7 @@ setup(
     entry_points={
         'console_scripts': [
             'pad = ros_pad.__main__:main',
-            *(f'{node}_node = ros_pad.nodes.{node}:main' for node in NODES),
+            *(f'{node}_node = ros_pad.nodes.start:{node}' for node in NODES),
         ],
     },
 )
