@@ -86,7 +86,7 @@ class FootPath:
         self._gait = gait
         self._homes = homes
         self._reach = gait.reach()
-        self._time = 0.0
+        self._advance = gait.body_advance(0.0)
         self._offsets: list[tuple[float, float]] = []
         for leg in range(1, 7):
             phase = gait.phase(leg, 0.0)
@@ -103,24 +103,25 @@ class FootPath:
     def move(self, time: float, turn: float) -> None:
         """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
         gait = self._gait
-        advance = gait.body_advance(time) - gait.body_advance(self._time)
-        self._time = time
+        before, self._advance = self._advance, gait.body_advance(time)
+        advance = self._advance - before
+        phases = (gait.phase(1, time), gait.phase(2, time))  # of the two tripods
+        strokes = [gait.swing(each) if each >= gait.duty else None for each in phases]
         feet, swinging = [], []
         for index, (home_x, home_y) in enumerate(self._homes):
-            phase = gait.phase(index + 1, time)
             x, y = self._offsets[index]
-            height = 0.0
-            swings = phase >= gait.duty
-            if swings:
+            stroke = strokes[index % 2]
+            if stroke is None:
+                # The foot moves in the body against the motion of the body.
+                height = 0.0
+                x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
+            else:
                 if not self.swings[index]:
                     self._lifted[index] = (x, y)
-                progress, height = gait.swing(phase)
+                progress, height = stroke
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
-            else:
-                # The foot moves in the body against the motion of the body.
-                x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
-            swinging.append(swings)
+            swinging.append(stroke is not None)
             self._offsets[index] = (x, y)
             feet.append((home_x + x, home_y + y, height))
         self.feet, self.swings = feet, tuple(swinging)
@@ -208,6 +209,7 @@ class FullHexapod:
         self._pushes = [(0.0, 0.0)] * 6
         self._moments = [0.0] * 6
         self._ratios = [0.0] * 6
+        self._ahead: list[tuple[float, bool, bool] | None] = [None] * 6  # see `_approach`
         self._mujoco = mujoco
         text = mjcf(scene, self._geometry, floor.heights is not None, settings, self._dt)
         self.model: Any = mujoco.MjModel.from_xml_string(text)
@@ -229,12 +231,13 @@ class FullHexapod:
         self._places = self.data.geom_xpos[first : first + 6]
         self._axes = self.data.geom_xmat[first : first + 6, :6]  # x and y rows of their rotation
         # Scalars go through a memoryview faster than through an array.
+        self._pose: Any = memoryview(self._state)
         self._frictions: list[Any] = [
             memoryview(self.model.pair(f'foot_{leg}').friction) for leg in self.legs
         ]
         if self._tow.weight:
-            self._sled_place = self.data.geom('sled').xpos[:2]
-            self._sled_friction = self.model.pair('sled').friction
+            self._sled_place: Any = memoryview(self.data.geom('sled').xpos)
+            self._sled_friction: Any = memoryview(self.model.pair('sled').friction)
         self._wrench = np.zeros(6)
 
     @property
@@ -280,9 +283,9 @@ class FullHexapod:
         check_pressures(pressures, 6)
         self._steps += 1
         self.time = self._steps * self.period
-        model, data, state = self.model, self.data, self._state
+        model, data, pose = self.model, self.data, self._pose
         mj_step = self._mujoco.mj_step
-        if not abs(state.item(0)) < _FAR:
+        if not abs(pose[0]) < _FAR:
             return
         self._aim()
         for _ in range(self._substeps):
@@ -290,7 +293,7 @@ class FullHexapod:
             mj_step(model, data)
             # Checking the body is enough: the solver couples all joints, so if one diverges the
             # body diverges too.
-            if not abs(state.item(0)) < _FAR:
+            if not abs(pose[0]) < _FAR:
                 self._end('the solution of MuJoCo has diverged')
                 return
             self.read_contacts()
@@ -303,10 +306,10 @@ class FullHexapod:
         heading = self.body[2]
         path, swung = self._path, self._path.swings
         path.move(max(0.0, self.time - self._settle), -self._heading_gain * heading * self.period)
-        for index, (before, now) in enumerate(zip(swung, path.swings, strict=True)):
-            if now and not before:
+        for index in range(6) if path.swings != swung else ():
+            if not swung[index] and path.swings[index]:
                 self._cleared[index] = False
-            elif before and not now and not self._cleared[index]:
+            elif swung[index] and not path.swings[index] and not self._cleared[index]:
                 self._end(f'leg {index + 1} does not clear the ground in its swing')
         targets: list[float] = []
         try:
@@ -325,13 +328,12 @@ class FullHexapod:
         """
         for index, load in enumerate(self._loads):
             if load > LIGHT:
+                self._ahead[index] = None
                 self._write_friction(index, load, pressures[index], self._dt)
         tow = self._tow
         if tow.weight:
-            x, y = self._sled_place.tolist()
-            self._sled_friction[:2] = (
-                tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
-            )
+            row, (x, y, _) = self._sled_friction, self._sled_place
+            row[0] = row[1] = tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
 
     def _write_friction(self, index: int, load: float, pressure: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
@@ -369,23 +371,22 @@ class FullHexapod:
 
     def update_feet(self, pressures: Sequence[float]) -> None:
         """Set the states of the feet, and the work lost in slip, from the contacts read last."""
-        dt, foot, floor = self.period, self._foot, self._floor
+        dt, foot, wet = self.period, self._foot, self._floor.wet
         softness = 1.0 / foot.shear_stiffness
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        for index, state in enumerate(self.feet):
-            x, y, z = places[index]
-            load, (push_x, push_y) = self._loads[index], self._pushes[index]
+        each = zip(self.feet, places, self._loads, self._pushes, pressures, strict=True)
+        for index, (state, (x, y, z), load, (push_x, push_y), pressure) in enumerate(each):
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
             state.force = (push_x, push_y, load)
             state.moment = self._moments[index]
             state.standing = load > 0.0
             state.grip = self._ratios[index] * load
             state.slip_speed = 0.0
-            state.wet = floor.wet(x, y)
+            state.wet = wet(x, y)
             if load <= LIGHT:
-                self._approach(index, x, y, z - POINT, pressures[index])
+                self._approach(index, x, y, z - POINT, pressure)
             elif load > SLIP_LOAD:
                 step_x, step_y = x - last[index][0], y - last[index][1]
                 distance = math.hypot(step_x, step_y)
@@ -396,7 +397,6 @@ class FullHexapod:
                 # As on L1, sliding and turning share a foot's grip.
                 if math.hypot(distance, self._lever * turn) > SLIP_SPEED * dt:
                     self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
-            pressure = pressures[index]
             if pressure > 0.0 and foot.dome_load(load, pressure) < load:
                 state.overload_time += dt
 
@@ -409,11 +409,15 @@ class FullHexapod:
             ground = float(block[2])
             if z > ground + _SHALLOW:
                 block[2] = self._floor.height(x, y)
-        if z > ground + CLEAR:
-            self._films[index].touch_down(self._floor.depth(x, y))
         if z > ground + clear:
             self._cleared[index] = True
-        self._write_friction(index, LIGHT, pressure, 0.0)
+        left = z > ground + CLEAR
+        ahead = (pressure, self.feet[index].wet, left)
+        if ahead != self._ahead[index]:  # else film and friction are as they were set last
+            self._ahead[index] = ahead
+            if left:
+                self._films[index].touch_down(self._floor.depth(x, y))
+            self._write_friction(index, LIGHT, pressure, 0.0)
 
     def _judge(self) -> None:
         """Set the verdict when the body tips over or a joint is far from its set-point."""
