@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from operator import sub
 from typing import Any
 
-import numpy as np
-
 from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError
@@ -206,7 +204,8 @@ class FullHexapod:
         self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
         self._cleared = [True] * 6  # whether a foot left the ground in its present or last swing
         self._loads = [0.0] * 6
-        self._pushes = [(0.0, 0.0)] * 6
+        self._lefts = [0.0] * 6
+        self._backs = [0.0] * 6
         self._moments = [0.0] * 6
         self._ratios = [0.0] * 6
         self._ahead: list[tuple[float, bool, bool] | None] = [None] * 6  # see `_approach`
@@ -225,7 +224,6 @@ class FullHexapod:
     def _keep_views(self) -> None:
         """Keep views of MuJoCo's arrays, because it would take time to make them in every step."""
         first = self.model.geom('foot_1').id
-        self._index = {first + index: index for index in range(6)}
         self._state = self.data.qpos[:25]
         self._ctrl = self.data.ctrl
         self._places = self.data.geom_xpos[first : first + 6]
@@ -238,7 +236,7 @@ class FullHexapod:
         if self._tow.weight:
             self._sled_place: Any = memoryview(self.data.geom('sled').xpos)
             self._sled_friction: Any = memoryview(self.model.pair('sled').friction)
-        self._wrench = np.zeros(6)
+        self._contacts = self.data.sensordata  # force and moment of each foot's contact
 
     @property
     def body(self) -> Vector:
@@ -356,18 +354,10 @@ class FullHexapod:
 
     def read_contacts(self) -> None:
         """Read the ground's force and yaw moment on each foot in the last step of MuJoCo."""
-        model, data, wrench = self.model, self.data, self._wrench
-        contact_force = self._mujoco.mj_contactForce
-        loads, pushes, moments = [0.0] * 6, [(0.0, 0.0)] * 6, [0.0] * 6
-        for contact, (_, geom) in enumerate(data.contact.geom.tolist()):
-            index = self._index.get(geom)
-            if index is not None:
-                contact_force(model, data, contact, wrench)
-                # The axes of a contact with level ground are z, y, -x.
-                normal, left, back, moment, _, _ = wrench.tolist()
-                loads[index], pushes[index] = normal, (-back, left)
-                moments[index] = moment
-        self._loads, self._pushes, self._moments = loads, pushes, moments
+        values = self._contacts.tolist()
+        # The axes of a contact with level ground are z, y, -x.
+        self._loads, self._lefts, self._backs = values[::6], values[1::6], values[2::6]
+        self._moments = values[3::6]
 
     def update_feet(self, pressures: Sequence[float]) -> None:
         """Set the states of the feet, and the work lost in slip, from the contacts read last."""
@@ -376,8 +366,10 @@ class FullHexapod:
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        each = zip(self.feet, places, self._loads, self._pushes, pressures, strict=True)
-        for index, (state, (x, y, z), load, (push_x, push_y), pressure) in enumerate(each):
+        feet = zip(self.feet, places, pressures, strict=True)
+        for index, (state, (x, y, z), pressure) in enumerate(feet):
+            load = self._loads[index]
+            push_x, push_y = 0.0 - self._backs[index], self._lefts[index]  # not -0.0 in the air
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
             state.force = (push_x, push_y, load)
             state.moment = self._moments[index]
