@@ -77,12 +77,7 @@ class Repeats:
     def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
         last, self._last = self._last, values
-        if (
-            self._fine
-            and values[0] != last[0]
-            and values[1] != last[1]
-            and values[2] != last[2]
-        ):
+        if self._fine and values[0] != last[0] and values[1] != last[1] and values[2] != last[2]:
             self._since, self._counts = (time, time, time), (1, 1, 1)
             return ()
         return self._compare(time, last, values) if self._noise else ()

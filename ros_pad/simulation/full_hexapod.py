@@ -208,6 +208,8 @@ class FullHexapod:
         self._backs = [0.0] * 6
         self._moments = [0.0] * 6
         self._ratios = [0.0] * 6
+        self._pressures = [0.0] * 6
+        self._limits = [0.0] * 6  # force limits of the domes at these pressures, N
         self._ahead: list[tuple[float, bool, bool] | None] = [None] * 6  # see `_approach`
         self._mujoco = mujoco
         text = mjcf(scene, self._geometry, floor.heights is not None, settings, self._dt)
@@ -278,7 +280,7 @@ class FullHexapod:
         InvalidInput
             When there are not six finite pressures.
         """
-        check_pressures(pressures, 6)
+        self._fill(pressures)
         self._steps += 1
         self.time = self._steps * self.period
         model, data, pose = self.model, self.data, self._pose
@@ -287,7 +289,7 @@ class FullHexapod:
             return
         self._aim()
         for _ in range(self._substeps):
-            self._set_friction(pressures)
+            self._set_friction()
             mj_step(model, data)
             # Checking the body is enough: the solver couples all joints, so if one diverges the
             # body diverges too.
@@ -297,6 +299,13 @@ class FullHexapod:
             self.read_contacts()
         self.update_feet(pressures)
         self._judge()
+
+    def _fill(self, pressures: Sequence[float]) -> None:
+        """Set the gauge pressures of the pads, Pa."""
+        if pressures != self._pressures:  # they change more rarely than the robot steps
+            check_pressures(pressures, 6)
+            self._pressures = list(pressures)
+            self._limits = [self._foot.dome_load(math.inf, each) for each in pressures]
 
     def _aim(self) -> None:
         """Set the set-points of all servos; where a foot is out of reach, they stay unchanged."""
@@ -319,7 +328,7 @@ class FullHexapod:
         self._targets = targets
         self._ctrl[:] = targets
 
-    def _set_friction(self, pressures: Sequence[float]) -> None:
+    def _set_friction(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last one.
 
         Set the friction of the towed load, too.
@@ -327,16 +336,16 @@ class FullHexapod:
         for index, load in enumerate(self._loads):
             if load > LIGHT:
                 self._ahead[index] = None
-                self._write_friction(index, load, pressures[index], self._dt)
+                self._write_friction(index, load, self._dt)
         tow = self._tow
         if tow.weight:
             row, (x, y, _) = self._sled_friction, self._sled_place
             row[0] = row[1] = tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
 
-    def _write_friction(self, index: int, load: float, pressure: float, drained: float) -> None:
+    def _write_friction(self, index: int, load: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
-        foot = self._foot
-        dome_load = foot.dome_load(load, pressure) if pressure > 0.0 else 0.0
+        foot, pressure, limit = self._foot, self._pressures[index], self._limits[index]
+        dome_load = load if load < limit else limit
         sole_load = load - dome_load
         if self.feet[index].wet:
             film = self._films[index]
@@ -361,13 +370,13 @@ class FullHexapod:
 
     def update_feet(self, pressures: Sequence[float]) -> None:
         """Set the states of the feet, and the work lost in slip, from the contacts read last."""
-        dt, foot, wet = self.period, self._foot, self._floor.wet
-        softness = 1.0 / foot.shear_stiffness
+        self._fill(pressures)
+        dt, wet, softness = self.period, self._floor.wet, 1.0 / self._foot.shear_stiffness
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        feet = zip(self.feet, places, pressures, strict=True)
-        for index, (state, (x, y, z), pressure) in enumerate(feet):
+        for index, state in enumerate(self.feet):
+            x, y, z = places[index]
             load = self._loads[index]
             push_x, push_y = 0.0 - self._backs[index], self._lefts[index]  # not -0.0 in the air
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
@@ -378,7 +387,7 @@ class FullHexapod:
             state.slip_speed = 0.0
             state.wet = wet(x, y)
             if load <= LIGHT:
-                self._approach(index, x, y, z - POINT, pressure)
+                self._approach(index, x, y, z - POINT)
             elif load > SLIP_LOAD:
                 step_x, step_y = x - last[index][0], y - last[index][1]
                 distance = math.hypot(step_x, step_y)
@@ -389,10 +398,10 @@ class FullHexapod:
                 # As on L1, sliding and turning share a foot's grip.
                 if math.hypot(distance, self._lever * turn) > SLIP_SPEED * dt:
                     self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
-            if pressure > 0.0 and foot.dome_load(load, pressure) < load:
+            if self._pressures[index] > 0.0 and self._limits[index] < load:
                 state.overload_time += dt
 
-    def _approach(self, index: int, x: float, y: float, z: float, pressure: float) -> None:
+    def _approach(self, index: int, x: float, y: float, z: float) -> None:
         """Prepare film, block and friction below a foot without load."""
         ground, clear = 0.0, CLEAR
         if self._floor.heights is not None:
@@ -404,12 +413,12 @@ class FullHexapod:
         if z > ground + clear:
             self._cleared[index] = True
         left = z > ground + CLEAR
-        ahead = (pressure, self.feet[index].wet, left)
+        ahead = (self._pressures[index], self.feet[index].wet, left)
         if ahead != self._ahead[index]:  # else film and friction are as they were set last
             self._ahead[index] = ahead
             if left:
                 self._films[index].touch_down(self._floor.depth(x, y))
-            self._write_friction(index, LIGHT, pressure, 0.0)
+            self._write_friction(index, LIGHT, 0.0)
 
     def _judge(self) -> None:
         """Set the verdict when the body tips over or a joint is far from its set-point."""

@@ -260,9 +260,7 @@ def mjcf(
         pairs.append(
             f'<pair name="foot_{leg}" geom1="block_{leg}" geom2="foot_{leg}" condim="4"/>'
         )
-        sensors.append(
-            f'<contact geom1="block_{leg}" geom2="foot_{leg}" data="force torque"/>'
-        )
+        sensors.append(f'<contact geom1="block_{leg}" geom2="foot_{leg}" data="force torque"/>')
         servos += [f'<position joint="leg_{leg}_{joint}"/>' for joint in LINKS]
     load = line = ''
     if tow.weight:
