@@ -77,10 +77,16 @@ class SlipAlarm:
 
         Return whether the alarm is on.
         """
-        variance = self._variance * max(1.0, self._correlation_time / dt)
-        gain = self._speed / variance * (speed - self._half)
-        self.statistic = min(max(0.0, self.statistic + gain), self._highest)
-        return self.statistic > self._threshold
+        stretch = self._correlation_time / dt
+        variance = self._variance * stretch if stretch > 1.0 else self._variance
+        statistic = self.statistic + self._speed / variance * (speed - self._half)
+        # Conditions are several times faster than min and max.
+        if not statistic > 0.0:
+            statistic = 0.0
+        elif statistic > self._highest:
+            statistic = self._highest
+        self.statistic = statistic
+        return statistic > self._threshold
 
 
 class SlipAlarms:

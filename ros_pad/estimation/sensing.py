@@ -52,49 +52,54 @@ def sensor_fault(doubt: str) -> str:
 
 
 class Repeats:
-    """Measure for how long each of several values has not changed at all.
+    """Measure for how long each of three values has not changed at all.
 
     Parameters
     ----------
-    values : int
-        Number of values.
     noise : float
         Standard deviation of the values; values without noise never count as stopped.
     """
 
-    __slots__ = ('_counts', '_last', '_noise', '_since', '_steps')
+    __slots__ = ('_counts', '_fine', '_last', '_noise', '_since', '_steps')
 
-    def __init__(self, values: int, noise: float) -> None:
+    def __init__(self, noise: float) -> None:
         self._noise = noise
-        self._steps = [math.inf] * values  # smallest change so far
-        self._last = [math.nan] * values
-        self._since = [math.inf] * values
-        self._counts = [0] * values
+        self._steps = [math.inf] * 3  # smallest change so far
+        self._fine = False  # whether each value has changed by no more than twice the noise
+        self._last: Sequence[float] = (math.nan,) * 3
+        self._since: Sequence[float] = (0.0,) * 3
+        self._counts: Sequence[int] = (0,) * 3
 
     def since(self, place: int) -> float:
         """Return the time since which the value with an index has not changed, s."""
         return self._since[place]
 
-    def update(self, time: float, values: Sequence[float]) -> list[int]:
+    def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
-        stopped: list[int] = []
-        if not self._noise:
-            return stopped
-        last, counts = self._last, self._counts
+        last, self._last = self._last, values
+        if self._fine and values[0] != last[0] and values[1] != last[1] and values[2] != last[2]:
+            self._since, self._counts = (time, time, time), (1, 1, 1)
+            return ()
+        return self._compare(time, last, values) if self._noise else ()
+
+    def _compare(
+        self, time: float, last: Sequence[float], values: Sequence[float]
+    ) -> Sequence[int]:
+        """Process values of which some may be those of the time before."""
+        stopped = []
+        self._counts, self._since = counts, since = list(self._counts), list(self._since)
         for place, value in enumerate(values):
             if value != last[place]:
-                change = abs(value - last[place])
-                if change < self._steps[place]:
-                    self._steps[place] = change
-                last[place] = value
-                self._since[place] = time
+                self._steps[place] = min(self._steps[place], abs(value - last[place]))
+                since[place] = time
                 counts[place] = 1
                 continue
             counts[place] += 1
-            if counts[place] >= FEWEST and time - self._since[place] > PATIENCE:
+            if counts[place] >= FEWEST and time - since[place] > PATIENCE:
                 coarse = 2.0 * self._noise < self._steps[place] < math.inf
-                if not coarse or time - self._since[place] > DEAD:
+                if not coarse or time - since[place] > DEAD:
                     stopped.append(place)
+        self._fine = max(self._steps) <= 2.0 * self._noise
         return stopped
 
 
@@ -124,8 +129,8 @@ class Sensing:
 
     def restart(self) -> None:
         """Discard all readings, because the clock has been set back."""
-        self._forces = Repeats(3, self._force_noise)
-        self._positions = Repeats(3, self._position_noise)
+        self._forces = Repeats(self._force_noise)
+        self._positions = Repeats(self._position_noise)
         self._last: tuple[float, Sequence[float]] | None = None
         self._grounded = math.inf
         self._dead = False
@@ -165,7 +170,7 @@ class Sensing:
         self.marker_valid = not marker
         return self._force_fault(time, force, forces) or marker
 
-    def _force_fault(self, time: float, force: Sequence[float], stopped: list[int]) -> str:
+    def _force_fault(self, time: float, force: Sequence[float], stopped: Sequence[int]) -> str:
         if not stopped and self._range == math.inf:
             self._dead = False
             return ''
@@ -196,7 +201,7 @@ class Sensing:
         stopped = self._positions.update(time, position)
         # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
         seen = time - age
-        last, self._last = self._last, (seen, tuple(position))
+        last, self._last = self._last, (seen, position)
         if age > OLDEST_POSITION:
             self.since = time - age
             return f'marker lost: last seen {age:.2g} s ago'

@@ -245,8 +245,8 @@ class ClosedLoop:
         """
         self._stamp_ns += self.period_ns
         now_ns, legs = self._stamp_ns, self.legs
-        for leg in legs:
-            leg.channel.tick(now_ns)
+        for channel in self._channels:
+            channel.tick(now_ns)
         if self._tick_pace.due(now_ns):
             for leg in legs:
                 leg.tick(now_ns)
