@@ -403,7 +403,8 @@ def test_a_text_that_is_not_utf_8_is_refused_where_it_is_read(text, order):
         (b'', ''),  # rclpy, too, reads these three
         (b'\0', ''),
         (b'abc', 'abc'),
-        (b'a\0b\0', 'a\0b'),  # where rosbags does the same, and rclpy ends at the first zero
+        (b'a\0b\0', 'a\0b'),  # rosbags reads these two so; for rclpy they end at the first zero
+        (b'ab\0\0', 'ab\0'),
     ],
 )
 def test_texts_that_no_node_writes_are_read(data, text):
