@@ -111,6 +111,15 @@ class EstimationStage:
         if wrench is not None and position is not None and wrench[0] == stamp_ns:
             self._update(wrench, position)
 
+    def sample(self, stamp_ns: int, force: Vector, moment: float | None, point: Vector) -> None:
+        """Process a wrench and a position of the same time stamp, see :meth:`wrench`."""
+        if self._wrench is None and math.isfinite(point[0] + point[1] + point[2]):
+            self._position = position = stamp_ns, point
+            self._update((stamp_ns, force, moment if self._moments else None), position)
+        else:
+            self.wrench(stamp_ns, force, moment)
+            self.position(stamp_ns, point)
+
     def _update(
         self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
     ) -> None:
@@ -173,10 +182,9 @@ class EstimationStage:
 def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
     """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
     (fx, fy, fz), (x, y, z) = force, point
-    # Squares take less time than abs().
-    if fx * fx + fy * fy + fz * fz > LARGEST_FORCE**2:
+    # Squares take less time than abs(). Only an unusual sample is looked at more closely.
+    if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2:
         _check_size('force', force, LARGEST_FORCE, 'N')
-    if x * x + y * y + z * z > LARGEST_POSITION**2:
         _check_size('position', point, LARGEST_POSITION, 'm')
     if moment is not None:
         _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')
