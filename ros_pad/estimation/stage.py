@@ -122,9 +122,7 @@ class EstimationStage:
         if self._wrench is not None and self._position is not None:
             # No position came for the last wrench: the marker is hidden or sampled more slowly.
             self._update(self._wrench, self._position)
-        self._load = load = force[2]
-        if self._largest < load < math.inf:
-            self._largest = load
+        self._hold(force[2])
         self._wrench = stamp_ns, force, moment if self._moments else None
         if self._position is not None and self._position[0] == stamp_ns:
             self._update(self._wrench, self._position)
@@ -138,6 +136,22 @@ class EstimationStage:
         wrench, position = self._wrench, self._position
         if wrench is not None and position is not None and wrench[0] == stamp_ns:
             self._update(wrench, position)
+
+    def sample(self, stamp_ns: int, force: Vector, moment: float | None, point: Vector) -> None:
+        """Process a wrench and a position of the same time stamp, see :meth:`wrench`."""
+        if self._wrench is None and math.isfinite(point[0] + point[1] + point[2]):
+            self._hold(force[2])
+            self._place = point[0], point[1]
+            self._position = position = stamp_ns, point
+            self._update((stamp_ns, force, moment if self._moments else None), position)
+        else:
+            self.wrench(stamp_ns, force, moment)
+            self.position(stamp_ns, point)
+
+    def _hold(self, load: float) -> None:
+        self._load = load
+        if self._largest < load < math.inf:
+            self._largest = load
 
     def _update(
         self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
@@ -203,10 +217,9 @@ class EstimationStage:
 def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
     """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
     (fx, fy, fz), (x, y, z) = force, point
-    # Squares take less time than abs().
-    if fx * fx + fy * fy + fz * fz > LARGEST_FORCE**2:
+    # Squares take less time than abs(). Only an unusual sample is looked at more closely.
+    if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2:
         _check_size('force', force, LARGEST_FORCE, 'N')
-    if x * x + y * y + z * z > LARGEST_POSITION**2:
         _check_size('position', point, LARGEST_POSITION, 'm')
     if moment is not None:
         _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')

@@ -24,6 +24,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
@@ -48,6 +49,11 @@ PARAMETERS = (
         'folder',
         '',
         'Folder of the bag, which must not exist; empty: a new one, named after the time.',
+    ),
+    Parameter(
+        'reliable',
+        False,
+        'Ask publishers to repeat lost measurements: for a recorder on another computer.',
     ),
 )
 
@@ -113,6 +119,7 @@ class RecorderNode(Node):
             values = declare(self, PARAMETERS)
             folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
             recorded = topics.names(values['legs'])
+            self._reliable: bool = values['reliable']
             self._simulated = self.get_parameter('use_sim_time').value
             # Called for every message; replaced when the first /clock message arrives.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
@@ -135,7 +142,7 @@ class RecorderNode(Node):
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
             if subscribes:
-                self._record(full_name, topic, qos.recording([topic.publish]))
+                self._record(full_name, topic, self._profile(topic, [topic.publish]))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
@@ -199,6 +206,10 @@ class RecorderNode(Node):
         finally:
             super().destroy_node()
 
+    def _profile(self, topic: topics.Topic, offered: list[QoSProfile]) -> QoSProfile:
+        measured = topic.subscribe.reliability == ReliabilityPolicy.BEST_EFFORT
+        return qos.recording(offered, measured and not self._reliable)
+
     def _record(self, name: str, topic: topics.Topic, profile: QoSProfile) -> None:
         """Subscribe to a topic so that each message goes into the bag."""
 
@@ -206,7 +217,7 @@ class RecorderNode(Node):
             # Drivers of sensors may offer less than is requested: request less.
             offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
             self.destroy_subscription(self._recordings.pop(name))
-            self._record(name, topic, qos.recording([topic.publish, *offered]))
+            self._record(name, topic, self._profile(topic, [topic.publish, *offered]))
 
         self._recordings[name] = self.create_subscription(
             topic.message,

@@ -375,15 +375,17 @@ class FullHexapod:
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        for index, state in enumerate(self.feet):
-            x, y, z = places[index]
-            load = self._loads[index]
-            push_x, push_y = 0.0 - self._backs[index], self._lefts[index]  # not -0.0 in the air
+        feet = zip(
+            range(6), self.feet, places, self._loads, self._backs, self._lefts, self._moments,
+            self._ratios, self._pressures, self._limits, strict=True,
+        )  # fmt: skip
+        for index, state, (x, y, z), load, back, push_y, moment, ratio, pressure, limit in feet:
+            push_x = 0.0 - back  # not -0.0 in the air
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
             state.force = (push_x, push_y, load)
-            state.moment = self._moments[index]
+            state.moment = moment
             state.standing = load > 0.0
-            state.grip = self._ratios[index] * load
+            state.grip = ratio * load
             state.slip_speed = 0.0
             state.wet = wet(x, y)
             if load <= LIGHT:
@@ -397,8 +399,8 @@ class FullHexapod:
                 turn = _turn(last_axes[index], axes[index])
                 # As on L1, sliding and turning share a foot's grip.
                 if math.hypot(distance, self._lever * turn) > SLIP_SPEED * dt:
-                    self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
-            if self._pressures[index] > 0.0 and self._limits[index] < load:
+                    self.dissipation -= push_x * step_x + push_y * step_y + moment * turn
+            if pressure > 0.0 and limit < load:
                 state.overload_time += dt
 
     def _approach(self, index: int, x: float, y: float, z: float) -> None:
