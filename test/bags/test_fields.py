@@ -428,7 +428,7 @@ def test_a_size_beyond_the_message_is_refused_and_not_remembered(size):
 
 def test_texts_of_many_sizes_neither_fill_the_memory_nor_slow_the_reader():
     reader = FieldReader(TYPES[POINT], ['point.x', FRAME])
-    for size in range(1000):
+    for size in range(100, 1100):
         assert reader(with_text(b'a' * size)) == (0.1, 'a' * size)
     assert len(reader._plans) <= 64
     usual = with_text(b'leg_1_sole\0')
