@@ -2,6 +2,7 @@
 """Fields are read and written as rclpy and rosbags do it; anything else is refused."""
 
 import dataclasses
+import functools
 import importlib
 import math
 import operator
@@ -46,6 +47,7 @@ LITTLE, BIG = True, False
 quick = settings(max_examples=30, deadline=None)
 
 
+@functools.cache
 def of_type(name):
     return MessageType(name, STORE.generate_msgdef(name, ros_version=2)[0])
 
