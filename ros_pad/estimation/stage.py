@@ -44,7 +44,7 @@ class Emission(NamedTuple):
     estimate : Estimate
         The estimate.
     load : float
-        Largest normal force since the last emission, N; NaN if the last one is not finite.
+        Largest normal force since the last emission, N, also of rejected samples.
     position : tuple of float or None
         Last position x and y of the foot, m; None if none has arrived since the last emission.
     """
@@ -103,7 +103,7 @@ class EstimationStage:
         self._wrench: tuple[int, Vector, float | None] | None = None
         self._position: tuple[int, Vector] | None = None
         self._used: tuple[int, Vector] | None = None  # position of the last sample
-        self._load, self._largest = math.nan, -math.inf  # last and largest since the last emission
+        self._load = -math.inf  # largest since the last emission
         self._place: tuple[float, float] | None = None  # last position since the last emission
         self._used_ns = 0  # stamp of the wrench with which that position was first used
         self._silent_since_ns: int | None = None
@@ -149,9 +149,8 @@ class EstimationStage:
             self.position(stamp_ns, point)
 
     def _hold(self, load: float) -> None:
-        self._load = load
-        if self._largest < load < math.inf:
-            self._largest = load
+        if self._load < load <= LARGEST_FORCE:
+            self._load = load
 
     def _update(
         self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
@@ -180,9 +179,9 @@ class EstimationStage:
         if estimate.doubt != self.doubt or estimate.sound != self.sound:
             self._update_doubt(estimate.doubt, estimate.sound)
         if self._pace.due(stamp_ns):
-            load = max(self._largest, self._load) if math.isfinite(self._load) else math.nan
-            place, self._place, self._largest = self._place, None, -math.inf
-            self._emit(Emission(stamp_ns, estimate, load, place))
+            emission = Emission(stamp_ns, estimate, self._load, self._place)
+            self._load, self._place = -math.inf, None
+            self._emit(emission)
 
     def reject(self, error: InvalidInput) -> None:
         """Report a rejected sample; its error becomes the doubt if no sample follows for long."""
