@@ -57,16 +57,15 @@ class FieldReader:
     UnknownEncoding
         When the type has a list of variable length, or more than one text.
     ValueError
-        When the type has no such field.
+        When the type has no such field, or a path is given twice.
     """
 
     def __init__(self, message_type: MessageType, paths: Sequence[str]) -> None:
         self.paths = tuple(paths)
         self._fields = list(_fields(message_type, message_type.blank()))
-        known = [path for path, _ in self._fields]
-        self._wanted = [known.index(path) for path in paths]
+        self._wanted = _chosen(self._fields, paths)
         texts = [place for place, (_, form) in enumerate(self._fields) if form.endswith('s')]
-        if len(texts) > 1 or any(path.endswith(_COUNT) for path in known):
+        if len(texts) > 1 or any(path.endswith(_COUNT) for path, _ in self._fields):
             raise UnknownEncoding(f'{message_type.name} has a list, or more than one text')
         self._text = texts[0] if texts else None
         self._size_at = _places(self._fields)[self._text - 1] if self._text is not None else 0
@@ -106,8 +105,9 @@ class FieldReader:
         fields = self._sized(size)
         form = _format(fields, _places(fields), self._wanted)
         plan = struct.Struct(_ORDERS[order] + form).unpack_from
-        if len(self._plans) < _MOST_PLANS:
-            self._plans[order, size] = plan
+        if len(self._plans) == _MOST_PLANS:
+            self._plans.clear()  # texts of many sizes must not keep out the usual one
+        self._plans[order, size] = plan
         return plan
 
     def _sized(self, size: int) -> list[_Field]:
@@ -146,8 +146,11 @@ class FieldReader:
         ValueError
             When a path is that of a text.
         """
+        if self._text_at is not None:
+            raise ValueError(f'{self.paths[self._text_at]} is a text, and a table has numbers')
+        table = np.empty((len(messages), len(self.paths)))
         if not messages:
-            return np.empty((0, len(self.paths)))
+            return table
         first = messages[0]
         self(first)  # refuses wrong bytes
         at = self._size_at
@@ -155,7 +158,8 @@ class FieldReader:
         if any(
             (each[:_ENCAPSULATION], each[at : at + 4], len(each)) != layout for each in messages
         ):
-            return np.array([self(each) for each in messages], dtype=float)
+            table[:] = [self(each) for each in messages]
+            return table
         order = first[1]
         fields = self._sized(_SIZES[order].unpack_from(first, at)[0] if at else 0)
         places = _places(fields)
@@ -168,7 +172,9 @@ class FieldReader:
             }
         )
         rows = np.frombuffer(b''.join(messages), record)
-        return np.column_stack([rows[name].astype(float) for name in record.names or ()])
+        for column, name in enumerate(record.names or ()):
+            table[:, column] = rows[name]
+        return table
 
 
 class FieldWriter:
@@ -187,7 +193,8 @@ class FieldWriter:
     Raises
     ------
     AttributeError, ValueError
-        When the type has no such field, or a list has no such element.
+        When the type has no such field, a list has no such element, or a path is given twice or
+        is that of a text.
     """
 
     def __init__(
@@ -205,8 +212,10 @@ class FieldWriter:
                 value = np.asarray(value, before.dtype)
             setattr(target, name, value)
         fields = list(_fields(message_type, message))
-        known = [path for path, _ in fields]
-        wanted = [known.index(path) for path in paths]
+        wanted = _chosen(fields, paths)
+        for path, form in map(fields.__getitem__, wanted):
+            if form.endswith('s'):
+                raise ValueError(f'{path} is a text: only numbers may differ')
         template = message_type.encode(message)
         places = _places(fields)
         # Numbers that differ, and the bytes between them, in the order of the message.
@@ -262,6 +271,14 @@ def _fields(message_type: MessageType, message: Any) -> Iterator[_Field]:
             raise UnknownEncoding(f'{message_type.name}: type {inner[0]} of {path}')
 
     return inside(message_type.name, message, '')
+
+
+def _chosen(fields: Sequence[_Field], paths: Sequence[str]) -> list[int]:
+    """Return the number of the field of each path."""
+    if len(set(paths)) < len(paths):
+        raise ValueError(f'{paths} has a path twice')
+    known = [path for path, _ in fields]
+    return [known.index(path) for path in paths]
 
 
 def _places(fields: Sequence[_Field]) -> list[int]:

@@ -4,8 +4,6 @@ import struct
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
 
 from ros_pad.bags import codec
 
@@ -35,8 +33,6 @@ int8 small
 float64 value
 """
 FLOAT = ('std_msgs/msg/Float64', 'float64 data')
-WRENCH = 'geometry_msgs/msg/WrenchStamped'
-POINT = 'geometry_msgs/msg/PointStamped'
 
 
 @pytest.mark.parametrize('end_of_line', ['\n', '\r\n'])
@@ -79,42 +75,3 @@ def test_bytes_that_are_no_message_are_an_error(data):
 def test_a_definition_that_makes_no_sense_is_an_error(definition):
     with pytest.raises(Exception, match=r'.'):  # of any type
         codec.MessageType('test_msgs/msg/Wrong', definition)
-
-
-@pytest.mark.parametrize('little_endian', [True, False])
-@pytest.mark.parametrize('frame', ['', 'a', 'leg_1_sole', 'κ', 'x' * 100])
-def test_the_vector_behind_a_header_is_read_from_the_bytes(frame, little_endian):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    types = store.types
-    header = types['std_msgs/msg/Header'](types['builtin_interfaces/msg/Time'](1, 2), frame)
-    vector = types['geometry_msgs/msg/Vector3']
-    wrench = types['geometry_msgs/msg/Wrench'](vector(0.1, 0.2, 0.3), vector(0.4, 0.5, 0.6))
-    point = types['geometry_msgs/msg/Point'](0.1, 0.2, 0.3)
-
-    def serialized(name, content):
-        message = types[name](header, content)
-        return bytes(store.serialize_cdr(message, name, little_endian=little_endian))
-
-    assert codec.normal_force(serialized(WRENCH, wrench)) == 0.3
-    assert codec.horizontal_position(serialized(POINT, point)) == (0.1, 0.2)
-    assert math.isnan(codec.normal_force(serialized(POINT, point)[:-1]))
-
-
-@pytest.mark.parametrize('data', [b'', b'\0', b'\0\1\0\0', bytes(16), b'\0\1\0\0' + b'\xff' * 40])
-def test_bytes_that_are_no_message_have_no_force_and_no_position(data):
-    assert math.isnan(codec.normal_force(data))
-    assert all(map(math.isnan, codec.horizontal_position(data)))
-
-
-@pytest.mark.parametrize(
-    ('data', 'time_ns'),
-    [
-        (b'\0\1\0\0' + b'\1\0\0\0' + b'\2\0\0\0', 1_000_000_002),
-        (b'\0\0\0\0' + b'\0\0\0\1' + b'\0\0\0\2', 1_000_000_002),  # big-endian
-        (b'\0\1\0\0' + b'\xff\xff\xff\xff' + b'\0\0\0\0', -1_000_000_000),
-        (b'\0\1\0\0' + b'\1\0\0\0', None),
-        (b'', None),
-    ],
-)
-def test_the_time_of_a_clock_is_read_from_the_bytes(data, time_ns):
-    assert codec.clock_time(data) == time_ns

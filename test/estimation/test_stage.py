@@ -18,6 +18,7 @@ class Watched:
 
     def __init__(self, moments=False, period_ms=20):
         self.samples, self.emitted, self.doubts, self.rejected = [], [], [], []
+        self.estimates = []
         estimator = FootEstimator(
             Foot.load('large37'), 6.83, Tuning(moment_noise=5e-4 if moments else 0.0)
         )
@@ -26,13 +27,14 @@ class Watched:
         def update_noting(*sample):
             estimate = update(*sample)
             self.samples.append(sample)
+            self.estimates.append(estimate)
             return estimate
 
         estimator.update = update_noting
         self.stage = EstimationStage(
             estimator,
             period_ms * MS,
-            lambda stamp_ns, estimate: self.emitted.append(stamp_ns // MS),
+            self.emitted.append,
             self.doubts.append,
             self.rejected.append,
         )
@@ -40,8 +42,18 @@ class Watched:
     def wrench(self, ms, load=6.0, moment=0.25):
         self.stage.wrench(ms * MS, (0.5, 0.0, load), moment)
 
-    def position(self, ms, x=0.0):
-        self.stage.position(ms * MS, (x, 0.0, 0.0))
+    def position(self, ms, x=0.0, y=0.0):
+        self.stage.position(ms * MS, (x, y, 0.0))
+
+    def sample(self, ms, load=6.0):
+        self.wrench(ms, load)
+        self.position(ms)
+
+    def loads(self):
+        return [(each.stamp_ns // MS, each.load) for each in self.emitted]
+
+    def positions(self):
+        return [(each.stamp_ns // MS, each.position) for each in self.emitted]
 
 
 @pytest.mark.parametrize('first', ['wrench', 'position'])
@@ -94,8 +106,107 @@ def test_estimates_are_emitted_once_a_period():
     for ms in range(4, 60, 4):
         watched.wrench(ms)
         watched.position(ms)
-    assert watched.emitted == [4, 20, 40]
+    assert [each.stamp_ns for each in watched.emitted] == [4 * MS, 20 * MS, 40 * MS]
     assert watched.stage.samples == 14
+    for emission, sample in zip(watched.emitted, (0, 4, 9), strict=True):
+        assert emission.estimate is watched.estimates[sample]
+
+
+def test_the_largest_normal_force_since_the_last_emission_counts():
+    watched = Watched()
+    for ms, load in ((4, 9.0), (8, 6.5), (12, 8.0), (16, 7.0), (20, 6.0), (24, 5.0), (40, 5.5)):
+        watched.sample(ms, load)
+    assert watched.loads() == [(4, 9.0), (20, 8.0), (40, 5.5)]
+
+
+def test_the_force_of_the_next_wrench_does_not_count_yet():
+    watched = Watched()
+    watched.sample(4)
+    watched.wrench(20, 6.0)
+    watched.wrench(24, 9.0)  # this ends the wait for a position of the sample before
+    assert watched.loads() == [(4, 6.0), (20, 6.0)]
+    watched.position(24)
+    watched.sample(40, 6.0)
+    assert watched.loads()[2:] == [(40, 9.0)]
+
+
+def test_forces_of_rejected_samples_count():
+    watched = Watched()
+    watched.sample(4)
+    watched.sample(8)
+    watched.sample(8, 9.0)  # a time stamp twice
+    watched.sample(12, math.inf)
+    watched.sample(16, math.nan)
+    assert len(watched.rejected) == 3
+    watched.sample(20, 6.0)
+    watched.sample(40, 6.0)
+    assert watched.loads() == [(4, 6.0), (20, 9.0), (40, 6.0)]
+
+
+@pytest.mark.parametrize('last', [math.nan, math.inf, -math.inf])
+def test_no_estimate_is_emitted_of_a_force_that_is_not_finite(last):
+    watched = Watched()
+    watched.sample(4)
+    watched.sample(20, last)
+    assert watched.loads() == [(4, 6.0)]
+    watched.sample(24)
+    assert watched.loads() == [(4, 6.0), (24, 6.0)]
+
+
+@pytest.mark.parametrize('last', [math.nan, math.inf, -math.inf])
+def test_a_last_force_that_is_not_finite_gives_no_load(last):
+    watched = Watched()
+    watched.sample(4)
+    # FootEstimator takes no such sample; the stage does not rely on it.
+    watched.stage.estimator.update = lambda *sample: watched.estimates[0]
+    watched.sample(8, 9.0)
+    watched.sample(20, last)
+    watched.sample(24, last)
+    watched.sample(40, 6.0)
+    assert [stamp_ms for stamp_ms, _ in watched.loads()] == [4, 20, 40]
+    assert math.isnan(watched.emitted[1].load)
+    assert watched.emitted[2].load == 6.0
+
+
+def test_the_last_position_since_the_last_emission_is_emitted():
+    watched = Watched()
+    watched.wrench(4)
+    watched.position(4, 0.1, 0.2)
+    for ms in (8, 12, 16, 20):
+        watched.wrench(ms)
+        watched.position(ms, ms / 1000, -ms / 1000)
+    assert watched.positions() == [(4, (0.1, 0.2)), (20, (0.02, -0.02))]
+
+
+def test_without_a_new_position_none_is_emitted():
+    watched = Watched()
+    watched.sample(4)
+    for ms in (8, 20, 24):
+        watched.wrench(ms)
+    assert watched.positions() == [(4, (0.0, 0.0)), (20, None)]
+    watched.position(24, 0.3, 0.4)
+    watched.wrench(40)
+    watched.wrench(44)
+    watched.wrench(60)
+    watched.wrench(64)
+    assert watched.positions()[2:] == [(40, (0.3, 0.4)), (60, None)]
+
+
+def test_no_place_is_emitted_while_the_marker_is_hidden():
+    watched = Watched()
+    watched.sample(4)
+    watched.wrench(8)
+    watched.position(8, 0.3)
+    watched.wrench(20)
+    watched.position(20, math.nan, math.nan)
+    watched.wrench(24)
+    stamp_ms, place = watched.positions()[1]
+    assert stamp_ms == 20 and all(map(math.isnan, place))
+    watched.position(28, math.nan, math.nan)
+    watched.position(32, 0.5, 0.6)  # in sight again
+    watched.wrench(40)
+    watched.wrench(44)
+    assert watched.positions()[2:] == [(40, (0.5, 0.6))]
 
 
 def test_a_rejected_sample_is_reported_and_left_out():
