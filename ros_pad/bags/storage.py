@@ -8,10 +8,12 @@ import struct
 from collections import Counter
 from collections.abc import Collection
 from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 from typing import Any
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.reader import make_reader
 from mcap.records import Channel
@@ -25,11 +27,18 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
+from ros_pad.bags.fields import items_at
 from ros_pad.errors import BagError
 
 _MESSAGE_OPCODE = 0x05
-_MESSAGE_HEADER = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log, publish
+_MESSAGE_HEADER = struct.Struct('<BQHIQQ')
+_FIELDS = ('opcode', 'length', 'channel', 'sequence', 'log_time', 'publish_time')
+_HEADER = np.dtype(list(zip(_FIELDS, ('u1', '<u8', '<u2', '<u4', '<u8', '<u8'), strict=True)))
 _RECORD_HEADER_SIZE = 9
+_LENGTH = struct.Struct('<Q')
+_LENGTH_AT = 1
+_BATCH_SIZE = 8 * 1024 * 1024  # bytes
+_FEW = 32  # pieces that are followed one by one; more are followed side by side
 
 
 @dataclass
@@ -132,6 +141,25 @@ def _readable_records(path: pathlib.Path, contents: Contents) -> Iterator[Any]:
             return
 
 
+@dataclass(frozen=True)
+class Batch:
+    """Messages of a file, in the order in which they were written.
+
+    Attributes
+    ----------
+    data : bytes
+        The messages, and records between them.
+    channels, log_times, starts, sizes : ndarray of int
+        Channel id, log time, ns, first byte in `data` and number of bytes of each message.
+    """
+
+    data: bytes
+    channels: np.ndarray
+    log_times: np.ndarray
+    starts: np.ndarray
+    sizes: np.ndarray
+
+
 def raw_messages(
     path: pathlib.Path, contents: Contents, wanted: Collection[int]
 ) -> Iterator[tuple[int, int, bytes]]:
@@ -142,10 +170,44 @@ def raw_messages(
     BagError
         When a chunk is damaged.
     """
+    for batch in batches(path, contents, wanted):
+        ends = batch.starts + batch.sizes
+        columns = (batch.channels, batch.log_times, batch.starts, ends)
+        for channel, log_time, start, end in zip(
+            *(each.tolist() for each in columns), strict=True
+        ):
+            yield channel, log_time, batch.data[start:end]
+
+
+def batches(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> Iterator[Batch]:
+    """Yield the messages on the wanted channels, some megabytes at a time.
+
+    Raises
+    ------
+    BagError
+        When a chunk is damaged.
+    """
+    pieces: list[bytes] = []
+    size = 0
+    for piece in _pieces(path, contents, wanted):
+        pieces.append(piece)
+        size += len(piece)
+        if size >= _BATCH_SIZE:
+            yield _batch(path, pieces, wanted)
+            pieces, size = [], 0
+    if pieces:
+        yield _batch(path, pieces, wanted)
+
+
+def _pieces(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> Iterator[bytes]:
+    """Yield bytes with whole records in them: chunks, or single messages."""
     if not contents.chunks:
         for record in _readable_records(path, contents):
             if isinstance(record, Message) and record.channel_id in wanted:
-                yield record.channel_id, record.log_time, record.data
+                length = _HEADER.itemsize - _RECORD_HEADER_SIZE + len(record.data)
+                times = record.log_time, record.publish_time
+                header = _MESSAGE_OPCODE, length, record.channel_id, record.sequence, *times
+                yield _MESSAGE_HEADER.pack(*header) + record.data
         return
     with path.open('rb') as stream:
         for index in sorted(contents.chunks, key=lambda index: index.chunk_start_offset):
@@ -162,20 +224,50 @@ def raw_messages(
                 raise BagError(
                     f'{path}: is damaged at byte {index.chunk_start_offset}: {error}'
                 ) from error
-            yield from _messages_of_chunk(records.read(size), wanted)
+            yield records.read(size)
 
 
-def _messages_of_chunk(data: bytes, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-    """Yield the wanted messages of a chunk; the mcap package takes ten times as long."""
-    unpack = _MESSAGE_HEADER.unpack_from
-    position = 0
-    # Remaining bytes that are too few for a message are a schema or a channel.
-    while position + _MESSAGE_HEADER.size <= len(data):
-        opcode, length, channel_id, _, log_time, _ = unpack(data, position)
-        end = position + _RECORD_HEADER_SIZE + length
-        if opcode == _MESSAGE_OPCODE and channel_id in wanted:
-            yield channel_id, log_time, data[position + _MESSAGE_HEADER.size : end]
-        position = end
+def _batch(path: pathlib.Path, pieces: Sequence[bytes], wanted: Collection[int]) -> Batch:
+    """Return the wanted messages in some pieces."""
+    data = b''.join(pieces)
+    ends = np.cumsum([len(each) for each in pieces])
+    try:
+        places = _places(data, np.concatenate([[0], ends[:-1]]), ends)
+    except ValueError as error:
+        raise BagError(f'{path}: is damaged: {error}') from None
+    headers = items_at(data, places, f'V{_HEADER.itemsize}').view(_HEADER)
+    mine = (headers['opcode'] == _MESSAGE_OPCODE) & np.isin(headers['channel'], list(wanted))
+    headers, places = headers[mine], places[mine]
+    return Batch(
+        data,
+        headers['channel'],
+        headers['log_time'],
+        places + _HEADER.itemsize,
+        headers['length'].astype(np.int64) - (_HEADER.itemsize - _RECORD_HEADER_SIZE),
+    )
 
 
-__all__ = ['Contents', 'raw_messages', 'scan']
+def _places(data: bytes, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return the places of all records in pieces of data, in order.
+
+    Pieces are followed side by side, which takes a quarter of the time of one after the other.
+    The last record of a piece is left out if it is too short for a message.
+    """
+    found = []
+    while np.count_nonzero(more := starts + _HEADER.itemsize <= ends) > _FEW:
+        starts, ends = starts[more], ends[more]
+        found.append(starts)
+        starts = starts + items_at(data, starts + _LENGTH_AT, '<i8') + _RECORD_HEADER_SIZE
+        if np.any((starts > ends) | (starts <= found[-1])):
+            raise ValueError('a record is longer than its chunk')
+    rest = []
+    for place, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        while place + _HEADER.itemsize <= end:
+            rest.append(place)
+            place += _LENGTH.unpack_from(data, place + _LENGTH_AT)[0] + _RECORD_HEADER_SIZE
+            if place > end:
+                raise ValueError('a record is longer than its chunk')
+    return np.sort(np.concatenate([*found, np.array(rest, dtype=np.int64)]))
+
+
+__all__ = ['Batch', 'Contents', 'batches', 'raw_messages', 'scan']

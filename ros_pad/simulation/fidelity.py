@@ -119,7 +119,7 @@ class ErrorTable:
         """
         path = configuration.shared_folder() / 'fidelity.yaml'
         try:
-            values = yaml.safe_load(path.read_text(encoding='utf-8'))
+            values = configuration.read_yaml(path.read_text(encoding='utf-8'))
             reserves = tuple(float(value) for value in values['reserves'])
             bounds = {
                 level: tuple(float(value) for value in values['bounds'][level])
