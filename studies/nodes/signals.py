@@ -123,14 +123,13 @@ def words_of(name: str, number: int, *parameters: str) -> list[str]:
     return [*start, '--ros-args', *(word for each in parameters for word in ('-p', each))]
 
 
-def handles_signals(pid: int) -> bool:
+def _handles_signals(child: subprocess.Popen[bytes]) -> bool:
     """Return whether a process handles SIGTERM, or has ended."""
-    try:
-        lines = pathlib.Path(f'/proc/{pid}/status').read_text(encoding='ascii').splitlines()
-    except (FileNotFoundError, ProcessLookupError):
+    if child.poll() is not None:
         return True
-    caught = [int(line.split()[1], 16) for line in lines if line.startswith('SigCgt:')]
-    return not caught or bool(caught[0] >> (signal.SIGTERM - 1) & 1)
+    lines = pathlib.Path(f'/proc/{child.pid}/status').read_text(encoding='ascii').splitlines()
+    (caught,) = (int(line.split()[1], 16) for line in lines if line.startswith('SigCgt:'))
+    return bool(caught >> (signal.SIGTERM - 1) & 1)
 
 
 def perform(
@@ -169,7 +168,7 @@ def perform(
             children.append(child)
         for child in children:
             stack.callback(child.kill)
-        while not all(handles_signals(child.pid) for child in children):
+        while not all(map(_handles_signals, children)):
             if time.monotonic() > begin + START:
                 raise TimeoutError(f'{commands[0]}: does not handle signals after {START:g} s')
             time.sleep(1e-3)
@@ -341,14 +340,14 @@ def run(target: str, repeats: int, work: float, seed: int = 0) -> Iterator[Try]:
 def table(tries: Sequence[Try]) -> str:
     """Return the results as text."""
     lines = [
-        'target      tries  good  status 0  with bag or pressure  Python starts (s)  longest end (s)'
+        'target      tries  good  status 0  bag or pressure  Python starts (s)  longest end (s)'
     ]
     for target in dict.fromkeys(one.target for one in tries):
         own = [one for one in tries if one.target == target]
         good = sum(not one.problems for one in own)
         lines.append(
             f'{target:10} {len(own):6} {good:5} {sum(0 in one.statuses for one in own):9}'
-            f' {sum(one.reached for one in own):21}'
+            f' {sum(one.reached for one in own):16}'
             f' {max(one.python for one in own):18.2f} {max(one.ending for one in own):16.2f}'
         )
     return '\n'.join(lines)
