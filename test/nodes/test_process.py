@@ -3,8 +3,6 @@ import signal
 
 import pytest
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
@@ -37,14 +35,14 @@ def fail(error):
     raise error
 
 
-@pytest.fixture(params=[EventsExecutor, SingleThreadedExecutor], ids=['events', 'single'])
-def perform(request):
+@pytest.fixture
+def perform():
     """Run a probe with a deed; return the exit status. The probe must always end in order."""
 
     def perform(deed):
         ends = []
         try:
-            return run(lambda: Probe(deed, ends), [], request.param)
+            return run(lambda: Probe(deed, ends), [])
         finally:
             assert not rclpy.ok()
             assert ends == ['in order']
