@@ -61,15 +61,16 @@ class Repeats:
         Standard deviation of each value; values without noise never count as stopped.
     """
 
-    __slots__ = ('_counts', '_fine', '_noises', '_since', '_steps', 'last')
+    __slots__ = ('_changed', '_counts', '_fine', '_noises', '_since', '_steps', 'last')
 
     def __init__(self, noises: Sequence[float]) -> None:
         self._noises = noises
         self._steps = [math.inf] * len(noises)  # smallest change so far
         self._fine = False  # whether each value has changed by twice its noise or less
         self.last: Sequence[float] = (math.nan,) * len(noises)
-        self._since = [0.0] * len(noises)
-        self._counts = [0] * len(noises)
+        self._changed: float | None = 0.0  # time at which all changed last; None if not all did
+        self._since: list[float] = []
+        self._counts: list[int] = []
 
     def since(self, place: int) -> float:
         """Return the time since which the value with an index has not changed, s."""
@@ -79,7 +80,7 @@ class Repeats:
         """Process the values of a time, s; return the indices of those that have stopped."""
         last, self.last = self.last, values
         if self._fine and not any(map(eq, values, last)):
-            self._since, self._counts = [time] * len(values), [1] * len(values)
+            self._changed = time
             return ()
         return self._compare(time, last, values)
 
@@ -88,6 +89,9 @@ class Repeats:
     ) -> Sequence[int]:
         """Process values of which some may be those of the time before."""
         stopped: list[int] = []
+        if self._changed is not None:
+            self._since, self._counts = [self._changed] * len(values), [1] * len(values)
+            self._changed = None
         since, counts = self._since, self._counts
         for place, (value, noise) in enumerate(zip(values, self._noises, strict=True)):
             if value != last[place]:

@@ -105,9 +105,9 @@ class FootPath:
         advance = self._advance - before
         phases = (gait.phase(1, time), gait.phase(2, time))  # of the two tripods
         strokes = [gait.swing(each) if each >= gait.duty else None for each in phases]
-        feet, swinging = [], []
-        for index, (home_x, home_y) in enumerate(self._homes):
-            x, y = self._offsets[index]
+        offsets, feet = [], []
+        places = zip(self._homes, self._offsets, strict=True)
+        for index, ((home_x, home_y), (x, y)) in enumerate(places):
             stroke = strokes[index % 2]
             if stroke is None:
                 # The foot moves in the body against the motion of the body.
@@ -119,10 +119,10 @@ class FootPath:
                 progress, height = stroke
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
-            swinging.append(stroke is not None)
-            self._offsets[index] = (x, y)
+            offsets.append((x, y))
             feet.append((home_x + x, home_y + y, height))
-        self.feet, self.swings = feet, tuple(swinging)
+        self._offsets, self.feet = offsets, feet
+        self.swings = (strokes[0] is not None, strokes[1] is not None) * 3
 
 
 def _import_mujoco() -> Any:
