@@ -154,7 +154,7 @@ def live(checkout: pathlib.Path, seconds: float) -> dict[str, float]:
             for node in NODES
         }
         shares = _shares(commands, checkout, seconds)
-        return shares | {'rate': _printed(checkout, _RATE, bag)}
+        return shares | {'rate': _printed(_HERE, _RATE, bag)}
 
 
 def floor(seconds: float) -> dict[str, float]:
