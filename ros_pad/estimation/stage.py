@@ -161,8 +161,11 @@ class EstimationStage:
         if position is not self._used:
             # The position's own stamp may come from another clock.
             self._used, self._used_ns = position, stamp_ns
+        (fx, fy, fz), (x, y, z) = force, position[1]
         try:
-            _check_sizes(force, position[1], moment)
+            # Only an unusual sample is looked at more closely; squares take less time than abs().
+            if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2 or moment:
+                _check_sizes(force, position[1], moment)
             estimate = self.estimator.update(
                 stamp_ns * 1e-9,
                 force,
@@ -215,11 +218,8 @@ class EstimationStage:
 
 def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
     """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
-    (fx, fy, fz), (x, y, z) = force, point
-    # Squares take less time than abs(). Only an unusual sample is looked at more closely.
-    if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2:
-        _check_size('force', force, LARGEST_FORCE, 'N')
-        _check_size('position', point, LARGEST_POSITION, 'm')
+    _check_size('force', force, LARGEST_FORCE, 'N')
+    _check_size('position', point, LARGEST_POSITION, 'm')
     if moment is not None:
         _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')
 

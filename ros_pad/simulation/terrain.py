@@ -207,9 +207,9 @@ class Floor:
 
     def wet(self, x: float, y: float) -> bool:
         """Return whether there is liquid at a world position, m."""
-        rows, cell, (left, low) = self._rows, self.cell, self.origin
-        row = rows[int((y - low) // cell) % len(rows)]
-        return row[int((x - left) // cell) % len(row)]
+        rows = self._rows
+        row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
+        return row[int((x - self.origin[0]) // self.cell) % len(row)]
 
     def depth(self, x: float, y: float) -> float:
         """Return the depth of the liquid at a world position, m; 0 on dry ground."""
