@@ -81,6 +81,8 @@ class EstimationStage:
         Estimator of the foot, as given.
     samples : int
         Number of samples used so far.
+    last_ns : int
+        Time stamp of the last sample used, ns; 0 before the first one.
     doubt : str or None
         Doubt emitted last, with the present details after the colon; None before the first sample.
     sound : bool
@@ -108,7 +110,7 @@ class EstimationStage:
         self._used_ns = 0  # stamp of the wrench with which that position was first used
         self._silent_since_ns: int | None = None
         self._rejection = ''
-        self.samples = 0
+        self.samples = self.last_ns = 0
         self.doubt: str | None = None
         self.sound = True
 
@@ -178,6 +180,7 @@ class EstimationStage:
             self.reject(error)
             return
         self.samples += 1
+        self.last_ns = stamp_ns
         self._silent_since_ns, self._rejection = None, ''
         if estimate.doubt != self.doubt or estimate.sound != self.sound:
             self._update_doubt(estimate.doubt, estimate.sound)

@@ -14,6 +14,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import ListParameters
@@ -41,6 +44,7 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.parameters import plain
 from ros_pad.nodes.process import run
+from ros_pad.pace import LATE
 from ros_pad.trials import label
 
 PARAMETERS = (
@@ -132,6 +136,8 @@ class RecorderNode(Node):
             raise
         self._recordings: dict[str, Subscription] = {}
         self._lost: Counter[str] = Counter()
+        self._told = 0  # lost messages in the last message on /diagnostics
+        self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
         # The subscription to /clock is made first: an executor that finds several messages
@@ -253,11 +259,26 @@ class RecorderNode(Node):
             return
         if self._collects_parameters:
             self._look_for_nodes()
+        if self._lost.total() > self._told:
+            self._told = self._lost.total()
+            self._diagnose()
         try:
             self._bag.flush()
         except BagError:
             self._failed = True
             raise
+
+    def _diagnose(self) -> None:
+        """Tell on ``/diagnostics`` how many messages were lost."""
+        status = DiagnosticStatus(
+            name=f'{self.get_name()}: lost messages',
+            level=DiagnosticStatus.WARN,
+            message=f'{LATE}: {self._told} messages lost so far',
+            values=[KeyValue(key=topic, value=str(n)) for topic, n in self.lost.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics(array)
 
     def _look_for_nodes(self) -> None:
         """Request the parameters of every node of the robot when its services are there.
