@@ -21,6 +21,7 @@ from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.signals import children_spared
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.mujoco_model import LINKS
 from ros_pad.simulation.mujoco_model import POINT
@@ -127,7 +128,8 @@ class FootPath:
 
 def _import_mujoco() -> Any:
     try:
-        import mujoco
+        with children_spared():  # mujoco imports glfw, which starts a Python of its own
+            import mujoco
     except ImportError as error:
         raise ConfigError(
             f'fidelity L2 needs MuJoCo ({error}): pip install "ros_pad[mujoco]"'
