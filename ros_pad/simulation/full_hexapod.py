@@ -349,14 +349,10 @@ class FullHexapod:
         foot, pressure, limit = self._foot, self._pressures[index], self._limits[index]
         dome_load = load if load < limit else limit
         sole_load = load - dome_load
+        films = (0.0, 0.0)
         if self.feet[index].wet:
-            film = self._films[index]
-            film.drain(dome_load, sole_load, pressure, drained)
-            grip = foot.resistance_of(
-                dome_load, sole_load, pressure, film.under_domes, film.under_sole
-            )
-        else:
-            grip = foot.resistance_of(dome_load, sole_load, pressure, 0.0, 0.0)
+            films = self._films[index].drain(dome_load, sole_load, pressure, drained)
+        grip = foot.resistance_of(dome_load, sole_load, pressure, *films)
         self._ratios[index] = ratio = grip / load
         row = self._frictions[index]
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
