@@ -71,7 +71,7 @@ setup(
         'ros': ros('jazzy'),
         'kilted': ros('kilted'),
         # The hexapod with joints (L2), and compiled loops of the planar one.
-        'mujoco': ['mujoco>=3.2'],
+        'mujoco': ['mujoco>=3.3.6'],
         'fast': ['numba>=0.60'],
         # Sweeps on a Dask cluster, and Parquet beside their CSV.
         'sweep': ['distributed>=2024.1', 'pyarrow>=14'],
@@ -85,7 +85,7 @@ setup(
             'mcap-ros2-support',
             'meshio>=5.3',
             'mpmath>=1.2',
-            'mujoco>=3.2',
+            'mujoco>=3.3.6',
             'mypy==2.4.*',
             'numba>=0.60',
             'pyarrow>=14',
@@ -98,7 +98,7 @@ setup(
     entry_points={
         'console_scripts': [
             'pad = ros_pad.__main__:main',
-            *(f'{node}_node = ros_pad.nodes.{node}:main' for node in NODES),
+            *(f'{node}_node = ros_pad.nodes.start:{node}' for node in NODES),
         ],
     },
 )

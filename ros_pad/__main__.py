@@ -6,17 +6,18 @@ from __future__ import annotations
 
 import sys
 
-INTERRUPTED = 130  # exit status after Ctrl-C, the same as in shells
+from ros_pad.signals import INTERRUPTED
+from ros_pad.signals import STOP
 
 
 def main() -> int:
     """Run the command line; return the exit status, see :func:`ros_pad.cli.main`."""
+    STOP.install('pad: stopped\n')
     try:
         from ros_pad import cli
 
         return cli.main()
-    except KeyboardInterrupt:
-        print('pad: stopped', file=sys.stderr)
+    except KeyboardInterrupt:  # after the command had ended
         return INTERRUPTED
 
 

@@ -9,15 +9,16 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
-import signal
 import sys
-import threading
 from collections.abc import Sequence
-from typing import Any
+from functools import partial
 
 import ros_pad
 from ros_pad.commands.command import Help
 from ros_pad.commands.command import exit_status
+from ros_pad.signals import STOP
+from ros_pad.signals import end
+from ros_pad.signals import interrupt
 
 COMMANDS = {
     'run': 'walk a scene in closed loop: bag, report, comparison of policies',
@@ -64,9 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done; 1 a failure at run time, or a replay that differs; 2 bad usage or input; 130
         stopped by Ctrl-C or SIGTERM.
     """
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _stop)
-    return exit_status(lambda: _run(arguments))
+    with STOP.during(partial(end, 'pad: stopped\n')):
+        return exit_status(lambda: _run(arguments))
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -74,7 +74,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _complete()
     words = sys.argv[1:] if arguments is None else arguments
     options = parser(_command_in(words)).parse_args(words)
-    return int(options.command(options))
+    with STOP.during(interrupt):
+        return int(options.command(options))
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -116,9 +117,6 @@ def _complete() -> int:
     return 0
 
 
-def _stop(number: int, frame: Any) -> None:
-    raise KeyboardInterrupt
-
-
 if __name__ == '__main__':
+    STOP.install('pad: stopped\n')
     sys.exit(main())

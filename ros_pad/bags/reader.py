@@ -131,13 +131,17 @@ class BagReader:
                 raise BagError(f'{self.path}: its file {file.name} is missing')
         return files
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, Any, int]]:
+    def messages(
+        self, topics: Collection[str] | None = None, containing: bytes = b''
+    ) -> Iterator[tuple[str, Any, int]]:
         """Yield topic, decoded message and log time in ns of each message.
 
         Parameters
         ----------
         topics : collection of str, optional
             Topics to read, by default all; a topic that the bag does not have yields nothing.
+        containing : bytes
+            Messages without these bytes are left out.
 
         Raises
         ------
@@ -151,6 +155,8 @@ class BagReader:
             }
             for channel_id, log_time, data in raw_messages(file, contents, decoders):
                 topic, decode = decoders[channel_id]
+                if containing not in data:
+                    continue
                 try:
                     message = decode(data)
                 except Exception as error:  # invalid bytes can raise any exception

@@ -17,8 +17,8 @@ from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.signals import INTERRUPTED
 
-INTERRUPTED = 130  # exit status after Ctrl-C, the same as in shells
 WIDEST = 98  # largest width of the help in columns, also on a wider terminal
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'

@@ -25,6 +25,7 @@ from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.reports import report
+from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import is_bench
@@ -208,7 +209,8 @@ def _walk_on_nodes(
     scene: Scene, policy: str, seed: int, level: str, bag: pathlib.Path, live: bool
 ) -> Trial:
     try:
-        from ros_pad.nodes import composed
+        with STOP.deferred():  # an exception in the midst of imports may be dropped
+            from ros_pad.nodes import composed
     except ModuleNotFoundError as error:
         raise PadError(
             f'ROS 2 is not found ({error}): source its setup.bash, or'

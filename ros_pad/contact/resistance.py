@@ -22,6 +22,7 @@ import os
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -221,7 +222,7 @@ class Foot:
         """Lever of friction against turning about the vertical, m."""
         return DISC_TURNING_RADIUS * self.sole_radius
 
-    @property
+    @cached_property
     def sole_area(self) -> float:
         """Area of the sole, m²."""
         return math.pi * self.sole_radius**2
@@ -310,21 +311,22 @@ class Foot:
         total = under_domes = 0.0
         if dome_load > 0.0:
             # Below the conforming pressure, only a share of the dome's contact area touches.
-            under_domes = dome_load / max(pressure, self.conforming_pressure)
-            dry = self.friction * dome_load + self.shear_strength * under_domes
-            total += self._on_film(dry, dome_load, dome_film)
+            conforming = self.conforming_pressure
+            under_domes = dome_load / (pressure if pressure > conforming else conforming)
+            total = self.friction * dome_load + self.shear_strength * under_domes
             if dome_film > 0.0:
+                total = self._on_film(total, dome_load, dome_film)
                 total += self.pads * self.capillary_force
         if sole_load > 0.0:
-            area = min(self.sole_area - under_domes, sole_load / self.conforming_pressure)
+            area = sole_load / self.conforming_pressure
+            if area > self.sole_area - under_domes:
+                area = self.sole_area - under_domes
             dry = self.friction * sole_load + self.shear_strength * area
-            total += self._on_film(dry, sole_load, sole_film)
+            total += self._on_film(dry, sole_load, sole_film) if sole_film > 0.0 else dry
         return total
 
     def _on_film(self, dry: float, load: float, film: float) -> float:
-        """Return the resistance, N, with a film, from the dry resistance and the load, N."""
-        if film <= 0.0:
-            return dry
+        """Return the resistance, N, on a film, from the dry resistance and the load, N."""
         touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
         return touching * dry + (1.0 - touching) * self.boundary_friction * load
 

@@ -167,7 +167,9 @@ class PadMonitor:
     @property
     def reason(self) -> str:
         """Missing readings and the fault as text; empty if there are none."""
-        return '; '.join(filter(None, (self.silence, self.fault)))
+        if self.silence and self.fault:
+            return f'{self.silence}; {self.fault}'
+        return self.silence or self.fault
 
     def update(self, time: float, setpoint: float | None, pressure: float | None) -> None:
         """Process a reading, or its absence.

@@ -451,6 +451,9 @@ class MorphologyController:
     def _list_faults(self, leg: int, state: _LegState) -> None:
         """Update the list of faults: one entry from the start of a fault to its end."""
         monitor, faults = state.air.monitor, state.faults
+        none = not (monitor.reason or faults.timeout or faults.no_step or faults.sensors)
+        if none and not faults.open:
+            return
         for kind, reason in (
             ('fault', monitor.fault), ('silence', monitor.silence),
             ('timeout', faults.timeout), ('no step', faults.no_step),

@@ -77,10 +77,14 @@ class SlipAlarm:
 
         Return whether the alarm is on.
         """
-        variance = self._variance * max(1.0, self._correlation_time / dt)
-        gain = self._speed / variance * (speed - self._half)
-        self.statistic = min(max(0.0, self.statistic + gain), self._highest)
-        return self.statistic > self._threshold
+        stretch = self._correlation_time / dt
+        variance = self._variance * stretch if stretch > 1.0 else self._variance
+        statistic = self.statistic + self._speed / variance * (speed - self._half)
+        if not statistic > 0.0:
+            self.statistic = 0.0
+            return False
+        self.statistic = statistic if statistic < self._highest else self._highest
+        return statistic > self._threshold
 
 
 class SlipAlarms:
@@ -124,5 +128,6 @@ class SlipAlarms:
         """
         raised = False
         for alarm in self._alarms:
-            raised |= alarm.update(speed, dt)
+            if alarm.update(speed, dt):
+                raised = True
         return raised

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 from ros_pad.configuration import number
@@ -102,6 +104,10 @@ class Estimate(NamedTuple):
     sound: bool
 
 
+_estimate: Callable[[tuple[object, ...]], Estimate] = partial(tuple.__new__, Estimate)
+"""``Estimate(...)`` without the check of its arguments, which takes longer than all the rest."""
+
+
 class FootEstimator:
     """Estimate slip, wetness and friction of one foot from its force, marker and pressure.
 
@@ -134,6 +140,10 @@ class FootEstimator:
         self.tuning = tuning = tuning or Tuning()
         self._foot = foot
         self._expected_load = expected_load
+        self._least_load = AIRBORNE_LOAD * expected_load  # a smaller one may be an offset, N
+        self._measures_moment = tuning.moment_noise > 0.0
+        self._stiffness = foot.shear_stiffness
+        self._filter_period = tuning.filter_period - 1e-9
         noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
         self._contact_noise = noise
         self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
@@ -207,7 +217,7 @@ class FootEstimator:
             does not advance.
         """
         age = 0.0 if position_time is None else abs(time - position_time)
-        if not self.tuning.moment_noise:
+        if not self._measures_moment:
             moment = None
         yaw = 0.0 if moment is None else moment
         try:
@@ -218,26 +228,30 @@ class FootEstimator:
             raise _not_numbers(time, force, position, pressure, moment) from error
         if not finite:
             raise _not_finite(time, force, position, pressure, moment, position_time)
-        dt = self._advance(time)
-        stood, offset = self._gate.standing, self._offset
-        aloft = not z <= self._height + AIRBORNE < math.inf
-        fault = self._sensing.update(time, force, position, age, stood, aloft)
+        dt = time - self._time
+        if dt <= 0.0:
+            dt = self._set_back(time)
+        self._time = time
+        gate, offset = self._gate, self._offset
+        stood = gate.standing
+        air = self._height + AIRBORNE
+        fault = self._sensing.update(time, force, position, age, stood, not z <= air < math.inf)
         if fault:
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z
         if stood and z > self._stance.height + AIRBORNE:
             self._height, load = self._stance.height, 0.0  # the ground cannot rise with the foot
-        if z > self._height + AIRBORNE and load < AIRBORNE_LOAD * self._expected_load:
+            air = self._height + AIRBORNE
+        if z > air and load < self._least_load:
             offset.update(dt, fx, fy, fz, yaw)
             load = 0.0
-        if not self._gate.update(load):
+        if not gate.update(load):
             return self._swing(time, stood)
-        if load >= AIRBORNE_LOAD * self._expected_load:  # a smaller load may be an offset
+        if load >= self._least_load:
             self._height = z
         fx, fy, fz = fx - offset.x, fy - offset.y, fz - offset.z
         # The marker is above the soft pad: subtract the pad's shear to get the contact.
-        contact_x = x + fx / self._foot.shear_stiffness
-        contact_y = y + fy / self._foot.shear_stiffness
+        contact_x, contact_y = x + fx / self._stiffness, y + fy / self._stiffness
         if not stood or dt > LONGEST_GAP:
             self._touch_down(time, contact_x, contact_y, z, pressure)
             dt = self.tuning.smoothing / 10.0 if math.isinf(dt) else dt
@@ -246,22 +260,18 @@ class FootEstimator:
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
 
-    def _advance(self, time: float) -> float:
-        """Store the time of a sample, s; return the time since the last one, infinite if none."""
-        if time <= self._time:
-            if time > self._time - LONGEST_GAP:
-                raise InvalidInput(
-                    f'time = {time!r} s is not allowed: it must be later than that of the last'
-                    f' sample, {self._time!r} s'
-                )
-            # The clock has been set back: begin a new stance.
-            self._time = -math.inf
-            self._gate.standing = False
-            self._path.restart()
-            self._history.clear()
-            self._sensing.restart()
-        dt, self._time = time - self._time, time
-        return dt
+    def _set_back(self, time: float) -> float:
+        """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
+        if time > self._time - LONGEST_GAP:
+            raise InvalidInput(
+                f'time = {time!r} s is not allowed: it must be later than that of the last'
+                f' sample, {self._time!r} s'
+            )
+        self._gate.standing = False
+        self._path.restart()
+        self._history.clear()
+        self._sensing.restart()
+        return math.inf
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._alarm.reset()
@@ -293,8 +303,9 @@ class FootEstimator:
         slipping = self._alarm.update(-along, dt)
         stance, window, last = self._stance, self._window, self.estimate
         window.add(fz, pull, turning, -along)
-        stance.peak_load = max(stance.peak_load, fz)
-        fresh = time - window.start >= self.tuning.filter_period - 1e-9
+        if fz > stance.peak_load:
+            stance.peak_load = fz
+        fresh = time - window.start >= self._filter_period
         if fresh:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
@@ -307,22 +318,21 @@ class FootEstimator:
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
             wet, reason = last.wet_probability, last.doubt if last.sound else NOT_AGAIN
-        self.estimate = Estimate(
+        estimate = self.estimate = _estimate((
             time, True, slipping, slip, -along, self._speed_noise,
             wet, friction_mean, friction_sd, self._quantile - math.hypot(pull, turning) / fz,
             fresh, reason, True,
-        )  # fmt: skip
-        return self.estimate
+        ))  # fmt: skip
+        return estimate
 
     def _swing(self, time: float, stood: bool) -> Estimate:
         """Return the estimate of a foot in the air."""
-        last = self.estimate
-        self.estimate = Estimate(
-            time, False, False, (0.0, 0.0), 0.0, self._speed_noise, last.wet_probability,
-            last.friction_mean, last.friction_sd, last.margin, stood or not last.sound,
-            last.doubt if last.sound else NOT_AGAIN, True,
-        )  # fmt: skip
-        return self.estimate
+        _, _, _, _, _, _, wet, mean, sd, margin, _, reason, sound = self.estimate
+        estimate = self.estimate = _estimate((
+            time, False, False, (0.0, 0.0), 0.0, self._speed_noise, wet, mean, sd, margin,
+            stood or not sound, reason if sound else NOT_AGAIN, True,
+        ))  # fmt: skip
+        return estimate
 
     def _without_sensors(self, time: float, dt: float, x: float, y: float, fault: str) -> Estimate:
         """Return the estimate while sensors are faulty: undo the samples since then, and fade."""

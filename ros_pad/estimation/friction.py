@@ -25,7 +25,8 @@ from ros_pad.estimation.tuning import Tuning
 GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
 _UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
-_ONES = np.ones_like(GRID)  # a matrix product with it is several times faster than sum(axis=1)
+# Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
+_ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
 
 Posterior: TypeAlias = tuple[np.ndarray, bool]
@@ -134,6 +135,7 @@ class GroundFilter:
         self.prior = prior
         self._tables = {dome: prior.table(dome) for dome in (False, True)}
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
+        self._flat_prior = self._grounds * self._tables[False]
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
@@ -144,7 +146,7 @@ class GroundFilter:
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
-        self._normalise(self._grounds * self._tables[False])
+        self._normalise(self._flat_prior)
 
     def touch_down(self, distance: float, dome: bool) -> None:
         """Begin a stance at a distance, m, from the last one, as a dome or flat."""
@@ -211,18 +213,20 @@ class GroundFilter:
         # is μ less the part used by turning.
         likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         if slip > 0.0:
-            if turning_known:
-                likely = np.exp(-0.5 * away * away)
-            else:
+            if not turning_known:
                 shown = speed / np.hypot(speed, self._rim_speeds)
-                away = (shown * friction[:, None] - ratio) / ratio_noise
-                likely = _SHARES @ np.exp(-0.5 * away * away)
+                away = shown * friction[:, None]
+                away -= ratio
+                away /= ratio_noise
+            likely = np.exp(-0.5 * away * away)
+            if not turning_known:
+                likely = _SHARES @ likely
             unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
         self._posterior = self._posterior * (likelihood + 1e-6) ** (weight * self._temper)
         self._posterior /= self._posterior.sum()
-        dry, wet = (self._posterior @ _ONES).tolist()
+        dry, wet = self._posterior.dot(_ONES).tolist()
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
         if speed > 0.0:
             self._move(speed * dt)
@@ -237,15 +241,15 @@ class GroundFilter:
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         stay = math.exp(-distance / self._patch_length)
-        table = self._tables[self._dome]
         if self._dome:
             # Under domes wet and dry ground have the same friction: when friction fades, the
             # probability of wet ground must not change.
             grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
             friction = self._posterior[0] + self._posterior[1]
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * table[0])
+            table = self._tables[True][0]
+            self._posterior = grounds * (stay * friction + (1.0 - stay) * table)
         else:
-            self._posterior = stay * self._posterior + (1.0 - stay) * (self._grounds * table)
+            self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
 
     def _wet_or_dry(self) -> np.ndarray:
         return self._posterior.sum(axis=1, keepdims=True)
@@ -254,16 +258,17 @@ class GroundFilter:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
         self._posterior = posterior = posterior / posterior.sum()
-        dry, wet = (posterior @ _ONES).tolist()
+        dry, wet = posterior.dot(_ONES).tolist()
         self.wet_probability = wet / (dry + wet)
-        self._blurred = posterior @ self._blur.T / (dry + wet)
+        self._blurred = posterior.dot(self._blur.T)
+        self._blurred /= dry + wet
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
         scales = np.array(self.scales)
-        mean = float(scales @ (self._blurred @ GRID))
-        square = float(scales * scales @ (self._blurred @ _SQUARES))
+        mean = float(scales.dot(self._blurred.dot(GRID)))
+        square = float((scales * scales).dot(self._blurred.dot(_SQUARES)))
         return mean, math.sqrt(max(square - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
@@ -273,6 +278,6 @@ class GroundFilter:
         """
         dry, wet = self.scales
         edges = dry * _UPPER_EDGES
-        on_dry, on_wet = np.cumsum(self._blurred, axis=1)
+        on_dry, on_wet = np.add.accumulate(self._blurred, axis=1)
         below = on_dry + np.interp(edges, wet * _UPPER_EDGES, on_wet, left=0.0)
         return float(np.interp(share, below, edges))

@@ -13,12 +13,9 @@ import copy
 import gc
 import json
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -46,6 +43,7 @@ from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.pace import Progress
+from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
@@ -328,25 +326,9 @@ class ComposedTrial:
             self.executor.shutdown()
 
 
-@contextmanager
-def _interruptible(trial: ComposedTrial) -> Iterator[None]:
-    """Let the first Ctrl-C or SIGTERM stop the walk; a second one ends the process at once."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
-
-    def stop(number: int, frame: Any) -> None:
-        trial.stopped = True
-        signal.signal(number, before[signal.Signals(number)])
-
-    for number in before:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _interruptible(trial: ComposedTrial) -> AbstractContextManager[None]:
+    """Let the first Ctrl-C or SIGTERM stop the walk; further ones disturb nothing."""
+    return STOP.during(partial(setattr, trial, 'stopped', True))
 
 
 def _walked(
@@ -359,17 +341,18 @@ def _walked(
     progress: Progress | None,
 ) -> tuple[ComposedTrial, float]:
     """Walk a scene and close its nodes; return them, and the wall time of the walk, s."""
-    trial = ComposedTrial(scene, policy, seed, bag, context, level)
-    started = time.perf_counter()
-    try:
+    with STOP.during():  # no signal leaves half a trial
+        trial = ComposedTrial(scene, policy, seed, bag, context, level)
+        started = time.perf_counter()
         with _interruptible(trial):
-            trial.walk(progress)
-    except BaseException:
-        with suppress(PadError):  # a bag on a full disk cannot be closed either
+            try:
+                trial.walk(progress)
+            except BaseException:
+                with suppress(PadError):  # a bag on a full disk cannot be closed either
+                    trial.close()
+                raise
+            wall = time.perf_counter() - started
             trial.close()
-        raise
-    wall = time.perf_counter() - started
-    trial.close()
     return trial, wall
 
 

@@ -14,7 +14,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -416,8 +415,7 @@ class RegulatorNode(LifecycleNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until it is interrupted, then vent the pads. Return the exit status."""
-    # Drivers may start threads of their own: the older executor has been tried longer with them.
-    return run(RegulatorNode, args, SingleThreadedExecutor)
+    return run(RegulatorNode, args)
 
 
 if __name__ == '__main__':

@@ -108,7 +108,10 @@ def permitted(gauge_pa: float, ceiling: float) -> float:
     LimitError
         When it is above the ceiling.
     """
-    number = isinstance(gauge_pa, Real) and not isinstance(gauge_pa, bool)
+    # The type first, because isinstance of an abstract class takes long.
+    number = type(gauge_pa) is float or (
+        isinstance(gauge_pa, Real) and not isinstance(gauge_pa, bool)
+    )
     if not number or not math.isfinite(gauge_pa) or gauge_pa < 0.0:
         raise InvalidInput(
             f'set-point {gauge_pa!r} Pa is not allowed: a number from 0 to {ceiling:g} Pa gauge is'

@@ -114,6 +114,7 @@ class SimulatedRegulator:
         self._disturbance_time = -math.inf
         self._is_open = False
         self._now = 0.0  # time of the last call
+        self._rest = 0.0  # time since the last internal step, s
         self._epoch = 0.0  # time of the last change of the set-point
         self._steps = 0  # internal steps since that change
 
@@ -143,7 +144,7 @@ class SimulatedRegulator:
             self._check_answer(now)
             self._is_open = True
             self._now = self._epoch = self._channel.time = now
-            self._steps = 0
+            self._rest, self._steps = 0.0, 0
 
     def set_pressure(self, gauge_pa: float) -> None:
         """Command a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``."""
@@ -154,13 +155,15 @@ class SimulatedRegulator:
             self._channel.step(self._channel.setpoint, rest)
             self._channel.step(setpoint, 0.0)
             self._epoch = self._now
-            self._steps = 0
+            self._rest, self._steps = 0.0, 0
 
     def read(self) -> Reading:
         """Return pad pressure and set-point at the present time of the clock."""
         channel = self._present()
         self._check_answer(self._now)
-        pressure = channel.pad_pressure + self._drift()
+        pressure = channel.pad_pressure
+        if self._faults:
+            pressure += self._drift()
         if self._noise:
             if self._now != self._disturbance_time:
                 self._disturbance_time = self._now
@@ -209,6 +212,8 @@ class SimulatedRegulator:
         if not self._is_open:
             raise TransportError('the simulated regulator is not open: call open() first')
         now = self._clock()
+        if now == self._now:
+            return self._rest
         if not self._now <= now < math.inf:
             raise InvalidInput(
                 f'the clock went from {self._now!r} s to {now!r} s: it must be finite and must not'
@@ -225,4 +230,5 @@ class SimulatedRegulator:
             channel.step(channel.setpoint, count * STEP)
             self._steps += count
         rest = elapsed - steps * STEP
-        return rest if rest > _ROUNDING * STEP else 0.0
+        self._rest = rest if rest > _ROUNDING * STEP else 0.0
+        return self._rest

@@ -197,6 +197,8 @@ class SupervisedChannel:
     @property
     def fault(self) -> str:
         """Faults of device and pad, separated by semicolons; empty when there are none."""
+        if not self._device_faults:
+            return self.monitor.reason
         return '; '.join(filter(None, (*self._device_faults, self.monitor.reason)))
 
     @property

@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from operator import sub
 from typing import Any
 
-import numpy as np
-
 from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError
@@ -86,7 +84,7 @@ class FootPath:
         self._gait = gait
         self._homes = homes
         self._reach = gait.reach()
-        self._time = 0.0
+        self._advance = gait.body_advance(0.0)
         self._offsets: list[tuple[float, float]] = []
         for leg in range(1, 7):
             phase = gait.phase(leg, 0.0)
@@ -103,27 +101,28 @@ class FootPath:
     def move(self, time: float, turn: float) -> None:
         """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
         gait = self._gait
-        advance = gait.body_advance(time) - gait.body_advance(self._time)
-        self._time = time
-        feet, swinging = [], []
-        for index, (home_x, home_y) in enumerate(self._homes):
-            phase = gait.phase(index + 1, time)
-            x, y = self._offsets[index]
-            height = 0.0
-            swings = phase >= gait.duty
-            if swings:
+        before, self._advance = self._advance, gait.body_advance(time)
+        advance = self._advance - before
+        phases = (gait.phase(1, time), gait.phase(2, time))  # of the two tripods
+        strokes = [gait.swing(each) if each >= gait.duty else None for each in phases]
+        offsets, feet = [], []
+        places = zip(self._homes, self._offsets, strict=True)
+        for index, ((home_x, home_y), (x, y)) in enumerate(places):
+            stroke = strokes[index % 2]
+            if stroke is None:
+                # The foot moves in the body against the motion of the body.
+                height = 0.0
+                x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
+            else:
                 if not self.swings[index]:
                     self._lifted[index] = (x, y)
-                progress, height = gait.swing(phase)
+                progress, height = stroke
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
-            else:
-                # The foot moves in the body against the motion of the body.
-                x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
-            swinging.append(swings)
-            self._offsets[index] = (x, y)
+            offsets.append((x, y))
             feet.append((home_x + x, home_y + y, height))
-        self.feet, self.swings = feet, tuple(swinging)
+        self._offsets, self.feet = offsets, feet
+        self.swings = (strokes[0] is not None, strokes[1] is not None) * 3
 
 
 def _import_mujoco() -> Any:
@@ -205,9 +204,13 @@ class FullHexapod:
         self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
         self._cleared = [True] * 6  # whether a foot left the ground in its present or last swing
         self._loads = [0.0] * 6
-        self._pushes = [(0.0, 0.0)] * 6
+        self._lefts = [0.0] * 6
+        self._backs = [0.0] * 6
         self._moments = [0.0] * 6
         self._ratios = [0.0] * 6
+        self._pressures = [0.0] * 6
+        self._limits = [0.0] * 6  # force limits of the domes at these pressures, N
+        self._ahead: list[tuple[float, bool, bool] | None] = [None] * 6  # see `_approach`
         self._mujoco = mujoco
         text = mjcf(scene, self._geometry, floor.heights is not None, settings, self._dt)
         self.model: Any = mujoco.MjModel.from_xml_string(text)
@@ -223,19 +226,19 @@ class FullHexapod:
     def _keep_views(self) -> None:
         """Keep views of MuJoCo's arrays, because it would take time to make them in every step."""
         first = self.model.geom('foot_1').id
-        self._index = {first + index: index for index in range(6)}
         self._state = self.data.qpos[:25]
         self._ctrl = self.data.ctrl
         self._places = self.data.geom_xpos[first : first + 6]
         self._axes = self.data.geom_xmat[first : first + 6, :6]  # x and y rows of their rotation
         # Scalars go through a memoryview faster than through an array.
+        self._pose: Any = memoryview(self._state)
         self._frictions: list[Any] = [
             memoryview(self.model.pair(f'foot_{leg}').friction) for leg in self.legs
         ]
         if self._tow.weight:
-            self._sled_place = self.data.geom('sled').xpos[:2]
-            self._sled_friction = self.model.pair('sled').friction
-        self._wrench = np.zeros(6)
+            self._sled_place: Any = memoryview(self.data.geom('sled').xpos)
+            self._sled_friction: Any = memoryview(self.model.pair('sled').friction)
+        self._contacts = self.data.sensordata  # force and moment of each foot's contact
 
     @property
     def body(self) -> Vector:
@@ -277,25 +280,32 @@ class FullHexapod:
         InvalidInput
             When there are not six finite pressures.
         """
-        check_pressures(pressures, 6)
+        self._fill(pressures)
         self._steps += 1
         self.time = self._steps * self.period
-        model, data, state = self.model, self.data, self._state
+        model, data, pose = self.model, self.data, self._pose
         mj_step = self._mujoco.mj_step
-        if not abs(state.item(0)) < _FAR:
+        if not abs(pose[0]) < _FAR:
             return
         self._aim()
         for _ in range(self._substeps):
-            self._set_friction(pressures)
+            self._set_friction()
             mj_step(model, data)
             # Checking the body is enough: the solver couples all joints, so if one diverges the
             # body diverges too.
-            if not abs(state.item(0)) < _FAR:
+            if not abs(pose[0]) < _FAR:
                 self._end('the solution of MuJoCo has diverged')
                 return
             self.read_contacts()
         self.update_feet(pressures)
         self._judge()
+
+    def _fill(self, pressures: Sequence[float]) -> None:
+        """Set the gauge pressures of the pads, Pa."""
+        if pressures != self._pressures:  # they change more rarely than the robot steps
+            check_pressures(pressures, 6)
+            self._pressures = list(pressures)
+            self._limits = [self._foot.dome_load(math.inf, each) for each in pressures]
 
     def _aim(self) -> None:
         """Set the set-points of all servos; where a foot is out of reach, they stay unchanged."""
@@ -303,10 +313,10 @@ class FullHexapod:
         heading = self.body[2]
         path, swung = self._path, self._path.swings
         path.move(max(0.0, self.time - self._settle), -self._heading_gain * heading * self.period)
-        for index, (before, now) in enumerate(zip(swung, path.swings, strict=True)):
-            if now and not before:
+        for index in range(6) if path.swings != swung else ():
+            if not swung[index] and path.swings[index]:
                 self._cleared[index] = False
-            elif before and not now and not self._cleared[index]:
+            elif swung[index] and not path.swings[index] and not self._cleared[index]:
                 self._end(f'leg {index + 1} does not clear the ground in its swing')
         targets: list[float] = []
         try:
@@ -318,25 +328,24 @@ class FullHexapod:
         self._targets = targets
         self._ctrl[:] = targets
 
-    def _set_friction(self, pressures: Sequence[float]) -> None:
+    def _set_friction(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last one.
 
         Set the friction of the towed load, too.
         """
         for index, load in enumerate(self._loads):
             if load > LIGHT:
-                self._write_friction(index, load, pressures[index], self._dt)
+                self._ahead[index] = None
+                self._write_friction(index, load, self._dt)
         tow = self._tow
         if tow.weight:
-            x, y = self._sled_place.tolist()
-            self._sled_friction[:2] = (
-                tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
-            )
+            row, (x, y, _) = self._sled_friction, self._sled_place
+            row[0] = row[1] = tow.friction_wet if self._floor.wet(x, y) else tow.friction_dry
 
-    def _write_friction(self, index: int, load: float, pressure: float, drained: float) -> None:
+    def _write_friction(self, index: int, load: float, drained: float) -> None:
         """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
-        foot = self._foot
-        dome_load = foot.dome_load(load, pressure) if pressure > 0.0 else 0.0
+        foot, pressure, limit = self._foot, self._pressures[index], self._limits[index]
+        dome_load = load if load < limit else limit
         sole_load = load - dome_load
         if self.feet[index].wet:
             film = self._films[index]
@@ -354,38 +363,33 @@ class FullHexapod:
 
     def read_contacts(self) -> None:
         """Read the ground's force and yaw moment on each foot in the last step of MuJoCo."""
-        model, data, wrench = self.model, self.data, self._wrench
-        contact_force = self._mujoco.mj_contactForce
-        loads, pushes, moments = [0.0] * 6, [(0.0, 0.0)] * 6, [0.0] * 6
-        for contact, (_, geom) in enumerate(data.contact.geom.tolist()):
-            index = self._index.get(geom)
-            if index is not None:
-                contact_force(model, data, contact, wrench)
-                # The axes of a contact with level ground are z, y, -x.
-                normal, left, back, moment, _, _ = wrench.tolist()
-                loads[index], pushes[index] = normal, (-back, left)
-                moments[index] = moment
-        self._loads, self._pushes, self._moments = loads, pushes, moments
+        values = self._contacts.tolist()
+        # The axes of a contact with level ground are z, y, -x.
+        self._loads, self._lefts, self._backs = values[::6], values[1::6], values[2::6]
+        self._moments = values[3::6]
 
     def update_feet(self, pressures: Sequence[float]) -> None:
         """Set the states of the feet, and the work lost in slip, from the contacts read last."""
-        dt, foot, floor = self.period, self._foot, self._floor
-        softness = 1.0 / foot.shear_stiffness
+        self._fill(pressures)
+        dt, wet, softness = self.period, self._floor.wet, 1.0 / self._foot.shear_stiffness
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        for index, state in enumerate(self.feet):
-            x, y, z = places[index]
-            load, (push_x, push_y) = self._loads[index], self._pushes[index]
+        feet = zip(
+            range(6), self.feet, places, self._loads, self._backs, self._lefts, self._moments,
+            self._ratios, self._pressures, self._limits, strict=True,
+        )  # fmt: skip
+        for index, state, (x, y, z), load, back, push_y, moment, ratio, pressure, limit in feet:
+            push_x = 0.0 - back  # not -0.0 in the air
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
             state.force = (push_x, push_y, load)
-            state.moment = self._moments[index]
+            state.moment = moment
             state.standing = load > 0.0
-            state.grip = self._ratios[index] * load
+            state.grip = ratio * load
             state.slip_speed = 0.0
-            state.wet = floor.wet(x, y)
+            state.wet = wet(x, y)
             if load <= LIGHT:
-                self._approach(index, x, y, z - POINT, pressures[index])
+                self._approach(index, x, y, z - POINT)
             elif load > SLIP_LOAD:
                 step_x, step_y = x - last[index][0], y - last[index][1]
                 distance = math.hypot(step_x, step_y)
@@ -395,12 +399,11 @@ class FullHexapod:
                 turn = _turn(last_axes[index], axes[index])
                 # As on L1, sliding and turning share a foot's grip.
                 if math.hypot(distance, self._lever * turn) > SLIP_SPEED * dt:
-                    self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
-            pressure = pressures[index]
-            if pressure > 0.0 and foot.dome_load(load, pressure) < load:
+                    self.dissipation -= push_x * step_x + push_y * step_y + moment * turn
+            if pressure > 0.0 and limit < load:
                 state.overload_time += dt
 
-    def _approach(self, index: int, x: float, y: float, z: float, pressure: float) -> None:
+    def _approach(self, index: int, x: float, y: float, z: float) -> None:
         """Prepare film, block and friction below a foot without load."""
         ground, clear = 0.0, CLEAR
         if self._floor.heights is not None:
@@ -409,11 +412,15 @@ class FullHexapod:
             ground = float(block[2])
             if z > ground + _SHALLOW:
                 block[2] = self._floor.height(x, y)
-        if z > ground + CLEAR:
-            self._films[index].touch_down(self._floor.depth(x, y))
         if z > ground + clear:
             self._cleared[index] = True
-        self._write_friction(index, LIGHT, pressure, 0.0)
+        left = z > ground + CLEAR
+        ahead = (self._pressures[index], self.feet[index].wet, left)
+        if ahead != self._ahead[index]:  # else film and friction are as they were set last
+            self._ahead[index] = ahead
+            if left:
+                self._films[index].touch_down(self._floor.depth(x, y))
+            self._write_friction(index, LIGHT, 0.0)
 
     def _judge(self) -> None:
         """Set the verdict when the body tips over or a joint is far from its set-point."""

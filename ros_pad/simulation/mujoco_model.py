@@ -251,7 +251,7 @@ def mjcf(
     """
     body, tow, slope = scene.body, scene.tow, scene.floor.slope
     assert isinstance(body, HexapodBody)
-    grounds, trees, pairs, servos = [], [], [], []
+    grounds, trees, pairs, servos, sensors = [], [], [], [], []
     for leg, geometry in enumerate(legs, 1):
         ground = f'<geom name="block_{leg}" type="plane" size="0 0 1"/>'
         # Each body costs computing time, so a block is a body only if it can move.
@@ -260,6 +260,7 @@ def mjcf(
         pairs.append(
             f'<pair name="foot_{leg}" geom1="block_{leg}" geom2="foot_{leg}" condim="4"/>'
         )
+        sensors.append(f'<contact geom1="block_{leg}" geom2="foot_{leg}" data="force torque"/>')
         servos += [f'<position joint="leg_{leg}_{joint}"/>' for joint in LINKS]
     load = line = ''
     if tow.weight:
@@ -294,6 +295,7 @@ def mjcf(
   <contact>{''.join(pairs)}</contact>
   {line}
   <actuator>{''.join(servos)}</actuator>
+  <sensor>{''.join(sensors)}</sensor>
 </mujoco>
 """
 

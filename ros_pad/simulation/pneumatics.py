@@ -352,6 +352,8 @@ class PneumaticChannel:
     @property
     def quiet_time(self) -> float:
         """Time until the next fault starts or ends, s; infinite if none does."""
+        if not self._edges:
+            return math.inf
         time = self.time + _INSTANT
         return min((edge for edge in self._edges if edge > time), default=math.inf) - self.time
 
@@ -380,7 +382,7 @@ class PneumaticChannel:
         if setpoint != self.setpoint:
             self._command(setpoint)
         while dt > _INSTANT:
-            sound = self.quiet_time if self._edges else math.inf
+            sound = self.quiet_time
             if self.settled:
                 h = min(dt, sound)
                 self._time += h

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -48,9 +49,7 @@ class TrialLog:
         """Add a sensor sample: time, s, body, and force, N, and position, m, of each foot."""
         self._time.append(time)
         self._body.append(body)
-        for force, position in readings:
-            self._readings.extend(force)
-            self._readings.extend(position)
+        self._readings.extend(chain.from_iterable(chain.from_iterable(readings)))
 
     def control(
         self,

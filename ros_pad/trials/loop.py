@@ -96,8 +96,7 @@ class LegStages:
     def sample(self, stamp_ns: int, reading: Reading, moment: float | None) -> None:
         """Pass a sample of the sensors to the stages."""
         force, position = reading
-        self.estimation.wrench(stamp_ns, force, moment)
-        self.estimation.position(stamp_ns, position)
+        self.estimation.sample(stamp_ns, force, moment, position)
 
     def report(self, now_ns: int) -> None:
         """Read the pressure from the regulator, and pass it to estimation and decision."""
@@ -245,8 +244,8 @@ class ClosedLoop:
         """
         self._stamp_ns += self.period_ns
         now_ns, legs = self._stamp_ns, self.legs
-        for leg in legs:
-            leg.channel.tick(now_ns)
+        for channel in self._channels:
+            channel.tick(now_ns)
         if self._tick_pace.due(now_ns):
             for leg in legs:
                 leg.tick(now_ns)

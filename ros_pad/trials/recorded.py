@@ -27,12 +27,14 @@ import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.recovery import KEY as REPAIR
+from ros_pad.bags.topics import DIAGNOSTICS
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
+from ros_pad.pace import LATE
 from ros_pad.pace import Progress
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.label import AMBIENT_PRESSURE
@@ -163,6 +165,7 @@ def load(
         trial['settings']['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
     if bag.problem:
         trial['settings']['problem'] = bag.problem
+    trial['settings']['late'] = late(bag)
     ambient = trial['settings']['ambient_pressure']
     return Trial(
         **trial,
@@ -182,6 +185,22 @@ def load(
         dome=slow('morphology') == 1.0,
         doubt=np.nan_to_num(slow('doubt'), nan=-1.0).astype(int),
     )
+
+
+def late(bag: BagReader) -> list[str]:
+    """Return a line for each node that told on ``/diagnostics`` that it did not keep up."""
+    if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
+        return []
+    told: dict[str, list[tuple[float, str]]] = {}
+    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode()):
+        for status in array.status:
+            if status.message.startswith(LATE):
+                seconds = (log_ns - bag.start) * 1e-9
+                told.setdefault(status.name, []).append((seconds, status.message))
+    return [
+        f'{name}, told {len(found)} times from {found[0][0]:.1f} s on: {found[-1][1]}'
+        for name, found in told.items()
+    ]
 
 
 def _grid(series: Mapping[tuple[int, str], _Series], *kinds: str) -> np.ndarray:
@@ -349,4 +368,4 @@ def _read(
     return {key: _Series.of(topics[name], *tables[name]) for name, key in wanted.items()}
 
 
-__all__ = ['load', 'wanted_topics']
+__all__ = ['late', 'load', 'wanted_topics']

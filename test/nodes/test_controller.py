@@ -6,11 +6,11 @@ from itertools import pairwise
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 
+from ros_pad.control.stage import DecisionStage
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.stamps import nanoseconds
@@ -19,7 +19,7 @@ from ros_pad.nodes.stamps import set_stamp
 AMBIENT = 101325.0
 LOAD = 6.83
 LEGS = (1, 2)
-INPUTS = (topics.WRENCH, topics.POSITION, topics.WETNESS)
+INPUTS = (topics.CONTACT_LOAD, topics.CONTACT_POSITION, topics.WETNESS)
 TIME_NS = 5_000_000_000
 
 
@@ -42,6 +42,7 @@ class Robot:
         self.diagnostics = []
         topics.DIAGNOSTICS.subscription(self.node, self.diagnostics.append)
         self.controller = None
+        self.taken = {'load': 0, 'position': 0}  # number of values that the stages have received
         self.position = 0.0
         self.time_ns = TIME_NS
 
@@ -74,16 +75,16 @@ class Robot:
         self.until(lambda: self.controller.get_clock().now().nanoseconds == self.time_ns)
 
     def sense(self, load, position=None, leg=1, seen=True):
-        """Publish wrench and, if ``seen``, position of a leg, and wait for the controller."""
-        before = self.controller.wrenches
+        """Publish load and, if ``seen``, position of a leg, and wait for the controller."""
+        before = dict(self.taken)
         point = PointStamped()
         point.point.x = self.position if position is None else position
         if seen:
-            self.inputs[topics.POSITION.name(leg)].publish(point)
-        wrench = WrenchStamped()
-        wrench.wrench.force.z = load
-        self.inputs[topics.WRENCH.name(leg)].publish(wrench)
-        self.until(lambda: self.controller.wrenches > before)
+            self.inputs[topics.CONTACT_POSITION.name(leg)].publish(point)
+        self.inputs[topics.CONTACT_LOAD.name(leg)].publish(Float64(data=load))
+        self.until(lambda: self.taken['load'] > before['load'], what='the load')
+        if seen:
+            self.until(lambda: self.taken['position'] > before['position'], what='the position')
 
     def estimate(self, wet, leg=1):
         """Publish an estimate of wetness; return the set-point that follows."""
@@ -114,8 +115,21 @@ class Robot:
 
 
 @pytest.fixture
-def robot(context, executor, until):
-    return Robot(context, executor, until)
+def robot(context, executor, until, monkeypatch):
+    robot = Robot(context, executor, until)
+
+    def count(name):
+        method = getattr(DecisionStage, name)
+
+        def counted(stage, *values):
+            method(stage, *values)
+            robot.taken[name] += 1
+
+        monkeypatch.setattr(DecisionStage, name, counted)
+
+    for name in robot.taken:
+        count(name)
+    return robot
 
 
 def test_every_estimate_is_answered_by_a_setpoint(robot):

@@ -29,7 +29,12 @@ NODES = {
     'recorder': RecorderNode,
 }
 OWN = {
-    'simulator': {'scene': 'hexapod_patches', 'publish_clock': True, 'free_running': False},
+    'simulator': {
+        'scene': 'hexapod_patches',
+        'publish_clock': True,
+        'fidelity': 'L1',
+        'rate': 50.0,
+    },
     'recorder': {},
 }
 SETPOINT = topics.PRESSURE_SETPOINT.name('?')

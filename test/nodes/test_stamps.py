@@ -34,7 +34,7 @@ def test_in_simulated_time_each_clock_message_is_a_tick(context, executor, until
     )
     executor.add_node(node)
     ticks = []
-    on_tick(node, 0.001, ticks.append)
+    on_tick(node, 0.001, ticks.append, pytest.fail)
     clock = topics.CLOCK.publisher(node)
     until(lambda: clock.get_subscription_count() == 2)  # two subscriptions: time and ticks
     for time_ns in (7, 1_000_000_000, 3_000_000_004):
@@ -49,7 +49,7 @@ def test_in_real_time_a_timer_ticks(context, executor, until):
     node = Node('probe', context=context)
     executor.add_node(node)
     ticks = []
-    on_tick(node, 0.01, ticks.append)
+    on_tick(node, 0.01, ticks.append, pytest.fail)
     before = node.get_clock().now().nanoseconds
     until(lambda: len(ticks) == 5)
     assert ticks[0] > before
