@@ -178,9 +178,11 @@ class FieldReader:
         if len(starts) and self._text_at is None:
             first = data[starts[0] : starts[0] + sizes[0]]
             self(first)  # refuses wrong bytes
-            if np.all(sizes == sizes[0]) and self._alike(data, starts):
+            if np.all(sizes == sizes[0]):
                 record = self._record(first)
-                return items_at(data, starts, f'V{record.itemsize}').view(record)
+                found = items(data, f'V{record.itemsize}')[starts]
+                if self._alike(found):
+                    return found.view(record)
         ends = (starts + sizes).tolist()
         found = [self(data[s:e]) for s, e in zip(starts.tolist(), ends, strict=True)]
         forms = (self._fields[place][1] for place in self._wanted)
@@ -189,22 +191,26 @@ class FieldReader:
             [(p, 'O' if f.endswith('s') else f) for p, f in zip(self.paths, forms, strict=True)],
         )
 
-    def _alike(self, data: bytes, starts: np.ndarray) -> bool:
+    def _alike(self, messages: np.ndarray) -> bool:
         """Return whether messages have the same encapsulation, and texts of the same size."""
-        heads, texts = (items_at(data, starts + at, 'u4') for at in (0, self._size_at))
-        return bool(np.all(heads == heads[0]) and (np.all(texts == texts[0])))
+        table = messages.view(np.uint8).reshape(len(messages), -1)
+        places = [slice(at, at + _ENCAPSULATION) for at in (0, self._size_at)]
+        return all(bool(np.all(table[:, at] == table[0, at])) for at in places)
 
     def _record(self, message: bytes) -> np.dtype[np.void]:
         """Return the layout of messages that are like this one."""
         order, at = message[1], self._size_at
         fields = self._sized(_SIZES[order].unpack_from(message, at)[0] if at else 0)
         places = _places(fields)
+        formats = [np.dtype(_ORDERS[order] + fields[place][1]) for place in self._wanted]
+        offsets = [places[place] for place in self._wanted]
+        ends = [offset + form.itemsize for offset, form in zip(offsets, formats, strict=True)]
         return np.dtype(
             {
                 'names': list(self.paths),
-                'formats': [_ORDERS[order] + fields[place][1] for place in self._wanted],
-                'offsets': [places[place] for place in self._wanted],
-                'itemsize': len(message),
+                'formats': formats,
+                'offsets': offsets,
+                'itemsize': max([at + _ENCAPSULATION, *ends]),  # up to the last field
             }
         )
 
@@ -285,11 +291,20 @@ def field_of(message: Any, path: str) -> Any:
     return value[int(place)] if place else value
 
 
-def items_at(data: bytes, places: np.ndarray, form: str) -> np.ndarray:
-    """Return the items of a NumPy type that begin at these places in bytes."""
-    # A view with an item from every byte on, so that a place is an index.
-    count = max(0, len(data) - np.dtype(form).itemsize + 1)
-    return np.ndarray((count,), form, data, strides=(1,))[places]
+def items(data: bytes, form: str, first: int = 0) -> np.ndarray:
+    """Return a view of bytes in which the index of an item is the place where it begins.
+
+    Parameters
+    ----------
+    data : bytes
+        Any bytes.
+    form : str
+        NumPy type of an item.
+    first : int
+        Place of the item with index 0.
+    """
+    count = max(0, len(data) - first - np.dtype(form).itemsize + 1)
+    return np.ndarray((count,), form, data, first if count else 0, (1,))
 
 
 def _fields(message_type: MessageType, message: Any) -> Iterator[_Field]:
@@ -356,4 +371,4 @@ def _picker(order: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]
     return tuple  # a tuple is returned as it is
 
 
-__all__ = ['FieldReader', 'FieldWriter', 'field_of', 'items_at']
+__all__ = ['FieldReader', 'FieldWriter', 'field_of', 'items']

@@ -235,15 +235,18 @@ class BagReader:
             }
             for batch in batches(file, contents, readers):
                 parts: _Parts = {}
-                for channel_id, (topic, read) in readers.items():
-                    mine = np.flatnonzero(batch.channels == channel_id)
-                    places, times = (batch.starts[mine], batch.sizes[mine]), batch.log_times[mine]
+                order = np.argsort(batch.channels, kind='stable')
+                present, first = np.unique(batch.channels[order], return_index=True)
+                for channel_id, mine in zip(
+                    present.tolist(), np.split(order, first[1:]), strict=True
+                ):
+                    topic, read = readers[channel_id]
                     try:
-                        rows = read(batch.data, *places)
+                        rows = read(batch.data, batch.starts[mine], batch.sizes[mine])
                     except Exception:  # invalid bytes can raise any exception
                         _raise_first(file, topic, read, batch, mine)
                         raise
-                    parts[channel_id] = topic, rows, times
+                    parts[channel_id] = topic, rows, batch.log_times[mine]
                 yield batch, parts
 
 

@@ -76,8 +76,8 @@ def _each(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
 
     The loop without ROS uses ``math``; NumPy's functions differ from it in the last bit.
     """
-    rows = values.reshape(-1, values.shape[-1]).tolist()
-    return np.reshape([function(*row) for row in rows], values.shape[:-1])
+    columns = values.reshape(-1, values.shape[-1]).T.tolist()
+    return np.reshape(list(map(function, *columns)), values.shape[:-1])
 
 
 @dataclasses.dataclass
