@@ -108,18 +108,14 @@ def test_messages_that_cannot_be_read_are_counted_and_reported(sender, name):
     sender.until(lambda: node.refusals.counts[full_name] == 1, what='the first refusal')
     report = sender.reported(node)
     assert report.level == DiagnosticStatus.WARN
-    assert report.message == (
-        f'{full_name}: message refused: {len(good) - 1} bytes are too few'
-    )
+    assert report.message == (f'{full_name}: message refused: {len(good) - 1} bytes are too few')
     assert [(each.key, each.value) for each in report.values] == [(full_name, '1')]
     if stamped:
         sender.send(too_long_frame(good))
         sender.until(lambda: node.refusals.counts[full_name] == 2, what='the second refusal')
         sender.statuses.clear()
         report = sender.reported(node)
-        assert report.message.endswith(
-            f'{len(good)} bytes are too few for a text of 4000 bytes'
-        )
+        assert report.message.endswith(f'{len(good)} bytes are too few for a text of 4000 bytes')
         assert report.values[0].value == '2'
     # No other status is lost, and sound messages are still read.
     sender.statuses.clear()
@@ -145,8 +141,7 @@ def controller_goes_on(sender, node):
     setpoints = []
     topics.PRESSURE_SETPOINT.subscription(sender.node, setpoints.append, 1)
     load, place = (
-        topic.publisher(sender.node, 1)
-        for topic in (topics.CONTACT_LOAD, topics.CONTACT_POSITION)
+        topic.publisher(sender.node, 1) for topic in (topics.CONTACT_LOAD, topics.CONTACT_POSITION)
     )
     sender.until(lambda: load.get_subscription_count() and place.get_subscription_count())
     sender.until(lambda: sender.node.count_publishers('leg_1/pressure_setpoint'))
@@ -233,9 +228,7 @@ def test_a_clock_that_cannot_be_read_is_refused(context):
         context=context, parameter_overrides=[Parameter('use_sim_time', value=True)]
     )
     try:
-        (tick,) = [
-            each for each in node.subscriptions if each.topic_name == '/clock' and each.raw
-        ]
+        (tick,) = [each for each in node.subscriptions if each.topic_name == '/clock' and each.raw]
         tick.callback(b'\0\1\0\0\1\0\0\0')
         assert dict(node.refusals.counts) == {'/clock': 1}
     finally:

@@ -30,7 +30,10 @@ NODES = {
 }
 OWN = {
     'simulator': {
-        'scene': 'hexapod_patches', 'publish_clock': True, 'fidelity': 'L1', 'rate': 50.0
+        'scene': 'hexapod_patches',
+        'publish_clock': True,
+        'fidelity': 'L1',
+        'rate': 50.0,
     },
     'recorder': {},
 }
