@@ -323,6 +323,7 @@ class ComposedTrial:
             for node in self._nodes:
                 self.executor.remove_node(node)
                 node.destroy_node()
+            topics.unhook(self._context)
             self.executor.shutdown()
 
 
