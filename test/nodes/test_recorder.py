@@ -77,6 +77,8 @@ def data_on(folder, topic):
 
 def custom_data(folder, key):
     """Return a value of the custom data of a bag, also while it is open; None if missing."""
+    if not (folder / 'metadata.yaml').exists():  # the first flush writes it
+        return None
     text = (folder / 'metadata.yaml').read_text(encoding='utf-8')
     end = yaml.safe_load(text[text.index('  custom_data:') :])  # all of it can take seconds
     return json.loads(end['custom_data'].get(key, 'null'))
