@@ -109,7 +109,7 @@ class BagReader:
 
     def _files_of_folder(self) -> list[pathlib.Path]:
         """Return the MCAP files of the folder, and store its custom data."""
-        information = metadata.read(self.path)
+        information = metadata.read(self.path, topics=False)
         try:
             storage = information['storage_identifier']
             compression = str(information.get('compression_mode', ''))
@@ -149,19 +149,20 @@ class BagReader:
             When a message cannot be decoded, or a chunk of a closed file is damaged.
         """
         for file, contents in self._files:
-            decoders = {
-                channel.id: (channel.topic, _message_type(file, channel, contents).decode)
-                for channel in _channels(contents, self.topics if topics is None else topics)
-            }
-            for channel_id, log_time, data in raw_messages(file, contents, decoders):
-                topic, decode = decoders[channel_id]
+            wanted = _channels(contents, self.topics if topics is None else topics)
+            channels = {channel.id: channel for channel in wanted}
+            types: dict[int, MessageType] = {}
+            for channel_id, log_time, data in raw_messages(file, contents, channels):
                 if containing not in data:
                     continue
+                channel = channels[channel_id]
+                if channel_id not in types:
+                    types[channel_id] = _message_type(file, channel, contents)
                 try:
-                    message = decode(data)
+                    message = types[channel_id].decode(data)
                 except Exception as error:  # invalid bytes can raise any exception
-                    raise _bad(file, topic, log_time, error) from error
-                yield topic, message, log_time
+                    raise _bad(file, channel.topic, log_time, error) from error
+                yield channel.topic, message, log_time
 
     def values(
         self, paths: Mapping[str, Sequence[str]]

@@ -659,6 +659,28 @@ def test_a_bag_that_makes_no_sense_is_an_error_of_ours(tmp_path, wrong, message)
         list(BagReader(path).messages())
 
 
+def test_aliases_to_what_a_reader_leaves_out_of_the_metadata(tmp_path):
+    folder = one_bag(tmp_path / 'trial', custom_data={'seed': '3'})
+    path = folder / 'metadata.yaml'
+    content = yaml.safe_load(path.read_text())
+    information = content['rosbag2_bagfile_information']
+    # In YAML, the second mention of the same list is an alias of the first.
+    information['topics_with_message_count'] = information['relative_file_paths']
+    del information['relative_file_paths']
+    information['relative_file_paths'] = information['topics_with_message_count']
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    assert '*id' in path.read_text()
+    reader = BagReader(folder)
+    assert (reader.message_count, reader.custom_data) == (10, {'seed': '3'})
+
+
+def test_deeply_nested_metadata_are_an_error_of_ours(tmp_path):
+    folder = one_bag(tmp_path / 'trial')
+    (folder / 'metadata.yaml').write_text('a: ' + '[' * 100_000)
+    with pytest.raises(BagError, match='nested more than 100 deep'):
+        BagReader(folder)
+
+
 @pytest.mark.parametrize('mode', ['null', '[]', '5', 'zstd'])
 def test_metadata_may_say_anything_of_compression(tmp_path, mode):
     folder = tmp_path / 'bag'
