@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from ros_pad.errors import InvalidInput
 from ros_pad.pace import Pace
+from ros_pad.pace import RealTime
 
 
 def test_first_stamp_of_each_period():
@@ -46,3 +47,61 @@ def test_slower_input_is_always_due():
 def test_bad_period(period):
     with pytest.raises(InvalidInput, match=r'period = .* ns: a whole number from 1'):
         Pace(period)
+
+
+# --- real time ----------------------------------------------------------------------------------
+
+MS = 1_000_000
+
+
+def test_each_period_is_due_once_and_late_ones_together():
+    clock = RealTime(4 * MS, 1000 * MS)
+    times = {1003: 0, 1004: 1, 1005: 0, 1007: 0, 1009: 1, 1012: 1, 1020: 2, 1035: 3, 1036: 1}
+    assert {ms: clock.due(ms * MS) for ms in times} == times
+
+
+@given(
+    st.integers(1, 30 * MS), st.integers(0, 10**18),
+    st.lists(st.integers(0, 50 * MS), max_size=50),
+)  # fmt: skip
+def test_short_delays_lose_no_time(period, start, gaps):
+    clock, now, passed = RealTime(period, start), start, 0
+    for gap in gaps:
+        now += gap
+        passed += clock.due(now)
+        # Samples that were due, but have not passed, have less than a period left to wait.
+        assert passed == (now - start) // period
+
+
+def test_more_than_a_tenth_of_a_second_is_lost():
+    clock = RealTime(4 * MS, 0)
+    assert clock.due(100 * MS) == 25
+    assert clock.due(1100 * MS) == 25  # of 250
+    assert clock.due(1103 * MS) == 0
+    assert clock.due(1104 * MS) == 1  # it does not run after the lost time
+
+
+def test_a_period_longer_than_the_limit_passes_once():
+    clock = RealTime(300 * MS, 0)
+    assert [clock.due(ms * MS) for ms in (299, 300, 599, 1500)] == [0, 1, 0, 1]
+
+
+def test_the_rate_is_that_since_the_last_call():
+    clock = RealTime(4 * MS, 0)
+    for ms in range(4, 1001, 4):
+        assert clock.due(ms * MS) == 1
+    assert clock.rate(1000 * MS) == pytest.approx((250.0, 250.0, 1.0))
+    # Late, but within the limit: samples are left out, and time is kept.
+    for ms in range(1020, 2001, 20):
+        assert clock.due(ms * MS) == 5
+    rate = clock.rate(2000 * MS)
+    assert (rate.wanted, rate.reached, rate.speed) == pytest.approx((250.0, 50.0, 1.0))
+    # Later than the limit: time is lost.
+    for ms in (2200, 2400, 2600, 2800, 3000):
+        assert clock.due(ms * MS) == 25
+    rate = clock.rate(3000 * MS)
+    assert (rate.wanted, rate.reached, rate.speed) == pytest.approx((250.0, 5.0, 0.5))
+
+
+def test_the_rate_of_no_time_is_a_number():
+    assert RealTime(4 * MS, 7).rate(7) == (250.0, 0.0, 0.0)

@@ -135,3 +135,35 @@ def test_the_module_imports_nothing_heavy():
     )
     child = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True)
     assert (child.returncode, child.stdout) == (0, '\n')
+
+
+def test_an_interrupt_that_python_drops_is_raised_again():
+    script = """
+class Closing:
+    def __del__(self):
+        send(INT)
+
+try:
+    with STOP.during(interrupt):
+        closing = Closing()
+        del closing
+        send(TERM)
+        time.sleep(60.0)
+except KeyboardInterrupt:
+    print('interrupted')
+"""
+    assert run(script) == (0, 'interrupted\n', '')
+
+
+def test_processes_that_start_here_get_no_sigint():
+    script = """
+import subprocess
+from ros_pad.signals import children_spared
+with STOP.during(lambda: print('first')):
+    with children_spared():
+        script = 'import os; os.kill(os.getpid(), 2); print("child", flush=True)'
+        os.kill(os.getpid(), INT)
+        subprocess.run([sys.executable, '-c', script])
+        print('after', flush=True)
+"""
+    assert run(script) == (0, 'child\nafter\nfirst\n', '')

@@ -81,6 +81,11 @@ def hook(context: Context, hooks: Hooks) -> None:
     _HOOKS[context] = hooks
 
 
+def unhook(context: Context) -> None:
+    """Forget the hooks of a context, which otherwise keep alive what they refer to."""
+    _HOOKS.pop(context, None)
+
+
 Refuse = Callable[[str, Exception], None]
 """Called with the full name of the topic and the reason when a message cannot be read."""
 

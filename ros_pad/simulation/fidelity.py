@@ -293,8 +293,7 @@ def mid_stance_grip(scene: Scene, dome: bool, wet: bool) -> float:
         stance = gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
         film = Film(foot, scene.floor.viscosity)
         film.touch_down(scene.floor.film_thickness)
-        film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
-        thickness = film.under_domes, film.under_sole
+        thickness = film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
     return foot.resistance_of(on_domes, load - on_domes, pressure, *thickness) / load
 
 

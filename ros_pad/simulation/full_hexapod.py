@@ -21,6 +21,7 @@ from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.signals import children_spared
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.mujoco_model import LINKS
 from ros_pad.simulation.mujoco_model import POINT
@@ -127,7 +128,8 @@ class FootPath:
 
 def _import_mujoco() -> Any:
     try:
-        import mujoco
+        with children_spared():  # mujoco imports glfw, which starts a Python of its own
+            import mujoco
     except ImportError as error:
         raise ConfigError(
             f'fidelity L2 needs MuJoCo ({error}): pip install "ros_pad[mujoco]"'
@@ -347,14 +349,10 @@ class FullHexapod:
         foot, pressure, limit = self._foot, self._pressures[index], self._limits[index]
         dome_load = load if load < limit else limit
         sole_load = load - dome_load
+        films = (0.0, 0.0)
         if self.feet[index].wet:
-            film = self._films[index]
-            film.drain(dome_load, sole_load, pressure, drained)
-            grip = foot.resistance_of(
-                dome_load, sole_load, pressure, film.under_domes, film.under_sole
-            )
-        else:
-            grip = foot.resistance_of(dome_load, sole_load, pressure, 0.0, 0.0)
+            films = self._films[index].drain(dome_load, sole_load, pressure, drained)
+        grip = foot.resistance_of(dome_load, sole_load, pressure, *films)
         self._ratios[index] = ratio = grip / load
         row = self._frictions[index]
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.

@@ -60,7 +60,7 @@ PAIRS = (
 )
 STATUSES = (0, 130)
 WORK = {'group': 12.0, 'launch': 12.0}  # time in which the first signal comes, s; else:
-WORK_OF_NODE = 4.0
+WORK_OF_NODE = 8.0
 SHORTEST, LONGEST = 1e-3, 1.0  # between two signals, s
 PATIENCE = 10.0  # for the end of a process, s
 START = 60.0  # for the start of Python, s

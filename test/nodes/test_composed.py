@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
+import collections
 import contextlib
 import dataclasses
 import gc
 import os
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -14,6 +16,9 @@ import pytest
 import rclpy
 from mcap.reader import make_reader
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from ros_pad import cli
@@ -24,9 +29,12 @@ from ros_pad.bags import BagWriter
 from ros_pad.errors import BagError
 from ros_pad.errors import PadError
 from ros_pad.nodes import composed
+from ros_pad.nodes import topics
 from ros_pad.nodes.composed import ComposedTrial
+from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials import label
 
 AMBIENT = 101325.0
 LEGS = (1, 2, 3, 4, 5, 6)
@@ -257,10 +265,82 @@ def test_the_same_seed_gives_the_same_messages(tmp_path):
         composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name)
     one, two, other = (raw_messages(tmp_path / name) for name in ('first', 'second', 'other'))
     assert set(one) == set(two)
-    assert len(one) == 6 * 11 + 5  # eleven of each leg; pose, joints, clock, diagnostics
+    assert len(one) == 6 * 13 + 5  # thirteen of each leg; pose, joints, clock, diagnostics
     for topic in set(one) - {'/diagnostics'}:
         assert one[topic] == two[topic], topic
     assert one['/leg_1/wrench'][:250] != other['/leg_1/wrench'][:250]
+
+
+def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
+    """The reference are the calls of rclpy's publishers: none may pass the recorder by."""
+    published = []
+    publish = Publisher.publish
+
+    def watched(publisher, message):
+        data = message if isinstance(message, bytes) else serialize_message(message)
+        published.append((publisher.topic_name, data))
+        publish(publisher, message)
+
+    monkeypatch.setattr(Publisher, 'publish', watched)
+    with trial_of(scene_of('leg_wet_dome_60', 2), 'dome', 0, tmp_path / 'bag') as trial:
+        trial.walk()
+        assert trial.recorder.lost == {}
+        # Only the node's own clock comes through DDS.
+        assert {each.topic_name for each in trial.recorder.subscriptions} <= {'/clock'}
+    (file,) = (tmp_path / 'bag').glob('*.mcap')
+    with file.open('rb') as stream:
+        recorded = [
+            (channel.topic, message.data, message.log_time)
+            for _, channel, message in make_reader(stream).iter_messages(log_time_order=False)
+        ]
+    reader = BagReader(tmp_path / 'bag')
+    assert reader.custom_data[label.RECORDED_AT] == 'publisher'
+    published = [each for each in published if each[0] in reader.topics]
+    assert [each[:2] for each in recorded] == published
+    counts = collections.Counter(name for name, _ in published)
+    always = {topic.name(1) for topic in topics.LEG_TOPICS} | {'clock', 'body/pose', 'diagnostics'}
+    assert {f'/{name}' for name in always} <= set(counts)
+    assert counts['/leg_1/contact_load'] == counts['/leg_1/wetness'] > 100
+    assert counts['/leg_1/wrench'] == counts['/leg_1/position'] > 700
+    # The log time is that of the last clock before.
+    clock = 0
+    for topic, data, log_time in recorded:
+        if topic == '/clock':
+            seconds, fraction = struct.unpack('<4xiI', data)
+            clock = seconds * 10**9 + fraction
+        assert log_time == clock
+
+
+def test_another_recorder_receives_what_the_trial_publishes(context, executor, until, tmp_path):
+    other = RecorderNode(
+        context=context, parameter_overrides=[Parameter('folder', value=str(tmp_path / 'other'))]
+    )
+    executor.add_node(other)
+    with trial_of(scene_of('leg_wet_dome_60', 2), 'dome', 0, tmp_path / 'bag') as trial:
+        inside = [each for node in trial.executor.get_nodes() for each in node.subscriptions]
+        expected = collections.Counter(each.topic_name for each in inside)
+        recorded = {
+            each: expected[each.topic_name] + 1
+            for node in trial.executor.get_nodes()
+            for each in node.publishers
+            if each.topic_name in {sink.topic_name for sink in other.subscriptions}
+            and each.topic_name != '/parameter_events'
+        }
+        assert len(recorded) > 13
+        until(lambda: all(each.get_subscription_count() == n for each, n in recorded.items()))
+        for _ in range(50):
+            trial.step()
+            executor.spin_once(timeout_sec=0.0)
+        until(lambda: other.message_count == trial.recorder.message_count)
+    other.close()
+    bags = raw_messages(tmp_path / 'bag'), raw_messages(tmp_path / 'other')
+    sent, received = ({name: [data for _, data in m] for name, m in bag.items()} for bag in bags)
+    # The venting at the end is not in the other bag.
+    assert set(received) > {'/clock', '/leg_1/wrench', '/leg_1/contact_load', '/leg_1/wetness'}
+    for name, messages in received.items():
+        assert messages == sent[name][: len(messages)], name
+    assert len(received['/leg_1/wrench']) == 50
+    assert BagReader(tmp_path / 'other').custom_data[label.RECORDED_AT] == 'receiver'
 
 
 def check_vented(bag):

@@ -8,6 +8,7 @@ from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import FluidPressure
 
 from ros_pad.nodes import topics
@@ -16,8 +17,8 @@ from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 
 ESTIMATES = (
-    topics.SLIP, topics.SLIPPING, topics.FRICTION, topics.FRICTION_MARGIN, topics.WETNESS,
-    topics.DOUBT,
+    topics.SLIP, topics.SLIPPING, topics.FRICTION, topics.FRICTION_MARGIN, topics.CONTACT_LOAD,
+    topics.CONTACT_POSITION, topics.WETNESS, topics.DOUBT,
 )  # fmt: skip
 LOAD = 6.83
 AMBIENT = 101325.0
@@ -144,6 +145,53 @@ def test_an_estimate_is_one_message_of_each_kind(robot):
     assert robot.heard['leg_1/wetness'][0].data == pytest.approx(0.5)
     assert 0.1 < robot.heard['leg_1/friction'][0].data < 1.0
     assert -1.0 < robot.heard['leg_1/friction_margin'][0].data < 1.0
+    assert robot.heard['leg_1/contact_load'][0].data == LOAD
+    (place,) = robot.heard['leg_1/contact_position']
+    assert (nanoseconds(place.header.stamp), place.header.frame_id) == (10**9, 'world')
+
+
+def test_an_estimate_has_the_largest_load_and_the_last_position_since_the_last_one(robot):
+    robot.start(publish_rate=50.0)
+    loads = (1.0, 9.0, 4.0, 2.0, 3.0, 5.0, 8.0, 7.0, 6.0, 0.5, 0.0)
+    for number, load in enumerate(loads):
+        robot.sample(0.020 + 0.004 * number, (0.0, 0.0, load), (0.1 * number, -0.2 * number, 9.0))
+    robot.until(lambda: len(robot.heard['leg_1/wetness']) == 3)
+    # The estimates are at 0.02, 0.04 and 0.06 s, with samples 0, 1 to 5, and 6 to 10.
+    assert [each.data for each in robot.heard['leg_1/contact_load']] == [1.0, 9.0, 8.0]
+    places = robot.heard['leg_1/contact_position']
+    assert [(p.point.x, p.point.y) for p in places] == [(0.0, 0.0), (0.5, -1.0), (1.0, -2.0)]
+    assert [nanoseconds(p.header.stamp) for p in places] == [20_000_000, 40_000_000, 60_000_000]
+
+
+def test_a_hidden_marker_gives_estimates_without_a_position(robot):
+    robot.start()
+    robot.sample(0.004)
+    robot.wrench(0.008)
+    robot.wrench(0.012, (0.0, 0.0, 2.0))  # the wrench before it is used now
+    robot.until(lambda: len(robot.heard['leg_1/wetness']) == 2)
+    robot.until(lambda: len(robot.heard['leg_1/contact_load']) == 2)
+    assert len(robot.heard['leg_1/contact_position']) == 1
+
+
+def test_load_and_position_come_before_the_wetness_that_uses_them(context, monkeypatch):
+    """The controller decides when the wetness arrives."""
+    sent = []
+    publish = Publisher.publish
+
+    def watched(publisher, message):
+        sent.append(publisher.topic_name)
+        publish(publisher, message)
+
+    monkeypatch.setattr(Publisher, 'publish', watched)
+    node = EstimatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
+    stage = node.legs[1].stage
+    sent.clear()
+    stage.wrench(4_000_000, (0.0, 0.0, LOAD), 0.0)
+    stage.position(4_000_000, (0.0, 0.0, 0.0))
+    node.destroy_node()
+    names = [name for name in sent if name.startswith('/leg_1')]
+    assert sorted(names) == sorted(f'/{topic.name(1)}' for topic in ESTIMATES)
+    assert names[-1] == '/leg_1/wetness'
 
 
 @pytest.mark.parametrize('first', ['wrench', 'position'])

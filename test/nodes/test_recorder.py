@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_msgs.msg import String
@@ -107,7 +108,7 @@ def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path
             for topic in topics.LEG_TOPICS
         ]
     } | {topic.name().lstrip('/'): topic.publisher(robot) for topic in topics.COMMON_TOPICS}
-    assert len(publishers) == 2 * 11 + 5
+    assert len(publishers) == 2 * 13 + 5
     recorder = record(legs=[1, 4])
     until(lambda: all(p.get_subscription_count() for p in publishers.values()))
     for round_number in range(1, 21):
@@ -118,11 +119,38 @@ def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path
     reader = BagReader(tmp_path / 'trial')
     assert reader.counts == {f'/{name}': 20 for name in publishers}
     assert reader.custom_data['outcome'] == 'done'
+    assert reader.custom_data[label.RECORDED_AT] == 'receiver'
     assert json.loads(reader.custom_data[label.LOST]) == {}
     assert json.loads(reader.custom_data[label.MADE_WITH])['ros_pad'] == ros_pad.__version__
     assert {f'/{topic.name(4)}': topic.type_name for topic in topics.LEG_TOPICS} == {
         name: type_name for name, type_name in reader.topics.items() if 'leg_4' in name
     }
+
+
+def test_messages_that_publishers_hand_over_are_recorded_once(
+    robot, executor, context, until, tmp_path
+):
+    """Such a recorder does not subscribe: what comes through DDS is not recorded."""
+    folder = Parameter('folder', value=str(tmp_path / 'trial'))
+    recorder = RecorderNode(
+        subscribes=False, context=context, parameter_overrides=[folder], **QUIET
+    )
+    executor.add_node(recorder)
+    assert not [each for each in recorder.subscriptions if 'leg_' in each.topic_name]
+    publisher = topics.WETNESS.publisher(robot, 1)
+    for number in range(3):
+        message = serialize_message(Float64(data=float(number)))
+        recorder.record('/leg_1/wetness', message)
+        publisher.publish(message)
+    ticks = []
+    robot.create_timer(0.1, lambda: ticks.append(1))
+    until(lambda: len(ticks) == 3)
+    assert recorder.message_count == 3
+    with pytest.raises(KeyError):
+        recorder.record('/leg_7/wetness', message)
+    recorder.close()
+    assert data_on(tmp_path / 'trial', '/leg_1/wetness') == [0.0, 1.0, 2.0]
+    assert BagReader(tmp_path / 'trial').custom_data[label.RECORDED_AT] == 'publisher'
 
 
 def test_a_burst_is_recorded_whole_and_in_order(robot, record, until, tmp_path):
@@ -392,7 +420,7 @@ def test_a_namespace_moves_the_robot_but_not_the_clock(context, tmp_path):
     node.close()
     node.destroy_node()
     recorded = BagReader(tmp_path / 'trial').topics
-    assert len(recorded) == 6 * 11 + 5
+    assert len(recorded) == 6 * 13 + 5
     assert {'/lab/robot_7/leg_6/wrench', '/lab/robot_7/body/pose', '/clock'} <= set(recorded)
     assert recorded['/diagnostics'] == 'diagnostic_msgs/msg/DiagnosticArray'
 

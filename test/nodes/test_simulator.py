@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
@@ -108,6 +109,94 @@ def test_free_running_keeps_its_rate_and_the_time_of_day(start, observer, until)
     assert not observer.count_publishers('/clock')
 
 
+@pytest.fixture
+def rates(robot):
+    """Return a list that receives the statuses of the simulator's rate from /diagnostics."""
+    found = []
+
+    def receive(array):
+        found.extend((array, each) for each in array.status if each.name == 'simulator: rate')
+
+    topics.DIAGNOSTICS.subscription(robot, receive)
+    return found
+
+
+def delay(node, seconds, monkeypatch):
+    """Let each step of the robot take a time, s."""
+    step = node.robot.step
+
+    def slow(pressures):
+        time.sleep(seconds)
+        step(pressures)
+
+    monkeypatch.setattr(node.robot, 'step', slow)
+
+
+def figures(status):
+    return [float(each.value) for each in status.values]
+
+
+def test_a_simulator_that_is_too_slow_reports_its_rate(
+    start, observer, rates, until, monkeypatch, capfd
+):
+    """A step of 40 ms at 100 Hz: samples are left out, and then time itself."""
+    node = start(scene='leg_wet_dome_40', fidelity='L0', rate=100.0)
+    delay(node, 0.04, monkeypatch)
+    heard = observer.heard['leg_1/wrench']
+    until(lambda: len(rates) >= 4 and len(heard) >= 4)  # not so slow in the first two seconds
+    array, status = rates[-1]
+    assert status.level == DiagnosticStatus.WARN
+    assert [each.key for each in status.values] == [
+        'wanted rate (Hz)', 'reached rate (Hz)', 'speed (times real time)',
+    ]  # fmt: skip
+    wanted, reached, speed = figures(status)
+    assert wanted == 100.0
+    # At most ten samples of 40 ms each pass between two messages.
+    assert 0.0 < reached < 20.0
+    assert 0.0 < speed <= 0.27
+    assert status.message.startswith(f'too slow: {reached:.0f} of 100 samples a second: choose ')
+    assert 'too slow: ' in capfd.readouterr().err
+    assert abs(nanoseconds(array.header.stamp) - time.time_ns()) < 60_000_000_000
+    # Stamps are those of the time of day, so that other nodes do not take readings for old ones.
+    stamps = [nanoseconds(each.header.stamp) for each in heard]
+    assert all(late - early >= 40_000_000 for early, late in pairwise(stamps))
+
+
+def test_late_samples_are_left_out_and_simulated_time_is_kept(start, observer, until):
+    """The robot advances at each sample; only the last one of those that are due is published."""
+    node = start(
+        scene='leg_wet_dome_40', fidelity='L0', rate=100.0, publish_clock=True, free_running=False
+    )
+    heard, clock = observer.heard['leg_1/wrench'], observer.heard['/clock']
+    until(lambda: observer.count_publishers('leg_1/wrench'))
+    until(lambda: observer.count_publishers('/clock'))
+    for number, samples in enumerate((7, 1), 1):
+        node.step(samples)
+        until(lambda n=number: len(heard) == len(clock) == n)
+    assert node.time_ns == 80_000_000
+    assert node.robot.time == pytest.approx(0.08)
+    assert [nanoseconds(each.header.stamp) for each in heard] == [70_000_000, 80_000_000]
+    stamps = [nanoseconds(each.clock) for each in clock]
+    assert stamps == [70_000_000, 80_000_000]
+
+
+@pytest.mark.realtime
+def test_a_simulator_that_keeps_up_reports_that(start, rates, until):
+    start(scene='leg_wet_dome_40', fidelity='L0', rate=50.0)
+    until(lambda: len(rates) >= 2)
+    _, status = rates[-1]
+    assert status.level == DiagnosticStatus.OK
+    assert status.message.endswith('of 50 samples a second')
+    wanted, reached, speed = figures(status)
+    assert (wanted, reached, speed) == pytest.approx((50.0, 50.0, 1.0), rel=0.05)
+
+
+def test_without_real_time_there_is_no_rate(start, robot):
+    node = start(free_running=False)
+    node.step()
+    assert not robot.count_publishers('/diagnostics')
+
+
 def test_it_does_not_wait_for_its_own_clock(start, observer, until):
     start(rate=100.0, publish_clock=True, use_sim_time=True)
     until(lambda: len(observer.heard['/clock']) > 5 and len(observer.heard['leg_1/wrench']) > 5)
@@ -195,13 +284,13 @@ def test_a_pressure_that_is_none_changes_nothing(start, robot, until):
 
 
 class Outbox:
-    """Records messages of one topic as text, because padding bytes vary."""
+    """Records messages of one topic: bytes, or those of markers as text."""
 
     def __init__(self):
         self.sent = []
 
     def publish(self, message):
-        self.sent.append(repr(message))
+        self.sent.append(message if isinstance(message, bytes) else repr(message))
 
 
 def test_the_same_seed_is_the_same_walk(start, monkeypatch):
@@ -220,9 +309,10 @@ def test_the_same_seed_is_the_same_walk(start, monkeypatch):
             node.step()
             seen.append([foot.force for foot in node.robot.feet])
         node.destroy_node()
-        wrenches = boxes[topics.WRENCH.name(1)].sent
-        assert len(wrenches) == 100
-        return seen, wrenches
+        sent = {name: box.sent for name, box in boxes.items()}
+        assert len(sent[topics.WRENCH.name(1)]) == 100
+        return seen, sent
 
     assert steps(3) == steps(3)
-    assert steps(3)[1] != steps(4)[1]
+    wrench = topics.WRENCH.name(1)
+    assert steps(3)[1][wrench] != steps(4)[1][wrench]
