@@ -118,6 +118,5 @@ def _complete() -> int:
 
 
 if __name__ == '__main__':
-    from ros_pad import __main__
-
-    sys.exit(__main__.main())
+    STOP.install('pad: stopped\n')
+    sys.exit(main())

@@ -16,6 +16,9 @@ CONTROL_PERIOD_NS = 20_000_000
 TICK_PERIOD_NS = 100_000_000
 """Period at which the stages check whether messages are missing, ns."""
 
+LATE = 'too slow'
+"""First words of a status on ``/diagnostics`` that a computer does not keep up."""
+
 Progress: TypeAlias = Callable[[float], None]
 """Callback of a long task, called with the share that is done, 0 to 1, or with the simulated
 time, s.

@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from collections.abc import Iterator
@@ -18,11 +19,22 @@ from functools import partial
 
 INTERRUPTED = 130  # exit status after Ctrl-C, the same as in shells
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_AGAIN = 0.01  # time until an interrupt that Python has dropped is raised again, s
 
 
 def interrupt() -> None:
     """Raise KeyboardInterrupt: the action of work that can be left at any place."""
+    sys.unraisablehook = _raise_again
     raise KeyboardInterrupt
+
+
+def _raise_again(dropped: sys.UnraisableHookArgs) -> None:
+    """Raise an interrupt soon again that Python has dropped, as it does in a destructor."""
+    if dropped.exc_type is KeyboardInterrupt:
+        signal.signal(signal.SIGALRM, lambda number, frame: STOP.act())
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def end(text: str = '') -> None:
@@ -69,6 +81,7 @@ class Stop:
         self._install(partial(end, text))
         # Nothing is open any more, and the end of Python cannot handle signals.
         atexit.register(_set_handlers, signal.SIG_IGN)
+        atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
 
     def _install(self, action: Callable[[], object]) -> None:
         self.requested, self._installed, self._action = False, True, action
@@ -80,7 +93,11 @@ class Stop:
             _set_handlers(signal.SIG_DFL)
         else:
             self.requested = True
-            self._action()
+            self.act()
+
+    def act(self) -> None:
+        """Call the present action, as a first signal does."""
+        self._action()
 
     @contextmanager
     def during(self, action: Callable[[], object] = _wait) -> Iterator[None]:
@@ -106,12 +123,12 @@ class Stop:
             finally:
                 self._action = before
         else:
-            handlers = [signal.getsignal(each) for each in _SIGNALS]
+            handlers, hook = [signal.getsignal(each) for each in _SIGNALS], sys.unraisablehook
             self._install(action)
             try:
                 yield
             finally:
-                self._installed = False
+                self._installed, sys.unraisablehook = False, hook
                 _set_handlers(*handlers)
 
     @contextmanager
@@ -122,6 +139,19 @@ class Stop:
             yield
         if self.requested and not before:
             self._action()
+
+
+@contextmanager
+def children_spared() -> Iterator[None]:
+    """Keep SIGINT, which a terminal sends to all its processes, from those that start here.
+
+    In this process it acts after the block.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _set_handlers(*handlers: object) -> None:

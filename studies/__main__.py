@@ -31,6 +31,7 @@ STUDIES = {
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
     'lead_picture': ('closed_loop.lead_picture', 'the picture of the README (1 min)'),
     'real_time': ('nodes.real_time', 'speed of a trial without ROS and on nodes (1 min)'),
+    'nodes': ('nodes.cost', 'processor time of the nodes, beside another checkout (20 min)'),
     'recorder': ('nodes.recorder', 'messages that the recorder takes, and their cost (1 min)'),
     'regulators': ('nodes.regulators', 'time of commands and readings of drivers (1 min)'),
     'soak': ('nodes.soak', 'an hour of the regulator node with faults (10 min)'),

@@ -44,11 +44,19 @@ class MessageType:
         self.name = name
         self._store = get_typestore(Stores.EMPTY)
         self._store.register(get_types_from_msg(definition.replace('\r\n', '\n'), name))
-        for _, fields in self._store.fielddefs.values():
-            for field, description in fields:
-                if description[0] == Nodetype.ARRAY and description[1][1] > _LONGEST_ARRAY:
+        for each in self._store.fielddefs:
+            for field, (kind, inner) in self.fields(each):
+                if kind == Nodetype.ARRAY and inner[1] > _LONGEST_ARRAY:
                     raise ValueError(f'array {field} has more than {_LONGEST_ARRAY} elements')
-        self._type = self._store.get_msgdef(name)
+                if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                    kind, inner = inner[0]
+                if kind == Nodetype.NAME:
+                    self.fields(inner)  # raises KeyError without a definition of the type
+
+    @functools.cached_property
+    def _type(self) -> Any:
+        # Code for whole messages takes as long to make as all the rest; fields do without it.
+        return self._store.get_msgdef(self.name)
 
     def decode(self, data: bytes) -> Any:
         """Return a message, with an attribute for each field, from its bytes.

@@ -149,32 +149,70 @@ class FieldReader:
         if self._text_at is not None:
             raise ValueError(f'{self.paths[self._text_at]} is a text, and a table has numbers')
         table = np.empty((len(messages), len(self.paths)))
-        if not messages:
-            return table
-        first = messages[0]
-        self(first)  # refuses wrong bytes
-        at = self._size_at
-        layout = first[:_ENCAPSULATION], first[at : at + 4], len(first)
-        if any(
-            (each[:_ENCAPSULATION], each[at : at + 4], len(each)) != layout for each in messages
-        ):
-            table[:] = [self(each) for each in messages]
-            return table
-        order = first[1]
-        fields = self._sized(_SIZES[order].unpack_from(first, at)[0] if at else 0)
+        sizes = np.array([len(each) for each in messages], dtype=np.int64)
+        rows = self.rows(b''.join(messages), np.cumsum(sizes) - sizes, sizes)
+        for column, path in enumerate(self.paths):
+            table[:, column] = rows[path]
+        return table
+
+    def rows(self, data: bytes, starts: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """Return the fields of many messages as a structured array.
+
+        Parameters
+        ----------
+        data : bytes
+            Bytes with the messages in them.
+        starts, sizes : ndarray of int
+            First byte in `data` and number of bytes of each message.
+
+        Returns
+        -------
+        numpy.ndarray
+            Has a row for each message, in which the fields have their paths as names.
+
+        Raises
+        ------
+        BadMessage, UnknownEncoding
+            As for a single message.
+        """
+        if len(starts) and self._text_at is None:
+            first = data[starts[0] : starts[0] + sizes[0]]
+            self(first)  # refuses wrong bytes
+            if np.all(sizes == sizes[0]):
+                record = self._record(first)
+                found = items(data, f'V{record.itemsize}')[starts]
+                if self._alike(found):
+                    return found.view(record)
+        ends = (starts + sizes).tolist()
+        found = [self(data[s:e]) for s, e in zip(starts.tolist(), ends, strict=True)]
+        forms = (self._fields[place][1] for place in self._wanted)
+        return np.array(
+            found,
+            [(p, 'O' if f.endswith('s') else f) for p, f in zip(self.paths, forms, strict=True)],
+        )
+
+    def _alike(self, messages: np.ndarray) -> bool:
+        """Return whether messages have the same encapsulation, and texts of the same size."""
+        table = messages.view(np.uint8).reshape(len(messages), -1)
+        places = [slice(at, at + _ENCAPSULATION) for at in (0, self._size_at)]
+        return all(bool(np.all(table[:, at] == table[0, at])) for at in places)
+
+    def _record(self, message: bytes) -> np.dtype[np.void]:
+        """Return the layout of messages that are like this one."""
+        order, at = message[1], self._size_at
+        fields = self._sized(_SIZES[order].unpack_from(message, at)[0] if at else 0)
         places = _places(fields)
-        record = np.dtype(
+        formats = [np.dtype(_ORDERS[order] + fields[place][1]) for place in self._wanted]
+        offsets = [places[place] for place in self._wanted]
+        ends = [offset + form.itemsize for offset, form in zip(offsets, formats, strict=True)]
+        return np.dtype(
             {
-                'names': [str(place) for place in self._wanted],
-                'formats': [_ORDERS[order] + fields[place][1] for place in self._wanted],
-                'offsets': [places[place] for place in self._wanted],
-                'itemsize': len(first),
+                'names': list(self.paths),
+                'formats': formats,
+                'offsets': offsets,
+                'itemsize': max([at + _ENCAPSULATION, *ends]),  # up to the last field
             }
         )
-        rows = np.frombuffer(b''.join(messages), record)
-        for column, name in enumerate(record.names or ()):
-            table[:, column] = rows[name]
-        return table
 
 
 class FieldWriter:
@@ -246,6 +284,29 @@ class FieldWriter:
         return self._pack(*self._pick(values + self._between))
 
 
+def field_of(message: Any, path: str) -> Any:
+    """Return a field of a message, such as ``twist.covariance[7]``."""
+    field, _, place = path.rstrip(']').partition('[')
+    value = operator.attrgetter(field)(message)
+    return value[int(place)] if place else value
+
+
+def items(data: bytes, form: str, first: int = 0) -> np.ndarray:
+    """Return a view of bytes in which the index of an item is the place where it begins.
+
+    Parameters
+    ----------
+    data : bytes
+        Any bytes.
+    form : str
+        NumPy type of an item.
+    first : int
+        Place of the item with index 0.
+    """
+    count = max(0, len(data) - first - np.dtype(form).itemsize + 1)
+    return np.ndarray((count,), form, data, first if count else 0, (1,))
+
+
 def _fields(message_type: MessageType, message: Any) -> Iterator[_Field]:
     """Yield path and format of each number and text of a message, in the order of its bytes."""
 
@@ -310,4 +371,4 @@ def _picker(order: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]
     return tuple  # a tuple is returned as it is
 
 
-__all__ = ['FieldReader', 'FieldWriter']
+__all__ = ['FieldReader', 'FieldWriter', 'field_of', 'items']

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import pathlib
 from collections.abc import Iterable
@@ -15,6 +16,7 @@ from mcap.records import Channel
 from mcap.records import Schema
 
 from ros_pad.bags.storage import Contents
+from ros_pad.configuration import read_yaml
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 
@@ -29,9 +31,15 @@ def topic_metadata(channel: Channel, schema: Schema) -> dict[str, Any]:
         'name': channel.topic,
         'type': schema.name,
         'serialization_format': channel.message_encoding,
-        'offered_qos_profiles': yaml.safe_load(profiles) or [],
+        'offered_qos_profiles': _parsed(profiles),
         'type_description_hash': channel.metadata.get('topic_type_hash', ''),
     }
+
+
+@functools.lru_cache(maxsize=256)
+def _parsed(profiles: str) -> list[Any]:
+    """Return QoS profiles from their YAML text, cached because many topics have the same."""
+    return read_yaml(profiles) or []
 
 
 def write(
@@ -99,7 +107,7 @@ def read(folder: pathlib.Path) -> dict[str, Any]:
     if not path.is_file():
         raise BagError(f'{folder}: is not a bag, or an incomplete one: it has no {_NAME}')
     try:
-        return dict(yaml.safe_load(path.read_text(encoding='utf-8'))[_ROOT])
+        return dict(read_yaml(path.read_text(encoding='utf-8'))[_ROOT])
     except Exception as error:  # invalid YAML or content can raise any exception
         raise BagError(f'{path}: is not the metadata of a bag: {error!r}') from error
 
@@ -165,7 +173,7 @@ def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
         raise
 
 
-class _NoAliasDumper(yaml.SafeDumper):
+class _NoAliasDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
     """Write equal values in full each time: the metadata of rosbag2 has no YAML anchors."""
 
     def ignore_aliases(self, data: Any) -> bool:

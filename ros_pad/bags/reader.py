@@ -3,22 +3,38 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pathlib
 import warnings
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
+from typing import TypeAlias
 
+import numpy as np
 from mcap.records import Channel
-from mcap.records import Schema
 
-from ros_pad.bags import codec
 from ros_pad.bags import metadata
+from ros_pad.bags.codec import MessageType
+from ros_pad.bags.codec import message_type
+from ros_pad.bags.fields import FieldReader
+from ros_pad.bags.fields import field_of
+from ros_pad.bags.storage import Batch
+from ros_pad.bags.storage import Contents
+from ros_pad.bags.storage import batches
 from ros_pad.bags.storage import raw_messages
 from ros_pad.bags.storage import scan
 from ros_pad.errors import BagError
+from ros_pad.errors import UnknownEncoding
+from ros_pad.pace import Progress
+
+_RowReader: TypeAlias = Callable[[bytes, np.ndarray, np.ndarray], np.ndarray]
+_Parts: TypeAlias = dict[int, tuple[str, np.ndarray, np.ndarray]]
 
 
 class BagReader:
@@ -115,13 +131,17 @@ class BagReader:
                 raise BagError(f'{self.path}: its file {file.name} is missing')
         return files
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, Any, int]]:
+    def messages(
+        self, topics: Collection[str] | None = None, containing: bytes = b''
+    ) -> Iterator[tuple[str, Any, int]]:
         """Yield topic, decoded message and log time in ns of each message.
 
         Parameters
         ----------
         topics : collection of str, optional
             Topics to read, by default all; a topic that the bag does not have yields nothing.
+        containing : bytes
+            Messages without these bytes are left out.
 
         Raises
         ------
@@ -129,30 +149,118 @@ class BagReader:
             When a message cannot be decoded, or a chunk of a closed file is damaged.
         """
         for file, contents in self._files:
-            # Each file numbers its channels and schemas in its own way.
             decoders = {
-                channel.id: (
-                    channel.topic,
-                    _decoder(file, channel, contents.schemas.get(channel.schema_id)),
-                )
-                for channel in contents.channels.values()
-                if contents.counts[channel.topic] and (topics is None or channel.topic in topics)
+                channel.id: (channel.topic, _message_type(file, channel, contents).decode)
+                for channel in _channels(contents, self.topics if topics is None else topics)
             }
             for channel_id, log_time, data in raw_messages(file, contents, decoders):
                 topic, decode = decoders[channel_id]
+                if containing not in data:
+                    continue
                 try:
                     message = decode(data)
                 except Exception as error:  # invalid bytes can raise any exception
-                    raise BagError(
-                        f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}'
-                    ) from error
+                    raise _bad(file, topic, log_time, error) from error
                 yield topic, message, log_time
 
+    def values(
+        self, paths: Mapping[str, Sequence[str]]
+    ) -> Iterator[tuple[str, tuple[Any, ...], int]]:
+        """Yield topic, values and log time in ns of each message.
 
-def _decoder(
-    file: pathlib.Path, channel: Channel, schema: Schema | None
-) -> Callable[[bytes], Any]:
-    """Return a function from CDR bytes to a message."""
+        Parameters
+        ----------
+        paths : mapping
+            Fields to read, such as ``wrench.force.x``, by topic; a topic that the bag does not
+            have yields nothing.
+
+        Raises
+        ------
+        BagError
+            When a field cannot be read, or a chunk of a closed file is damaged.
+        """
+        for batch, parts in self._parts(paths):
+            streams = {
+                channel: zip(itertools.repeat(topic), rows.tolist(), times.tolist())
+                for channel, (topic, rows, times) in parts.items()
+            }
+            # The next message of each channel, in the order of the channels in the file.
+            yield from map(next, map(streams.__getitem__, batch.channels.tolist()))
+
+    def tables(
+        self, paths: Mapping[str, Sequence[str]], progress: Progress | None = None
+    ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return log times and values of all messages on some topics.
+
+        Parameters
+        ----------
+        paths : mapping
+            As in :meth:`values`.
+        progress : callable or None
+            Called now and then with the share that is done, 0 to 1.
+
+        Returns
+        -------
+        dict
+            Log times, int64, ns, and values, by topic. Values have a row for each message and a
+            column for each path; they are float64, or objects if one of them is a text.
+
+        Raises
+        ------
+        BagError
+            As in :meth:`values`.
+        """
+        none = np.empty(0, np.int64)
+        found = {topic: [(none, np.empty((0, len(each))))] for topic, each in paths.items()}
+        total, done = sum(self.counts.get(topic, 0) for topic in paths), 0
+        for batch, parts in self._parts(paths):
+            for topic, rows, times in parts.values():
+                found[topic].append((times.astype(np.int64), _table(rows)))
+            done += len(batch.channels)
+            if progress:
+                progress(done / total)
+        if progress:
+            progress(1.0)
+        return {
+            topic: (np.concatenate([t for t, _ in each]), np.concatenate([v for _, v in each]))
+            for topic, each in found.items()
+        }
+
+    def _parts(self, paths: Mapping[str, Sequence[str]]) -> Iterator[tuple[Batch, _Parts]]:
+        """Yield batches of messages, with topic, values and log times by channel id."""
+        for file, contents in self._files:
+            readers = {
+                channel.id: (channel.topic, _row_reader(file, channel, contents, paths))
+                for channel in _channels(contents, paths)
+            }
+            for batch in batches(file, contents, readers):
+                parts: _Parts = {}
+                order = np.argsort(batch.channels, kind='stable')
+                present, first = np.unique(batch.channels[order], return_index=True)
+                for channel_id, mine in zip(
+                    present.tolist(), np.split(order, first[1:]), strict=True
+                ):
+                    topic, read = readers[channel_id]
+                    try:
+                        rows = read(batch.data, batch.starts[mine], batch.sizes[mine])
+                    except Exception:  # invalid bytes can raise any exception
+                        _raise_first(file, topic, read, batch, mine)
+                        raise
+                    parts[channel_id] = topic, rows, batch.log_times[mine]
+                yield batch, parts
+
+
+def _channels(contents: Contents, topics: Collection[str]) -> list[Channel]:
+    """Return the channels of some topics; each file numbers its channels in its own way."""
+    return [
+        channel
+        for channel in contents.channels.values()
+        if contents.counts[channel.topic] and channel.topic in topics
+    ]
+
+
+def _message_type(file: pathlib.Path, channel: Channel, contents: Contents) -> MessageType:
+    schema = contents.schemas.get(channel.schema_id)
     encoding = schema.encoding if schema else 'none'
     if schema is None or (channel.message_encoding, encoding) != ('cdr', 'ros2msg'):
         raise BagError(
@@ -161,12 +269,60 @@ def _decoder(
             " 'cdr' and schema encoding 'ros2msg' are needed"
         )
     try:
-        return codec.message_type(schema.name, schema.data.decode()).decode
+        return message_type(schema.name, schema.data.decode())
     except Exception as error:  # an invalid definition can raise any exception
         raise BagError(
             f'{file}: topic {channel.topic}: the definition of its message type {schema.name}'
             f' cannot be used: {error}'
         ) from error
+
+
+def _row_reader(
+    file: pathlib.Path, channel: Channel, contents: Contents, paths: Mapping[str, Sequence[str]]
+) -> _RowReader:
+    """Return a function such as :meth:`ros_pad.bags.fields.FieldReader.rows`."""
+    of_type = _message_type(file, channel, contents)
+    try:
+        return FieldReader(of_type, paths[channel.topic]).rows
+    except UnknownEncoding:
+        return partial(_decoded_rows, of_type, paths[channel.topic])
+    except Exception as error:  # no such field, or a type that contains itself
+        raise BagError(
+            f'{file}: topic {channel.topic}: message type {of_type.name}: {error}'
+        ) from error
+
+
+def _decoded_rows(
+    of_type: MessageType, paths: Sequence[str], data: bytes, starts: np.ndarray, sizes: np.ndarray
+) -> np.ndarray:
+    """Return fields of messages that must be decoded as a whole."""
+    rows = np.empty(len(starts), [(path, 'O') for path in paths])
+    for row, (start, size) in enumerate(zip(starts.tolist(), sizes.tolist(), strict=True)):
+        message = of_type.decode(data[start : start + size])
+        rows[row] = tuple(field_of(message, path) for path in paths)
+    return rows
+
+
+def _table(rows: np.ndarray) -> np.ndarray:
+    """Return structured rows as a table of numbers, or of objects if there is a text."""
+    columns = [rows[name] for name in rows.dtype.names or ()]
+    text = any(isinstance(each, str) for column in columns for each in column[:1])
+    return np.column_stack([column.astype(object if text else float) for column in columns])
+
+
+def _raise_first(
+    file: pathlib.Path, topic: str, read: _RowReader, batch: Batch, rows: np.ndarray
+) -> None:
+    """Raise an error that names the first of some messages that cannot be read."""
+    for row in rows:
+        try:
+            read(batch.data, batch.starts[row : row + 1], batch.sizes[row : row + 1])
+        except Exception as error:
+            raise _bad(file, topic, int(batch.log_times[row]), error) from error
+
+
+def _bad(file: pathlib.Path, topic: str, log_time: int, error: Exception) -> BagError:
+    return BagError(f'{file}: a message on {topic} at {log_time} ns cannot be decoded: {error}')
 
 
 __all__ = ['BagReader']

@@ -41,6 +41,7 @@ COMPRESSION = CompressionType.ZSTD
 class BagWriter:
     """Write a new bag; use it as a context manager.
 
+    The first message and the end write ``metadata.yaml``, as do topics and custom data in between.
     If the process dies or the power fails, all but about the last second can still be read, and
     `ros_pad.bags.repair` makes a complete bag of it.
 
@@ -85,6 +86,7 @@ class BagWriter:
         self._topics: dict[str, dict[str, Any]] = {}  # entries of metadata.yaml
         self._channels: dict[str, int] = {}  # empty once the bag is closed
         self._schemas: dict[str, int] = {}
+        self._types: dict[str, tuple[str, bytes]] = {}  # hash and definition
         self._next_flush = 0.0
         self._stream: IO[bytes] | None = None
         # Another thread waits for the disk, so that the caller does not.
@@ -94,7 +96,6 @@ class BagWriter:
             self._stream = self._path.open('xb')
             self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION)
             self._writer.start(profile='ros2', library='ros_pad')
-            self._write_metadata(Contents())
         except OSError as error:
             self._fail(error)
 
@@ -126,8 +127,11 @@ class BagWriter:
         BagError
             When the type is not installed, the topic is there already, or the bag is closed.
         """
-        about = {'offered_qos_profiles': qos, 'topic_type_hash': type_hash(type_name)}
-        definition = message_definition(type_name).encode()
+        if type_name not in self._types:
+            definition = message_definition(type_name).encode()
+            self._types[type_name] = type_hash(type_name), definition
+        known_hash, definition = self._types[type_name]
+        about = {'offered_qos_profiles': qos, 'topic_type_hash': known_hash}
         self.copy_topic(
             Channel(id=0, topic=name, message_encoding='cdr', metadata=about, schema_id=0),
             Schema(id=0, name=type_name, encoding='ros2msg', data=definition),

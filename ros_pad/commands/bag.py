@@ -20,6 +20,7 @@ from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.trials import label as labels
+from ros_pad.trials.recorded import late
 
 
 def add(commands: Commands) -> None:
@@ -129,6 +130,7 @@ def _show(options: argparse.Namespace, reader: BagReader) -> int:
                         for name, kind in reader.topics.items()
                     },
                     'lost': lost,
+                    'late': late(reader),
                     'problem': reader.problem,
                     'repair': repair,
                     'trial': about,
@@ -148,6 +150,8 @@ def _show(options: argparse.Namespace, reader: BagReader) -> int:
     if repair:
         print('repaired from', repair.get('source', 'a broken bag'))
         _show_losses(repair)
+    for line in late(reader):
+        print(line)
     for name in sorted(reader.topics):
         missed = f'  {lost[name]} lost' if name in lost else ''
         print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')

@@ -529,8 +529,7 @@ def _modelled_forces(friction: Friction, foot: Foot, floor: _WetFloor) -> Array:
         if wet:
             film = Film(foot, floor.viscosity)
             film.touch_down(floor.film_thickness)
-            film.drain(domes, sole, pressure, stance_time)
-            under_domes, under_sole = film.under_domes, film.under_sole
+            under_domes, under_sole = film.drain(domes, sole, pressure, stance_time)
         forces.append(foot.resistance_of(domes, sole, pressure, under_domes, under_sole))
     return np.array(forces)
 

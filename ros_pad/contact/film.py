@@ -111,10 +111,13 @@ class Film:
         self._dome_state = self._sole_state = self._fresh
         self._dome_area = 0.0
 
-    def drain(self, dome_load: float, sole_load: float, pressure: float, duration: float) -> None:
+    def drain(
+        self, dome_load: float, sole_load: float, pressure: float, duration: float
+    ) -> tuple[float, float]:
         """Drain for a duration, s, under the loads of domes and flat sole, N.
 
-        The gauge pressure, Pa, must be above 0 if the domes carry load.
+        The gauge pressure, Pa, must be above 0 if the domes carry load. Return
+        :attr:`under_domes` and :attr:`under_sole`, m.
         """
         if dome_load > 0.0:
             area = dome_load / pressure
@@ -127,6 +130,7 @@ class Film:
             self._dome_area = 0.0
         if sole_load > 0.0:
             self._sole_state += self._sole_rate * sole_load / self._area * duration
+        return self._dome_state**-0.5, self._sole_state**-0.5
 
     @property
     def under_domes(self) -> float:

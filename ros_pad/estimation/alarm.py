@@ -80,12 +80,10 @@ class SlipAlarm:
         stretch = self._correlation_time / dt
         variance = self._variance * stretch if stretch > 1.0 else self._variance
         statistic = self.statistic + self._speed / variance * (speed - self._half)
-        # Conditions are several times faster than min and max.
         if not statistic > 0.0:
-            statistic = 0.0
-        elif statistic > self._highest:
-            statistic = self._highest
-        self.statistic = statistic
+            self.statistic = 0.0
+            return False
+        self.statistic = statistic if statistic < self._highest else self._highest
         return statistic > self._threshold
 
 
@@ -130,5 +128,6 @@ class SlipAlarms:
         """
         raised = False
         for alarm in self._alarms:
-            raised |= alarm.update(speed, dt)
+            if alarm.update(speed, dt):
+                raised = True
         return raised

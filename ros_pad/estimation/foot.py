@@ -235,9 +235,7 @@ class FootEstimator:
         gate, offset = self._gate, self._offset
         stood = gate.standing
         air = self._height + AIRBORNE
-        fault = self._sensing.update(
-            time, (fx, fy, fz), (x, y, z), age, stood, not z <= air < math.inf
-        )
+        fault = self._sensing.update(time, force, position, age, stood, not z <= air < math.inf)
         if fault:
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z

@@ -135,6 +135,7 @@ class GroundFilter:
         self.prior = prior
         self._tables = {dome: prior.table(dome) for dome in (False, True)}
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
+        self._flat_prior = self._grounds * self._tables[False]
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
@@ -145,7 +146,7 @@ class GroundFilter:
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
-        self._normalise(self._grounds * self._tables[False])
+        self._normalise(self._flat_prior)
 
     def touch_down(self, distance: float, dome: bool) -> None:
         """Begin a stance at a distance, m, from the last one, as a dome or flat."""
@@ -240,15 +241,15 @@ class GroundFilter:
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         stay = math.exp(-distance / self._patch_length)
-        table = self._tables[self._dome]
         if self._dome:
             # Under domes wet and dry ground have the same friction: when friction fades, the
             # probability of wet ground must not change.
             grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
             friction = self._posterior[0] + self._posterior[1]
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * table[0])
+            table = self._tables[True][0]
+            self._posterior = grounds * (stay * friction + (1.0 - stay) * table)
         else:
-            self._posterior = stay * self._posterior + (1.0 - stay) * (self._grounds * table)
+            self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
 
     def _wet_or_dry(self) -> np.ndarray:
         return self._posterior.sum(axis=1, keepdims=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import eq
 
 PATIENCE = 0.1
 """Time for which a value may stay the same to the last bit, s: markers are sampled more slowly
@@ -52,23 +53,24 @@ def sensor_fault(doubt: str) -> str:
 
 
 class Repeats:
-    """Measure for how long each of three values has not changed at all.
+    """Measure for how long each of several values has not changed at all.
 
     Parameters
     ----------
-    noise : float
-        Standard deviation of the values; values without noise never count as stopped.
+    noises : sequence of float
+        Standard deviation of each value; values without noise never count as stopped.
     """
 
-    __slots__ = ('_counts', '_fine', '_last', '_noise', '_since', '_steps')
+    __slots__ = ('_changed', '_counts', '_fine', '_noises', '_since', '_steps', 'last')
 
-    def __init__(self, noise: float) -> None:
-        self._noise = noise
-        self._steps = [math.inf] * 3  # smallest change so far
-        self._fine = False  # whether each value has changed by no more than twice the noise
-        self._last: Sequence[float] = (math.nan,) * 3
-        self._since: Sequence[float] = (0.0,) * 3
-        self._counts: Sequence[int] = (0,) * 3
+    def __init__(self, noises: Sequence[float]) -> None:
+        self._noises = noises
+        self._steps = [math.inf] * len(noises)  # smallest change so far
+        self._fine = False  # whether each value has changed by twice its noise or less
+        self.last: Sequence[float] = (math.nan,) * len(noises)
+        self._changed: float | None = 0.0  # time at which all changed last; None if not all did
+        self._since: list[float] = []
+        self._counts: list[int] = []
 
     def since(self, place: int) -> float:
         """Return the time since which the value with an index has not changed, s."""
@@ -76,30 +78,36 @@ class Repeats:
 
     def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
-        last, self._last = self._last, values
-        if self._fine and values[0] != last[0] and values[1] != last[1] and values[2] != last[2]:
-            self._since, self._counts = (time, time, time), (1, 1, 1)
+        last, self.last = self.last, values
+        if self._fine and not any(map(eq, values, last)):
+            self._changed = time
             return ()
-        return self._compare(time, last, values) if self._noise else ()
+        return self._compare(time, last, values)
 
     def _compare(
         self, time: float, last: Sequence[float], values: Sequence[float]
     ) -> Sequence[int]:
         """Process values of which some may be those of the time before."""
-        stopped = []
-        self._counts, self._since = counts, since = list(self._counts), list(self._since)
-        for place, value in enumerate(values):
+        stopped: list[int] = []
+        if self._changed is not None:
+            self._since, self._counts = [self._changed] * len(values), [1] * len(values)
+            self._changed = None
+        since, counts = self._since, self._counts
+        for place, (value, noise) in enumerate(zip(values, self._noises, strict=True)):
             if value != last[place]:
                 self._steps[place] = min(self._steps[place], abs(value - last[place]))
                 since[place] = time
                 counts[place] = 1
                 continue
             counts[place] += 1
-            if counts[place] >= FEWEST and time - since[place] > PATIENCE:
-                coarse = 2.0 * self._noise < self._steps[place] < math.inf
+            if noise and counts[place] >= FEWEST and time - since[place] > PATIENCE:
+                coarse = 2.0 * noise < self._steps[place] < math.inf
                 if not coarse or time - since[place] > DEAD:
                     stopped.append(place)
-        self._fine = max(self._steps) <= 2.0 * self._noise
+        self._fine = all(
+            step <= 2.0 * noise or not noise
+            for step, noise in zip(self._steps, self._noises, strict=True)
+        )
         return stopped
 
 
@@ -122,16 +130,14 @@ class Sensing:
     """
 
     def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
-        self._force_noise = force_noise
-        self._position_noise = position_noise
+        self._noises = (force_noise,) * 3 + (position_noise,) * 3
         self._range = force_range
         self.restart()
 
     def restart(self) -> None:
         """Discard all readings, because the clock has been set back."""
-        self._forces = Repeats(self._force_noise)
-        self._positions = Repeats(self._position_noise)
-        self._last: tuple[float, Sequence[float]] | None = None
+        self._repeats = Repeats(self._noises)
+        self._seen = -math.inf  # time of the last position, s
         self._grounded = math.inf
         self._dead = False
         self.marker_valid = True
@@ -165,8 +171,20 @@ class Sensing:
             self._grounded = math.inf
         elif self._grounded == math.inf:
             self._grounded = time
-        forces = self._forces.update(time, force)
-        marker = self._marker_fault(time, position, age, standing)
+        last = self._repeats.last
+        stopped = self._repeats.update(time, (*force, *position))
+        # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
+        since, self._seen = self._seen, time - age
+        leap = 0.0
+        if standing and 0.0 < self._seen - since < PATIENCE:
+            leap = math.dist(last[3:], position)
+        if not (
+            stopped or leap > LEAP_DISTANCE or age > OLDEST_POSITION or self._range < math.inf
+        ):
+            self._dead, self.marker_valid = False, True
+            return ''
+        forces = [place for place in stopped if place < 3]
+        marker = self._marker_fault(time, age, stopped[len(forces) :], leap, self._seen - since)
         self.marker_valid = not marker
         return self._force_fault(time, force, forces) or marker
 
@@ -175,7 +193,7 @@ class Sensing:
             self._dead = False
             return ''
         if len(stopped) == 3:
-            self.since = max(map(self._forces.since, stopped))
+            self.since = max(map(self._repeats.since, stopped))
             if any(force):
                 return f'force stands still: {force[2]:.3g} N to the last digit'
             grounded = time - max(self._grounded, self.since)
@@ -191,26 +209,20 @@ class Sensing:
                 return f'force out of range: {axis} = {force[place]:.3g} N'
             # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
-                self.since = self._forces.since(place)
+                self.since = self._repeats.since(place)
                 return f'force out of range: {axis} stays at {force[place]:.3g} N'
         return ''
 
     def _marker_fault(
-        self, time: float, position: Sequence[float], age: float, standing: bool
+        self, time: float, age: float, stopped: Sequence[int], leap: float, duration: float
     ) -> str:
-        stopped = self._positions.update(time, position)
-        # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
-        seen = time - age
-        last, self._last = self._last, (seen, position)
         if age > OLDEST_POSITION:
             self.since = time - age
             return f'marker lost: last seen {age:.2g} s ago'
         if len(stopped) == 3:
-            self.since = max(map(self._positions.since, stopped))
+            self.since = max(map(self._repeats.since, stopped))
             return 'marker stands still: to the last digit'
-        if standing and last and 0.0 < seen - last[0] < PATIENCE:
-            distance = math.dist(last[1], position)
-            if distance > LEAP_DISTANCE and distance > LEAP * (seen - last[0]):
-                self.since = time
-                return f'marker leapt: {1e3 * distance:.0f} mm'
+        if leap > LEAP_DISTANCE and leap > LEAP * duration:
+            self.since = time
+            return f'marker leapt: {1e3 * leap:.0f} mm'
         return ''

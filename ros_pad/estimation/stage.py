@@ -44,7 +44,7 @@ class Emission(NamedTuple):
     estimate : Estimate
         The estimate.
     load : float
-        Largest normal force since the last emission, N; NaN if the last one is not finite.
+        Largest normal force since the last emission, N, also of rejected samples.
     position : tuple of float or None
         Last position x and y of the foot, m; None if none has arrived since the last emission.
     """
@@ -81,6 +81,8 @@ class EstimationStage:
         Estimator of the foot, as given.
     samples : int
         Number of samples used so far.
+    last_ns : int
+        Time stamp of the last sample used, ns; 0 before the first one.
     doubt : str or None
         Doubt emitted last, with the present details after the colon; None before the first sample.
     sound : bool
@@ -103,12 +105,12 @@ class EstimationStage:
         self._wrench: tuple[int, Vector, float | None] | None = None
         self._position: tuple[int, Vector] | None = None
         self._used: tuple[int, Vector] | None = None  # position of the last sample
-        self._load, self._largest = math.nan, -math.inf  # last and largest since the last emission
+        self._load = -math.inf  # largest since the last emission
         self._place: tuple[float, float] | None = None  # last position since the last emission
         self._used_ns = 0  # stamp of the wrench with which that position was first used
         self._silent_since_ns: int | None = None
         self._rejection = ''
-        self.samples = 0
+        self.samples = self.last_ns = 0
         self.doubt: str | None = None
         self.sound = True
 
@@ -122,9 +124,7 @@ class EstimationStage:
         if self._wrench is not None and self._position is not None:
             # No position came for the last wrench: the marker is hidden or sampled more slowly.
             self._update(self._wrench, self._position)
-        self._load = load = force[2]
-        if self._largest < load < math.inf:
-            self._largest = load
+        self._hold(force[2])
         self._wrench = stamp_ns, force, moment if self._moments else None
         if self._position is not None and self._position[0] == stamp_ns:
             self._update(self._wrench, self._position)
@@ -139,6 +139,21 @@ class EstimationStage:
         if wrench is not None and position is not None and wrench[0] == stamp_ns:
             self._update(wrench, position)
 
+    def sample(self, stamp_ns: int, force: Vector, moment: float | None, point: Vector) -> None:
+        """Process a wrench and a position of the same time stamp, see :meth:`wrench`."""
+        if self._wrench is None and math.isfinite(point[0] + point[1] + point[2]):
+            self._hold(force[2])
+            self._place = point[0], point[1]
+            self._position = position = stamp_ns, point
+            self._update((stamp_ns, force, moment if self._moments else None), position)
+        else:
+            self.wrench(stamp_ns, force, moment)
+            self.position(stamp_ns, point)
+
+    def _hold(self, load: float) -> None:
+        if self._load < load <= LARGEST_FORCE:
+            self._load = load
+
     def _update(
         self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
     ) -> None:
@@ -148,8 +163,11 @@ class EstimationStage:
         if position is not self._used:
             # The position's own stamp may come from another clock.
             self._used, self._used_ns = position, stamp_ns
+        (fx, fy, fz), (x, y, z) = force, position[1]
         try:
-            _check_sizes(force, position[1], moment)
+            # Only an unusual sample is looked at more closely; squares take less time than abs().
+            if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2 or moment:
+                _check_sizes(force, position[1], moment)
             estimate = self.estimator.update(
                 stamp_ns * 1e-9,
                 force,
@@ -162,13 +180,14 @@ class EstimationStage:
             self.reject(error)
             return
         self.samples += 1
+        self.last_ns = stamp_ns
         self._silent_since_ns, self._rejection = None, ''
         if estimate.doubt != self.doubt or estimate.sound != self.sound:
             self._update_doubt(estimate.doubt, estimate.sound)
         if self._pace.due(stamp_ns):
-            load = max(self._largest, self._load) if math.isfinite(self._load) else math.nan
-            place, self._place, self._largest = self._place, None, -math.inf
-            self._emit(Emission(stamp_ns, estimate, load, place))
+            emission = Emission(stamp_ns, estimate, self._load, self._place)
+            self._load, self._place = -math.inf, None
+            self._emit(emission)
 
     def reject(self, error: InvalidInput) -> None:
         """Report a rejected sample; its error becomes the doubt if no sample follows for long."""
@@ -202,12 +221,8 @@ class EstimationStage:
 
 def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
     """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
-    (fx, fy, fz), (x, y, z) = force, point
-    # Squares take less time than abs().
-    if fx * fx + fy * fy + fz * fz > LARGEST_FORCE**2:
-        _check_size('force', force, LARGEST_FORCE, 'N')
-    if x * x + y * y + z * z > LARGEST_POSITION**2:
-        _check_size('position', point, LARGEST_POSITION, 'm')
+    _check_size('force', force, LARGEST_FORCE, 'N')
+    _check_size('position', point, LARGEST_POSITION, 'm')
     if moment is not None:
         _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')
 

@@ -353,6 +353,8 @@ def _walked(
                     trial.close()
                 raise
             wall = time.perf_counter() - started
+            about = label(scene, policy, seed, level, interrupted=trial.stopped)
+            trial.recorder.describe(about)
             trial.close()
     return trial, wall
 
@@ -409,7 +411,6 @@ def run(
     del trial
     gc.collect()
     describe = partial(label, scene, policy, seed, level, interrupted=stopped)
-    annotate(bag, describe())
     result = recorded.load(bag)
     result.floor = floor
     result.metrics = summarise(scene, result, robot, controller)

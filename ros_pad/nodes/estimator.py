@@ -40,6 +40,7 @@ from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
+from ros_pad.pace import LATE
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 
@@ -51,6 +52,9 @@ PARAMETERS = (
     *(Parameter(**vars(setting)) for setting in SETTINGS),
     Parameter(**vars(PUBLISH_RATE)),
 )  # fmt: skip
+
+OLDEST = 0.1
+"""Age of the last sample, s, from which the estimator counts as late."""
 
 _LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
@@ -188,6 +192,8 @@ class EstimatorNode(Node):
         self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
+        self._simulated: bool = self.get_parameter('use_sim_time').value
+        self._since_ns, self._counted = self.get_clock().now().nanoseconds, 0
         self._health_pace = Pace(TICK_PERIOD_NS)
         on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick, self.refusals)
 
@@ -201,8 +207,28 @@ class EstimatorNode(Node):
             self._reported = sound
             array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
             array.status.extend(self.refusals.statuses())
+            if not self._simulated:
+                array.status.append(self._rate(now_ns))
             set_stamp(array.header.stamp, now_ns)
             self._diagnostics(array)
+
+    def _rate(self, now_ns: int) -> DiagnosticStatus:
+        """Return rate and age of the samples, for ``/diagnostics``."""
+        elapsed = max(1, now_ns - self._since_ns) * 1e-9
+        rate = (self.samples - self._counted) / elapsed / len(self.legs)
+        self._since_ns, self._counted = now_ns, self.samples
+        age = (now_ns - max(leg.stage.last_ns for leg in self.legs.values())) * 1e-9
+        late = rate > 0.0 and not -OLDEST < age < OLDEST
+        text = f'samples are {age:.3g} s old' if late else f'{rate:.0f} samples a second'
+        return DiagnosticStatus(
+            name=f'{self.get_name()}: rate',
+            level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
+            message=f'{LATE}, or clocks differ: {text}' if late else text,
+            values=[
+                KeyValue(key='samples a second of a foot (Hz)', value=f'{rate:.1f}'),
+                KeyValue(key='age of the last sample (s)', value=f'{age:.3f}'),
+            ],
+        )
 
     @property
     def samples(self) -> int:

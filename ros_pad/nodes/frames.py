@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 
 from ros_pad.errors import InvalidInput
@@ -10,6 +11,7 @@ from ros_pad.errors import InvalidInput
 _OF_A_LEG = re.compile(r'(?:.*/)?leg_(\d+)_', re.DOTALL)
 
 
+@functools.lru_cache(maxsize=64)
 def check_frame(frame: str, leg: int) -> None:
     """Refuse a frame that names another leg, because two cables or topics may be swapped.
 
@@ -26,8 +28,6 @@ def check_frame(frame: str, leg: int) -> None:
     InvalidInput
         When the frame names another leg.
     """
-    if 'leg_' not in frame:  # in the usual case this is ten times faster than the pattern
-        return
     named = _OF_A_LEG.match(frame)
     if named and named[1] != str(leg):
         raise InvalidInput(

@@ -14,6 +14,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import ListParameters
@@ -24,6 +27,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
@@ -40,6 +44,7 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.parameters import plain
 from ros_pad.nodes.process import run
+from ros_pad.pace import LATE
 from ros_pad.trials import label
 
 PARAMETERS = (
@@ -48,6 +53,11 @@ PARAMETERS = (
         'folder',
         '',
         'Folder of the bag, which must not exist; empty: a new one, named after the time.',
+    ),
+    Parameter(
+        'reliable',
+        False,
+        'Ask publishers to repeat lost measurements: for a recorder on another computer.',
     ),
 )
 
@@ -113,6 +123,7 @@ class RecorderNode(Node):
             values = declare(self, PARAMETERS)
             folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
             recorded = topics.names(values['legs'])
+            self._reliable: bool = values['reliable']
             self._simulated = self.get_parameter('use_sim_time').value
             # Called for every message; replaced when the first /clock message arrives.
             self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
@@ -125,6 +136,8 @@ class RecorderNode(Node):
             raise
         self._recordings: dict[str, Subscription] = {}
         self._lost: Counter[str] = Counter()
+        self._told = 0  # lost messages in the last message on /diagnostics
+        self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
         # The subscription to /clock is made first: an executor that finds several messages
@@ -135,7 +148,7 @@ class RecorderNode(Node):
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
             if subscribes:
-                self._record(full_name, topic, qos.recording([topic.publish]))
+                self._record(full_name, topic, self._profile(topic, [topic.publish]))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
@@ -199,6 +212,10 @@ class RecorderNode(Node):
         finally:
             super().destroy_node()
 
+    def _profile(self, topic: topics.Topic, offered: list[QoSProfile]) -> QoSProfile:
+        measured = topic.subscribe.reliability == ReliabilityPolicy.BEST_EFFORT
+        return qos.recording(offered, measured and not self._reliable)
+
     def _record(self, name: str, topic: topics.Topic, profile: QoSProfile) -> None:
         """Subscribe to a topic so that each message goes into the bag."""
 
@@ -206,7 +223,7 @@ class RecorderNode(Node):
             # Drivers of sensors may offer less than is requested: request less.
             offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
             self.destroy_subscription(self._recordings.pop(name))
-            self._record(name, topic, qos.recording([topic.publish, *offered]))
+            self._record(name, topic, self._profile(topic, [topic.publish, *offered]))
 
         self._recordings[name] = self.create_subscription(
             topic.message,
@@ -242,11 +259,26 @@ class RecorderNode(Node):
             return
         if self._collects_parameters:
             self._look_for_nodes()
+        if self._lost.total() > self._told:
+            self._told = self._lost.total()
+            self._diagnose()
         try:
             self._bag.flush()
         except BagError:
             self._failed = True
             raise
+
+    def _diagnose(self) -> None:
+        """Tell on ``/diagnostics`` how many messages were lost."""
+        status = DiagnosticStatus(
+            name=f'{self.get_name()}: lost messages',
+            level=DiagnosticStatus.WARN,
+            message=f'{LATE}: {self._told} messages lost so far',
+            values=[KeyValue(key=topic, value=str(n)) for topic, n in self.lost.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics(array)
 
     def _look_for_nodes(self) -> None:
         """Request the parameters of every node of the robot when its services are there.

@@ -30,6 +30,7 @@ from ros_pad.nodes.process import run
 from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
+from ros_pad.pace import LATE
 from ros_pad.pace import Pace
 from ros_pad.pace import Rate
 from ros_pad.pace import RealTime
@@ -214,7 +215,7 @@ class SimulatorNode(Node):
         late = rate.reached < 0.95 * rate.wanted
         text = f'{rate.reached:.0f} of {rate.wanted:.0f} samples a second'
         if late:
-            text = f'too slow: {text}: choose a lower rate, L1, or a faster computer'
+            text = f'{LATE}: {text}: choose a lower rate, L1, or a faster computer'
             self.get_logger().warning(text, throttle_duration_sec=10.0)
         status = DiagnosticStatus(
             name=f'{self.get_name()}: rate',

@@ -307,6 +307,7 @@ def _warnings(trial: Trial) -> list[str]:
     if lost := trial.settings.get('lost'):
         counts = ', '.join(f'{count} on {topic}' for topic, count in sorted(lost.items()))
         found.append(f'Messages were lost before the recorder received them: {counts}.')
+    found += [f'{line}.' for line in trial.settings.get('late', ())]
     if trial.settings.get('problem'):
         found.append(str(trial.settings['problem']))
     return found

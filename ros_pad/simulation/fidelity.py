@@ -119,7 +119,7 @@ class ErrorTable:
         """
         path = configuration.shared_folder() / 'fidelity.yaml'
         try:
-            values = yaml.safe_load(path.read_text(encoding='utf-8'))
+            values = configuration.read_yaml(path.read_text(encoding='utf-8'))
             reserves = tuple(float(value) for value in values['reserves'])
             bounds = {
                 level: tuple(float(value) for value in values['bounds'][level])
@@ -293,8 +293,7 @@ def mid_stance_grip(scene: Scene, dome: bool, wet: bool) -> float:
         stance = gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
         film = Film(foot, scene.floor.viscosity)
         film.touch_down(scene.floor.film_thickness)
-        film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
-        thickness = film.under_domes, film.under_sole
+        thickness = film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
     return foot.resistance_of(on_domes, load - on_domes, pressure, *thickness) / load
 
 

@@ -21,6 +21,7 @@ from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.signals import children_spared
 from ros_pad.simulation.gait import TripodGait
 from ros_pad.simulation.mujoco_model import LINKS
 from ros_pad.simulation.mujoco_model import POINT
@@ -105,9 +106,9 @@ class FootPath:
         advance = self._advance - before
         phases = (gait.phase(1, time), gait.phase(2, time))  # of the two tripods
         strokes = [gait.swing(each) if each >= gait.duty else None for each in phases]
-        feet, swinging = [], []
-        for index, (home_x, home_y) in enumerate(self._homes):
-            x, y = self._offsets[index]
+        offsets, feet = [], []
+        places = zip(self._homes, self._offsets, strict=True)
+        for index, ((home_x, home_y), (x, y)) in enumerate(places):
             stroke = strokes[index % 2]
             if stroke is None:
                 # The foot moves in the body against the motion of the body.
@@ -119,15 +120,16 @@ class FootPath:
                 progress, height = stroke
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
-            swinging.append(stroke is not None)
-            self._offsets[index] = (x, y)
+            offsets.append((x, y))
             feet.append((home_x + x, home_y + y, height))
-        self.feet, self.swings = feet, tuple(swinging)
+        self._offsets, self.feet = offsets, feet
+        self.swings = (strokes[0] is not None, strokes[1] is not None) * 3
 
 
 def _import_mujoco() -> Any:
     try:
-        import mujoco
+        with children_spared():  # mujoco imports glfw, which starts a Python of its own
+            import mujoco
     except ImportError as error:
         raise ConfigError(
             f'fidelity L2 needs MuJoCo ({error}): pip install "ros_pad[mujoco]"'
@@ -347,14 +349,10 @@ class FullHexapod:
         foot, pressure, limit = self._foot, self._pressures[index], self._limits[index]
         dome_load = load if load < limit else limit
         sole_load = load - dome_load
+        films = (0.0, 0.0)
         if self.feet[index].wet:
-            film = self._films[index]
-            film.drain(dome_load, sole_load, pressure, drained)
-            grip = foot.resistance_of(
-                dome_load, sole_load, pressure, film.under_domes, film.under_sole
-            )
-        else:
-            grip = foot.resistance_of(dome_load, sole_load, pressure, 0.0, 0.0)
+            films = self._films[index].drain(dome_load, sole_load, pressure, drained)
+        grip = foot.resistance_of(dome_load, sole_load, pressure, *films)
         self._ratios[index] = ratio = grip / load
         row = self._frictions[index]
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
@@ -375,15 +373,17 @@ class FullHexapod:
         places, last = self._places.tolist(), self._last
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
-        for index, state in enumerate(self.feet):
-            x, y, z = places[index]
-            load = self._loads[index]
-            push_x, push_y = 0.0 - self._backs[index], self._lefts[index]  # not -0.0 in the air
+        feet = zip(
+            range(6), self.feet, places, self._loads, self._backs, self._lefts, self._moments,
+            self._ratios, self._pressures, self._limits, strict=True,
+        )  # fmt: skip
+        for index, state, (x, y, z), load, back, push_y, moment, ratio, pressure, limit in feet:
+            push_x = 0.0 - back  # not -0.0 in the air
             state.position = (x - push_x * softness, y - push_y * softness, z - POINT)
             state.force = (push_x, push_y, load)
-            state.moment = self._moments[index]
+            state.moment = moment
             state.standing = load > 0.0
-            state.grip = self._ratios[index] * load
+            state.grip = ratio * load
             state.slip_speed = 0.0
             state.wet = wet(x, y)
             if load <= LIGHT:
@@ -397,8 +397,8 @@ class FullHexapod:
                 turn = _turn(last_axes[index], axes[index])
                 # As on L1, sliding and turning share a foot's grip.
                 if math.hypot(distance, self._lever * turn) > SLIP_SPEED * dt:
-                    self.dissipation -= push_x * step_x + push_y * step_y + state.moment * turn
-            if self._pressures[index] > 0.0 and self._limits[index] < load:
+                    self.dissipation -= push_x * step_x + push_y * step_y + moment * turn
+            if pressure > 0.0 and limit < load:
                 state.overload_time += dt
 
     def _approach(self, index: int, x: float, y: float, z: float) -> None:

@@ -119,8 +119,7 @@ class RailLeg:
             state.wet = self._floor.wet(self._x + offset, 0.0)
             films = (0.0, 0.0)
             if state.wet:
-                self._film.drain(domes, load - domes, pressure, dt)
-                films = self._film.under_domes, self._film.under_sole
+                films = self._film.drain(domes, load - domes, pressure, dt)
             cap = foot.resistance_of(domes, load - domes, pressure, *films)
         free = self.speed - self._downhill * dt
         self.speed, force = push(free, back, cap, self._body, dt)

@@ -50,9 +50,9 @@ class Sensors:
         self._moment_noise = noise.moment
         self._moments: list[list[float]] = []
         self._last_moments: list[float | None] = [0.0] * legs
-        self._scale = np.array([noise.force] * 3 + [noise.position] * 3)
+        self._scale = np.array(([noise.force] * 3 + [noise.position] * 3) * legs)
         self._legs = legs
-        self._block: list[list[list[float]]] = []
+        self._block: list[list[float]] = []
         self._next = 0
 
     @classmethod
@@ -64,13 +64,15 @@ class Sensors:
     def read(self, robot: Robot) -> list[Reading]:
         """Return the next reading of each foot: force, N, and position, m, with their noise."""
         if self._next == len(self._block):
-            drawn = self._generator.normal(size=(_BLOCK, self._legs, 6)) * self._scale
+            drawn = self._generator.normal(size=(_BLOCK, 6 * self._legs)) * self._scale
+            # One list a sample: with one a foot, the garbage collector would run often.
             self._block = drawn.tolist()
             self._next = 0
-        row = self._block[self._next]
+        row = iter(self._block[self._next])
         self._next += 1
         readings: list[Reading] = []
-        for foot, (a, b, c, d, e, f) in zip(robot.feet, row, strict=True):
+        sixes = zip(row, row, row, row, row, row, strict=True)
+        for foot, (a, b, c, d, e, f) in zip(robot.feet, sixes, strict=True):
             fx, fy, fz = foot.force
             x, y, z = foot.position
             readings.append(((fx + a, fy + b, fz + c), (x + d, y + e, z + f)))

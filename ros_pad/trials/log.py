@@ -39,16 +39,14 @@ class TrialLog:
         self._policy = policy
         self._seed = seed
         self._fidelity = fidelity
-        self._time: list[float] = []
-        self._body: list[Vector] = []
-        self._readings = array('d')
-        self._slow_time: list[float] = []
-        self._rows: list[list[tuple[float, ...]]] = []
+        # Arrays, because many small tuples would occupy memory and the garbage collector.
+        self._time, self._body, self._readings = array('d'), array('d'), array('d')
+        self._slow_time, self._rows = array('d'), array('d')
 
     def sample(self, time: float, body: Vector, readings: Sequence[tuple[Vector, Vector]]) -> None:
         """Add a sensor sample: time, s, body, and force, N, and position, m, of each foot."""
         self._time.append(time)
-        self._body.append(body)
+        self._body.extend(body)
         self._readings.extend(chain.from_iterable(chain.from_iterable(readings)))
 
     def control(
@@ -60,8 +58,8 @@ class TrialLog:
     ) -> None:
         """Add a control step: time, s, gauge pressures, Pa, estimates, and set-points."""
         self._slow_time.append(time)
-        self._rows.append([
-            (
+        for leg, pressure, estimate in zip(self._scene.legs, pressures, estimates, strict=True):
+            self._rows.extend((
                 pressure,
                 controller.setpoint(leg),
                 estimate.wet_probability,
@@ -71,11 +69,7 @@ class TrialLog:
                 estimate.slipping,
                 controller.morphology(leg) == 'dome',
                 DOUBTS.index(estimate.doubt.partition(':')[0]),
-            )
-            for leg, pressure, estimate in zip(
-                self._scene.legs, pressures, estimates, strict=True
-            )
-        ])  # fmt: skip
+            ))  # fmt: skip
 
     def finish(
         self,
@@ -86,7 +80,7 @@ class TrialLog:
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
         readings = np.array(self._readings).reshape(len(self._time), -1, 2, 3)
-        slow = np.array(self._rows, dtype=float)
+        slow = np.array(self._rows).reshape(len(self._slow_time), -1, 9)
         trial = Trial(
             scene=self._scene.name,
             policy=self._policy,
@@ -94,7 +88,7 @@ class TrialLog:
             seed=self._seed,
             legs=self._scene.legs,
             time=np.array(self._time),
-            body=np.array(self._body),
+            body=np.array(self._body).reshape(-1, 3),
             force=readings[:, :, 0],
             position=readings[:, :, 1],
             slow_time=np.array(self._slow_time),

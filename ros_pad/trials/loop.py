@@ -96,8 +96,7 @@ class LegStages:
     def sample(self, stamp_ns: int, reading: Reading, moment: float | None) -> None:
         """Pass a sample of the sensors to the stages."""
         force, position = reading
-        self.estimation.wrench(stamp_ns, force, moment)
-        self.estimation.position(stamp_ns, position)
+        self.estimation.sample(stamp_ns, force, moment, position)
 
     def report(self, now_ns: int) -> None:
         """Read the pressure from the regulator, and pass it to estimation and decision."""

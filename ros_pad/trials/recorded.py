@@ -18,7 +18,6 @@ import math
 import os
 import pathlib
 import re
-from array import array
 from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Mapping
@@ -28,11 +27,14 @@ import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.recovery import KEY as REPAIR
+from ros_pad.bags.topics import DIAGNOSTICS
+from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
+from ros_pad.pace import LATE
 from ros_pad.pace import Progress
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.label import AMBIENT_PRESSURE
@@ -44,7 +46,6 @@ from ros_pad.trials.trial import Trial
 _TOPIC = re.compile(r'(?P<namespace>.*?/)(?:leg_(?P<leg>\d+)/)?(?P<kind>\w+(?:/pose)?)')
 # A log time after 2001 is a date, an earlier one is simulated time.
 _FIRST_DATE_NS = 10**18
-_REPORT_EVERY = 20_000  # messages
 
 
 def _doubt_code(text: str) -> float:
@@ -75,42 +76,37 @@ def _each(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
 
     The loop without ROS uses ``math``; NumPy's functions differ from it in the last bit.
     """
-    rows = values.reshape(-1, values.shape[-1]).tolist()
-    return np.reshape([function(*row) for row in rows], values.shape[:-1])
+    columns = values.reshape(-1, values.shape[-1]).T.tolist()
+    return np.reshape(list(map(function, *columns)), values.shape[:-1])
 
 
 @dataclasses.dataclass
 class _Series:
-    """Time stamps, ns, and values of the messages on one topic."""
+    """Time stamps, ns, and values of the messages on one topic, in the order of the stamps."""
 
-    topic: Topic
-    stamps: array[int] = dataclasses.field(default_factory=lambda: array('q'))
-    values: array[float] = dataclasses.field(default_factory=lambda: array('d'))
+    stamps: np.ndarray
+    values: np.ndarray
 
-    def adder(self) -> Callable[[Any, int], None]:
-        """Return a function that adds a message with its log time, ns."""
-        read, add_stamp, add_values = self.topic.read, self.stamps.append, self.values.extend
-        code = _CODES.get(self.topic.kind)
-
-        def add(message: Any, log_ns: int) -> None:
-            values = read(message)
-            add_values(values if code is None else (code(*values),))
-            header = getattr(message, 'header', None)
-            stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec if header else 0
-            # The stamp is 0 if the message has none, or if a driver leaves it empty.
-            add_stamp(stamp_ns or log_ns)
-
-        return add
+    @classmethod
+    def of(cls, topic: Topic, log_times: np.ndarray, table: np.ndarray) -> _Series:
+        """Return the series of a table of the values and, if the topic has them, stamps."""
+        width = len(topic.values)
+        stamps, values = log_times, table[:, :width]
+        if topic.frame:
+            seconds, nanoseconds = table[:, width:].astype(np.int64).T
+            stamps = seconds * 10**9 + nanoseconds
+            # A driver may leave the stamp empty.
+            stamps = np.where(stamps == 0, log_times, stamps)
+        if code := _CODES.get(topic.kind):
+            values = np.array([[code(text)] for (text,) in values]).reshape(len(stamps), width)
+        order = np.argsort(stamps, kind='stable')
+        return cls(stamps[order], values[order])
 
     def at(self, grid: np.ndarray) -> np.ndarray:
         """Return the last values up to each time, ns, of the grid: shape (len(grid), width)."""
-        stamps = np.array(self.stamps, dtype=np.int64)
-        width = len(self.topic.values)
-        values = np.array(self.values).reshape(len(stamps), width)
-        order = np.argsort(stamps, kind='stable')
-        rows = np.searchsorted(stamps[order], grid, side='right')
-        first = np.full((1, width), np.nan)
-        return np.concatenate([first, values[order]])[rows]
+        rows = np.searchsorted(self.stamps, grid, side='right')
+        first = np.full((1, self.values.shape[1]), np.nan)
+        return np.concatenate([first, self.values])[rows]
 
 
 def load(
@@ -149,8 +145,7 @@ def load(
     """
     bag = BagReader(folder)
     wanted = wanted_topics(bag, namespace, remaps)
-    series = {key: _Series(TRIAL[key[1]]) for key in wanted.values()}
-    _read(bag, wanted, series, progress)
+    series = _read(bag, wanted, progress)
     legs = tuple(sorted({leg for leg, _ in series if leg != _BODY}))
 
     def columns(kind: str, times: np.ndarray) -> np.ndarray:
@@ -170,6 +165,7 @@ def load(
         trial['settings']['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
     if bag.problem:
         trial['settings']['problem'] = bag.problem
+    trial['settings']['late'] = late(bag)
     ambient = trial['settings']['ambient_pressure']
     return Trial(
         **trial,
@@ -191,22 +187,40 @@ def load(
     )
 
 
+def late(bag: BagReader) -> list[str]:
+    """Return a line for each node that told on ``/diagnostics`` that it did not keep up."""
+    if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
+        return []
+    told: dict[str, list[tuple[float, str]]] = {}
+    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode()):
+        for status in array.status:
+            if status.message.startswith(LATE):
+                seconds = (log_ns - bag.start) * 1e-9
+                told.setdefault(status.name, []).append((seconds, status.message))
+    return [
+        f'{name}, told {len(found)} times from {found[0][0]:.1f} s on: {found[-1][1]}'
+        for name, found in told.items()
+    ]
+
+
 def _grid(series: Mapping[tuple[int, str], _Series], *kinds: str) -> np.ndarray:
     """Return the time stamps, ns, of the first of these kinds that was recorded.
 
     They are those of the leg with the most messages of this kind.
     """
     for kind in kinds:
-        stamps = [each.stamps for (_, name), each in sorted(series.items()) if name == kind]
+        stamps = [series[key].stamps for key in sorted(series) if key[1] == kind]
         if stamps:
-            return np.unique(np.array(max(stamps, key=len), dtype=np.int64))
+            return np.unique(max(stamps, key=len))
     return np.empty(0, dtype=np.int64)
 
 
 def _column(
     series: Mapping[tuple[int, str], _Series], kind: str, leg: int, times: np.ndarray
 ) -> np.ndarray:
-    return series.get((leg, kind), _Series(TRIAL[kind])).at(times)
+    if (leg, kind) not in series:
+        return np.full((len(times), len(TRIAL[kind].values)), np.nan)
+    return series[leg, kind].at(times)
 
 
 def _described(bag: BagReader) -> dict[str, Any]:
@@ -343,20 +357,15 @@ def _listed(robots: Iterable[str]) -> str:
 
 
 def _read(
-    bag: BagReader,
-    wanted: dict[str, tuple[int, str]],
-    series: dict[tuple[int, str], _Series],
-    progress: Progress | None,
-) -> None:
-    """Fill the series from the messages of a bag."""
-    total = sum(bag.counts[name] for name in wanted)
-    adders = {name: series[key].adder() for name, key in wanted.items()}
-    for number, (name, message, log_ns) in enumerate(bag.messages(wanted)):
-        adders[name](message, log_ns)
-        if progress and number % _REPORT_EVERY == 0:
-            progress(number / total)
-    if progress:
-        progress(1.0)
+    bag: BagReader, wanted: Mapping[str, tuple[int, str]], progress: Progress | None
+) -> dict[tuple[int, str], _Series]:
+    """Return the series of the topics of a bag by leg and kind."""
+    topics = {name: TRIAL[kind] for name, (_, kind) in wanted.items()}
+    paths = {
+        name: (*topic.values, *(STAMP if topic.frame else ())) for name, topic in topics.items()
+    }
+    tables = bag.tables(paths, progress)
+    return {key: _Series.of(topics[name], *tables[name]) for name, key in wanted.items()}
 
 
-__all__ = ['load', 'wanted_topics']
+__all__ = ['late', 'load', 'wanted_topics']

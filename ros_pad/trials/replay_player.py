@@ -17,6 +17,8 @@ from typing import Any
 from typing import TypeAlias
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.topics import CLOCK
+from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.control.stage import Decision
 from ros_pad.control.stage import DecisionStage
@@ -43,7 +45,7 @@ LONGEST_SILENCE_NS = 10_000_000_000
 _REPORT_EVERY = 5_000  # messages
 
 Take: TypeAlias = Callable[[Any, int], None]
-"""Function of a message and its log time, ns."""
+"""Function of the values of a message and its log time, ns."""
 
 Tracks: TypeAlias = 'dict[tuple[int, str], Track]'
 
@@ -96,36 +98,34 @@ class ReplayedLeg:
         self._standing = False
         self.landings, self.lift_offs = array('q'), array('q')
 
-    def _note(self, kind: str, message: Any, log_ns: int) -> int:
+    def _note(self, kind: str, stamp: tuple[int, int], log_ns: int) -> int:
         """Store stamp and log time of an input; return the stamp, ns."""
-        stamp = message.header.stamp
+        seconds, nanoseconds = stamp
         # A driver that sets no stamp leaves 0: use the log time.
-        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec or log_ns
+        stamp_ns = seconds * 1_000_000_000 + nanoseconds or log_ns
         stamps, times = self.inputs[kind]
         stamps.append(stamp_ns)
         times.append(log_ns)
         return stamp_ns
 
-    def wrench(self, message: Any, log_ns: int) -> None:
+    def wrench(self, values: tuple[Any, ...], log_ns: int) -> None:
         """Process a message of the foot's wrench."""
-        stamp_ns = self._note('wrench', message, log_ns)
-        force = message.wrench.force
+        stamp_ns = self._note('wrench', values[:2], log_ns)
         if stamp_ns >= self.first_stamp_ns:
-            self.estimation.wrench(stamp_ns, (force.x, force.y, force.z), message.wrench.torque.z)
+            self.estimation.wrench(stamp_ns, values[2:5], values[5])
         self._follow_stance(log_ns)
 
-    def position(self, message: Any, log_ns: int) -> None:
+    def position(self, values: tuple[Any, ...], log_ns: int) -> None:
         """Process a message of the foot's position."""
-        stamp_ns = self._note('position', message, log_ns)
-        point = message.point
+        stamp_ns = self._note('position', values[:2], log_ns)
         if stamp_ns >= self.first_stamp_ns:
-            self.estimation.position(stamp_ns, (point.x, point.y, point.z))
+            self.estimation.position(stamp_ns, values[2:])
         self._follow_stance(log_ns)
 
-    def pressure(self, message: Any, log_ns: int) -> None:
+    def pressure(self, values: tuple[Any, ...], log_ns: int) -> None:
         """Process a message of the pressure in the pads."""
-        self._note('pressure', message, log_ns)
-        gauge = message.fluid_pressure - self._ambient
+        self._note('pressure', values[:2], log_ns)
+        gauge = values[2] - self._ambient
         self.estimation.pressure(gauge)
         if not self._diverged:
             self.decision.pressure(gauge)
@@ -220,20 +220,21 @@ class Player:
         self.clocked = clocked
         self._next_tick_ns: int | None = None
 
-    def clock(self, message: Any, log_ns: int) -> None:
+    def clock(self, values: tuple[int, int], log_ns: int) -> None:
         """Process a message of ``/clock`` with its log time, ns."""
         self.flush()
         self.log_ns = log_ns
-        self.now_ns = message.clock.sec * 1_000_000_000 + message.clock.nanosec
+        seconds, nanoseconds = values
+        self.now_ns = seconds * 1_000_000_000 + nanoseconds
         self._tick()
 
-    def play(self, take: Take, message: Any, log_ns: int) -> None:
+    def play(self, take: Take, values: tuple[Any, ...], log_ns: int) -> None:
         """Process a message of a leg with its log time, ns, by the function ``take``."""
         if not self.clocked and log_ns != self.log_ns:
             self.flush()
             self._pass_time(log_ns)
         self.log_ns = log_ns
-        take(message, log_ns)
+        take(values, log_ns)
 
     def _pass_time(self, until_ns: int) -> None:
         """Tick the stages up to a log time, ns, as the timers of the nodes do."""
@@ -260,16 +261,18 @@ class Player:
         self.later.clear()
 
 
-def _keep(track: Track, kind: str, message: Any, log_ns: int) -> None:
-    """Add a recorded message to its track."""
-    values = TRIAL[kind].read(message)
+def _keeper(track: Track, kind: str) -> Take:
+    """Return a function that adds a recorded message to its track."""
     if kind in TEXTS:
-        track.add_text(log_ns, *values)
-    elif kind == 'slip':
-        stamp = message.header.stamp
-        track.add(log_ns, values, stamp.sec * 1_000_000_000 + stamp.nanosec)
-    else:
-        track.add(log_ns, values)
+        return lambda values, log_ns: track.add_text(log_ns, *values)
+    if kind != 'slip':
+        return lambda values, log_ns: track.add(log_ns, values)
+
+    def keep(values: tuple[Any, ...], log_ns: int) -> None:
+        seconds, nanoseconds, *numbers = values
+        track.add(log_ns, tuple(numbers), seconds * 1_000_000_000 + nanoseconds)
+
+    return keep
 
 
 def _clock(bag: BagReader) -> str | None:
@@ -321,21 +324,24 @@ def play(
     for leg, beginning_ns in beginnings.items():
         player.legs[leg].first_stamp_ns = beginning_ns
     takers: dict[str, Take] = {}
-    keepers: dict[str, Take] = {}
+    paths: dict[str, tuple[str, ...]] = {}
     for topic, (leg, kind) in wanted.items():
-        if leg in player.legs and kind in INPUTS:
-            takers[topic] = getattr(player.legs[leg], kind)
-        elif leg in player.legs:
-            keepers[topic] = partial(_keep, player.recorded[leg, kind], kind)
-    topics = {*takers, *keepers, *([clock] if clock else [])}
-    total = sum(bag.counts[topic] for topic in topics)
-    for count, (topic, message, log_ns) in enumerate(bag.messages(topics)):
-        if topic in takers:
-            player.play(takers[topic], message, log_ns)
-        elif topic == clock:
-            player.clock(message, log_ns)
+        if leg not in player.legs:
+            continue
+        paths[topic] = TRIAL[kind].values
+        if kind in INPUTS:
+            takers[topic] = partial(player.play, getattr(player.legs[leg], kind))
         else:
-            keepers[topic](message, log_ns)
+            takers[topic] = _keeper(player.recorded[leg, kind], kind)
+        if kind in (*INPUTS, 'slip'):
+            paths[topic] = STAMP + paths[topic]
+        if kind == 'wrench':
+            paths[topic] += ('wrench.torque.z',)
+    if clock:
+        takers[clock], paths[clock] = player.clock, CLOCK.values
+    total = sum(bag.counts[topic] for topic in paths)
+    for count, (topic, values, log_ns) in enumerate(bag.values(paths)):
+        takers[topic](values, log_ns)
         if progress and count % _REPORT_EVERY == 0:
             progress(count / total)
     player.flush()

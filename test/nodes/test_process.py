@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
+import os
 import signal
+import threading
+import time
 
 import pytest
 import rclpy
@@ -9,6 +12,7 @@ from rclpy.node import Node
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
+from ros_pad.nodes.process import REACTION
 from ros_pad.nodes.process import run
 
 
@@ -56,6 +60,33 @@ def test_a_signal_is_an_orderly_end(perform, number, capfd):
     assert perform(lambda: signal.raise_signal(number)) == 0
     assert signal.getsignal(number) is before
     assert 'Traceback' not in capfd.readouterr().err
+
+
+def test_a_signal_before_the_spin_ends_the_node_in_order():
+    ends = []
+
+    def make():
+        signal.raise_signal(signal.SIGTERM)
+        return Probe(lambda: fail(AssertionError), ends)
+
+    assert run(make, []) == 0
+    assert ends == ['in order']
+
+
+def test_an_idle_node_ends_well_under_a_second_after_a_signal():
+    sent = []
+
+    def send():
+        time.sleep(0.5)
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def make():
+        threading.Thread(target=send).start()
+        return Node('idle', start_parameter_services=False)
+
+    assert run(make, []) == 0
+    assert time.monotonic() - sent[0] < REACTION + 0.5
 
 
 @pytest.mark.parametrize(

@@ -302,7 +302,8 @@ def test_a_bag_that_was_not_closed_is_reported(tmp_path):
     bag.writer.close()
 
 
-def test_progress_ends_at_one(tmp_path):
+def test_progress_ends_at_one(tmp_path, monkeypatch):
+    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', 500_000)
     with Recording(tmp_path / 'bag') as bag:
         for number in range(1, 50001):
             bag.add('/leg_1/slipping', Bool(data=False), number * MS)

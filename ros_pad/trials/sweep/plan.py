@@ -17,8 +17,6 @@ from dataclasses import replace
 from typing import Any
 from typing import TypeAlias
 
-import yaml
-
 from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.control import POLICIES
@@ -226,7 +224,7 @@ def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> S
     """
     path = configuration.locate('scenes', source)
     Table.load(path)  # reports errors of the file itself without naming the values
-    content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    content = configuration.read_yaml(path.read_text(encoding='utf-8'))
     with _errors_naming(values):
         for name, value in values.items():
             *folders, key = name.split('.')

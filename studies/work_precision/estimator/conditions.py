@@ -203,7 +203,7 @@ CHANGES = (
     Change('position noise', 'm', NOISES, 1.5e-4, CONFIGURED, configured_noise),
     Change('position noise', 'm', NOISES, 1.5e-4, NOT_CONFIGURED, position_noise),
     Change(
-        'sample rate', 'Hz', (50.0, 100.0, 250.0, 1000.0), 250.0,
+        'sample rate', 'Hz', (50.0, 100.0, 250.0, 500.0, 1000.0), 250.0,
         disturb=rate, world=lambda _: at_1000_hertz,
     ),
     Change('shear stiffness', 'times', STIFFNESSES[::2], 1.0, CONFIGURED, world=with_stiffness),
