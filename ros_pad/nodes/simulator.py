@@ -32,6 +32,7 @@ from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import LATE
 from ros_pad.pace import Pace
+from ros_pad.pace import Rate
 from ros_pad.pace import RealTime
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.scene import Scene
@@ -69,6 +70,7 @@ HIGHEST = 1e6
 """Highest gauge pressure that is accepted, Pa: no regulator's ceiling may exceed it."""
 
 _SLOWEST = 50.0  # Hz, lowest rate that scenes allow
+_REPORT_PERIOD_NS = 1_000_000_000
 
 
 class SimulatorNode(Node):
@@ -145,8 +147,8 @@ class SimulatorNode(Node):
             choice = fidelity.choose(self.scene, values['fidelity'])
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
             self._diagnostics = topics.DIAGNOSTICS.output(self)
-            self._diagnostics_pace = Pace(1_000_000_000)
-            self._real_time = RealTime(self.period_ns, time.monotonic_ns())
+            self._real_time: RealTime | None = None
+            self._report_ns = 0  # time of the next message on /diagnostics
             # The timer cannot follow the clock that this node publishes.
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(self.period_ns * 1e-9, self._on_timer, clock=steady)
@@ -194,6 +196,9 @@ class SimulatorNode(Node):
 
     def _on_timer(self) -> None:
         now_ns = time.monotonic_ns()
+        if self._real_time is None:  # what passed before the executor spun is no delay
+            self._real_time = RealTime(self.period_ns, now_ns)
+            self._report_ns = now_ns + _REPORT_PERIOD_NS
         due = self._real_time.due(now_ns)
         if due:
             self.step(due)
@@ -202,11 +207,11 @@ class SimulatorNode(Node):
             self.get_logger().error(
                 f'the walk is not valid after {self.robot.time:.3f} s: {self.robot.verdict}'
             )
-        if self._diagnostics_pace.due(now_ns):
-            self._diagnose(now_ns)
+        if now_ns >= self._report_ns:
+            self._report_ns = now_ns + _REPORT_PERIOD_NS
+            self._diagnose(self._real_time.rate(now_ns))
 
-    def _diagnose(self, now_ns: int) -> None:
-        rate = self._real_time.rate(now_ns)
+    def _diagnose(self, rate: Rate) -> None:
         late = rate.reached < 0.95 * rate.wanted
         text = f'{rate.reached:.0f} of {rate.wanted:.0f} samples a second'
         if late:

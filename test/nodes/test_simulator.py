@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 import time
+import types
 from itertools import pairwise
 
 import numpy as np
@@ -11,12 +12,14 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
 
 from ros_pad import configuration
+from ros_pad.nodes import simulator
 from ros_pad.nodes import topics
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 
 AMBIENT = 101325.0
+OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 LEGS = (1, 2, 3, 4, 5, 6)
 
 
@@ -145,7 +148,7 @@ def test_a_simulator_that_is_too_slow_reports_its_rate(
     heard = observer.heard['leg_1/wrench']
     until(lambda: len(rates) >= 4 and len(heard) >= 4)  # not so slow in the first two seconds
     array, status = rates[-1]
-    assert status.level == DiagnosticStatus.WARN
+    assert status.level == WARN
     assert [each.key for each in status.values] == [
         'wanted rate (Hz)', 'reached rate (Hz)', 'speed (times real time)',
     ]  # fmt: skip
@@ -160,6 +163,42 @@ def test_a_simulator_that_is_too_slow_reports_its_rate(
     # Stamps are those of the time of day, so that other nodes do not take readings for old ones.
     stamps = [nanoseconds(each.header.stamp) for each in heard]
     assert all(late - early >= 40_000_000 for early, late in pairwise(stamps))
+
+
+def test_the_rate_is_measured_over_whole_seconds_from_the_first_tick(start, monkeypatch, capfd):
+    """A start that takes long is no reason to warn; the time here is not that of the machine."""
+    sent = []
+
+    def output(topic, node, leg=None):
+        return sent.append if topic is topics.DIAGNOSTICS else lambda message: None
+
+    monkeypatch.setattr(topics.Topic, 'output', output)
+    node = start(scene='leg_wet_dome_40', fidelity='L0', rate=100.0)
+    (timer,) = node.timers
+    now = 10**12
+
+    def tick_until(end_ms, step_ms):
+        nonlocal now
+        for _ in range(round((end_ms - (now - 10**12) / 1e6) / step_ms)):
+            now += step_ms * 1_000_000
+            timer.callback()
+
+    monkeypatch.setattr(simulator, 'time', types.SimpleNamespace(monotonic_ns=lambda: now))
+    timer.callback()
+    assert node.robot.time == 0.0
+    tick_until(2000, 10)
+    assert node.robot.time == pytest.approx(2.0)
+    tick_until(3000, 50)  # five samples at a time: four are left out
+    assert node.robot.time == pytest.approx(3.0)
+    tick_until(4000, 200)  # ten of twenty
+    assert node.robot.time == pytest.approx(3.5)
+    statuses = [array.status[0] for array in sent]
+    assert [figures(each) for each in statuses] == [
+        [100.0, 100.0, 1.0], [100.0, 100.0, 1.0], [100.0, 20.0, 1.0], [100.0, 5.0, 0.5],
+    ]  # fmt: skip
+    assert [each.level for each in statuses] == 2 * [OK] + 2 * [WARN]
+    assert statuses[0].message == '100 of 100 samples a second'
+    assert capfd.readouterr().err.count('too slow: 20 of 100 samples a second') == 1
 
 
 def test_late_samples_are_left_out_and_simulated_time_is_kept(start, observer, until):
@@ -185,7 +224,7 @@ def test_a_simulator_that_keeps_up_reports_that(start, rates, until):
     start(scene='leg_wet_dome_40', fidelity='L0', rate=50.0)
     until(lambda: len(rates) >= 2)
     _, status = rates[-1]
-    assert status.level == DiagnosticStatus.OK
+    assert status.level == OK
     assert status.message.endswith('of 50 samples a second')
     wanted, reached, speed = figures(status)
     assert (wanted, reached, speed) == pytest.approx((50.0, 50.0, 1.0), rel=0.05)
