@@ -451,7 +451,7 @@ def start(*parameters):
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor], indirect=True)
 def test_signals_close_the_bag(number, robot, until, tmp_path):
     publisher = robot.create_publisher(Float64, 'leg_5/friction', qos.RECORD)
-    process = start(f'folder:={tmp_path / "trial"}')
+    process = start(f'folder:={tmp_path / "trial"}', 'reliable:=true')
     try:
         until(lambda: publisher.get_subscription_count())
         for value in range(100):
