@@ -10,6 +10,7 @@ import warnings
 
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Parameter as RosParameter
 from rcl_interfaces.msg import ParameterEvent
@@ -323,6 +324,8 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     publisher = robot.create_publisher(WrenchStamped, 'leg_2/wrench', driver)
     process = start(f'folder:={tmp_path / "trial"}')
     sent = 0
+    statuses = []
+    topics.DIAGNOSTICS.subscription(robot, lambda array: statuses.extend(array.status))
 
     def send(count):
         nonlocal sent
@@ -339,6 +342,7 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
         before = on_disk(tmp_path / 'trial', '/leg_2/wrench')
         # The middleware detects lost messages when a later one arrives.
         until(lambda: send(1) or on_disk(tmp_path / 'trial', '/leg_2/wrench') > before)
+        until(lambda: statuses, what='a report of lost messages')
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=120)
     finally:
@@ -351,6 +355,26 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     # Messages sent before discovery or while the recorder ends are not counted as lost.
     assert sent - 50 <= lost[1] + reader.counts['/leg_2/wrench'] <= sent
     assert 'messages lost so far' in errors
+    (value,) = statuses[0].values
+    assert (statuses[0].name, statuses[0].level) == (
+        'recorder: lost messages', DiagnosticStatus.WARN,
+    )  # fmt: skip
+    assert statuses[0].message == f'too slow: {value.value} messages lost so far'
+    assert (value.key, 0 < int(value.value) <= lost[1]) == ('/leg_2/wrench', True)
+
+
+@pytest.mark.parametrize('reliable', [False, True])
+def test_measurements_are_repeated_only_where_that_is_wanted(record, reliable):
+    """Set-points and states are reliable in any case."""
+    node = record(**({'reliable': True} if reliable else {}))
+    profiles = {each.topic_name: each.qos_profile for each in node.subscriptions}
+    measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+    for topic in topics.LEG_TOPICS:
+        asked = profiles[f'/{topic.name(3)}'].reliability
+        state = topic in (topics.PRESSURE_SETPOINT, topics.DOUBT, topics.MORPHOLOGY)
+        assert asked == (ReliabilityPolicy.RELIABLE if state else measured), topic.name(3)
+    assert profiles['/diagnostics'].reliability == ReliabilityPolicy.RELIABLE
+    node.close()
 
 
 def test_time_is_that_of_the_machine(robot, record, until, tmp_path):
@@ -513,6 +537,9 @@ def test_recording_accepts_the_weakest_publisher():
     assert qos.recording([qos.SENSOR_PUBLISH, best_effort]).reliability == (
         ReliabilityPolicy.BEST_EFFORT
     )
+    measured = qos.recording([qos.SENSOR_PUBLISH], measured=True)
+    assert measured.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert measured.history == HistoryPolicy.KEEP_ALL
     assert qos.recording([qos.STATE]).durability == qos.STATE.durability
     assert qos.recording([qos.STATE, qos.COMMAND]).durability == qos.COMMAND.durability
     assert qos.recording([qos.SENSOR_PUBLISH]).history == HistoryPolicy.KEEP_ALL
