@@ -11,6 +11,7 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad.nodes import estimator
 from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.stamps import nanoseconds
@@ -441,6 +442,54 @@ def test_refused_samples_are_reported_with_the_reason(robot, health):
     robot.tick_until(1.0)
     robot.until(lambda: health and 'sample refused' in sensing(health, 1).message)
     assert 'must be finite' in sensing(health, 1).message
+
+
+def test_rate_and_age_of_the_samples_are_reported(context, monkeypatch):
+    """The times are given, so that the machine does not matter."""
+    sent, ticks = [], []
+
+    def output(topic, node, leg=None):
+        return sent.append if topic is topics.DIAGNOSTICS else lambda message: None
+
+    monkeypatch.setattr(topics.Topic, 'output', output)
+    monkeypatch.setattr(
+        estimator, 'on_tick', lambda node, period, call, refuse: ticks.append(call)
+    )
+    legs = Parameter('legs', value=[1, 2])
+    node = EstimatorNode(context=context, parameter_overrides=[legs])
+    (tick,) = ticks
+    start_ns = node.get_clock().now().nanoseconds // 10**9 * 10**9 + 10**9
+    tick(start_ns)
+
+    def second(number, age_ns):
+        """Give each leg 50 samples in a second, with stamps of an age, and return the status."""
+        for sample in range(50):
+            now_ns = start_ns + (number - 1) * 10**9 + (sample + 1) * 20_000_000
+            for leg in node.legs.values():
+                stamp_ns = now_ns - age_ns
+                leg.stage.wrench(stamp_ns, (0.001 * sample, 0.0, LOAD), 0.0)
+                leg.stage.position(stamp_ns, (1e-6 * sample, 0.0, 0.0))
+        tick(start_ns + number * 10**9)
+        (status,) = [each for each in sent[-1].status if each.name == 'estimator: rate']
+        return status
+
+    good = second(1, 5_000_000)
+    assert (good.level, good.message) == (DiagnosticStatus.OK, '50 samples a second')
+    assert [each.value for each in good.values] == ['50.0', '0.005']
+    late = second(2, 150_000_000)
+    assert (late.level, late.message) == (
+        DiagnosticStatus.WARN, 'too slow, or clocks differ: samples are 0.15 s old',
+    )  # fmt: skip
+    early = second(3, -300_000_000)  # the other clock is ahead
+    assert (early.level, early.values[1].value) == (DiagnosticStatus.WARN, '-0.300')
+    node.destroy_node()
+
+
+def test_in_simulated_time_no_rate_is_reported(robot, health):
+    robot.start()
+    robot.tick(1.0)
+    robot.until(lambda: health)
+    assert {each.name for each in health} == {f'estimator: leg {leg} sensing' for leg in (1, 2)}
 
 
 def test_a_moment_counts_where_there_is_one(robot):

@@ -10,6 +10,7 @@ import warnings
 
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Parameter as RosParameter
 from rcl_interfaces.msg import ParameterEvent
@@ -77,11 +78,17 @@ def data_on(folder, topic):
 
 def custom_data(folder, key):
     """Return a value of the custom data of a bag, also while it is open; None if missing."""
-    if not (folder / 'metadata.yaml').exists():  # the first flush writes it
+    file = folder / 'metadata.yaml'
+    if not file.exists():  # no message yet
         return None
-    text = (folder / 'metadata.yaml').read_text(encoding='utf-8')
+    text = file.read_text(encoding='utf-8')
     end = yaml.safe_load(text[text.index('  custom_data:') :])  # all of it can take seconds
     return json.loads(end['custom_data'].get(key, 'null'))
+
+
+def begin(recorder):
+    """Record a message, because a bag without messages has no metadata before it is closed."""
+    recorder.record('/leg_6/wetness', serialize_message(Float64()))
 
 
 @pytest.fixture
@@ -224,6 +231,7 @@ def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
         node.declare_parameter('homes', [0.1, 0.2])
         executor.add_node(node)
     recorder = record()
+    begin(recorder)
     bag = tmp_path / 'trial'
     until(lambda: '/gait' in (custom_data(bag, label.PARAMETERS) or {}))
     changed = Parameter('stride', value=0.10)
@@ -258,6 +266,7 @@ def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
     driver.declare_parameter('key', [b'\x01', b'\xff'])
     executor.add_node(driver)
     recorder = record()
+    begin(recorder)
 
     def parameters():
         return (custom_data(tmp_path / 'trial', label.PARAMETERS) or {}).get('/driver', {})
@@ -292,6 +301,7 @@ def stride_in(tmp_path):
 
 def test_a_node_that_comes_back_is_asked_again(gait, record, until, destroy, stride_in):
     recorder = record()
+    begin(recorder)
     for stride in (0.14, 0.2):
         node = gait(stride)
         until(lambda stride=stride: stride_in() == stride)
@@ -306,6 +316,7 @@ def test_a_node_that_comes_back_before_its_name_is_dropped_is_asked_again(
     gait, record, until, executor, stride_in
 ):
     recorder = record()
+    begin(recorder)
     killed = []
     for stride in (0.14, 0.2):
         node = gait(stride)
@@ -325,6 +336,8 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     publisher = robot.create_publisher(WrenchStamped, 'leg_2/wrench', driver)
     process = start(f'folder:={tmp_path / "trial"}')
     sent = 0
+    statuses = []
+    topics.DIAGNOSTICS.subscription(robot, lambda array: statuses.extend(array.status))
 
     def send(count):
         nonlocal sent
@@ -341,6 +354,7 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
         before = on_disk(tmp_path / 'trial', '/leg_2/wrench')
         # The middleware detects lost messages when a later one arrives.
         until(lambda: send(1) or on_disk(tmp_path / 'trial', '/leg_2/wrench') > before)
+        until(lambda: statuses, what='a report of lost messages')
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=120)
     finally:
@@ -353,6 +367,26 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     # Messages sent before discovery or while the recorder ends are not counted as lost.
     assert sent - 50 <= lost[1] + reader.counts['/leg_2/wrench'] <= sent
     assert 'messages lost so far' in errors
+    (value,) = statuses[0].values
+    assert (statuses[0].name, statuses[0].level) == (
+        'recorder: lost messages', DiagnosticStatus.WARN,
+    )  # fmt: skip
+    assert statuses[0].message == f'too slow: {value.value} messages lost so far'
+    assert (value.key, 0 < int(value.value) <= lost[1]) == ('/leg_2/wrench', True)
+
+
+@pytest.mark.parametrize('reliable', [False, True])
+def test_measurements_are_repeated_only_where_that_is_wanted(record, reliable):
+    """Set-points and states are reliable in any case."""
+    node = record(**({'reliable': True} if reliable else {}))
+    profiles = {each.topic_name: each.qos_profile for each in node.subscriptions}
+    measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+    for topic in topics.LEG_TOPICS:
+        asked = profiles[f'/{topic.name(3)}'].reliability
+        state = topic in (topics.PRESSURE_SETPOINT, topics.DOUBT, topics.MORPHOLOGY)
+        assert asked == (ReliabilityPolicy.RELIABLE if state else measured), topic.name(3)
+    assert profiles['/diagnostics'].reliability == ReliabilityPolicy.RELIABLE
+    node.close()
 
 
 def test_time_is_that_of_the_machine(robot, record, until, tmp_path):
@@ -515,6 +549,9 @@ def test_recording_accepts_the_weakest_publisher():
     assert qos.recording([qos.SENSOR_PUBLISH, best_effort]).reliability == (
         ReliabilityPolicy.BEST_EFFORT
     )
+    measured = qos.recording([qos.SENSOR_PUBLISH], measured=True)
+    assert measured.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert measured.history == HistoryPolicy.KEEP_ALL
     assert qos.recording([qos.STATE]).durability == qos.STATE.durability
     assert qos.recording([qos.STATE, qos.COMMAND]).durability == qos.COMMAND.durability
     assert qos.recording([qos.SENSOR_PUBLISH]).history == HistoryPolicy.KEEP_ALL
