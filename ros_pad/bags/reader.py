@@ -182,7 +182,7 @@ class BagReader:
         """
         for batch, parts in self._parts(paths):
             streams = {
-                channel: zip(itertools.repeat(topic), rows.tolist(), times.tolist())
+                channel: zip(itertools.repeat(topic), _tuples(rows), times.tolist())
                 for channel, (topic, rows, times) in parts.items()
             }
             # The next message of each channel, in the order of the channels in the file.
@@ -323,11 +323,20 @@ def _decoded_rows(
     return rows
 
 
+def _tuples(rows: np.ndarray) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a structured array, in half the time of its ``tolist``."""
+    columns = [rows[name].tolist() for name in rows.dtype.names or ()]
+    return zip(*columns, strict=True) if columns else itertools.repeat((), len(rows))
+
+
 def _table(rows: np.ndarray) -> np.ndarray:
     """Return structured rows as a table of numbers, or of objects if there is a text."""
     columns = [rows[name] for name in rows.dtype.names or ()]
     text = any(isinstance(each, str) for column in columns for each in column[:1])
-    return np.column_stack([column.astype(object if text else float) for column in columns])
+    table = np.empty((len(rows), len(columns)), object if text else float)
+    for place, column in enumerate(columns):
+        table[:, place] = column
+    return table
 
 
 def _raise_first(

@@ -510,6 +510,7 @@ PATHS = {
     '/Bool': ('data',),
     '/String': ('data',),
     '/DiagnosticArray': ('header.stamp.sec',),  # has lists: is decoded as a whole
+    '/Float64': (),
     '/absent': ('data',),
 }
 
