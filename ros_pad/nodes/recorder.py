@@ -8,10 +8,11 @@ import datetime
 import json
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -23,7 +24,6 @@ from rcl_interfaces.srv import ListParameters
 from rclpy.client import Client
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
@@ -39,6 +39,7 @@ from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
@@ -62,6 +63,10 @@ PARAMETERS = (
 )
 
 
+INTAKE_PERIOD = 0.02
+"""Time after which received messages are written, s; the middleware keeps them until then."""
+
+
 @dataclasses.dataclass
 class _Peer:
     """A node of the robot, and the state of the requests for its parameters."""
@@ -82,12 +87,12 @@ class RecorderNode(Node):
 
     Messages are written without decoding, so that tens of thousands a second can be recorded.
     Their log time is the node's clock: with ``use_sim_time`` the time in the last ``/clock``
-    message, and 0 before the first one.
+    message, and 0 before the first one; otherwise, the time of receipt.
 
     Composed nodes are recorded at the publisher: they pass their messages to :meth:`record`.
 
-    Messages reach the disk within about a second. The middleware counts messages that were lost
-    before they arrived; the node logs these counts, and writes them into the bag under
+    Messages reach the disk within about a second. Messages that were lost before they arrived are
+    counted; the node reports the counts on ``/diagnostics``, and writes them into the bag under
     `ros_pad.trials.label.LOST`.
 
     Its ROS parameters are in :data:`PARAMETERS`; ``use_sim_time`` is read at the start only.
@@ -126,7 +131,8 @@ class RecorderNode(Node):
             self._reliable: bool = values['reliable']
             self._simulated = self.get_parameter('use_sim_time').value
             # Called for every message; replaced when the first /clock message arrives.
-            self._now: Callable[[], int] = self._before_clock if self._simulated else time.time_ns
+            self._now: Callable[[], int] = self._before_clock if self._simulated else self._receipt
+            self._received_ns = 0  # of the message that is being written
             self._clock_ns = 0
             about = dict(custom_data or {label.MADE_WITH: json.dumps(label.made_with())})
             about[label.RECORDED_AT] = 'receiver' if subscribes else 'publisher'
@@ -134,25 +140,25 @@ class RecorderNode(Node):
         except BaseException:
             super().destroy_node()
             raise
-        self._recordings: dict[str, Subscription] = {}
-        self._lost: Counter[str] = Counter()
+        self._intake = Intake(self)
         self._told = 0  # lost messages in the last message on /diagnostics
         self._diagnostics = topics.DIAGNOSTICS.output(self)
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
-        # The subscription to /clock is made first: an executor that finds several messages
-        # waiting takes them in the order of their subscriptions.
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
             if subscribes:
-                self._record(full_name, topic, self._profile(topic, [topic.publish]))
+                self._intake.add(full_name, topic.message, partial(self._profile, topic))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
-        self.create_timer(FLUSH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(FLUSH_PERIOD, self._look, clock=steady)
+        if subscribes:
+            self.create_timer(INTAKE_PERIOD, self._take, clock=steady)
         self._collects_parameters = custom_data is None
         self._changes: list[tuple[int, str, str, Any]] = []
         if self._collects_parameters:
@@ -169,7 +175,21 @@ class RecorderNode(Node):
     @property
     def lost(self) -> dict[str, int]:
         """Number of messages that were lost before they arrived, by topic, where there are any."""
-        return dict(self._lost)
+        return dict(self._intake.lost)
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Subscriptions whose messages an executor takes: not the recorded ones."""
+        recorded = self._intake.subscriptions if hasattr(self, '_intake') else []
+        return (each for each in super().subscriptions if each not in recorded)
+
+    def _take(self) -> None:
+        self._intake.take(self._write_received)
+        self._received_ns = 0
+
+    def _write_received(self, name: str, data: bytes, received_ns: int) -> None:
+        self._received_ns = received_ns
+        self._writers[name](data)
 
     def record(self, name: str, data: bytes) -> None:
         """Write a message, as bytes, on the topic with this full name.
@@ -200,9 +220,9 @@ class RecorderNode(Node):
         BagError
             When the disk is full; it says how many messages are saved.
         """
-        for subscription in self._recordings.values():
-            self.destroy_subscription(subscription)
-        self._recordings.clear()
+        if not self._failed:
+            self._take()
+        self._intake.close()
         self._bag.close({label.LOST: json.dumps(self.lost)} | dict(custom_data or {}))
 
     def destroy_node(self) -> None:
@@ -214,44 +234,8 @@ class RecorderNode(Node):
 
     def _profile(self, topic: topics.Topic, offered: list[QoSProfile]) -> QoSProfile:
         measured = topic.subscribe.reliability == ReliabilityPolicy.BEST_EFFORT
-        return qos.recording(offered, measured and not self._reliable)
-
-    def _record(self, name: str, topic: topics.Topic, profile: QoSProfile) -> None:
-        """Subscribe to a topic so that each message goes into the bag."""
-
-        def adapt(_event: object) -> None:
-            # Drivers of sensors may offer less than is requested: request less.
-            offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
-            self.destroy_subscription(self._recordings.pop(name))
-            self._record(name, topic, self._profile(topic, [topic.publish, *offered]))
-
-        self._recordings[name] = self.create_subscription(
-            topic.message,
-            name,
-            self._writers[name],
-            profile,
-            event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=adapt, message_lost=self._loss_counter(name)
-            ),
-            raw=True,
-        )
-
-    def _loss_counter(self, name: str) -> Callable[[Any], None]:
-        known = 0
-
-        def callback(event: Any) -> None:
-            nonlocal known
-            # The previous event may have reported this change already.
-            more, known = event.total_count - known, event.total_count
-            self._lost[name] += more
-            if more:
-                self.get_logger().warning(
-                    f'{self._lost.total()} messages lost so far, {self._lost[name]} of them on'
-                    f' {name}: this machine or network is too slow',
-                    throttle_duration_sec=1.0,
-                )
-
-        return callback
+        # Drivers of sensors may offer less than is requested: request less.
+        return qos.recording([topic.publish, *offered], measured and not self._reliable)
 
     def _look(self) -> None:
         """Flush the bag, also when no messages arrive, and request parameters of new nodes."""
@@ -259,8 +243,10 @@ class RecorderNode(Node):
             return
         if self._collects_parameters:
             self._look_for_nodes()
-        if self._lost.total() > self._told:
-            self._told = self._lost.total()
+        lost = self._intake.lost.total()
+        if lost > self._told:
+            self.get_logger().warning(f'{lost} messages lost so far: see /diagnostics')
+            self._told = lost
             self._diagnose()
         try:
             self._bag.flush()
@@ -398,6 +384,9 @@ class RecorderNode(Node):
             write(data)
 
         return callback
+
+    def _receipt(self) -> int:
+        return self._received_ns or time.time_ns()
 
     def _simulated_time(self) -> int:
         return self._clock_ns

@@ -376,16 +376,22 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
 
 
 @pytest.mark.parametrize('reliable', [False, True])
-def test_measurements_are_repeated_only_where_that_is_wanted(record, reliable):
+def test_measurements_are_repeated_only_where_that_is_wanted(robot, record, until, reliable):
     """Set-points and states are reliable in any case."""
+
+    def asked(name):
+        peers = robot.get_subscriptions_info_by_topic(name)
+        return [peer.qos_profile.reliability for peer in peers]
+
     node = record(**({'reliable': True} if reliable else {}))
     profiles = {each.topic_name: each.qos_profile for each in node.subscriptions}
     measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
     for topic in topics.LEG_TOPICS:
-        asked = profiles[f'/{topic.name(3)}'].reliability
         state = topic in (topics.PRESSURE_SETPOINT, topics.DOUBT, topics.MORPHOLOGY)
-        assert asked == (ReliabilityPolicy.RELIABLE if state else measured), topic.name(3)
-    assert profiles['/diagnostics'].reliability == ReliabilityPolicy.RELIABLE
+        name = f'/{topic.name(3)}'
+        until(lambda name=name: asked(name), what=name)
+        assert asked(name) == [ReliabilityPolicy.RELIABLE if state else measured], name
+    assert asked('/diagnostics') == [ReliabilityPolicy.RELIABLE]
     node.close()
 
 
