@@ -384,7 +384,6 @@ def test_measurements_are_repeated_only_where_that_is_wanted(robot, record, unti
         return [peer.qos_profile.reliability for peer in peers]
 
     node = record(**({'reliable': True} if reliable else {}))
-    profiles = {each.topic_name: each.qos_profile for each in node.subscriptions}
     measured = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
     for topic in topics.LEG_TOPICS:
         state = topic in (topics.PRESSURE_SETPOINT, topics.DOUBT, topics.MORPHOLOGY)
