@@ -38,6 +38,7 @@ from std_msgs.msg import String
 from ros_pad.bags import BagReader
 from ros_pad.bags import BagWriter
 from ros_pad.bags import annotate
+from ros_pad.bags import metadata
 from ros_pad.bags.definitions import message_definition
 from ros_pad.bags.definitions import type_hash
 from ros_pad.errors import BagError
@@ -362,6 +363,22 @@ def test_a_killed_writer_leaves_a_readable_start(tmp_path):
     metadata = yaml.safe_load((folder / 'metadata.yaml').read_text())
     (topic,) = metadata['rosbag2_bagfile_information']['topics_with_message_count']
     assert topic['topic_metadata']['name'] == '/wrench'
+
+
+def test_metadata_are_written_at_the_first_message_and_at_the_end(tmp_path, monkeypatch):
+    written = []
+    replace = metadata._replace
+    monkeypatch.setattr(metadata, '_replace', lambda *a: (written.append(a), replace(*a)))
+    with BagWriter(tmp_path / 'trial', {'seed': '3'}) as writer:
+        for number in range(20):
+            writer.add_topic(f'/data_{number}', 'std_msgs/msg/Float64', QOS)
+        writer.describe({'scene': 'lab'})
+        for number in range(100):
+            writer.write('/data_3', serialize_message(Float64()), number)
+        ((_, information),) = written
+        assert len(information['topics_with_message_count']) == 20
+        assert information['custom_data'] == {'seed': '3', 'scene': 'lab'}
+    assert len(written) == 2
 
 
 def test_messages_reach_the_disk_while_the_bag_is_open(tmp_path, monkeypatch):
