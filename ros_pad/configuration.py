@@ -309,7 +309,7 @@ def read_yaml(text: str, loader: Any = SAFE_LOADER) -> Any:
             if depth > DEEPEST_YAML:
                 problem = f'nested more than {DEEPEST_YAML} deep'
                 mark: Any = event.start_mark  # libyaml has a class of its own
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
+                raise yaml.MarkedYAMLError(None, None, problem, mark)
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
     return yaml.load(text, Loader=loader)

@@ -16,12 +16,14 @@ from mcap.records import Channel
 from mcap.records import Schema
 
 from ros_pad.bags.storage import Contents
+from ros_pad.configuration import SAFE_LOADER
 from ros_pad.configuration import read_yaml
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 
 _NAME = 'metadata.yaml'
 _ROOT = 'rosbag2_bagfile_information'
+_TOPICS = 'topics_with_message_count'
 
 
 def topic_metadata(channel: Channel, schema: Schema) -> dict[str, Any]:
@@ -74,7 +76,7 @@ def write(
         'duration': duration,
         'starting_time': starting_time,
         'message_count': contents.message_count,
-        'topics_with_message_count': [
+        _TOPICS: [
             {'topic_metadata': dict(topic), 'message_count': contents.counts[topic['name']]}
             for topic in topics
         ],
@@ -95,8 +97,15 @@ def write(
     _replace(file.parent, information)
 
 
-def read(folder: pathlib.Path) -> dict[str, Any]:
+def read(folder: pathlib.Path, topics: bool = True) -> dict[str, Any]:
     """Return the metadata of a bag, without its root key.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the bag.
+    topics : bool
+        False leaves out the entries of the topics, with their QoS by far the longest part.
 
     Raises
     ------
@@ -107,7 +116,11 @@ def read(folder: pathlib.Path) -> dict[str, Any]:
     if not path.is_file():
         raise BagError(f'{folder}: is not a bag, or an incomplete one: it has no {_NAME}')
     try:
-        return dict(read_yaml(path.read_text(encoding='utf-8'))[_ROOT])
+        text = path.read_text(encoding='utf-8')
+        with contextlib.suppress(yaml.YAMLError):  # an alias may refer to what is left out
+            if not topics:
+                return dict(read_yaml(text, _WithoutTopics)[_ROOT])
+        return dict(read_yaml(text)[_ROOT])
     except Exception as error:  # invalid YAML or content can raise any exception
         raise BagError(f'{path}: is not the metadata of a bag: {error!r}') from error
 
@@ -171,6 +184,29 @@ def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
         with contextlib.suppress(OSError):
             new.unlink()
         raise
+
+
+# The loader of libyaml composes in C; the composer of PyYAML can be told to leave something out.
+_LOADERS = (yaml.composer.Composer, SAFE_LOADER) if yaml.__with_libyaml__ else (SAFE_LOADER,)
+
+
+class _WithoutTopics(*_LOADERS):  # type: ignore[misc]
+    """A safe loader that leaves out the entries of the topics."""
+
+    def __init__(self, text: str) -> None:
+        SAFE_LOADER.__init__(self, text)
+        yaml.composer.Composer.__init__(self)
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if not isinstance(index, yaml.ScalarNode) or index.value != _TOPICS:
+            return super().compose_node(parent, index)
+        depth = 0
+        while True:
+            event = self.get_event()
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if not depth:
+                return yaml.SequenceNode('tag:yaml.org,2002:seq', [])
 
 
 class _NoAliasDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]

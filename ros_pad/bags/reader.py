@@ -109,7 +109,7 @@ class BagReader:
 
     def _files_of_folder(self) -> list[pathlib.Path]:
         """Return the MCAP files of the folder, and store its custom data."""
-        information = metadata.read(self.path)
+        information = metadata.read(self.path, topics=False)
         try:
             storage = information['storage_identifier']
             compression = str(information.get('compression_mode', ''))
@@ -149,19 +149,20 @@ class BagReader:
             When a message cannot be decoded, or a chunk of a closed file is damaged.
         """
         for file, contents in self._files:
-            decoders = {
-                channel.id: (channel.topic, _message_type(file, channel, contents).decode)
-                for channel in _channels(contents, self.topics if topics is None else topics)
-            }
-            for channel_id, log_time, data in raw_messages(file, contents, decoders):
-                topic, decode = decoders[channel_id]
+            wanted = _channels(contents, self.topics if topics is None else topics)
+            channels = {channel.id: channel for channel in wanted}
+            types: dict[int, MessageType] = {}
+            for channel_id, log_time, data in raw_messages(file, contents, channels):
                 if containing not in data:
                     continue
+                channel = channels[channel_id]
+                if channel_id not in types:
+                    types[channel_id] = _message_type(file, channel, contents)
                 try:
-                    message = decode(data)
+                    message = types[channel_id].decode(data)
                 except Exception as error:  # invalid bytes can raise any exception
-                    raise _bad(file, topic, log_time, error) from error
-                yield topic, message, log_time
+                    raise _bad(file, channel.topic, log_time, error) from error
+                yield channel.topic, message, log_time
 
     def values(
         self, paths: Mapping[str, Sequence[str]]
@@ -226,6 +227,22 @@ class BagReader:
             for topic, each in found.items()
         }
 
+    def log_times(self) -> dict[str, np.ndarray]:
+        """Return the log times of all messages on each topic, int64, ns, in the order of the file.
+
+        Raises
+        ------
+        BagError
+            When a chunk of a closed file is damaged.
+        """
+        found = {topic: [np.empty(0, np.int64)] for topic in self.topics}
+        for file, contents in self._files:
+            for batch in batches(file, contents, contents.channels):
+                for channel_id, mine in _by_channel(batch):
+                    times = batch.log_times[mine].astype(np.int64)
+                    found[contents.channels[channel_id].topic].append(times)
+        return {topic: np.concatenate(times) for topic, times in found.items()}
+
     def _parts(self, paths: Mapping[str, Sequence[str]]) -> Iterator[tuple[Batch, _Parts]]:
         """Yield batches of messages, with topic, values and log times by channel id."""
         for file, contents in self._files:
@@ -235,11 +252,7 @@ class BagReader:
             }
             for batch in batches(file, contents, readers):
                 parts: _Parts = {}
-                order = np.argsort(batch.channels, kind='stable')
-                present, first = np.unique(batch.channels[order], return_index=True)
-                for channel_id, mine in zip(
-                    present.tolist(), np.split(order, first[1:]), strict=True
-                ):
+                for channel_id, mine in _by_channel(batch):
                     topic, read = readers[channel_id]
                     try:
                         rows = read(batch.data, batch.starts[mine], batch.sizes[mine])
@@ -248,6 +261,13 @@ class BagReader:
                         raise
                     parts[channel_id] = topic, rows, batch.log_times[mine]
                 yield batch, parts
+
+
+def _by_channel(batch: Batch) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield each channel id in a batch, with the rows of its messages."""
+    order = np.argsort(batch.channels, kind='stable')
+    present, first = np.unique(batch.channels[order], return_index=True)
+    return zip(present.tolist(), np.split(order, first[1:]), strict=True)
 
 
 def _channels(contents: Contents, topics: Collection[str]) -> list[Channel]:

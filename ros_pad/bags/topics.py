@@ -6,12 +6,7 @@ Nodes add message class and QoS to this table, in `ros_pad.nodes.topics`.
 
 from __future__ import annotations
 
-import functools
-import operator
-from collections.abc import Callable
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 FRAME = 'header.frame_id'
@@ -52,38 +47,6 @@ class Topic:
     def name(self, leg: int | None = None) -> str:
         """Return the name; a topic of each leg needs the number of the leg."""
         return self.pattern.format(leg=leg)
-
-    @functools.cached_property
-    def read(self) -> Callable[[Any], tuple[Any, ...]]:
-        """Function that returns the values of a message as a tuple."""
-        if len(self.values) > 1 and not any('[' in path for path in self.values):
-            # One call for all values is faster, and wrenches come at the rate of the sensors.
-            return operator.attrgetter(*self.values)
-        getters = [_getter(path) for path in self.values]
-        return lambda message: tuple(get(message) for get in getters)
-
-    def fill(self, message: Any, values: Iterable[Any]) -> None:
-        """Put values into a message, in the order of :attr:`values`."""
-        for path, value in zip(self.values, values, strict=True):
-            owner, name, place = _parts(path)
-            target = operator.attrgetter(owner)(message) if owner else message
-            if place is None:
-                setattr(target, name, value)
-            else:
-                getattr(target, name)[place] = value
-
-
-def _parts(path: str) -> tuple[str, str, int | None]:
-    """Return owner, attribute and index of ``twist.covariance[7]``; None without an index."""
-    field, _, place = path.rstrip(']').partition('[')
-    owner, _, name = field.rpartition('.')
-    return owner, name, int(place) if place else None
-
-
-def _getter(path: str) -> Callable[[Any], Any]:
-    get = operator.attrgetter(path.partition('[')[0])
-    place = _parts(path)[2]
-    return get if place is None else lambda message: get(message)[place]
 
 
 PRESSURE = Topic(

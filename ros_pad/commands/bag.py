@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from ros_pad.bags import BagReader
 from ros_pad.bags import recovery
 from ros_pad.commands.command import Commands
@@ -36,8 +38,9 @@ def add(commands: Commands) -> None:
     part.add_argument(
         'action',
         choices=('info', 'repair'),
-        help='info: list topics, types, numbers of messages and losses; repair: copy the messages'
-        ' that can be read from an incomplete bag (recorder killed, disk full) into a new bag',
+        help='info: list topics with types, numbers of messages, rates, gaps and losses; repair:'
+        ' copy the messages that can be read from an incomplete bag (recorder killed, disk full)'
+        ' into a new bag',
     )
     part.add_argument(
         'bag', metavar='BAG', type=pathlib.Path, help='folder of a bag, or one MCAP file'
@@ -115,46 +118,73 @@ def _custom(reader: BagReader, key: str) -> dict[str, Any]:
 
 
 def _show(options: argparse.Namespace, reader: BagReader) -> int:
-    about, lost = _custom(reader, labels.KEY), _custom(reader, labels.LOST)
-    made_with, repair = _custom(reader, labels.MADE_WITH), _custom(reader, recovery.KEY)
+    found = _content(options.bag, reader)
     if options.json:
-        print(
-            json.dumps(
-                {
-                    'bag': str(options.bag),
-                    'start_ns': reader.start,
-                    'duration_s': (reader.end - reader.start) * 1e-9,
-                    'messages': reader.message_count,
-                    'topics': {
-                        name: {'type': kind, 'messages': reader.counts[name]}
-                        for name, kind in reader.topics.items()
-                    },
-                    'lost': lost,
-                    'late': late(reader),
-                    'problem': reader.problem,
-                    'repair': repair,
-                    'trial': about,
-                    'made_with': made_with,
-                    'parameters': _custom(reader, labels.PARAMETERS),
-                }
-            )
-        )
-        return 1 if reader.problem else 0
-    print(f'{options.bag}: {reader.message_count} messages in', end=' ')
-    print(f'{(reader.end - reader.start) * 1e-9:.2f} s')
-    if about:
-        words = (f'{name} {about.get(name, "unknown")}' for name in ('scene', 'policy', 'seed'))
+        print(json.dumps(found))
+        return 1 if found['problem'] else 0
+    _print(found)
+    if found['problem']:
+        return complain(f'{found["problem"]}: repair it with pad bag repair', 1)
+    return 0
+
+
+def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
+    problem, times = reader.problem, {}
+    try:
+        times = reader.log_times()
+    except BagError as error:  # what does not depend on single messages is listed all the same
+        problem = problem or str(error)
+    return {
+        'bag': str(bag),
+        'start_ns': reader.start,
+        'duration_s': (reader.end - reader.start) * 1e-9,
+        'messages': reader.message_count,
+        'recorded_at': reader.custom_data.get(labels.RECORDED_AT),
+        'topics': {
+            name: {'type': kind, 'messages': reader.counts[name]} | _timing(times.get(name))
+            for name, kind in reader.topics.items()
+        },
+        'lost': _custom(reader, labels.LOST),
+        'late': late(reader),
+        'problem': problem,
+        'repair': _custom(reader, recovery.KEY),
+        'trial': _custom(reader, labels.KEY),
+        'made_with': _custom(reader, labels.MADE_WITH),
+        'parameters': _custom(reader, labels.PARAMETERS),
+    }
+
+
+def _timing(times: np.ndarray | None) -> dict[str, float | None]:
+    """Return mean rate and longest gap of messages with these log times, ns."""
+    steps = np.diff(np.sort(times)) * 1e-9 if times is not None else np.empty(0)
+    known = bool(steps.sum() > 0.0)
+    return {
+        'rate_hz': float(len(steps) / steps.sum()) if known else None,
+        'longest_gap_s': float(steps.max()) if known else None,
+    }
+
+
+def _print(found: Mapping[str, Any]) -> None:
+    print(f'{found["bag"]}: {found["messages"]} messages in {found["duration_s"]:.2f} s')
+    trial, made_with, repair = found['trial'], found['made_with'], found['repair']
+    if trial:
+        words = (f'{name} {trial.get(name, "unknown")}' for name in ('scene', 'policy', 'seed'))
         print(', '.join(words))
     if made_with:
         print('made with', ', '.join(f'{name} {version}' for name, version in made_with.items()))
+    if found['recorded_at']:
+        print('recorded at the', found['recorded_at'])
     if repair:
         print('repaired from', repair.get('source', 'a broken bag'))
         _show_losses(repair)
-    for line in late(reader):
+    for line in found['late']:
         print(line)
-    for name in sorted(reader.topics):
-        missed = f'  {lost[name]} lost' if name in lost else ''
-        print(f'{reader.counts[name]:8d}  {name}  {reader.topics[name]}{missed}')
-    if reader.problem:
-        return complain(f'{reader.problem}: repair it with pad bag repair', 1)
-    return 0
+    print('messages    mean rate  longest gap  topic')
+    for name, topic in sorted(found['topics'].items()):
+        rate, gap = _in('Hz', topic['rate_hz']), _in('s', topic['longest_gap_s'])
+        lost = f'  {found["lost"][name]} lost' if name in found['lost'] else ''
+        print(f'{topic["messages"]:8d}  {rate:>11}  {gap:>11}  {name}  {topic["type"]}{lost}')
+
+
+def _in(unit: str, value: float | None) -> str:
+    return '-' if value is None else f'{value:.4g} {unit}'

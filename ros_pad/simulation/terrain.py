@@ -87,12 +87,14 @@ class Floor:
     origin: tuple[float, float]
     film_thickness: float
     heights: np.ndarray | None = None
-    _rows: list[list[bool]] = field(init=False, repr=False, compare=False)
+    _rows: list[bytes] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('cell', self.cell, 'm', above=True)
         number('film_thickness', self.film_thickness, 'm')
-        object.__setattr__(self, '_rows', self.wet_map.tolist())
+        # Lists would be searched whole by every full run of the garbage collector.
+        rows = [row.tobytes() for row in np.asarray(self.wet_map, dtype=bool)]
+        object.__setattr__(self, '_rows', rows)
 
     @classmethod
     def uniform(cls, wet: bool, film_thickness: float) -> Floor:
@@ -209,7 +211,7 @@ class Floor:
         """Return whether there is liquid at a world position, m."""
         rows = self._rows
         row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
-        return row[int((x - self.origin[0]) // self.cell) % len(row)]
+        return row[int((x - self.origin[0]) // self.cell) % len(row)] != 0
 
     def depth(self, x: float, y: float) -> float:
         """Return the depth of the liquid at a world position, m; 0 on dry ground."""

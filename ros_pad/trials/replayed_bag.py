@@ -14,6 +14,9 @@ from collections.abc import Iterator
 from ros_pad.bags import BagWriter
 from ros_pad.bags import codec
 from ros_pad.bags.definitions import message_definition
+from ros_pad.bags.fields import FieldWriter
+from ros_pad.bags.topics import FRAME
+from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
 from ros_pad.trials.comparison import Track
@@ -65,18 +68,21 @@ def write(replay: Replay, folder: str | os.PathLike[str], namespace: str | None 
 
 def _messages(name: str, leg: int, topic: Topic, track: Track) -> Iterator[tuple[int, str, bytes]]:
     """Yield time, ns, name of the topic and bytes of each message of a track."""
-    definition = message_definition(topic.type_name)
-    message_type = codec.message_type(topic.type_name, definition)
-    message = message_type.blank()
-    if topic.frame:
-        message.header.frame_id = topic.frame.format(leg=leg)
-    rows = [[text] for text in track.texts] if topic.text else track.values.tolist()
-    for time_ns, key_ns, values in zip(track.times, track.keys, rows, strict=True):
-        if topic.frame:
-            stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = divmod(key_ns, 1_000_000_000)
-        topic.fill(message, values)
-        yield time_ns, name, message_type.encode(message)
+    message_type = codec.message_type(topic.type_name, message_definition(topic.type_name))
+    if topic.text:
+        (path,) = topic.values
+        for time_ns, text in zip(track.times, track.texts, strict=True):
+            yield time_ns, name, FieldWriter(message_type, (), {path: text})()
+        return
+    if not topic.frame:
+        write = FieldWriter(message_type, topic.values)
+        for time_ns, values in zip(track.times, track.values.tolist(), strict=True):
+            yield time_ns, name, write(*values)
+        return
+    write = FieldWriter(message_type, STAMP + topic.values, {FRAME: topic.frame.format(leg=leg)})
+    columns = track.times, track.keys, track.values.tolist()
+    for time_ns, key_ns, values in zip(*columns, strict=True):
+        yield time_ns, name, write(*divmod(key_ns, 1_000_000_000), *values)
 
 
 __all__ = ['write']

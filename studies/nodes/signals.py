@@ -353,6 +353,18 @@ def table(tries: Sequence[Try]) -> str:
     return '\n'.join(lines)
 
 
+def _perform_all(target: str, repeats: int, seed: int, tries: list[Try]) -> None:
+    """Add every try of a target to the list."""
+    work = duration_of_walk() if target == 'pad' else WORK.get(target, WORK_OF_NODE)
+    with (
+        bar(target, repeats * len(PAIRS), 'tries') as reach,
+        Commander() if target == 'regulator' else contextlib.nullcontext(),
+    ):
+        for done, one in enumerate(run(target, repeats, work, seed), start=1):
+            tries.append(one)
+            reach(done)
+
+
 def main(words: Sequence[str]) -> int:
     """Run the study; return the exit status."""
     parser = command.parser('signals', __doc__)
@@ -366,15 +378,9 @@ def main(words: Sequence[str]) -> int:
         print('ros2 launch is not installed: target launch is skipped', file=sys.stderr)
         targets.remove('launch')
     tries: list[Try] = []
-    for target in targets:
-        work = duration_of_walk() if target == 'pad' else WORK.get(target, WORK_OF_NODE)
-        with (
-            bar(target, options.repeats * len(PAIRS), 'tries') as reach,
-            Commander() if target == 'regulator' else contextlib.nullcontext(),
-        ):
-            for done, one in enumerate(run(target, options.repeats, work, options.seed), start=1):
-                tries.append(one)
-                reach(done)
+    with contextlib.suppress(KeyboardInterrupt):  # what was tried so far is shown
+        for target in targets:
+            _perform_all(target, options.repeats, options.seed, tries)
     command.show(options, [dataclasses.asdict(one) for one in tries], table(tries))
     bad = [one for one in tries if one.problems]
     for one in bad:

@@ -24,6 +24,7 @@ from geometry_msgs.msg import TwistWithCovarianceStamped
 from geometry_msgs.msg import WrenchStamped
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
@@ -494,6 +495,109 @@ def test_bags_of_other_writers(tmp_path):
     assert (reader.start, reader.end) == (0, 14)
 
 
+def test_log_times_of_each_topic(recorded):
+    folder, written = recorded
+    times = BagReader(folder).log_times()
+    assert {topic: each.tolist() for topic, each in times.items()} == {
+        f'/{kind.__name__}': [at for topic, _, at in written if topic == f'/{kind.__name__}']
+        for kind in MESSAGES
+    }
+
+
+PATHS = {
+    '/WrenchStamped': ('wrench.force.z', 'header.stamp.sec', 'wrench.torque.x'),
+    '/TwistWithCovarianceStamped': ('twist.covariance[7]',),
+    '/Bool': ('data',),
+    '/String': ('data',),
+    '/DiagnosticArray': ('header.stamp.sec',),  # has lists: is decoded as a whole
+    '/absent': ('data',),
+}
+
+
+def expected_values(written):
+    """Return topic, values and time of the messages on the topics of PATHS."""
+    return [
+        (topic, tuple(value_of(message, path) for path in PATHS[topic]), at)
+        for topic, message, at in written
+        if topic in PATHS
+    ]
+
+
+def value_of(message, path):
+    for name in path.replace(']', '').replace('[', '.').split('.'):
+        message = message[int(name) if name.isdigit() else name]
+    return message
+
+
+@pytest.mark.parametrize('size', [1, 5000, 1 << 23])
+def test_values_are_those_of_the_messages_in_their_order(recorded, monkeypatch, size):
+    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', size)
+    folder, written = recorded
+    assert list(BagReader(folder).values(PATHS)) == expected_values(written)
+
+
+@pytest.mark.parametrize('few', [0, 32])
+def test_tables_are_those_of_the_messages(recorded, monkeypatch, few):
+    monkeypatch.setattr('ros_pad.bags.storage._FEW', few)
+    folder, written = recorded
+    shares = []
+    tables = BagReader(folder).tables(PATHS, shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    expected = expected_values(written)
+    for topic, (times, values) in tables.items():
+        assert times.tolist() == [at for name, _, at in expected if name == topic]
+        rows = [list(row) for name, row, _ in expected if name == topic]
+        assert values.shape == (len(rows), len(PATHS[topic]))
+        assert values.tolist() == rows
+        assert values.dtype == (object if topic == '/String' else float)
+
+
+def test_a_killed_bag_has_the_same_values(recorded, tmp_path):
+    folder, written = recorded
+    whole = (folder / 'trial_0.mcap').read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(UserWarning, match='was not closed'):
+        reader = BagReader(tmp_path / 'cut.mcap')
+    read = list(reader.values(PATHS))
+    assert len(read) > 100 and read == expected_values(written[: reader.message_count])
+    assert len(reader.tables(PATHS)['/Bool'][0]) == reader.counts['/Bool']
+
+
+@pytest.mark.parametrize('kind', ['short', 'big_endian_xml', 'field'])
+def test_values_that_cannot_be_read_are_an_error(tmp_path, kind):
+    good = serialize_message(WrenchStamped())
+    bad = {'short': good[:-9], 'big_endian_xml': b'\0\2' + good[2:], 'field': good}[kind]
+    with BagWriter(tmp_path / 'trial') as writer:
+        writer.add_topic('/wrench', 'geometry_msgs/msg/WrenchStamped')
+        for time_ns, data in enumerate((good, good, bad, bad)):
+            writer.write('/wrench', data, time_ns)
+    path = 'wrench.force.w' if kind == 'field' else 'wrench.torque.z'
+    words = 'topic /wrench: ' if kind == 'field' else '/wrench at 2 ns cannot be decoded'
+    reader = BagReader(tmp_path / 'trial')
+    for read in (reader.tables, lambda paths: list(reader.values(paths))):
+        with pytest.raises(BagError, match=words):
+            read({'/wrench': (path,)})
+
+
+@pytest.mark.parametrize('few', [0, 32])
+def test_a_record_that_is_longer_than_its_chunk_is_an_error(tmp_path, monkeypatch, few):
+    monkeypatch.setattr('ros_pad.bags.storage._FEW', few)
+    path = tmp_path / 'bag.mcap'
+    with path.open('wb') as stream:
+        writer = Writer(stream, enable_crcs=False, compression=CompressionType.NONE)
+        writer.start('ros2')
+        schema = writer.register_schema('std_msgs/msg/Float64', 'ros2msg', b'float64 data')
+        channel = writer.register_channel('/data', 'cdr', schema)
+        writer.add_message(channel, 0, bytes(12), 0)
+        writer.finish()
+    opcode, length = b'\x05', (22 + 12).to_bytes(8, 'little')
+    content = path.read_bytes()
+    assert content.count(opcode + length) == 1
+    path.write_bytes(content.replace(opcode + length, opcode + b'\xff' * 8))
+    with pytest.raises(BagError, match='is damaged: a record is longer than its chunk'):
+        list(BagReader(path).messages())
+
+
 def test_what_is_no_bag_is_refused(tmp_path):
     with pytest.raises(BagError, match='absent: no such bag'):
         BagReader(tmp_path / 'absent')
@@ -553,6 +657,28 @@ def test_a_bag_that_makes_no_sense_is_an_error_of_ours(tmp_path, wrong, message)
         return
     with pytest.raises(BagError, match=message):
         list(BagReader(path).messages())
+
+
+def test_aliases_to_what_a_reader_leaves_out_of_the_metadata(tmp_path):
+    folder = one_bag(tmp_path / 'trial', custom_data={'seed': '3'})
+    path = folder / 'metadata.yaml'
+    content = yaml.safe_load(path.read_text())
+    information = content['rosbag2_bagfile_information']
+    # In YAML, the second mention of the same list is an alias of the first.
+    information['topics_with_message_count'] = information['relative_file_paths']
+    del information['relative_file_paths']
+    information['relative_file_paths'] = information['topics_with_message_count']
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    assert '*id' in path.read_text()
+    reader = BagReader(folder)
+    assert (reader.message_count, reader.custom_data) == (10, {'seed': '3'})
+
+
+def test_deeply_nested_metadata_are_an_error_of_ours(tmp_path):
+    folder = one_bag(tmp_path / 'trial')
+    (folder / 'metadata.yaml').write_text('a: ' + '[' * 100_000)
+    with pytest.raises(BagError, match='nested more than 100 deep'):
+        BagReader(folder)
 
 
 @pytest.mark.parametrize('mode', ['null', '[]', '5', 'zstd'])

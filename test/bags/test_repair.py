@@ -29,6 +29,7 @@ from ros_pad.bags import BagWriter
 from ros_pad.bags import recovery
 from ros_pad.cli import main
 from ros_pad.errors import BagError
+from ros_pad.trials.label import RECORDED_AT
 
 
 def data_in(folder: pathlib.Path, topic: str) -> list[float]:
@@ -352,3 +353,36 @@ def test_the_command(trial, tmp_path, capsys):
     assert said['repaired'] == str(tmp_path / 'b')
     assert said['messages'] == BagReader(tmp_path / 'b').message_count
     assert main(['bag', 'info', str(trial), '--out', 'x']) == 2
+
+
+def test_the_command_lists_rates_and_gaps(tmp_path, capsys):
+    folder = tmp_path / 'walk'
+    with BagWriter(folder, {RECORDED_AT: 'publisher'}) as writer:
+        for topic in ('/fast', '/once', '/never'):
+            writer.add_topic(topic, 'std_msgs/msg/Float64')
+        for number in (*range(50), *range(60, 101)):  # 250 Hz with a gap of 11 periods
+            writer.write('/fast', bytes(12), 10**18 + number * 4_000_000)
+        writer.write('/once', bytes(12), 10**18)
+    assert main(['bag', 'info', str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert 'recorded at the publisher\n' in out
+    assert '      91       225 Hz      0.044 s  /fast  std_msgs/msg/Float64\n' in out
+    assert '       1            -            -  /once  std_msgs/msg/Float64\n' in out
+    assert main(['bag', 'info', str(folder), '--json']) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['recorded_at'] == 'publisher'
+    assert said['topics']['/fast']['rate_hz'] == pytest.approx(225.0)
+    assert said['topics']['/fast']['longest_gap_s'] == pytest.approx(0.044)
+    assert said['topics']['/never']['rate_hz'] is None
+
+
+def test_the_command_lists_what_a_damaged_bag_says_of_itself(trial, capsys):
+    path = next(trial.glob('*.mcap'))
+    content = bytearray(path.read_bytes())
+    first = chunks(path)[0]
+    content[first.chunk_start_offset + 60 : first.chunk_start_offset + 90] = bytes(30)
+    path.write_bytes(content)
+    assert main(['bag', 'info', str(trial)]) == 1
+    captured = capsys.readouterr()
+    assert 'recorded at' not in captured.out and '10000 messages' in captured.out
+    assert 'is damaged at byte' in captured.err and 'pad bag repair' in captured.err
