@@ -39,7 +39,7 @@ CHANGES = 'ros_pad_parameter_changes'
 LOST = 'ros_pad_lost'
 """Key of the number of messages on each topic that were lost before the recorder received them."""
 
-RECORDED_AT = 'recorded_at'
+RECORDED_AT = 'ros_pad_recorded_at'
 """Key of where messages were recorded: ``publisher`` or ``receiver``."""
 
 AMBIENT_PRESSURE = Setting(

@@ -86,11 +86,6 @@ def custom_data(folder, key):
     return json.loads(end['custom_data'].get(key, 'null'))
 
 
-def begin(recorder):
-    """Record a message, because a bag without messages has no metadata before it is closed."""
-    recorder.record('/leg_6/wetness', serialize_message(Float64()))
-
-
 @pytest.fixture
 def destroy(executor, until):
     """Destroy a node while its executor goes on, but only after the executor dropped its services.
@@ -231,7 +226,6 @@ def test_the_parameters_of_the_robots_nodes_are_in_the_bag(
         node.declare_parameter('homes', [0.1, 0.2])
         executor.add_node(node)
     recorder = record()
-    begin(recorder)
     bag = tmp_path / 'trial'
     until(lambda: '/gait' in (custom_data(bag, label.PARAMETERS) or {}))
     changed = Parameter('stride', value=0.10)
@@ -266,7 +260,6 @@ def test_parameters_of_other_peoples_nodes_do_not_end_the_recording(
     driver.declare_parameter('key', [b'\x01', b'\xff'])
     executor.add_node(driver)
     recorder = record()
-    begin(recorder)
 
     def parameters():
         return (custom_data(tmp_path / 'trial', label.PARAMETERS) or {}).get('/driver', {})
@@ -301,7 +294,6 @@ def stride_in(tmp_path):
 
 def test_a_node_that_comes_back_is_asked_again(gait, record, until, destroy, stride_in):
     recorder = record()
-    begin(recorder)
     for stride in (0.14, 0.2):
         node = gait(stride)
         until(lambda stride=stride: stride_in() == stride)
@@ -316,7 +308,6 @@ def test_a_node_that_comes_back_before_its_name_is_dropped_is_asked_again(
     gait, record, until, executor, stride_in
 ):
     recorder = record()
-    begin(recorder)
     killed = []
     for stride in (0.14, 0.2):
         node = gait(stride)
