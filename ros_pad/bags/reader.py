@@ -12,6 +12,7 @@ from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
+from functools import lru_cache
 from functools import partial
 from typing import Any
 from typing import TypeAlias
@@ -303,13 +304,19 @@ def _row_reader(
     """Return a function such as :meth:`ros_pad.bags.fields.FieldReader.rows`."""
     of_type = _message_type(file, channel, contents)
     try:
-        return FieldReader(of_type, paths[channel.topic]).rows
+        return _field_reader(of_type, tuple(paths[channel.topic])).rows
     except UnknownEncoding:
         return partial(_decoded_rows, of_type, paths[channel.topic])
     except Exception as error:  # no such field, or a type that contains itself
         raise BagError(
             f'{file}: topic {channel.topic}: message type {of_type.name}: {error}'
         ) from error
+
+
+@lru_cache(maxsize=256)
+def _field_reader(of_type: MessageType, paths: tuple[str, ...]) -> FieldReader:
+    """Return a reader, cached because the topics of all legs have the same fields."""
+    return FieldReader(of_type, paths)
 
 
 def _decoded_rows(
