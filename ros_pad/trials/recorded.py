@@ -40,6 +40,7 @@ from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
 from ros_pad.trials.label import LOST
+from ros_pad.trials.label import RECORDED_AT
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
@@ -189,6 +190,8 @@ def load(
 
 def late(bag: BagReader) -> list[str]:
     """Return a line for each node that told on ``/diagnostics`` that it did not keep up."""
+    if bag.custom_data.get(RECORDED_AT) == 'publisher':
+        return []  # composed nodes wait for one another
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
     told: dict[str, list[tuple[float, str]]] = {}

@@ -4,7 +4,7 @@
 Another checkout of ros_pad with its own .venv, given by --against, is measured in turn with this
 one. The ratios are those of the medians; processor times are those of all threads and children.
 
-- live: five processes, six legs, 250 Hz, and a floor: a bare publisher and one bare subscriber
+- live: five processes, six legs, and a floor: a bare publisher and one bare subscriber
 - trial: pad run hexapod_patches on nodes, from start to report
 - reading: the trial in a recorded bag, decoded to arrays
 - loop: the closed loop without ROS on L2, per sample
@@ -40,6 +40,7 @@ from studies.drawing import ORANGE
 from studies.drawing import PURPLE
 from studies.drawing import SKY
 from studies.drawing import STYLE
+from studies.machine import memory
 from studies.machine import processor_time
 
 UNITS = {
@@ -52,6 +53,9 @@ UNITS = {
 
 Result = dict[str, dict[str, dict[str, float]]]
 """Medians by part, checkout and quantity."""
+
+OTHERS = ('rate', 'memory', 'wall')
+"""Quantities that are no processor time: Hz, MB and s."""
 
 NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')
 WARM_UP = 8.0  # s, until all nodes have found one another
@@ -116,7 +120,7 @@ def _printed(checkout: pathlib.Path, code: str, *words: object) -> float:
 
 
 def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -> dict[str, float]:
-    """Run processes, and return the processor time of each, s, per second of wall time."""
+    """Run processes; return the processor time of each, s/s, and the memory of all, MB."""
     processes = {
         name: subprocess.Popen(words, cwd=cwd, env=_environment(), stderr=subprocess.DEVNULL)
         for name, words in commands.items()
@@ -127,10 +131,11 @@ def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -
         started = time.monotonic()
         time.sleep(seconds)
         passed = time.monotonic() - started
-        return {
+        shares = {
             name: (processor_time(each.pid) - before[name]) / passed
             for name, each in processes.items()
         }
+        return shares | {'memory': sum(memory(each.pid) for each in processes.values())}
     finally:
         for each in processes.values():
             each.send_signal(signal.SIGINT)
@@ -141,15 +146,16 @@ def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -
                 each.kill()
 
 
-def live(checkout: pathlib.Path, seconds: float) -> dict[str, float]:
-    """Return the processor time a second of each node, and the rate that was reached, Hz."""
+def live(checkout: pathlib.Path, seconds: float, rate: float) -> dict[str, float]:
+    """Return the processor time a second of each node, memory, MB, and the reached rate, Hz."""
     with tempfile.TemporaryDirectory() as folder:
         bag = f'{folder}/bag'
+        own = {'recorder': ('-p', f'folder:={bag}'), 'simulator': ('-p', f'rate:={rate}')}
         commands = {
             node: [
                 *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
                 *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
-                *(('-p', f'folder:={bag}') if node == 'recorder' else ()),
+                *own.get(node, ()),
             ]
             for node in NODES
         }
@@ -198,7 +204,7 @@ def _measures(
 ) -> dict[str, Callable[[pathlib.Path], dict[str, float]]]:
     """Return a function for each part, which measures it in a checkout."""
     return {
-        'live': lambda checkout: live(checkout, options.seconds),
+        'live': lambda checkout: live(checkout, options.seconds, options.rate),
         'trial': lambda checkout: trial(checkout, options.cycles),
         'reading': lambda checkout: _used(checkout, _READING, bag),
         'loop': lambda checkout: _used(checkout, _LOOP, options.cycles),
@@ -232,7 +238,7 @@ def _measured(options: argparse.Namespace, bag: str) -> Result:
 
 def _total(values: dict[str, float]) -> float:
     """Return the processor time of a row."""
-    return sum(value for name, value in values.items() if name not in ('rate', 'wall'))
+    return sum(value for name, value in values.items() if name not in OTHERS)
 
 
 def ratio(rows: dict[str, dict[str, float]]) -> float:
@@ -262,7 +268,7 @@ def chart(rows: dict[str, dict[str, float]]) -> Figure:
         axes = figure.subplots()
         for row, values in enumerate(rows.values()):
             left = 0.0
-            parts = {name: value for name, value in values.items() if name != 'rate'}
+            parts = {name: value for name, value in values.items() if name not in OTHERS}
             for (part, share), colour in zip(parts.items(), colours, strict=False):
                 axes.barh(row, share, left=left, color=colour, edgecolor='white')
                 axes.text(left + share / 2, row, part, ha='center', va='center', fontsize=6.5)
@@ -272,7 +278,7 @@ def chart(rows: dict[str, dict[str, float]]) -> Figure:
         axes.set_yticks(range(len(rows)), list(rows))
         axes.invert_yaxis()
         axes.set_xlabel('processor time of all processes per second (1 is one core)')
-        axes.set_title('Five nodes in real time, six legs, 250 Hz', loc='left')
+        axes.set_title('Five nodes in real time, six legs', loc='left')
         axes.margins(x=0.15)
     return figure
 
@@ -286,6 +292,9 @@ def main(words: Sequence[str]) -> int:
     )
     command.add_count(parser, '--repeats', 5, 'measurements of each part')
     command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
+    parser.add_argument(
+        '--rate', type=float, default=250.0, help='samples a second, live, Hz (default: 250)'
+    )
     parser.add_argument('--seconds', type=float, default=10.0, help='live time, s (default: 10)')
     command.add_out(parser)
     options = parser.parse_args(words)
