@@ -82,8 +82,7 @@ class RealTime:
 
     def __init__(self, period_ns: int, now_ns: int) -> None:
         self._period = period_ns
-        # Half a period of slack, so that a timer of the same period may come early or late.
-        self._next_ns = now_ns + period_ns // 2
+        self._next_ns = now_ns + period_ns
         self._since_ns = now_ns
         self._passed = self._reached = 0
 

@@ -30,6 +30,9 @@ The true gain is between 0, if both morphologies have more capacity than the gai
 if a robot with one of them does not advance at all.
 """
 
+SHORTEST = 1e-6
+"""Length of a stride, m, up to which a foot has not moved."""
+
 LEAST_GAIN = 0.01
 """Gain of flat feet on dry ground, share of a stride, below which feet stay domes: the gain is not
 worth the air of the switches.
@@ -262,7 +265,7 @@ class Planner:
         if step.flat:
             ground.add(*step.lifted, step.wet, self._unmeasured)
             self._unmeasured = 0.0
-        if not before or swing + lost <= 0.0:
+        if not before or swing + lost <= SHORTEST:
             return
         self._steps.append(_Judged(step, lost, swing + lost))
         if len(self._steps) == HINDSIGHT * len(self._legs) + self._tripod:

@@ -199,7 +199,8 @@ class SimulatorNode(Node):
         if self._real_time is None:  # what passed before the executor spun is no delay
             self._real_time = RealTime(self.period_ns, now_ns)
             self._report_ns = now_ns + _REPORT_PERIOD_NS
-        due = self._real_time.due(now_ns)
+        # Half a period ahead, because a timer of the same period may come early or late.
+        due = self._real_time.due(now_ns + self.period_ns // 2)
         if due:
             self.step(due)
         if self.robot.verdict and not self._ended:
