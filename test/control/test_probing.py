@@ -237,3 +237,14 @@ def test_a_walk_on_dry_domes_shows_what_they_lose():
         body.ground.add(*body.at(body.x[1] + STRIDE, 1), 0.0)  # ground known to be dry
         body.step(0.2)
     assert body.planner.stakes.gain == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize('length', [0.0, 5e-324, 1e-300, 1e-6])
+def test_feet_that_do_not_advance_plan_no_probes(length):
+    """Rounding and hostile messages make strides of no length: a logarithm of it has no value."""
+    planner, ground = Planner(STAKES, LEGS), Footprints()
+    for number in range(100):
+        at = number % 2 * length, 0.0
+        for leg in LEGS:
+            planner.step(leg, Step(at, at, True, False, 0.5), ground)
+    assert planner.interval == math.inf
