@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import operator
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -49,6 +48,7 @@ from ros_pad.bags.codec import message_type
 from ros_pad.bags.definitions import message_definition
 from ros_pad.bags.fields import FieldReader
 from ros_pad.bags.fields import FieldWriter
+from ros_pad.bags.fields import field_of
 from ros_pad.errors import BadMessage
 from ros_pad.errors import ConfigError
 from ros_pad.errors import UnknownEncoding
@@ -195,7 +195,7 @@ class Topic:
     def _decoded(self, data: bytes, paths: Sequence[str]) -> tuple[Any, ...]:
         """Return fields of a message whose encoding only the middleware knows."""
         message = deserialize_message(data, self.message)
-        return tuple(operator.attrgetter(path)(message) for path in paths)
+        return tuple(field_of(message, path) for path in paths)
 
     def publisher(self, node: Node, leg: int | None = None) -> Publisher:
         """Create a publisher in a node.
