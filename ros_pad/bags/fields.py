@@ -278,7 +278,7 @@ class FieldWriter:
 
         Raises
         ------
-        struct.error
+        struct.error, OverflowError
             When a value does not fit its field.
         """
         return self._pack(*self._pick(values + self._between))

@@ -5,6 +5,7 @@ import sys
 
 from ros_pad.signals import STOP
 
-# So Python calls a program that it searches: python -m ros_pad.nodes.NAME, whose imports follow.
+# While python -m ros_pad.nodes.NAME looks for its module, before that module's imports, argv[0] is
+# '-m'.
 if sys.argv[:1] == ['-m']:
     STOP.install()

@@ -67,7 +67,8 @@ def _spin(make: Callable[[], Node]) -> None:
         executor = EventsExecutor()
         executor.add_node(node)
         # A spin runs in C++; without timeout it would not see a signal, and it may loop without
-        # calling anything. A future that the signal completes may be locked when the signal comes.
+        # calling anything. The signal handler cannot complete the future instead: the code that it
+        # interrupts may hold the lock of the future.
         never = Future()
         while not STOP.requested:
             executor.spin_until_future_complete(never, timeout_sec=REACTION)

@@ -42,8 +42,7 @@ DIAGNOSTICS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 RECORD = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 """Record a topic whose publishers are reliable.
 
-A queue of fixed depth drops messages silently; with this profile every message waits until it is
-written, and the middleware reports any that were lost.
+A queue of fixed depth drops messages; with this profile every message waits until it is taken.
 """
 
 

@@ -3,15 +3,16 @@
 
 In rmw_fastrtps without the correction of its pull request 890, the executor that takes an event
 (message lost, incompatible QoS, matched) locks first the event and then the reader, and the thread
-that receives messages locks first the reader and then the event. Every topic of ros_pad registers
-a callback for incompatible QoS, and the recorder one for lost messages, too.
+that receives messages locks first the reader and then the event. Nodes of ros_pad register a
+callback for incompatible QoS on every topic, and none for lost messages.
 
 Three processes publish and subscribe on the same topics some hundred times a second, with offered
 and requested QoS that match in part only, and with callbacks for these events. Each process makes
 and destroys a second node at random, on an executor of its own: where the executor spins on,
 rclpy 7.1 crashes if events of a removed node wait. Two of the processes end and are started again
 at random. The messages come in bursts into queues of depth 1, so that some are lost. With --renew,
-a subscription with incompatible QoS is replaced in its callback, as the recorder does.
+a subscription with incompatible QoS is destroyed and replaced in its callback; the recorder
+replaces it, too, but keeps the old one.
 
 A process whose executor calls nothing for 20 s prints the Python stacks of its threads and ends.
 The exit status is 1 if that happened, if a process crashed, or if a kind of event never came, so
