@@ -4,13 +4,13 @@
 This process sends wrenches of six legs in turn, at each rate to two receivers one after the other,
 each in a process of its own:
 
-- bare: rclpy's EventsExecutor with the same raw subscriptions and callbacks that only count;
+- bare: rclpy's EventsExecutor with raw, reliable subscriptions and callbacks that only count;
 - recorder: the recorder node as ``ros2 run`` starts it, with a bag in a temporary folder.
 
-*lost* is the number of messages that the middleware reported as lost (0 for bare, which does not
-read these reports), *unexplained* the number that neither arrived nor were reported. The
-requirement is 8000 messages a second without loss, on at most one core. The exit status is 1 if
-the recorder has lost or unexplained messages at a rate of up to 8000; it does not judge the cores.
+*lost* is the number of messages that the recorder counted as lost (0 for bare, which does not
+count them), *unexplained* the number that neither arrived nor were counted. The requirement is
+8000 messages a second without loss, on at most one core. The exit status is 1 if the recorder has
+lost or unexplained messages at a rate of up to 8000; it does not judge the cores.
 """
 
 from __future__ import annotations
