@@ -219,7 +219,7 @@ class BagReader:
             for topic, rows, times in parts.values():
                 found[topic].append((times.astype(np.int64), _table(rows)))
             done += len(batch.channels)
-            if progress:
+            if progress and total:
                 progress(done / total)
         if progress:
             progress(1.0)

@@ -129,9 +129,10 @@ def _show(options: argparse.Namespace, reader: BagReader) -> int:
 
 
 def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
-    problem, times = reader.problem, {}
+    problem, times, slow = reader.problem, {}, []
     try:
         times = reader.log_times()
+        slow = late(reader)
     except BagError as error:  # what does not depend on single messages is listed all the same
         problem = problem or str(error)
     return {
@@ -145,7 +146,7 @@ def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
             for name, kind in reader.topics.items()
         },
         'lost': _custom(reader, labels.LOST),
-        'late': late(reader),
+        'late': slow,
         'problem': problem,
         'repair': _custom(reader, recovery.KEY),
         'trial': _custom(reader, labels.KEY),

@@ -20,8 +20,6 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-_RESTARTS = 3  # after so many, several publishers are taken to share the topic
-
 _Received = tuple[int, str, bytes]  # time of receipt, ns, topic, message
 
 
@@ -31,7 +29,6 @@ class _Source:
 
     subscription: Subscription
     last: int | None = None
-    falls: int = 0  # how often the number was not larger than the last one
 
 
 class Intake:
@@ -99,6 +96,9 @@ class Intake:
     def take(self, write: Callable[[str, bytes, int], None]) -> None:
         """Hand over topic, bytes and time of receipt, ns, of all messages, in order of receipt."""
         until_ns = time.time_ns()
+        for subscription in self._replaced:  # they would keep thousands of messages
+            while subscription.handle.take_message(subscription.msg_type, True) is not None:
+                pass
         received = self._held
         for name, source in self._sources.items():
             take, message = source.subscription.handle.take_message, source.subscription.msg_type
@@ -118,13 +118,10 @@ class Intake:
     def _count(self, name: str, source: _Source, number: int | None) -> None:
         """Count the messages that are missing before the one with this number."""
         last, source.last = source.last, number
-        if number is None or last is None or number == last + 1:
+        if number is None or last is None or number <= last + 1:
             return
-        if number <= last:
-            source.falls += 1
-            if source.falls > _RESTARTS:
-                self.lost.pop(name, None)
-        elif source.falls <= _RESTARTS:
+        # Each publisher has numbers of its own.
+        if self._node.count_publishers(name) == 1:
             self.lost[name] += number - last - 1
 
     def close(self) -> None:
@@ -133,6 +130,7 @@ class Intake:
             self._node.destroy_subscription(subscription)
         self._sources.clear()
         self._replaced.clear()
+        self._held.clear()
 
 
 def _unused(message: Any) -> None:

@@ -19,8 +19,12 @@ def nanoseconds(stamp: Time) -> int:
 
 
 def split(time_ns: int) -> tuple[int, int]:
-    """Return a time in ns as whole seconds and the nanoseconds after them."""
-    return divmod(time_ns, 1_000_000_000)
+    """Return a time in ns as whole seconds and the nanoseconds after them.
+
+    Seconds beyond the 32 bits of a stamp wrap round, as they do in rclpy.
+    """
+    seconds, rest = divmod(time_ns, 1_000_000_000)
+    return (seconds + 2**31) % 2**32 - 2**31, rest
 
 
 def set_stamp(stamp: Time, time_ns: int) -> None:

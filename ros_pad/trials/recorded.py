@@ -10,6 +10,7 @@ before the first one.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import difflib
@@ -166,7 +167,9 @@ def load(
         trial['settings']['recorded'] = f'{moment:%Y-%m-%d %H:%M:%S} UTC'
     if bag.problem:
         trial['settings']['problem'] = bag.problem
-    trial['settings']['late'] = late(bag)
+    trial['settings']['late'] = []
+    with contextlib.suppress(BagError):  # a trial can be read without it
+        trial['settings']['late'] = late(bag)
     ambient = trial['settings']['ambient_pressure']
     return Trial(
         **trial,

@@ -459,6 +459,20 @@ def test_the_estimator_survives_and_estimates_what_is_possible(context, sent, ti
         node.destroy_node()
 
 
+def test_the_last_stamp_that_a_message_can_have_ends_no_estimator(context, sent, ticks):
+    """Its nanoseconds add four seconds to the largest number of seconds."""
+    parameters = [Parameter('legs', value=[1]), Parameter('publish_rate', value=1000.0)]
+    node = EstimatorNode(context=context, parameter_overrides=parameters)
+    last = 2**31 - 1, 2**32 - 1
+    sensed(node, ('position', last, '', (0.0, 0.0, 0.0)))
+    sensed(node, ('wrench', last, '', (0.0, 0.0, 7.0), 0.0))
+    assert node.samples == 1
+    (slip,) = sent[topics.SLIP.name(1)]
+    # The same as rclpy makes of such a number.
+    assert (slip.header.stamp.sec, slip.header.stamp.nanosec) == (-(2**31) + 3, 294_967_295)
+    node.destroy_node()
+
+
 @pytest.mark.parametrize('policy', ['adaptive', 'dome'])
 def test_the_controller_survives_and_commands_no_more_than_the_ceiling(
     context, sent, ticks, policy

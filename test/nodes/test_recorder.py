@@ -10,6 +10,7 @@ import warnings
 
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Parameter as RosParameter
@@ -364,6 +365,20 @@ def test_messages_that_do_not_come_are_counted(robot, until, tmp_path):
     )  # fmt: skip
     assert statuses[0].message == f'too slow: {value.value} messages lost so far'
     assert (value.key, 0 < int(value.value) <= lost[1]) == ('/leg_2/wrench', True)
+
+
+def test_numbers_of_several_publishers_are_no_losses(robot, record, until):
+    first, second = (topics.DIAGNOSTICS.publisher(robot) for _ in range(2))
+    for _ in range(300):
+        first.publish(DiagnosticArray())
+    recorder = record()
+    until(lambda: first.get_subscription_count() and second.get_subscription_count())
+    until(lambda: recorder.count_publishers('/diagnostics') == 3)  # its own, too
+    for count in range(1, 6):
+        second.publish(DiagnosticArray())
+        first.publish(DiagnosticArray())
+        until(lambda count=count: recorder.message_count == 2 * count)
+    assert recorder.lost == {}
 
 
 @pytest.mark.parametrize('reliable', [False, True])

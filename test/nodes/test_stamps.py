@@ -8,6 +8,7 @@ from ros_pad.nodes import topics
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
 
 
 @pytest.mark.parametrize(
@@ -26,6 +27,8 @@ def test_stamps_are_whole_nanoseconds(time_ns, sec, nanosec):
     set_stamp(stamp, time_ns)
     assert (stamp.sec, stamp.nanosec) == (sec, nanosec)
     assert nanoseconds(stamp) == time_ns
+    assert split(time_ns) == (sec, nanosec)
+    assert split(time_ns + 2**32 * 10**9) == (sec, nanosec)  # a stamp has no more seconds
 
 
 def test_in_simulated_time_each_clock_message_is_a_tick(context, executor, until):
