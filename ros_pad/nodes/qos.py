@@ -56,7 +56,7 @@ def recording(offered: Sequence[QoSProfile], measured: bool = False) -> QoSProfi
         a single volatile one makes it volatile. Without publishers, it is :data:`RECORD`.
     measured : bool
         Whether to be best effort anyway, as other subscribers of measurements are. To acknowledge
-        6,000 messages a second takes a fifth of the processor time of all nodes; a publisher keeps
+        6,000 messages a second takes about a sixth of the processor time of all nodes; a publisher keeps
         ten messages for repetition, the shared memory of one computer holds more.
     """
     reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered) and not measured
