@@ -55,8 +55,8 @@ def recording(offered: Sequence[QoSProfile], measured: bool = False) -> QoSProfi
         Profiles of the publishers. A single best-effort one makes the subscription best effort,
         a single volatile one makes it volatile. Without publishers, it is :data:`RECORD`.
     measured : bool
-        Whether to be best effort anyway, as other subscribers of measurements are. To acknowledge
-        6,000 messages a second takes about a sixth of the processor time of all nodes; a publisher keeps
+        Whether to be best effort anyway, as other subscribers of measurements are. Acknowledging
+        6,000 messages a second takes a sixth more processor time of all nodes; a publisher keeps
         ten messages for repetition, the shared memory of one computer holds more.
     """
     reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered) and not measured
