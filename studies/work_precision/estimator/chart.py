@@ -218,7 +218,11 @@ _COLUMNS: dict[str, tuple[str, str, float, bool]] = {
     'mass': ('mass', 'times', 1.0, True),
 }
 # Tick values of axes without room for every value.
-_TICKS = {'clock jumps': [-0.5, 0.0, 0.5], 'mass': [0.5, 1.0, 2.0, 4.0]}
+_TICKS = {
+    'clock jumps': [-0.5, 0.0, 0.5],
+    'sample rate': [50.0, 100.0, 250.0, 1000.0],
+    'mass': [0.5, 1.0, 2.0, 4.0],
+}
 # Measures: label, scale, range, and the target.
 _MEASURES: tuple[tuple[str, str, float, tuple[float, float], tuple[float, ...]], ...] = (
     ('slip_distance', 'slipped before\nalarm, mm', 1e3, (0.0, 6.0), ()),
