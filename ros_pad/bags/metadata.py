@@ -186,7 +186,7 @@ def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
         raise
 
 
-# The loader of libyaml composes in C; the composer of PyYAML can be told to leave something out.
+# The loader of libyaml composes in C; the composer of PyYAML can leave something out.
 _LOADERS = (yaml.composer.Composer, SAFE_LOADER) if yaml.__with_libyaml__ else (SAFE_LOADER,)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages that a node cannot read: counted by topic, logged, and told on ``/diagnostics``."""
+"""Messages that a node cannot read: counted by topic, logged, reported on ``/diagnostics``."""
 
 from __future__ import annotations
 

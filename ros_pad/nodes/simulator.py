@@ -78,7 +78,7 @@ class SimulatorNode(Node):
 
     These are the wrench and position of each foot, the pose of the body, and joint positions if
     the robot has joints. Parameters are in :data:`PARAMETERS`. Pads are flat until their pressure
-    is received. In real time, ``/diagnostics`` tells once a second the wanted and the reached
+    is received. In real time, ``/diagnostics`` has once a second the wanted and the reached
     rate: where the computer is too slow, samples are left out, and at last time itself.
 
     Attributes

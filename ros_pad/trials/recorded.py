@@ -192,20 +192,20 @@ def load(
 
 
 def late(bag: BagReader) -> list[str]:
-    """Return a line for each node that told on ``/diagnostics`` that it did not keep up."""
+    """Return a line for each node that reported on ``/diagnostics`` that it did not keep up."""
     if bag.custom_data.get(RECORDED_AT) == 'publisher':
         return []  # composed nodes wait for one another
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
-    told: dict[str, list[tuple[float, str]]] = {}
+    found: dict[str, list[tuple[float, str]]] = {}
     for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode()):
         for status in array.status:
             if status.message.startswith(LATE):
                 seconds = (log_ns - bag.start) * 1e-9
-                told.setdefault(status.name, []).append((seconds, status.message))
+                found.setdefault(status.name, []).append((seconds, status.message))
     return [
-        f'{name}, told {len(found)} times from {found[0][0]:.1f} s on: {found[-1][1]}'
-        for name, found in told.items()
+        f'{name}, reported {len(each)} times from {each[0][0]:.1f} s on: {each[-1][1]}'
+        for name, each in found.items()
     ]
 
 

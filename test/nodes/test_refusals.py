@@ -218,7 +218,8 @@ def test_a_cut_message_of_another_encapsulation_is_refused(sender):
     node = sender.start(EstimatorNode, LEGS, topics.WRENCH)
     whole = encapsulated('CDR2_LE', 'foot', 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     sender.send(whole[:-4])
-    sender.until(lambda: node.refusals.counts['/leg_1/wrench'] == 1, what='a refusal')
+    sender.until(lambda: node.refusals.counts, what='a refusal')
+    assert dict(node.refusals.counts) == {'/leg_1/wrench': 1}
     estimator_goes_on(sender, node)
 
 
