@@ -32,9 +32,11 @@ from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation.tuning import attribute
-from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.messages import Hooks
+from ros_pad.nodes.messages import hook
+from ros_pad.nodes.messages import unhook
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import values_of
 from ros_pad.nodes.recorder import RecorderNode
@@ -158,7 +160,7 @@ class ComposedTrial:
             legs=legs,
             folder=os.fspath(bag),
         )
-        topics.hook(self._context, topics.Hooks(self.recorder.record, self._on_received))
+        hook(self._context, Hooks(self.recorder.record, self._on_received))
         # The node gets the options of the scene, not its name, because the scene in memory may
         # differ from its file.
         options = {
@@ -323,7 +325,7 @@ class ComposedTrial:
             for node in self._nodes:
                 self.executor.remove_node(node)
                 node.destroy_node()
-            topics.unhook(self._context)
+            unhook(self._context)
             self.executor.shutdown()
 
 

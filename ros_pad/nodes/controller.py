@@ -42,6 +42,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.nodes import topics
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -50,8 +51,6 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import Refusals
-from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import TICK_PERIOD_NS
@@ -115,8 +114,10 @@ class _LegTopics:
     def __init__(self, node: ControllerNode, leg: int) -> None:
         self._node, self.leg = node, leg
         self.stage = DecisionStage(node.controller, leg, self._warn)
-        self._setpoint = topics.PRESSURE_SETPOINT.sender(node, (*STAMP, 'fluid_pressure'), leg)
-        self._morphologies = topics.MORPHOLOGY.output(node, leg)
+        self._setpoint = node.messages.sender(
+            topics.PRESSURE_SETPOINT, (*STAMP, 'fluid_pressure'), leg
+        )
+        self._morphologies = node.messages.output(topics.MORPHOLOGY, leg)
         inputs: tuple[tuple[topics.Topic, Callable[..., None], tuple[str, ...]], ...] = (
             (topics.CONTACT_LOAD, self.stage.load, ('data',)),
             (topics.CONTACT_POSITION, self.stage.position, ('point.x', 'point.y')),
@@ -125,7 +126,7 @@ class _LegTopics:
             (topics.WETNESS, self._on_wetness, ('data',)),
         )
         for topic, callback, paths in inputs:
-            topic.receive(node, callback, paths, node.refusals, leg)
+            node.messages.receive(topic, callback, paths, leg)
 
     def _on_pressure(self, pressure: float) -> None:
         self.stage.pressure(pressure - self._node.ambient)
@@ -164,8 +165,8 @@ class ControllerNode(Node):
         Controller of all legs.
     ambient : float
         Ambient pressure, absolute Pa.
-    refusals : Refusals
-        Counts of messages that could not be read.
+    messages : Messages
+        Publishers and subscriptions.
 
     Raises
     ------
@@ -205,8 +206,8 @@ class ControllerNode(Node):
                 f'node {self.get_name()}: {error} (parameter dome_pressure)'
             ) from error
         self.ambient: float = values['ambient_pressure']
-        self.refusals = Refusals(self)
-        self._diagnostics = topics.DIAGNOSTICS.output(self)
+        self.messages = Messages(self)
+        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         self._reported_faults: list[str] = []
         self._tick_pace = Pace(TICK_PERIOD_NS)
         self._diagnostics_pace = Pace(1_000_000_000)
@@ -222,7 +223,7 @@ class ControllerNode(Node):
         self._regulator = None
         with suppress(RuntimeError):
             self._regulator = self.create_client(GetParameters, f'{regulator}/get_parameters')
-        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick, self.refusals)
+        self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def update_policy(self) -> None:
         """Decide with the present parameters from the next lift-off on."""
@@ -303,7 +304,7 @@ class ControllerNode(Node):
                 ),
             ]
             array.status.append(status)
-        array.status.extend(self.refusals.statuses())
+        array.status.extend(self.messages.refusals.statuses())
         self._diagnostics(array)
 
 

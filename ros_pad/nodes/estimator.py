@@ -29,6 +29,7 @@ from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -36,8 +37,6 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import Refusals
-from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import LATE
@@ -81,20 +80,21 @@ class _LegTopics:
         self._node = node
         self._leg = leg
         self._ambient = ambient
-        self._slip = topics.SLIP.sender(node, _SLIP, leg)
-        self._slipping = topics.SLIPPING.sender(node, ('data',), leg)
-        self._friction = topics.FRICTION.sender(node, ('data',), leg)
-        self._margin = topics.FRICTION_MARGIN.sender(node, ('data',), leg)
-        self._load = topics.CONTACT_LOAD.sender(node, ('data',), leg)
-        self._position = topics.CONTACT_POSITION.sender(node, (*STAMP, *_POINT[:2]), leg)
-        self._wetness = topics.WETNESS.sender(node, ('data',), leg)
-        self._doubts = topics.DOUBT.output(node, leg)
+        sender = node.messages.sender
+        self._slip = sender(topics.SLIP, _SLIP, leg)
+        self._slipping = sender(topics.SLIPPING, ('data',), leg)
+        self._friction = sender(topics.FRICTION, ('data',), leg)
+        self._margin = sender(topics.FRICTION_MARGIN, ('data',), leg)
+        self._load = sender(topics.CONTACT_LOAD, ('data',), leg)
+        self._position = sender(topics.CONTACT_POSITION, (*STAMP, *_POINT[:2]), leg)
+        self._wetness = sender(topics.WETNESS, ('data',), leg)
+        self._doubts = node.messages.output(topics.DOUBT, leg)
         for topic, callback, paths in (
             (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
             (topics.WRENCH, self._on_wrench, (*STAMP, *_FORCE, 'wrench.torque.z')),
             (topics.POSITION, self._on_position, (*STAMP, *_POINT)),
         ):
-            topic.receive(node, callback, (FRAME, *paths), node.refusals, leg)
+            node.messages.receive(topic, callback, (FRAME, *paths), leg)
 
     def _is_ours(self, frame: str) -> bool:
         """Return whether a frame is allowed for this leg; otherwise reject the sample."""
@@ -167,8 +167,8 @@ class EstimatorNode(Node):
     ----------
     legs : dict
         For each leg, its topics and its estimation stage.
-    refusals : Refusals
-        Counts of messages that could not be read.
+    messages : Messages
+        Publishers and subscriptions.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -178,7 +178,7 @@ class EstimatorNode(Node):
         values = declare(self, PARAMETERS)
         foot: Foot = values['foot']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
-        self.refusals = Refusals(self)
+        self.messages = Messages(self)
         self.legs = {
             leg: _LegTopics(
                 self,
@@ -189,13 +189,13 @@ class EstimatorNode(Node):
             )
             for leg in values['legs']
         }
-        self._diagnostics = topics.DIAGNOSTICS.output(self)
+        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
         self._simulated: bool = self.get_parameter('use_sim_time').value
         self._since_ns, self._counted = self.get_clock().now().nanoseconds, 0
         self._health_pace = Pace(TICK_PERIOD_NS)
-        on_tick(self, TICK_PERIOD_NS * 1e-9, self._tick, self.refusals)
+        self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):
@@ -206,7 +206,7 @@ class EstimatorNode(Node):
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
-            array.status.extend(self.refusals.statuses())
+            array.status.extend(self.messages.refusals.statuses())
             if not self._simulated:
                 array.status.append(self._rate(now_ns))
             set_stamp(array.header.stamp, now_ns)

@@ -23,6 +23,9 @@ SENSOR_PUBLISH = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 """Publish set-points, or subscribe to them: only the newest is kept, and it must arrive."""
 
+COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Batches of set-points: a batch may lack the legs of the one before it."""
+
 STATE = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,

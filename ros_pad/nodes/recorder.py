@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from contextlib import suppress
@@ -39,7 +40,10 @@ from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.intake import Intake
+from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import Once
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
@@ -63,7 +67,7 @@ PARAMETERS = (
 )
 
 
-INTAKE_PERIOD = 0.02
+INTAKE_PERIOD = 0.1
 """Time after which received messages are written, s; the middleware keeps them until then."""
 
 
@@ -142,16 +146,24 @@ class RecorderNode(Node):
             raise
         self._intake = Intake(self)
         self._told = 0  # lost messages in the last message on /diagnostics
-        self._diagnostics = topics.DIAGNOSTICS.output(self)
+        messages = Messages(self)
+        self._diagnostics, self._refusals = messages.output(topics.DIAGNOSTICS), messages.refusals
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
+        self._once: dict[str, Once] = {}  # by full name of a topic that batches have too
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
+            if topic.source:
+                self._once[full_name] = Once()
             if subscribes:
                 self._intake.add(full_name, topic.message, partial(self._profile, topic))
+        if subscribes:
+            for source, topic in topics.BATCHES.items():
+                names = [n for n, each in recorded.items() if each.source == source]
+                self._receive_batches(topic, set(map(self.resolve_topic_name, names)))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
@@ -189,7 +201,8 @@ class RecorderNode(Node):
 
     def _write_received(self, name: str, data: bytes, received_ns: int) -> None:
         self._received_ns = received_ns
-        self._writers[name](data)
+        if name not in self._once or self._once[name].is_new(data, alone=True):
+            self._writers[name](data)
 
     def record(self, name: str, data: bytes) -> None:
         """Write a message, as bytes, on the topic with this full name.
@@ -262,7 +275,7 @@ class RecorderNode(Node):
             message=f'{LATE}: {self._told} messages lost so far',
             values=[KeyValue(key=topic, value=str(n)) for topic, n in self.lost.items()],
         )
-        array = DiagnosticArray(status=[status])
+        array = DiagnosticArray(status=[status, *self._refusals.statuses()])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics(array)
 
@@ -354,6 +367,23 @@ class RecorderNode(Node):
                 value = plain(parameter_value_to_python(each.value))
                 self._changes.append((now_ns, event.node, each.name, value))
         self._bag.describe({label.CHANGES: json.dumps(self._changes)})
+
+    def _receive_batches(self, topic: topics.Topic, names: Collection[str]) -> None:
+        """Write the messages of these topics in the batches of a topic."""
+        name, read = self.resolve_topic_name(topic.name()), BatchReader()
+
+        def write(batch: bytes) -> None:
+            try:
+                messages = read(batch)
+            except BadMessage as error:
+                self._refusals(name, error)
+                return
+            for each, data in messages:
+                if each in names and self._once[each].is_new(data, alone=False):
+                    self._writers[each](data)
+
+        self._writers[name] = write
+        self._intake.add(name, topic.message, partial(self._profile, topic))
 
     def _writer(self, name: str) -> Callable[[bytes], None]:
         write = self._bag.write

@@ -30,6 +30,7 @@ from ros_pad.errors import PadError
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import FOOT
@@ -37,8 +38,6 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import Refusals
-from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import Pace
@@ -111,8 +110,8 @@ class RegulatorNode(LifecycleNode):
         The :class:`SupervisedChannel` of each leg; empty while the devices are closed.
     tick_ns : int
         Time of the last tick, ns, on the clock of the stamps.
-    refusals : Refusals
-        Counts of messages that could not be read.
+    messages : Messages
+        Publishers and subscriptions.
 
     Raises
     ------
@@ -142,22 +141,20 @@ class RegulatorNode(LifecycleNode):
         self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why the last configuration failed
-        self.refusals = Refusals(self)
-        self._diagnostics = topics.DIAGNOSTICS.output(self)
+        self.messages = Messages(self)
+        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         paths = (*STAMP, 'fluid_pressure')
         self._pressures = {
-            leg: topics.PRESSURE.sender(self, paths, leg) for leg in self._values['legs']
+            leg: self.messages.sender(topics.PRESSURE, paths, leg) for leg in self._values['legs']
         }
         for leg in self._values['legs']:
-            topics.PRESSURE_SETPOINT.receive(
-                self, partial(self._on_setpoint, leg), (FRAME, *paths), self.refusals, leg,
+            self.messages.receive(
+                topics.PRESSURE_SETPOINT, partial(self._on_setpoint, leg), (FRAME, *paths), leg,
                 on_mismatch=partial(self._mismatches.__setitem__, leg),
             )  # fmt: skip
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
-        on_tick(
-            self, min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick, self.refusals
-        )
+        self.messages.on_tick(min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick)
         if self._starting:
             self.trigger_configure()
             if self._problem:
@@ -394,7 +391,7 @@ class RegulatorNode(LifecycleNode):
             array.status.append(status)
         if channels:
             array.status.append(self._status('supply', 'supply', supply))
-        array.status.extend(self.refusals.statuses())
+        array.status.extend(self.messages.refusals.statuses())
         self._diagnostics(array)
 
     def _health(self, channel: SupervisedChannel) -> Health:

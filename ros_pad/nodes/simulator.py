@@ -21,13 +21,13 @@ from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.markers import WalkMarkers
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import SCENE
 from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import LATE
@@ -95,8 +95,8 @@ class SimulatorNode(Node):
         Last pressure of each pad, gauge Pa, in the order of ``scene.legs``.
     pressure_stamps : list of int
         Stamps of these pressures, ns; 0 before the first one.
-    refusals : Refusals
-        Counts of messages that could not be read.
+    messages : Messages
+        Publishers and subscriptions.
 
     Raises
     ------
@@ -127,14 +127,10 @@ class SimulatorNode(Node):
         self.time_ns = 0
         self.pressures = [0.0] * len(self.scene.legs)
         self.pressure_stamps = [0] * len(self.scene.legs)
-        self.refusals = Refusals(self)
+        self.messages = Messages(self)
         for index, leg in enumerate(self.scene.legs):
-            topics.PRESSURE.receive(
-                self,
-                self._pressure_callback(index),
-                (*STAMP, 'fluid_pressure'),
-                self.refusals,
-                leg,
+            self.messages.receive(
+                topics.PRESSURE, self._pressure_callback(index), (*STAMP, 'fluid_pressure'), leg
             )
         rate = values['markers_rate']
         self._markers = WalkMarkers(self.scene, self.floor) if rate else None
@@ -146,7 +142,7 @@ class SimulatorNode(Node):
         if values['free_running']:
             choice = fidelity.choose(self.scene, values['fidelity'])
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
-            self._diagnostics = topics.DIAGNOSTICS.output(self)
+            self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
             self._real_time: RealTime | None = None
             self._report_ns = 0  # time of the next message on /diagnostics
             # The timer cannot follow the clock that this node publishes.
@@ -156,11 +152,13 @@ class SimulatorNode(Node):
     def _advertise(self) -> None:
         """Create the publishers."""
         legs, joints = self.scene.legs, self.robot.joint_names
-        self._marker_output = topics.MARKERS.output(self) if self._markers else None
-        clock = topics.CLOCK.sender(self, topics.CLOCK.schema.values) if self._simulated else None
-        self._clock_output = clock
-        self._pose = topics.BODY_POSE.sender(
-            self,
+        output, sender = self.messages.output, self.messages.sender
+        self._marker_output = output(topics.MARKERS) if self._markers else None
+        self._clock_output = None
+        if self._simulated:
+            self._clock_output = sender(topics.CLOCK, topics.CLOCK.schema.values)
+        self._pose = sender(
+            topics.BODY_POSE,
             (
                 *(*STAMP, 'pose.position.x', 'pose.position.y'),
                 *('pose.orientation.z', 'pose.orientation.w'),
@@ -170,11 +168,11 @@ class SimulatorNode(Node):
         if joints:
             paths = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
             still = {'name': joints, 'position': [0.0] * len(joints)}
-            self._joints = topics.JOINT_STATES.sender(self, paths, constants=still)
+            self._joints = sender(topics.JOINT_STATES, paths, constants=still)
         forces = (*(f'wrench.force.{axis}' for axis in 'xyz'), 'wrench.torque.z')
-        self._wrenches = [topics.WRENCH.sender(self, (*STAMP, *forces), leg) for leg in legs]
+        self._wrenches = [sender(topics.WRENCH, (*STAMP, *forces), leg) for leg in legs]
         points = (*STAMP, *topics.POSITION.schema.values)
-        self._positions = [topics.POSITION.sender(self, points, leg) for leg in legs]
+        self._positions = [sender(topics.POSITION, points, leg) for leg in legs]
 
     def _pressure_callback(self, index: int) -> Any:
         def callback(sec: int, nanosec: int, pressure: float) -> None:
@@ -228,7 +226,7 @@ class SimulatorNode(Node):
                 KeyValue(key='speed (times real time)', value=f'{rate.speed:.3f}'),
             ],
         )
-        array = DiagnosticArray(status=[status, *self.refusals.statuses()])
+        array = DiagnosticArray(status=[status, *self.messages.refusals.statuses()])
         set_stamp(array.header.stamp, self._stamp_ns())
         self._diagnostics(array)
 
@@ -257,6 +255,7 @@ class SimulatorNode(Node):
         if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
             assert self._marker_output
             self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))
+        self.messages.flush()
 
     def tick(self, samples: int = 1) -> None:
         """Advance simulated time, but not the robot; :meth:`step` calls this."""

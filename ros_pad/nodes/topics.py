@@ -3,9 +3,6 @@
 
 Names are relative, so that a namespace moves the whole robot; ``/clock`` and ``/diagnostics``
 are global, as everywhere in ROS.
-
-Nodes read and write the fields that they need in the bytes of a message: rclpy takes several times
-as long to convert whole messages. What is sent does not differ.
 """
 
 from __future__ import annotations
@@ -13,25 +10,19 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
-from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
-from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from geometry_msgs.msg import WrenchStamped
-from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
-from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
@@ -40,54 +31,18 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
 from std_msgs.msg import String
+from std_msgs.msg import UInt8MultiArray
 from visualization_msgs.msg import MarkerArray
 
 from ros_pad.bags import topics as schemas
 from ros_pad.bags.codec import MessageType
 from ros_pad.bags.codec import message_type
 from ros_pad.bags.definitions import message_definition
-from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.fields import FieldWriter
-from ros_pad.bags.fields import field_of
-from ros_pad.errors import BadMessage
 from ros_pad.errors import ConfigError
-from ros_pad.errors import UnknownEncoding
 from ros_pad.nodes import qos
 
 LEGS = (1, 2, 3, 4, 5, 6)
 """Leg numbers of the thesis: 1, 3, 5 and 2, 4, 6 are the tripods."""
-
-
-class Hooks(NamedTuple):
-    """Functions that are called with the messages of all nodes of a context.
-
-    Attributes
-    ----------
-    published : callable
-        Called with full name of the topic and bytes of each message before it is published.
-    received : callable
-        Called after each message that a node has received and processed.
-    """
-
-    published: Callable[[str, bytes], None]
-    received: Callable[[], None]
-
-
-_HOOKS: WeakKeyDictionary[Context, Hooks] = WeakKeyDictionary()
-
-
-def hook(context: Context, hooks: Hooks) -> None:
-    """Set the hooks of all publishers and subscriptions that nodes of a context make from now."""
-    _HOOKS[context] = hooks
-
-
-def unhook(context: Context) -> None:
-    """Forget the hooks of a context, which otherwise keep alive what they refer to."""
-    _HOOKS.pop(context, None)
-
-
-Refuse = Callable[[str, Exception], None]
-"""Called with the full name of the topic and the reason when a message cannot be read."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,12 +57,15 @@ class Topic:
         Message class.
     publish, subscribe : QoSProfile
         QoS that publishers offer, and QoS that subscriptions request.
+    source : str
+        The node of ros_pad that sends it in batches too; empty where none does.
     """
 
     schema: schemas.Topic
     message: type
     publish: QoSProfile
     subscribe: QoSProfile
+    source: str = ''
 
     @property
     def pattern(self) -> str:
@@ -127,75 +85,6 @@ class Topic:
     def message_type(self) -> MessageType:
         """The message type, from its installed definition."""
         return message_type(self.type_name, message_definition(self.type_name))
-
-    def output(self, node: Node, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes a message or its bytes; see :meth:`publisher`."""
-        publisher = self.publisher(node, leg)
-        hooks = _HOOKS.get(node.context)
-        if hooks is None:
-            return publisher.publish
-        name = publisher.topic_name
-
-        def publish(message: Any) -> None:
-            data = message if isinstance(message, bytes) else serialize_message(message)
-            hooks.published(name, data)
-            publisher.publish(data)
-
-        return publish
-
-    def sender(
-        self,
-        node: Node,
-        paths: Sequence[str],
-        leg: int | None = None,
-        constants: Mapping[str, Any] | None = None,
-    ) -> Callable[..., None]:
-        """Return a function that publishes a message with these numbers, in the order of `paths`.
-
-        The frame is that of the table of topics, other fields are zero; see
-        :class:`ros_pad.bags.fields.FieldWriter`.
-        """
-        frame = {schemas.FRAME: self.schema.frame.format(leg=leg)} if self.schema.frame else {}
-        write = FieldWriter(self.message_type, paths, frame | dict(constants or {}))
-        publish = self.output(node, leg)
-        return lambda *values: publish(write(*values))
-
-    def receive(
-        self,
-        node: Node,
-        callback: Callable[..., None],
-        paths: Sequence[str],
-        refuse: Refuse,
-        leg: int | None = None,
-        on_mismatch: Callable[[str], None] | None = None,
-    ) -> None:
-        """Call a function with some fields of each message, see :meth:`subscription`."""
-        name = node.resolve_topic_name(self.name(leg))
-        read = FieldReader(self.message_type, paths)
-        hooks = _HOOKS.get(node.context)
-
-        def take(data: bytes) -> None:
-            try:
-                values = read(data)
-            except UnknownEncoding:
-                try:
-                    values = self._decoded(data, paths)
-                except Exception as error:  # rclpy raises various ones
-                    refuse(name, error)
-                    return
-            except BadMessage as error:
-                refuse(name, error)
-                return
-            callback(*values)
-            if hooks:
-                hooks.received()
-
-        self.subscription(node, take, leg, raw=True, on_mismatch=on_mismatch)
-
-    def _decoded(self, data: bytes, paths: Sequence[str]) -> tuple[Any, ...]:
-        """Return fields of a message whose encoding only the middleware knows."""
-        message = deserialize_message(data, self.message)
-        return tuple(field_of(message, path) for path in paths)
 
     def publisher(self, node: Node, leg: int | None = None) -> Publisher:
         """Create a publisher in a node.
@@ -266,28 +155,42 @@ def _owner(peer: TopicEndpointInfo, topic: str) -> str:
     return f'node {peer.node_namespace.rstrip("/")}/{peer.node_name}'
 
 
-def _measured(topic: schemas.Topic, message: type) -> Topic:
-    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR)
+def _measured(topic: schemas.Topic, message: type, source: str = '') -> Topic:
+    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR, source)
 
 
-PRESSURE = _measured(schemas.PRESSURE, FluidPressure)
-PRESSURE_SETPOINT = Topic(schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND)
-WRENCH = _measured(schemas.WRENCH, WrenchStamped)
-POSITION = _measured(schemas.POSITION, PointStamped)
-SLIP = _measured(schemas.SLIP, TwistWithCovarianceStamped)
-WETNESS = _measured(schemas.WETNESS, Float64)
-FRICTION = _measured(schemas.FRICTION, Float64)
-FRICTION_MARGIN = _measured(schemas.FRICTION_MARGIN, Float64)
-CONTACT_LOAD = _measured(schemas.CONTACT_LOAD, Float64)
-CONTACT_POSITION = _measured(schemas.CONTACT_POSITION, PointStamped)
-SLIPPING = _measured(schemas.SLIPPING, Bool)
+PRESSURE = _measured(schemas.PRESSURE, FluidPressure, 'regulator')
+PRESSURE_SETPOINT = Topic(
+    schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND, 'controller'
+)
+WRENCH = _measured(schemas.WRENCH, WrenchStamped, 'simulator')
+POSITION = _measured(schemas.POSITION, PointStamped, 'simulator')
+SLIP = _measured(schemas.SLIP, TwistWithCovarianceStamped, 'estimator')
+WETNESS = _measured(schemas.WETNESS, Float64, 'estimator')
+FRICTION = _measured(schemas.FRICTION, Float64, 'estimator')
+FRICTION_MARGIN = _measured(schemas.FRICTION_MARGIN, Float64, 'estimator')
+CONTACT_LOAD = _measured(schemas.CONTACT_LOAD, Float64, 'estimator')
+CONTACT_POSITION = _measured(schemas.CONTACT_POSITION, PointStamped, 'estimator')
+SLIPPING = _measured(schemas.SLIPPING, Bool, 'estimator')
 DOUBT = Topic(schemas.DOUBT, String, qos.STATE, qos.STATE)
 MORPHOLOGY = Topic(schemas.MORPHOLOGY, String, qos.STATE, qos.STATE)
-BODY_POSE = _measured(schemas.BODY_POSE, PoseStamped)
-JOINT_STATES = _measured(schemas.JOINT_STATES, JointState)
+BODY_POSE = _measured(schemas.BODY_POSE, PoseStamped, 'simulator')
+JOINT_STATES = _measured(schemas.JOINT_STATES, JointState, 'simulator')
 MARKERS = Topic(schemas.MARKERS, MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
 CLOCK = Topic(schemas.CLOCK, Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
 DIAGNOSTICS = Topic(schemas.DIAGNOSTICS, DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
+
+_BATCHES = 'std_msgs/msg/UInt8MultiArray'
+BATCHES = {
+    **{
+        source: _measured(schemas.Topic(f'batches/{source}', _BATCHES), UInt8MultiArray)
+        for source in ('simulator', 'regulator', 'estimator')
+    },
+    'controller': Topic(
+        schemas.Topic('batches/controller', _BATCHES), UInt8MultiArray, qos.COMMANDS, qos.COMMANDS
+    ),
+}
+"""The topic with the batches of each node that sends some, see `ros_pad.nodes.batches`."""
 
 LEG_TOPICS = (
     PRESSURE,

@@ -32,7 +32,7 @@ ESTIMATED = (
 def _publish(node: Node, chosen: tuple[topics.Topic, ...], period: float) -> None:
     """Publish messages of zeros on these topics of every leg."""
     outputs = [
-        (topic.output(node, leg), serialize_message(topic.message()))
+        (topic.publisher(node, leg).publish, serialize_message(topic.message()))
         for leg in topics.LEGS
         for topic in chosen
     ]

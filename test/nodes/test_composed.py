@@ -30,6 +30,7 @@ from ros_pad.errors import BagError
 from ros_pad.errors import PadError
 from ros_pad.nodes import composed
 from ros_pad.nodes import topics
+from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.composed import ComposedTrial
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.simulation.faults import Fault
@@ -281,12 +282,16 @@ def test_the_same_seed_gives_the_same_messages(tmp_path):
 
 def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
     """The reference are the calls of rclpy's publishers: none may pass the recorder by."""
-    published = []
+    published, batches = [], []
     publish = Publisher.publish
 
     def watched(publisher, message):
         data = message if isinstance(message, bytes) else serialize_message(message)
-        published.append((publisher.topic_name, data))
+        if publisher.topic_name.startswith('/batches/'):
+            batches.append(publisher.topic_name)
+            published.extend(BatchReader()(data))
+        else:
+            published.append((publisher.topic_name, data))
         publish(publisher, message)
 
     monkeypatch.setattr(Publisher, 'publish', watched)
@@ -304,7 +309,15 @@ def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
     reader = BagReader(tmp_path / 'bag')
     assert reader.custom_data[label.RECORDED_AT] == 'publisher'
     published = [each for each in published if each[0] in reader.topics]
-    assert [each[:2] for each in recorded] == published
+
+    def of(name, messages):
+        return [data for topic, data, *_ in messages if topic == name]
+
+    for name in reader.topics:
+        assert of(name, recorded) == of(name, published), name
+    # All of one moment are one message, and nobody wants them alone.
+    assert set(batches) == {f'/batches/{source}' for source in topics.BATCHES}
+    assert len(published) > 2 * len(batches)
     counts = collections.Counter(name for name, _ in published)
     always = {topic.name(1) for topic in topics.LEG_TOPICS} | {'clock', 'body/pose', 'diagnostics'}
     assert {f'/{name}' for name in always} <= set(counts)

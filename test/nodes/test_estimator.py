@@ -8,12 +8,13 @@ from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from sensor_msgs.msg import FluidPressure
 
-from ros_pad.nodes import estimator
 from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.messages import Hooks
+from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import hook
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 
@@ -174,16 +175,10 @@ def test_a_hidden_marker_gives_estimates_without_a_position(robot):
     assert len(robot.heard['leg_1/contact_position']) == 1
 
 
-def test_load_and_position_come_before_the_wetness_that_uses_them(context, monkeypatch):
+def test_load_and_position_come_before_the_wetness_that_uses_them(context):
     """The controller decides when the wetness arrives."""
     sent = []
-    publish = Publisher.publish
-
-    def watched(publisher, message):
-        sent.append(publisher.topic_name)
-        publish(publisher, message)
-
-    monkeypatch.setattr(Publisher, 'publish', watched)
+    hook(context, Hooks(lambda name, _: sent.append(name), lambda: None))
     node = EstimatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
     stage = node.legs[1].stage
     sent.clear()
@@ -448,13 +443,11 @@ def test_rate_and_age_of_the_samples_are_reported(context, monkeypatch):
     """The times are given, so that the machine does not matter."""
     sent, ticks = [], []
 
-    def output(topic, node, leg=None):
+    def output(messages, topic, leg=None):
         return sent.append if topic is topics.DIAGNOSTICS else lambda message: None
 
-    monkeypatch.setattr(topics.Topic, 'output', output)
-    monkeypatch.setattr(
-        estimator, 'on_tick', lambda node, period, call, refuse: ticks.append(call)
-    )
+    monkeypatch.setattr(Messages, 'output', output)
+    monkeypatch.setattr(Messages, 'on_tick', lambda self, period, call: ticks.append(call))
     legs = Parameter('legs', value=[1, 2])
     node = EstimatorNode(context=context, parameter_overrides=[legs])
     (tick,) = ticks

@@ -26,13 +26,12 @@ from std_srvs.srv import Trigger
 
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
-from ros_pad.nodes import controller
-from ros_pad.nodes import estimator
 from ros_pad.nodes import regulator
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.frames import check_frame
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import HIGHEST
 from ros_pad.nodes.simulator import SimulatorNode
@@ -89,9 +88,13 @@ def quiet():
 class Outbox(list):
     """Messages that were published on one topic."""
 
-    def __init__(self, message_class):
+    def __init__(self, name, message_class):
         super().__init__()
-        self._class = message_class
+        self.topic_name, self._class = name, message_class
+        self.handle = self
+
+    def get_subscription_count(self):
+        return 1
 
     def publish(self, message):
         raw = isinstance(message, bytes)
@@ -104,7 +107,7 @@ def sent(monkeypatch):
     boxes = {}
 
     def publisher(topic, node, leg=None):
-        return boxes.setdefault(topic.name(leg), Outbox(topic.message))
+        return boxes.setdefault(topic.name(leg), Outbox(topic.name(leg), topic.message))
 
     monkeypatch.setattr(topics.Topic, 'publisher', publisher)
     return boxes
@@ -114,10 +117,7 @@ def sent(monkeypatch):
 def ticks(monkeypatch):
     """Replace timers of ticks; return their callbacks."""
     callbacks = []
-    for module in (controller, estimator, regulator):
-        monkeypatch.setattr(
-            module, 'on_tick', lambda node, period, call, refuse: callbacks.append(call)
-        )
+    monkeypatch.setattr(Messages, 'on_tick', lambda self, period, call: callbacks.append(call))
     return callbacks
 
 

@@ -105,14 +105,16 @@ def test_messages_that_cannot_be_read_are_counted_and_reported(sender, name):
     node = sender.start(kind, parameters, topic)
     full_name = f'/{topic.name(1)}'
     sender.send(good[:-1])
-    sender.until(lambda: node.refusals.counts[full_name] == 1, what='the first refusal')
+    sender.until(lambda: node.messages.refusals.counts[full_name] == 1, what='the first refusal')
     report = sender.reported(node)
     assert report.level == DiagnosticStatus.WARN
     assert report.message == (f'{full_name}: message refused: {len(good) - 1} bytes are too few')
     assert [(each.key, each.value) for each in report.values] == [(full_name, '1')]
     if stamped:
         sender.send(too_long_frame(good))
-        sender.until(lambda: node.refusals.counts[full_name] == 2, what='the second refusal')
+        sender.until(
+            lambda: node.messages.refusals.counts[full_name] == 2, what='the second refusal'
+        )
         sender.statuses.clear()
         report = sender.reported(node)
         assert report.message.endswith(f'{len(good)} bytes are too few for a text of 4000 bytes')
@@ -123,7 +125,7 @@ def test_messages_that_cannot_be_read_are_counted_and_reported(sender, name):
     sender.until(lambda: sender.statuses)
     assert {each.name[own:].rpartition(' ')[2] for each in sender.statuses} > {'messages'}
     RESUMED[name](sender, node)
-    assert dict(node.refusals.counts) == {full_name: 2 if stamped else 1}
+    assert dict(node.messages.refusals.counts) == {full_name: 2 if stamped else 1}
 
 
 def estimator_goes_on(sender, node):
@@ -202,14 +204,14 @@ def test_other_encapsulations_that_rclpy_knows_are_read(sender, name, monkeypatc
     sender.send(encapsulated(name, 'foot', 1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     sender.until(lambda: taken, what='a wrench')
     assert taken == [(5_000_000_006, (1.0, 2.0, 3.0), 6.0)]
-    assert not node.refusals.counts
+    assert not node.messages.refusals.counts
 
 
 @pytest.mark.parametrize('start', [b'\0\5\0\0', b'\1\1\0\0', b'\xff\xff\0\0'])
 def test_encapsulations_that_rclpy_does_not_know_are_refused(sender, start):
     node = sender.start(EstimatorNode, LEGS, topics.WRENCH)
     sender.send(start + wrench()[4:])
-    sender.until(lambda: node.refusals.counts['/leg_1/wrench'] == 1, what='a refusal')
+    sender.until(lambda: node.messages.refusals.counts['/leg_1/wrench'] == 1, what='a refusal')
     assert 'refused: failed to deserialize' in sender.reported(node).message
     estimator_goes_on(sender, node)
 
@@ -218,8 +220,8 @@ def test_a_cut_message_of_another_encapsulation_is_refused(sender):
     node = sender.start(EstimatorNode, LEGS, topics.WRENCH)
     whole = encapsulated('CDR2_LE', 'foot', 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     sender.send(whole[:-4])
-    sender.until(lambda: node.refusals.counts, what='a refusal')
-    assert dict(node.refusals.counts) == {'/leg_1/wrench': 1}
+    sender.until(lambda: node.messages.refusals.counts, what='a refusal')
+    assert dict(node.messages.refusals.counts) == {'/leg_1/wrench': 1}
     estimator_goes_on(sender, node)
 
 
@@ -231,7 +233,7 @@ def test_a_clock_that_cannot_be_read_is_refused(context):
     try:
         (tick,) = [each for each in node.subscriptions if each.topic_name == '/clock' and each.raw]
         tick.callback(b'\0\1\0\0\1\0\0\0')
-        assert dict(node.refusals.counts) == {'/clock': 1}
+        assert dict(node.messages.refusals.counts) == {'/clock': 1}
     finally:
         node.destroy_node()
 

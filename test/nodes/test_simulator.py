@@ -14,6 +14,7 @@ from sensor_msgs.msg import FluidPressure
 from ros_pad import configuration
 from ros_pad.nodes import simulator
 from ros_pad.nodes import topics
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
@@ -169,10 +170,10 @@ def test_the_rate_is_measured_over_whole_seconds_from_the_first_tick(start, monk
     """A start that takes long is no reason to warn; the time here is not that of the machine."""
     sent = []
 
-    def output(topic, node, leg=None):
+    def output(messages, topic, leg=None):
         return sent.append if topic is topics.DIAGNOSTICS else lambda message: None
 
-    monkeypatch.setattr(topics.Topic, 'output', output)
+    monkeypatch.setattr(Messages, 'output', output)
     node = start(scene='leg_wet_dome_40', fidelity='L0', rate=100.0)
     (timer,) = node.timers
     now = 10**12
@@ -325,8 +326,11 @@ def test_a_pressure_that_is_none_changes_nothing(start, robot, until):
 class Outbox:
     """Records messages of one topic: bytes, or those of markers as text."""
 
-    def __init__(self):
-        self.sent = []
+    def __init__(self, name):
+        self.topic_name, self.handle, self.sent = name, self, []
+
+    def get_subscription_count(self):
+        return 1
 
     def publish(self, message):
         self.sent.append(message if isinstance(message, bytes) else repr(message))
@@ -336,7 +340,7 @@ def test_the_same_seed_is_the_same_walk(start, monkeypatch):
     boxes = {}
 
     def publisher(topic, node, leg=None):
-        return boxes.setdefault(topic.name(leg), Outbox())
+        return boxes.setdefault(topic.name(leg), Outbox(topic.name(leg)))
 
     monkeypatch.setattr(topics.Topic, 'publisher', publisher)
 

@@ -5,8 +5,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ros_pad.nodes import topics
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.stamps import on_tick
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 
@@ -37,7 +37,7 @@ def test_in_simulated_time_each_clock_message_is_a_tick(context, executor, until
     )
     executor.add_node(node)
     ticks = []
-    on_tick(node, 0.001, ticks.append, pytest.fail)
+    Messages(node).on_tick(0.001, ticks.append)
     clock = topics.CLOCK.publisher(node)
     until(lambda: clock.get_subscription_count() == 2)  # two subscriptions: time and ticks
     for time_ns in (7, 1_000_000_000, 3_000_000_004):
@@ -52,7 +52,7 @@ def test_in_real_time_a_timer_ticks(context, executor, until):
     node = Node('probe', context=context)
     executor.add_node(node)
     ticks = []
-    on_tick(node, 0.01, ticks.append, pytest.fail)
+    Messages(node).on_tick(0.01, ticks.append)
     before = node.get_clock().now().nanoseconds
     until(lambda: len(ticks) == 5)
     assert ticks[0] > before

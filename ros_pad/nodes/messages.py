@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a node sends and receives.
+
+Nodes read and write the fields that they need in the bytes of a message: rclpy takes several times
+as long to convert whole messages. What is sent does not differ.
+
+Nodes of ros_pad send one another the measurements and set-points of one moment in one message, see
+`ros_pad.nodes.batches`. The topic of each is published while others subscribe to it. A message
+that comes both ways is received once.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Mapping
+from collections.abc import Sequence
+from typing import Any
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+from rclpy.clock import Clock as NodeClock
+from rclpy.clock import ClockType
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
+from rclpy.serialization import serialize_message
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from ros_pad.bags import topics as schemas
+from ros_pad.bags.fields import FieldReader
+from ros_pad.bags.fields import FieldWriter
+from ros_pad.bags.fields import field_of
+from ros_pad.errors import BadMessage
+from ros_pad.errors import UnknownEncoding
+from ros_pad.nodes import topics
+from ros_pad.nodes.batches import BatchReader
+from ros_pad.nodes.batches import BatchWriter
+from ros_pad.nodes.refusals import Refusals
+from ros_pad.nodes.topics import Topic
+
+
+class Hooks(NamedTuple):
+    """Functions that are called with the messages of all nodes of a context.
+
+    Attributes
+    ----------
+    published : callable
+        Called with full name of the topic and bytes of each message before it is published.
+    received : callable
+        Called after each message, or batch, that a node has received and processed.
+    """
+
+    published: Callable[[str, bytes], None]
+    received: Callable[[], None]
+
+
+_HOOKS: WeakKeyDictionary[Context, Hooks] = WeakKeyDictionary()
+
+
+def hook(context: Context, hooks: Hooks) -> None:
+    """Set the hooks of all publishers and subscriptions that nodes of a context make from now."""
+    _HOOKS[context] = hooks
+
+
+def unhook(context: Context) -> None:
+    """Forget the hooks of a context, which otherwise keep alive what they refer to."""
+    _HOOKS.pop(context, None)
+
+
+_Take = Callable[[bytes], None]
+
+_LOOK_PERIOD = 1.0  # s, between looks at the subscriptions of a topic that is published
+
+
+class Once:
+    """Tell which messages of a topic came before, once in a batch and once alone."""
+
+    def __init__(self) -> None:
+        self._alone: deque[bytes] = deque(maxlen=16)
+        self._in_batches: deque[bytes] = deque(maxlen=16)
+
+    def is_new(self, data: bytes, alone: bool) -> bool:
+        """Return whether a message has not come the other way before."""
+        same, other = self._alone, self._in_batches
+        if not alone:
+            same, other = other, same
+        if data in other:
+            other.remove(data)
+            return False
+        same.append(data)
+        return True
+
+
+class _Output:
+    """A topic whose messages go out in batches, and alone where others subscribe to it."""
+
+    def __init__(self, node: Node, publisher: Publisher, batches: Publisher) -> None:
+        self.name = publisher.topic_name
+        self.publish = publisher.publish
+        self._node = node
+        self._batches = batches.topic_name
+        self._count = publisher.handle.get_subscription_count
+        self._counts = (0, 0)
+        self._wanted = False
+        self._look_at = 0.0  # monotonic time of the next look
+
+    def wanted(self, receivers: int) -> bool:
+        """Return whether a node that does not receive batches subscribes to the topic.
+
+        Parameters
+        ----------
+        receivers : int
+            Number of subscriptions to the batches.
+        """
+        count = self._count()
+        if not count:
+            return False
+        changed = (count, receivers) != self._counts
+        if changed or (self._wanted and time.monotonic() > self._look_at):
+            self._counts, self._look_at = (count, receivers), time.monotonic() + _LOOK_PERIOD
+            self._wanted = self._has_others(count)
+        return self._wanted
+
+    def _has_others(self, count: int) -> bool:
+        owners = Counter(map(_owner, self._node.get_subscriptions_info_by_topic(self.name)))
+        receivers = map(_owner, self._node.get_subscriptions_info_by_topic(self._batches))
+        # The graph may not yet know all that DDS has connected.
+        return owners.total() < count or owners != Counter(set(receivers) & set(owners))
+
+
+def _owner(peer: TopicEndpointInfo) -> tuple[bytes, str, str]:
+    """Return what tells a node from all others: its process and its name."""
+    return bytes(peer.endpoint_gid)[:12], peer.node_namespace, peer.node_name
+
+
+class Messages:
+    """Publishers and subscriptions of a node.
+
+    Attributes
+    ----------
+    refusals : Refusals
+        Counts of messages that could not be read.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.refusals = Refusals(node)
+        self._node = node
+        self._hooks = _HOOKS.get(node.context)
+        self._takers: dict[str, dict[str, _Take]] = {}  # of batches, by source and topic
+        self._batches: Publisher | None = None
+        self._pending: list[tuple[_Output, bytes]] = []  # for the next batch
+        self._write = BatchWriter()
+
+    def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
+        """Return a function that publishes a message or its bytes.
+
+        What goes out in batches is published by :meth:`flush`, which is called after each received
+        message and each tick.
+        """
+        publisher, hooks = topic.publisher(self._node, leg), self._hooks
+        name = publisher.topic_name
+        send: Callable[[Any], None] = publisher.publish
+        if topic.source:
+            send = self._collector(topic.source, publisher)
+        elif hooks is None:
+            return send
+
+        def publish(message: Any) -> None:
+            data = message if isinstance(message, bytes) else serialize_message(message)
+            if hooks:
+                hooks.published(name, data)
+            send(data)
+
+        return publish
+
+    def _collector(self, source: str, publisher: Publisher) -> Callable[[bytes], None]:
+        """Return a function that adds a message to the next batch."""
+        if self._batches is None:
+            self._batches = topics.BATCHES[source].publisher(self._node)
+        output, pending = _Output(self._node, publisher, self._batches), self._pending
+        return lambda data: pending.append((output, data))
+
+    def flush(self) -> None:
+        """Publish the batch of the messages since the last call, then those that others want."""
+        if not self._pending:
+            return
+        assert self._batches is not None
+        pending = [*self._pending]
+        self._pending.clear()
+        receivers = self._batches.handle.get_subscription_count()
+        if receivers:
+            names = [output.name for output, _ in pending]
+            self._batches.publish(self._write(names, [data for _, data in pending]))
+        for output, data in pending:
+            if output.wanted(receivers):
+                output.publish(data)
+
+    def sender(
+        self,
+        topic: Topic,
+        paths: Sequence[str],
+        leg: int | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> Callable[..., None]:
+        """Return a function that publishes a message with these numbers, in the order of `paths`.
+
+        The frame is that of the table of topics, other fields are zero; see
+        :class:`ros_pad.bags.fields.FieldWriter`.
+        """
+        schema = topic.schema
+        frame = {schemas.FRAME: schema.frame.format(leg=leg)} if schema.frame else {}
+        write = FieldWriter(topic.message_type, paths, frame | dict(constants or {}))
+        publish = self.output(topic, leg)
+        return lambda *values: publish(write(*values))
+
+    def receive(
+        self,
+        topic: Topic,
+        callback: Callable[..., None],
+        paths: Sequence[str],
+        leg: int | None = None,
+        on_mismatch: Callable[[str], None] | None = None,
+    ) -> None:
+        """Call a function with some fields of each message, see :meth:`Topic.subscription`."""
+        name = self._node.resolve_topic_name(topic.name(leg))
+        take, once = self._taker(topic, name, callback, paths), Once()
+
+        def take_alone(data: bytes) -> None:
+            if once.is_new(data, alone=True):
+                take(data)
+                self._finish()
+
+        def take_of_batch(data: bytes) -> None:
+            if once.is_new(data, alone=False):
+                take(data)
+
+        if topic.source:
+            if topic.source not in self._takers:
+                self._takers[topic.source] = {}
+                self._receive_batches(topic.source)
+            self._takers[topic.source][name] = take_of_batch
+        topic.subscription(self._node, take_alone, leg, raw=True, on_mismatch=on_mismatch)
+
+    def _taker(
+        self, topic: Topic, name: str, callback: Callable[..., None], paths: Sequence[str]
+    ) -> _Take:
+        """Return a function that reads a message and calls another one with its fields."""
+        read, refuse = FieldReader(topic.message_type, paths), self.refusals
+
+        def take(data: bytes) -> None:
+            try:
+                values = read(data)
+            except UnknownEncoding:  # only the middleware knows it
+                try:
+                    message = deserialize_message(data, topic.message)
+                    values = tuple(field_of(message, path) for path in paths)
+                except Exception as error:  # rclpy raises various ones
+                    refuse(name, error)
+                    return
+            except BadMessage as error:
+                refuse(name, error)
+                return
+            callback(*values)
+
+        return take
+
+    def _receive_batches(self, source: str) -> None:
+        batches, takers = topics.BATCHES[source], self._takers[source]
+        name = self._node.resolve_topic_name(batches.name())
+        read = BatchReader()
+
+        def take(batch: bytes) -> None:
+            try:
+                messages = read(batch)
+            except BadMessage as error:
+                self.refusals(name, error)
+                return
+            for topic, data in messages:
+                if topic in takers:
+                    takers[topic](data)
+            self._finish()
+
+        batches.subscription(self._node, take, raw=True)
+
+    def _finish(self) -> None:
+        """End the work on a message, or batch."""
+        self.flush()
+        if self._hooks:
+            self._hooks.received()
+
+    def on_tick(self, period: float, callback: Callable[[int], None]) -> None:
+        """Call a function again and again with the node's time, ns.
+
+        In simulated time it is called at each ``/clock`` message with the time in that message, so
+        that a run can be repeated exactly. Otherwise a timer calls it every ``period`` seconds;
+        its clock keeps running when the time of day is changed.
+        """
+        if self._node.get_parameter('use_sim_time').value:
+
+            def take(seconds: int, fraction: int) -> None:
+                callback(seconds * 1_000_000_000 + fraction)
+
+            self.receive(topics.CLOCK, take, topics.CLOCK.schema.values)
+        else:
+            clock = self._node.get_clock()
+
+            def tick() -> None:
+                callback(clock.now().nanoseconds)
+                self.flush()
+
+            steady = NodeClock(clock_type=ClockType.STEADY_TIME)
+            self._node.create_timer(period, tick, clock=steady)

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes of ros_pad send one another batches, and each message alone to whoever else wants it."""
+
+import struct
+
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import MultiArrayDimension
+from std_msgs.msg import UInt8MultiArray
+
+from ros_pad.errors import BadMessage
+from ros_pad.nodes import topics
+from ros_pad.nodes.batches import BatchReader
+from ros_pad.nodes.batches import BatchWriter
+from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import Once
+from ros_pad.nodes.simulator import SimulatorNode
+
+names = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=20)
+contents = st.lists(st.tuples(names, st.binary(max_size=40)), max_size=8)
+
+
+@given(contents)
+def test_rclpy_reads_a_batch_as_an_ordinary_message(content):
+    batch = BatchWriter()([name for name, _ in content], [data for _, data in content])
+    message = deserialize_message(batch, UInt8MultiArray)
+    assert bytes(message.data) == b''.join(data for _, data in content)
+    start = 0
+    for (name, data), dimension in zip(content, message.layout.dim, strict=True):
+        assert (dimension.label, dimension.size) == (name, len(data))
+        assert dimension.stride == start
+        start += len(data)
+
+
+@given(st.lists(contents, max_size=5))
+def test_a_batch_is_read_as_it_was_written(batches):
+    """Repeated, because layouts are remembered."""
+    write, read = BatchWriter(), BatchReader()
+    for content in batches * 2:
+        found = read(write([name for name, _ in content], [data for _, data in content]))
+        assert list(found) == content
+
+
+@given(contents)
+def test_a_batch_of_rclpy_is_read(content):
+    message = UInt8MultiArray()
+    message.layout.dim = [MultiArrayDimension(label=n, size=len(d)) for n, d in content]
+    message.data = b''.join(data for _, data in content)
+    read = BatchReader()
+    assert list(read(serialize_message(message))) == content
+    assert list(read(serialize_message(message) + b'\0\0\0')) == content  # DDS may pad
+
+
+def test_a_big_endian_batch_is_read():
+    label = b'/leg_1/wetness\0'
+    head = struct.pack('>II', 1, len(label)) + label + b'\0' + struct.pack('>II', 3, 0)
+    batch = b'\0\0\0\0' + head + struct.pack('>II', 0, 3) + b'abc'
+    assert list(BatchReader()(batch)) == [('/leg_1/wetness', b'abc')]
+
+
+@settings(max_examples=500)
+@given(contents, st.data())
+def test_bytes_that_are_no_batch_are_refused_or_read(content, data):
+    """A wrong size, a wrong count and missing bytes raise nothing but BadMessage."""
+    batch = bytearray(BatchWriter()([name for name, _ in content], [each for _, each in content]))
+    for _ in range(data.draw(st.integers(0, 3))):
+        batch[data.draw(st.integers(0, len(batch) - 1))] = data.draw(st.integers(0, 255))
+    read = BatchReader()
+    for _ in range(2):
+        try:
+            found = read(bytes(batch[: data.draw(st.integers(0, len(batch)))]))
+            assert all(isinstance(each, bytes) for _, each in found)
+        except BadMessage:
+            pass
+
+
+def test_missing_bytes_are_refused_also_when_the_layout_is_known():
+    write, read = BatchWriter(), BatchReader()
+    batch = write(['/a', '/b'], [b'12', b'3456'])
+    read(batch)
+    with pytest.raises(BadMessage, match='too few for 2 messages'):
+        read(batch[:-1])
+
+
+def test_a_message_that_comes_both_ways_is_new_once():
+    once = Once()
+    assert [once.is_new(b'a', alone=False), once.is_new(b'a', alone=True)] == [True, False]
+    assert [once.is_new(b'b', alone=True), once.is_new(b'b', alone=False)] == [True, False]
+    # Equal ones that come the same way are different messages.
+    assert [once.is_new(b'c', alone=True) for _ in range(3)] == [True] * 3
+    assert [once.is_new(b'c', alone=False) for _ in range(4)] == [False] * 3 + [True]
+
+
+class Pair:
+    """A simulator that is stepped, and a node of ros_pad that receives the forces of leg 1."""
+
+    def __init__(self, context, executor, until):
+        self.until, self.heard = until, []
+        values = {'scene': 'hexapod_patches', 'fidelity': 'L1', 'free_running': False}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        self.simulator = SimulatorNode(context=context, parameter_overrides=overrides)
+        self.receiver = Node('receiver', context=context)
+        self.other = Node('other', context=context)
+        for node in (self.simulator, self.receiver, self.other):
+            executor.add_node(node)
+        receive = Messages(self.receiver).receive
+        receive(topics.WRENCH, lambda *force: self.heard.append(force), ('wrench.force.z',), 1)
+        (self.wrench,) = self._publishers('/leg_1/wrench')
+        (self.batches,) = self._publishers('/batches/simulator')
+        until(lambda: self.wrench.get_subscription_count() == 1)
+        until(lambda: self.batches.get_subscription_count() == 1)
+
+    def _publishers(self, name):
+        return [each for each in self.simulator.publishers if each.topic_name == name]
+
+    def step(self, samples=1):
+        for _ in range(samples):
+            before = len(self.heard)
+            self.simulator.step()
+            self.until(lambda n=before: len(self.heard) > n, what='a force')
+
+
+@pytest.fixture
+def pair(context, executor, until):
+    return Pair(context, executor, until)
+
+
+def test_among_nodes_of_ros_pad_only_batches_travel(pair, monkeypatch):
+    alone = []
+    monkeypatch.setattr(type(pair.wrench), 'publish', published(alone, type(pair.wrench).publish))
+    pair.until(lambda: pair.step() or ('/leg_1/wrench' not in alone and not alone.clear()))
+    alone.clear()
+    pair.step(20)
+    assert set(alone) == {'/batches/simulator'}
+
+
+def published(names_sent, publish):
+    """Return a method for publishers that notes their topics."""
+
+    def watched(publisher, message):
+        names_sent.append(publisher.topic_name)
+        publish(publisher, message)
+
+    return watched
+
+
+def test_another_subscriber_gets_every_message_alone(pair):
+    """And the node of ros_pad does not get them twice, before, while and after it listens."""
+    pair.step(20)
+    seen = []
+    subscription = pair.other.create_subscription(WrenchStamped, 'leg_1/wrench', seen.append, 100)
+    pair.until(lambda: pair.wrench.get_subscription_count() == 2)
+    before = len(pair.heard)
+    pair.step(20)
+    pair.until(lambda: len(seen) == 20, what='all forces')
+    assert [each.wrench.force.z for each in seen] == [z for (z,) in pair.heard[before:]]
+    assert len(pair.heard) == before + 20
+    pair.other.destroy_subscription(subscription)
+    pair.until(lambda: pair.wrench.get_subscription_count() == 1)
+    pair.step(20)
+    assert len(pair.heard) == before + 40
+    assert len(seen) == 20
+
+
+def test_a_message_of_another_publisher_is_received_beside_batches(pair):
+    pair.step(3)
+    stranger = pair.other.create_publisher(WrenchStamped, 'leg_1/wrench', 10)
+    pair.until(lambda: stranger.get_subscription_count() == 1)
+    message = WrenchStamped()
+    message.wrench.force.z = 123.0
+    stranger.publish(message)
+    pair.until(lambda: (123.0,) in pair.heard)
+    assert len(pair.heard) == 4
+
+
+def test_a_second_subscription_of_a_receiver_gets_messages_too(pair):
+    """Of one's own node in a program with callbacks of one's own."""
+    seen = []
+    pair.receiver.create_subscription(WrenchStamped, 'leg_1/wrench', seen.append, 100)
+    pair.until(lambda: pair.wrench.get_subscription_count() == 2)
+    pair.step(5)
+    pair.until(lambda: len(seen) == 5, what='all forces')
+    assert len(pair.heard) == 5
+
+
+def test_a_batch_may_only_have_topics_of_its_node(context, executor, until):
+    """Whoever may send estimates may not move a valve."""
+    receiver, sender = (Node(name, context=context) for name in ('receiver', 'sender'))
+    for node in (receiver, sender):
+        executor.add_node(node)
+    pressures, loads = [], []
+    messages = Messages(receiver)
+    messages.receive(topics.PRESSURE_SETPOINT, pressures.append, ('fluid_pressure',), 1)
+    messages.receive(topics.CONTACT_LOAD, loads.append, ('data',), 1)
+    batches = topics.BATCHES['estimator'].publisher(sender)
+    until(lambda: batches.get_subscription_count() == 1)
+    content = [
+        ('/leg_1/pressure_setpoint', serialize_message(FluidPressure(fluid_pressure=2e5))),
+        ('/leg_1/contact_load', serialize_message(topics.CONTACT_LOAD.message(data=7.0))),
+    ]
+    batches.publish(BatchWriter()(*zip(*content, strict=True)))
+    batches.publish(b'\0\1\0\0\xff\xff\xff\xff')
+    until(lambda: loads and messages.refusals.counts)
+    assert (pressures, loads) == ([], [7.0])
+    assert dict(messages.refusals.counts) == {'/batches/estimator': 1}
