@@ -32,6 +32,7 @@ from ros_pad.simulation.scene import is_bench
 from ros_pad.trials import Trial
 from ros_pad.trials import label as labels
 from ros_pad.trials import loop
+from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines
 
 _DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -155,6 +156,20 @@ def _on_foot(scene: Scene, foot: Foot) -> Scene:
 def _run_in(
     folder: pathlib.Path, options: argparse.Namespace, scene: Scene, policy: str, level: str
 ) -> int:
+    policies = () if options.no_compare or policy != 'adaptive' else POLICIES
+    compared = [each for each in policies if each != policy]
+    with Others(scene, compared, options.seed, level).beside() as others:
+        return _run_beside(others, folder, options, scene, policy, level)
+
+
+def _run_beside(
+    others: Others,
+    folder: pathlib.Path,
+    options: argparse.Namespace,
+    scene: Scene,
+    policy: str,
+    level: str,
+) -> int:
     bag = None if options.no_ros else folder / 'bag'
     if bag is None:
         trial = _walk(scene, policy, options.seed, level, f'{policy}, without ROS')
@@ -167,13 +182,8 @@ def _run_in(
             f' pads vented, bag closed: {bag}',
             INTERRUPTED,
         )
-    others = () if options.no_compare or policy != 'adaptive' else POLICIES
     trial.settings['comparison'] = [
-        {'policy': other, **each.metrics.as_dict()}
-        for other in others
-        if other != policy
-        for each in [_walk(scene, other, options.seed, level, f'{other:8} on the same ground')]
-        if each.metrics is not None
+        {'policy': other, **metrics.as_dict()} for other, metrics in others.metrics(bar).items()
     ]
     if bag is not None:
         about = labels.label(

@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
-import threading
 from collections import deque
 from collections.abc import Callable
 from collections.abc import Generator
@@ -16,16 +13,13 @@ from concurrent.futures import FIRST_COMPLETED
 from concurrent.futures import CancelledError
 from concurrent.futures import Executor
 from concurrent.futures import Future
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures import wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager
 from contextlib import ExitStack
 from contextlib import closing
 from contextlib import contextmanager
-from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any
 from typing import TypeAlias
 
@@ -41,6 +35,8 @@ from ros_pad.trials.sweep.table import Results
 from ros_pad.trials.sweep.table import columns_of
 from ros_pad.trials.sweep.table import identity
 from ros_pad.trials.sweep.table import write_tables
+from ros_pad.workers import cores
+from ros_pad.workers import pool
 
 PATIENCE = 20.0  # s, longest wait for a Dask scheduler or its first worker
 CLUSTER_JOBS = 1000  # trials submitted to a Dask cluster at the same time
@@ -111,7 +107,7 @@ def run(
     jobs = {job.key: job for job in sweep.jobs()}
     with ExitStack() as stack:
         if scheduler is None:
-            used = _processes(workers or _cores())
+            used = _processes(workers or cores())
         else:
             used = stack.enter_context(_cluster(scheduler))
         results = stack.enter_context(Results(folder, identity(sweep), jobs))
@@ -197,40 +193,7 @@ def _row(job: Job, future: Future[Row]) -> Row:
 
 def _processes(count: int) -> Workers:
     # Twice as many jobs as processes, so that no process waits for work.
-    return Workers(lambda: _pool(count), 2 * count)
-
-
-@contextmanager
-def _pool(count: int) -> Iterator[Executor]:
-    context = multiprocessing.get_context('spawn')
-    alive, parent = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, context, _start_worker, (alive,))
-    try:
-        yield pool
-    finally:
-        parent.close()  # ends workers that still run
-        pool.shutdown(cancel_futures=True)
-        alive.close()
-
-
-def _start_worker(alive: Connection) -> None:
-    # Ctrl-C in a terminal reaches all processes; only the first process shall act on it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
-
-
-def _end_with_parent(alive: Connection) -> None:
-    """End this process when the first process closes its end of a pipe, or is killed."""
-    with suppress(EOFError, OSError):
-        alive.recv_bytes()
-    os._exit(1)
-
-
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, 'sched_getaffinity'):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return Workers(lambda: pool(count), 2 * count)
 
 
 # --- on a Dask cluster --------------------------------------------------------------------------

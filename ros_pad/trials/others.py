@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walk a scene with other policies, in processes beside this one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import MutableSequence
+from collections.abc import Sequence
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager
+from contextlib import contextmanager
+from typing import TypeAlias
+
+from ros_pad import workers
+from ros_pad.pace import Progress
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials import loop
+from ros_pad.trials.trial import Metrics
+
+SHORTEST = 15.0
+"""Duration of a scene, s, from which processes are worth their start."""
+
+Bar: TypeAlias = 'Callable[[str, float], AbstractContextManager[Progress]]'
+"""Shows the progress of a text up to a total."""
+
+_POLL = 0.1  # s, time between two looks at the progress of other processes
+_reached: MutableSequence[float]  # simulated time of each walk, s; only in other processes
+
+
+def _share(reached: MutableSequence[float]) -> None:
+    global _reached  # the only way to pass an array to a process of a pool
+    _reached = reached
+
+
+def _walk(scene: Scene, policy: str, seed: int, level: str, place: int) -> Metrics | None:
+    def progress(seconds: float) -> None:
+        _reached[place] = seconds
+
+    return loop.run(scene, policy, seed, level, progress).metrics
+
+
+class Others:
+    """Walks that may be under way in other processes."""
+
+    def __init__(self, scene: Scene, policies: Sequence[str], seed: int, level: str) -> None:
+        self._given = scene, seed, level
+        self._policies = policies
+        self._reached = workers.CONTEXT.Array('d', len(policies))
+        self._walks: dict[str, Future[Metrics | None]] = {}
+
+    @contextmanager
+    def beside(self) -> Iterator[Others]:
+        """Walk in other processes as far as there are cores, until the block ends."""
+        scene, seed, level = self._given
+        free = min(workers.cores() - 1, len(self._policies))
+        if free < 1 or scene.duration < SHORTEST:
+            yield self
+            return
+        with workers.pool(free, _share, self._reached) as executor:
+            self._walks = {
+                policy: executor.submit(_walk, scene, policy, seed, level, place)
+                for place, policy in enumerate(self._policies)
+            }
+            yield self
+
+    def metrics(self, bar: Bar) -> dict[str, Metrics]:
+        """Return the metrics of the walks by policy; what has not begun is walked here.
+
+        Raises
+        ------
+        PadError
+            As :func:`ros_pad.trials.loop.run`.
+        """
+        found: dict[str, Metrics | None] = {}
+        # From the last on: the others begin with the first.
+        for policy in reversed(self._policies):
+            walk = self._walks.get(policy)
+            if walk is None or walk.cancel():
+                found[policy] = self._here(policy, bar)
+        for place, policy in enumerate(self._policies):
+            if policy not in found:
+                try:
+                    found[policy] = self._awaited(policy, place, bar)
+                except BrokenProcessPool:  # killed, possibly for lack of memory
+                    found[policy] = self._here(policy, bar)
+        return {policy: each for policy in self._policies if (each := found[policy]) is not None}
+
+    def _here(self, policy: str, bar: Bar) -> Metrics | None:
+        scene, seed, level = self._given
+        with bar(_text(policy), scene.duration) as progress:
+            return loop.run(scene, policy, seed, level, progress).metrics
+
+    def _awaited(self, policy: str, place: int, bar: Bar) -> Metrics | None:
+        walk = self._walks[policy]
+        with bar(_text(policy), self._given[0].duration) as progress:
+            while not walk.done():
+                progress(self._reached[place])
+                time.sleep(_POLL)
+            return walk.result()
+
+
+def _text(policy: str) -> str:
+    return f'{policy:8} on the same ground'
