@@ -12,6 +12,7 @@ is at a multiple of its size.
 
 from __future__ import annotations
 
+import functools
 import operator
 import struct
 from collections.abc import Callable
@@ -38,6 +39,7 @@ _ORDERS = '><'  # by the byte-order flag of a message
 _SIZES = tuple(struct.Struct(order + 'I') for order in _ORDERS)
 _SIZE, _COUNT = '#', '[#]'  # ends of the paths of the size of a text and of the length of a list
 _MOST_PLANS = 64  # sizes of the text that are remembered
+_SHORT = 64  # bytes, of texts that are remembered
 
 _Field = tuple[str, str]  # path, such as twist.covariance[7], and format for struct
 
@@ -120,11 +122,8 @@ class FieldReader:
     @staticmethod
     def _decoded(values: tuple[Any, ...], place: int) -> tuple[Any, ...]:
         data = values[place]
-        try:
-            # Texts end with a zero byte, which is not part of them.
-            return *values[:place], data.removesuffix(b'\0').decode(), *values[place + 1 :]
-        except UnicodeDecodeError as error:
-            raise BadMessage(f'text {data[:20]!r} is not UTF-8: {error.reason}') from None
+        text = (_short_text if len(data) < _SHORT else _text)(data)
+        return *values[:place], text, *values[place + 1 :]
 
     def table(self, messages: Sequence[bytes]) -> np.ndarray:
         """Return numbers of many messages as an array.
@@ -282,6 +281,16 @@ class FieldWriter:
             When a value does not fit its field.
         """
         return self._pack(*self._pick(values + self._between))
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.removesuffix(b'\0').decode()  # texts end with a zero byte
+    except UnicodeDecodeError as error:
+        raise BadMessage(f'text {data[:20]!r} is not UTF-8: {error.reason}') from None
+
+
+_short_text = functools.lru_cache(maxsize=256)(_text)  # names of frames come again and again
 
 
 def field_of(message: Any, path: str) -> Any:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import struct
-from collections.abc import Iterable
 from collections.abc import Sequence
 
 from rclpy.serialization import deserialize_message
@@ -50,7 +49,7 @@ class BatchReader:
     def __init__(self) -> None:
         self._layouts: dict[bytes, list[tuple[str, slice]]] = {}  # by what comes before `data`
 
-    def __call__(self, batch: bytes) -> Iterable[tuple[str, bytes]]:
+    def __call__(self, batch: bytes) -> list[tuple[str, bytes]]:
         """Return the full name of the topic and the bytes of each message in a batch.
 
         Raises

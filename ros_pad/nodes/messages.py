@@ -77,21 +77,33 @@ _LOOK_PERIOD = 1.0  # s, between looks at the subscriptions of a topic that is p
 
 
 class Once:
-    """Tell which messages of a topic came before, once in a batch and once alone."""
+    """Drop messages that came before, once in a batch of a node and once alone."""
 
     def __init__(self) -> None:
-        self._alone: deque[bytes] = deque(maxlen=16)
-        self._in_batches: deque[bytes] = deque(maxlen=16)
+        self._batches: deque[list[tuple[str, bytes]]] = deque(maxlen=16)
+        self._alone: dict[str, deque[bytes]] = {}  # by topic
 
-    def is_new(self, data: bytes, alone: bool) -> bool:
-        """Return whether a message has not come the other way before."""
-        same, other = self._alone, self._in_batches
-        if not alone:
-            same, other = other, same
-        if data in other:
-            other.remove(data)
+    def of_batch(self, messages: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
+        """Return the messages of a batch that have not come alone: topics and bytes."""
+        if self._alone:
+            messages = [each for each in messages if not self._came_alone(*each)]
+        self._batches.append(messages)
+        return messages
+
+    def _came_alone(self, topic: str, data: bytes) -> bool:
+        before = self._alone.get(topic)
+        if before is None or data not in before:
             return False
-        same.append(data)
+        before.remove(data)
+        return True
+
+    def is_new(self, topic: str, data: bytes) -> bool:
+        """Return whether a message that has come alone has not come in a batch."""
+        for batch in self._batches:
+            if (topic, data) in batch:
+                batch.remove((topic, data))
+                return False
+        self._alone.setdefault(topic, deque(maxlen=16)).append(data)
         return True
 
 
@@ -103,7 +115,7 @@ class _Output:
         self.publish = publisher.publish
         self._node = node
         self._batches = batches.topic_name
-        self._count = publisher.handle.get_subscription_count
+        self.count = publisher.handle.get_subscription_count
         self._counts = (0, 0)
         self._wanted = False
         self._look_at = 0.0  # monotonic time of the next look
@@ -116,9 +128,7 @@ class _Output:
         receivers : int
             Number of subscriptions to the batches.
         """
-        count = self._count()
-        if not count:
-            return False
+        count = self.count()
         changed = (count, receivers) != self._counts
         if changed or (self._wanted and time.monotonic() > self._look_at):
             self._counts, self._look_at = (count, receivers), time.monotonic() + _LOOK_PERIOD
@@ -151,14 +161,15 @@ class Messages:
         self._node = node
         self._hooks = _HOOKS.get(node.context)
         self._takers: dict[str, dict[str, _Take]] = {}  # of batches, by source and topic
+        self._once: dict[str, Once] = {}  # by source
         self._batches: Publisher | None = None
         self._pending: list[tuple[_Output, bytes]] = []  # for the next batch
         self._write = BatchWriter()
 
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes a message or its bytes.
+        """Return a function that publishes the bytes of a message, or a message.
 
-        What goes out in batches is published by :meth:`flush`, which is called after each received
+        What goes out in batches, bytes alone, is published by :meth:`flush`, which is called after each received
         message and each tick.
         """
         publisher, hooks = topic.publisher(self._node, leg), self._hooks
@@ -166,13 +177,12 @@ class Messages:
         send: Callable[[Any], None] = publisher.publish
         if topic.source:
             send = self._collector(topic.source, publisher)
-        elif hooks is None:
+        if hooks is None:
             return send
 
         def publish(message: Any) -> None:
             data = message if isinstance(message, bytes) else serialize_message(message)
-            if hooks:
-                hooks.published(name, data)
+            hooks.published(name, data)
             send(data)
 
         return publish
@@ -181,8 +191,8 @@ class Messages:
         """Return a function that adds a message to the next batch."""
         if self._batches is None:
             self._batches = topics.BATCHES[source].publisher(self._node)
-        output, pending = _Output(self._node, publisher, self._batches), self._pending
-        return lambda data: pending.append((output, data))
+        output, add = _Output(self._node, publisher, self._batches), self._pending.append
+        return lambda data: add((output, data))
 
     def flush(self) -> None:
         """Publish the batch of the messages since the last call, then those that others want."""
@@ -196,7 +206,7 @@ class Messages:
             names = [output.name for output, _ in pending]
             self._batches.publish(self._write(names, [data for _, data in pending]))
         for output, data in pending:
-            if output.wanted(receivers):
+            if output.count() and output.wanted(receivers):
                 output.publish(data)
 
     def sender(
@@ -227,22 +237,18 @@ class Messages:
     ) -> None:
         """Call a function with some fields of each message, see :meth:`Topic.subscription`."""
         name = self._node.resolve_topic_name(topic.name(leg))
-        take, once = self._taker(topic, name, callback, paths), Once()
+        take, once = self._taker(topic, name, callback, paths), None
+        if topic.source:
+            if topic.source not in self._takers:
+                self._receive_batches(topic.source)
+            once = self._once[topic.source]
+            self._takers[topic.source][name] = take
 
         def take_alone(data: bytes) -> None:
-            if once.is_new(data, alone=True):
+            if once is None or once.is_new(name, data):
                 take(data)
                 self._finish()
 
-        def take_of_batch(data: bytes) -> None:
-            if once.is_new(data, alone=False):
-                take(data)
-
-        if topic.source:
-            if topic.source not in self._takers:
-                self._takers[topic.source] = {}
-                self._receive_batches(topic.source)
-            self._takers[topic.source][name] = take_of_batch
         topic.subscription(self._node, take_alone, leg, raw=True, on_mismatch=on_mismatch)
 
     def _taker(
@@ -269,7 +275,9 @@ class Messages:
         return take
 
     def _receive_batches(self, source: str) -> None:
-        batches, takers = topics.BATCHES[source], self._takers[source]
+        takers = self._takers[source] = {}
+        once = self._once[source] = Once()
+        batches = topics.BATCHES[source]
         name = self._node.resolve_topic_name(batches.name())
         read = BatchReader()
 
@@ -279,7 +287,7 @@ class Messages:
             except BadMessage as error:
                 self.refusals(name, error)
                 return
-            for topic, data in messages:
+            for topic, data in once.of_batch(messages):
                 if topic in takers:
                     takers[topic](data)
             self._finish()

@@ -150,20 +150,18 @@ class RecorderNode(Node):
         self._diagnostics, self._refusals = messages.output(topics.DIAGNOSTICS), messages.refusals
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
-        self._once: dict[str, Once] = {}  # by full name of a topic that batches have too
+        self._once: dict[str, Once] = {}  # by full name of a topic whose messages batches have
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
-            if topic.source:
-                self._once[full_name] = Once()
             if subscribes:
                 self._intake.add(full_name, topic.message, partial(self._profile, topic))
         if subscribes:
             for source, topic in topics.BATCHES.items():
                 names = [n for n, each in recorded.items() if each.source == source]
-                self._receive_batches(topic, set(map(self.resolve_topic_name, names)))
+                self._receive_batches(topic, list(map(self.resolve_topic_name, names)))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
@@ -201,7 +199,7 @@ class RecorderNode(Node):
 
     def _write_received(self, name: str, data: bytes, received_ns: int) -> None:
         self._received_ns = received_ns
-        if name not in self._once or self._once[name].is_new(data, alone=True):
+        if name not in self._once or self._once[name].is_new(name, data):
             self._writers[name](data)
 
     def record(self, name: str, data: bytes) -> None:
@@ -370,7 +368,9 @@ class RecorderNode(Node):
 
     def _receive_batches(self, topic: topics.Topic, names: Collection[str]) -> None:
         """Write the messages of these topics in the batches of a topic."""
-        name, read = self.resolve_topic_name(topic.name()), BatchReader()
+        name, read, once = self.resolve_topic_name(topic.name()), BatchReader(), Once()
+        self._once |= dict.fromkeys(names, once)
+        writers = {each: self._writers[each] for each in names}
 
         def write(batch: bytes) -> None:
             try:
@@ -378,9 +378,9 @@ class RecorderNode(Node):
             except BadMessage as error:
                 self._refusals(name, error)
                 return
-            for each, data in messages:
-                if each in names and self._once[each].is_new(data, alone=False):
-                    self._writers[each](data)
+            for each, data in once.of_batch(messages):
+                if each in writers:
+                    writers[each](data)
 
         self._writers[name] = write
         self._intake.add(name, topic.message, partial(self._profile, topic))

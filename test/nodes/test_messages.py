@@ -92,11 +92,15 @@ def test_missing_bytes_are_refused_also_when_the_layout_is_known():
 
 def test_a_message_that_comes_both_ways_is_new_once():
     once = Once()
-    assert [once.is_new(b'a', alone=False), once.is_new(b'a', alone=True)] == [True, False]
-    assert [once.is_new(b'b', alone=True), once.is_new(b'b', alone=False)] == [True, False]
+    batch = [('/a', b'1'), ('/b', b'2')]
+    assert once.of_batch([*batch]) == batch
+    assert [once.is_new('/a', b'1'), once.is_new('/b', b'1'), once.is_new('/b', b'2')] == [
+        False, True, False,
+    ]  # fmt: skip
+    assert once.of_batch([*batch, ('/b', b'1')]) == batch
     # Equal ones that come the same way are different messages.
-    assert [once.is_new(b'c', alone=True) for _ in range(3)] == [True] * 3
-    assert [once.is_new(b'c', alone=False) for _ in range(4)] == [False] * 3 + [True]
+    assert [once.is_new('/c', b'3') for _ in range(3)] == [True] * 3
+    assert once.of_batch([('/c', b'3')] * 4) == [('/c', b'3')]
 
 
 class Pair:
