@@ -169,8 +169,8 @@ class Messages:
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
         """Return a function that publishes the bytes of a message, or a message.
 
-        What goes out in batches, bytes alone, is published by :meth:`flush`, which is called after each received
-        message and each tick.
+        What goes out in batches must be bytes; :meth:`flush` publishes it, which is called after
+        each received message and each tick.
         """
         publisher, hooks = topic.publisher(self._node, leg), self._hooks
         name = publisher.topic_name

@@ -22,6 +22,7 @@ import re
 from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -235,13 +236,14 @@ def _described(bag: BagReader) -> dict[str, Any]:
         noted = json.loads(bag.custom_data.get(KEY, '{}'))
         source = str(noted.get('scene') or '')
         seed = int(noted.get('seed') or 0)
+        plan = FloorPlan(**noted['floor']) if noted.get('floor') else None
         ambient = float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default))
         return {
             'scene': pathlib.PurePath(source).stem,
             'policy': str(noted.get('policy') or ''),
             'fidelity': str(noted.get('fidelity') or ''),
             'seed': seed,
-            'floor': FloorPlan(**noted['floor']).build(seed) if noted.get('floor') else None,
+            'floor': partial(plan.build, seed) if plan else None,
             'metrics': Metrics(**noted['metrics']) if noted.get('metrics') else None,
             'settings': (noted.get('settings') or {})
             | {

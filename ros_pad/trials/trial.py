@@ -111,6 +111,25 @@ def _end(fault: dict[str, Any]) -> str:
     return 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
 
 
+class _OnDemand:
+    """A field that may be set to a function, which makes its value when it is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f'_{name}'
+
+    def __get__(self, owner: object, kind: type) -> Any:
+        if owner is None:
+            return None  # the default
+        value = getattr(owner, self._name)
+        if callable(value):
+            value = value()
+            setattr(owner, self._name, value)
+        return value
+
+    def __set__(self, owner: object, value: Any) -> None:
+        setattr(owner, self._name, value)
+
+
 @dataclass
 class Trial:
     """Time series and metrics of one trial.
@@ -141,7 +160,7 @@ class Trial:
         Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
         was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
     floor : Floor or None
-        The true floor; None where it is unknown.
+        The true floor; None where it is unknown. It may be given as a function that builds it.
     metrics : Metrics or None
         None where the true floor is unknown, as for a robot's bag.
     settings : dict
@@ -168,7 +187,7 @@ class Trial:
     slip_speed: np.ndarray
     slipping: np.ndarray
     dome: np.ndarray
-    floor: Floor | None = None
+    floor: Floor | None = _OnDemand()  # type: ignore[assignment]
     metrics: Metrics | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None
