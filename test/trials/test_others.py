@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walks in other processes give what they give in this one, however these processes end."""
+
+import contextlib
+import dataclasses
+import os
+import signal
+import time
+
+import pytest
+
+from ros_pad import workers
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials import loop
+from ros_pad.trials import others
+from ros_pad.trials.others import Others
+
+SCENE = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
+POLICIES = ('flat', 'dome', 'oracle')
+
+
+@pytest.fixture
+def shown():
+    """Return a bar that notes its texts and its last places."""
+    texts, places = [], {}
+
+    @contextlib.contextmanager
+    def bar(text, total):
+        texts.append(text.split()[0])
+        yield lambda place: places.__setitem__(text.split()[0], place)
+
+    bar.texts, bar.places = texts, places
+    return bar
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    monkeypatch.setattr(others, 'SHORTEST', 0.0)
+
+
+def expected():
+    return {policy: loop.run(SCENE, policy, 1, 'L1').metrics for policy in POLICIES}
+
+
+@pytest.mark.parametrize('cores', [1, 2, 8])
+def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, cores):
+    monkeypatch.setattr(workers, 'cores', lambda: cores)
+    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+        found = walks.metrics(shown)
+    assert found == expected()
+    assert list(found) == list(POLICIES)
+    assert sorted(shown.texts) == sorted(POLICIES)
+
+
+def test_what_has_not_begun_is_walked_here_meanwhile(monkeypatch, shown):
+    """With one other process, which takes longer to start than a walk takes."""
+    monkeypatch.setattr(workers, 'cores', lambda: 2)
+    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+        walks.metrics(shown)
+    assert shown.texts[0] == 'oracle'
+    assert shown.places['oracle'] > 0.0
+
+
+def test_a_process_that_is_killed_costs_no_result(monkeypatch, shown):
+    monkeypatch.setattr(workers, 'cores', lambda: 3)
+    opened = []
+    pool = workers.pool
+
+    @contextlib.contextmanager
+    def watched(*given):
+        with pool(*given) as executor:
+            opened.append(executor)
+            yield executor
+
+    monkeypatch.setattr(workers, 'pool', watched)
+    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+        for pid in list(opened[0]._processes):
+            os.kill(pid, signal.SIGKILL)
+        assert walks.metrics(shown) == expected()
+
+
+def test_the_end_of_the_block_ends_walks_under_way(monkeypatch):
+    monkeypatch.setattr(workers, 'cores', lambda: 2)
+    long = dataclasses.replace(SCENE, cycles=100_000)
+    with Others(long, ('flat',), 1, 'L1').beside() as walks:
+        deadline = time.monotonic() + 60.0
+        while not walks._reached[0] and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert walks._reached[0] > 0.0
+        left = time.monotonic()
+    assert time.monotonic() - left < 10.0
+
+
+def test_a_short_scene_starts_no_process(monkeypatch, shown):
+    monkeypatch.setattr(others, 'SHORTEST', 15.0)
+    monkeypatch.setattr(workers, 'pool', lambda *given: pytest.fail('a process was started'))
+    with Others(SCENE, ('flat',), 1, 'L1').beside() as walks:
+        assert list(walks.metrics(shown)) == ['flat']
