@@ -25,22 +25,23 @@ _COUNT = struct.Struct('<I')  # length of `data`, which its bytes follow
 _MOST_LAYOUTS = 64  # that are remembered
 
 
-class BatchWriter:
-    """Write batches; their topics and sizes are much the same from one to the next."""
+def batch_head(names: Sequence[str], sizes: Sequence[int]) -> bytes:
+    """Return the bytes of a batch that come before its messages.
 
-    def __init__(self) -> None:
-        self._heads: dict[tuple[tuple[str, ...], tuple[int, ...]], bytes] = {}
-
-    def __call__(self, names: Sequence[str], messages: Sequence[bytes]) -> bytes:
-        """Return the bytes of a batch of messages on the topics with these full names."""
-        sizes = tuple(map(len, messages))
-        key = tuple(names), sizes
-        head = self._heads.get(key)
-        if head is None:
-            if len(self._heads) == _MOST_LAYOUTS:
-                self._heads.clear()
-            head = self._heads[key] = _head(names, sizes)
-        return head + b''.join(messages)
+    Parameters
+    ----------
+    names : sequence of str
+        Full name of the topic of each message.
+    sizes : sequence of int
+        Number of bytes of each message.
+    """
+    starts = itertools.accumulate(sizes, initial=0)
+    dimensions = [
+        MultiArrayDimension(label=name, size=size, stride=start)
+        for name, size, start in zip(names, sizes, starts, strict=False)
+    ]
+    empty = serialize_message(UInt8MultiArray(layout=MultiArrayLayout(dim=dimensions)))
+    return bytes(empty[: -_COUNT.size]) + _COUNT.pack(sum(sizes))
 
 
 class BatchReader:
@@ -70,17 +71,6 @@ class BatchReader:
         return [(name, batch[place]) for name, place in found]
 
 
-def _head(names: Sequence[str], sizes: Sequence[int]) -> bytes:
-    """Return the bytes of a batch that come before its messages."""
-    starts = itertools.accumulate(sizes, initial=0)
-    dimensions = [
-        MultiArrayDimension(label=name, size=size, stride=start)
-        for name, size, start in zip(names, sizes, starts, strict=False)
-    ]
-    empty = serialize_message(UInt8MultiArray(layout=MultiArrayLayout(dim=dimensions)))
-    return bytes(empty[: -_COUNT.size]) + _COUNT.pack(sum(sizes))
-
-
 def _layout(batch: bytes) -> tuple[bytes, list[tuple[str, slice]]]:
     """Return the bytes of a batch that come before its messages, and the place of each message."""
     try:
@@ -89,7 +79,7 @@ def _layout(batch: bytes) -> tuple[bytes, list[tuple[str, slice]]]:
         raise BadMessage(f'{len(batch)} bytes are no batch: {error}') from None
     names = [each.label for each in layout.dim]
     sizes = [each.size for each in layout.dim]
-    head = batch[: len(_head(names, sizes))]
+    head = batch[: len(batch_head(names, sizes))]
     ends = itertools.accumulate(sizes, initial=len(head))
     places = [slice(start, end) for start, end in itertools.pairwise(ends)]
     return head, list(zip(names, places, strict=True))

@@ -16,10 +16,13 @@ from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from ros_pad.bags.fields import FieldReader
 from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.contact.resistance import Foot
+from ros_pad.errors import BadMessage
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import UnknownEncoding
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
@@ -30,6 +33,7 @@ from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import Outgoing
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -80,14 +84,17 @@ class _LegTopics:
         self._node = node
         self._leg = leg
         self._ambient = ambient
-        sender = node.messages.sender
-        self._slip = sender(topics.SLIP, _SLIP, leg)
-        self._slipping = sender(topics.SLIPPING, ('data',), leg)
-        self._friction = sender(topics.FRICTION, ('data',), leg)
-        self._margin = sender(topics.FRICTION_MARGIN, ('data',), leg)
-        self._load = sender(topics.CONTACT_LOAD, ('data',), leg)
-        self._position = sender(topics.CONTACT_POSITION, (*STAMP, *_POINT[:2]), leg)
-        self._wetness = sender(topics.WETNESS, ('data',), leg)
+        data, place = ('data',), Outgoing(topics.CONTACT_POSITION, (*STAMP, *_POINT[:2]), leg)
+        first = [Outgoing(topics.SLIP, _SLIP, leg)]
+        for topic in (
+            *(topics.SLIPPING, topics.FRICTION),
+            *(topics.FRICTION_MARGIN, topics.CONTACT_LOAD),
+        ):
+            first.append(Outgoing(topic, data, leg))
+        # The last one, because it triggers the controller.
+        wetness = Outgoing(topics.WETNESS, data, leg)
+        self._send = node.messages.joint_sender([*first, wetness])
+        self._send_placed = node.messages.joint_sender([*first, place, wetness])
         self._doubts = node.messages.output(topics.DOUBT, leg)
         for topic, callback, paths in (
             (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
@@ -149,15 +156,14 @@ class _LegTopics:
     def _publish(self, emission: Emission) -> None:
         estimate, stamp = emission.estimate, split(emission.stamp_ns)
         variance = estimate.slip_speed_sd**2
-        self._slip(*stamp, *estimate.slip_velocity, variance, variance)
-        self._slipping(estimate.slipping)
-        self._friction(estimate.friction_mean)
-        self._margin(estimate.margin)
-        self._load(emission.load)
-        if emission.position is not None:
-            self._position(*stamp, *emission.position)
-        # Published last, because it triggers the controller.
-        self._wetness(estimate.wet_probability)
+        values = (
+            *(*stamp, *estimate.slip_velocity, variance, variance, estimate.slipping),
+            *(estimate.friction_mean, estimate.margin, emission.load),
+        )
+        if emission.position is None:
+            self._send(*values, estimate.wet_probability)
+        else:
+            self._send_placed(*values, *stamp, *emission.position, estimate.wet_probability)
 
 
 class EstimatorNode(Node):
@@ -195,7 +201,26 @@ class EstimatorNode(Node):
         self._simulated: bool = self.get_parameter('use_sim_time').value
         self._since_ns, self._counted = self.get_clock().now().nanoseconds, 0
         self._health_pace = Pace(TICK_PERIOD_NS)
+        if not self._simulated:
+            self._hold(round(1e9 / values['publish_rate']))
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+
+    def _hold(self, period_ns: int) -> None:
+        """Process the samples of a period together, when the estimate of the period is due."""
+        wrenches = {self.resolve_topic_name(topics.WRENCH.name(leg)) for leg in self.legs}
+        read, pace = FieldReader(topics.WRENCH.message_type, STAMP), Pace(period_ns)
+
+        def due(messages: list[tuple[str, bytes]]) -> bool:
+            for topic, data in messages:
+                if topic in wrenches:
+                    try:
+                        sec, nanosec = read(data)
+                    except (BadMessage, UnknownEncoding):
+                        return True
+                    return pace.due(sec * 1_000_000_000 + nanosec)
+            return False
+
+        self.messages.hold(due)
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):

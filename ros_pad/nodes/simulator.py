@@ -22,6 +22,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import Outgoing
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import SCENE
 from ros_pad.nodes.parameters import SEED
@@ -152,27 +153,24 @@ class SimulatorNode(Node):
     def _advertise(self) -> None:
         """Create the publishers."""
         legs, joints = self.scene.legs, self.robot.joint_names
-        output, sender = self.messages.output, self.messages.sender
-        self._marker_output = output(topics.MARKERS) if self._markers else None
+        self._marker_output = self.messages.output(topics.MARKERS) if self._markers else None
         self._clock_output = None
         if self._simulated:
-            self._clock_output = sender(topics.CLOCK, topics.CLOCK.schema.values)
-        self._pose = sender(
-            topics.BODY_POSE,
-            (
-                *(*STAMP, 'pose.position.x', 'pose.position.y'),
-                *('pose.orientation.z', 'pose.orientation.w'),
-            ),
-        )
-        self._joints = None
-        if joints:
-            paths = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
-            still = {'name': joints, 'position': [0.0] * len(joints)}
-            self._joints = sender(topics.JOINT_STATES, paths, constants=still)
+            values = topics.CLOCK.schema.values
+            self._clock_output = self.messages.sender(topics.CLOCK, values)
         forces = (*(f'wrench.force.{axis}' for axis in 'xyz'), 'wrench.torque.z')
-        self._wrenches = [sender(topics.WRENCH, (*STAMP, *forces), leg) for leg in legs]
-        points = (*STAMP, *topics.POSITION.schema.values)
-        self._positions = [sender(topics.POSITION, points, leg) for leg in legs]
+        point = (*STAMP, *topics.POSITION.schema.values)
+        readings: list[Outgoing] = []
+        for leg in legs:
+            readings.append(Outgoing(topics.WRENCH, (*STAMP, *forces), leg))
+            readings.append(Outgoing(topics.POSITION, point, leg))
+        pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
+        readings.append(Outgoing(topics.BODY_POSE, (*STAMP, *pose)))
+        if joints:
+            angles = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
+            still = {'name': joints, 'position': [0.0] * len(joints)}
+            readings.append(Outgoing(topics.JOINT_STATES, angles, constants=still))
+        self._readings = self.messages.joint_sender(readings)
 
     def _pressure_callback(self, index: int) -> Any:
         def callback(sec: int, nanosec: int, pressure: float) -> None:
@@ -241,17 +239,16 @@ class SimulatorNode(Node):
         self.tick(samples)
         stamp_ns = self._stamp_ns()
         stamp = split(stamp_ns)
-        for index, ((force, point), moment) in enumerate(
-            zip(
-                self._sensors.read(self.robot), self._sensors.read_moments(self.robot), strict=True
-            )
+        readings: list[float] = []
+        for (force, point), moment in zip(
+            self._sensors.read(self.robot), self._sensors.read_moments(self.robot), strict=True
         ):
-            self._wrenches[index](*stamp, *force, moment or 0.0)
-            self._positions[index](*stamp, *point)
+            readings += (*stamp, *force, moment or 0.0, *stamp, *point)
         x, y, heading = self.robot.body
-        self._pose(*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
-        if self._joints:
-            self._joints(*stamp, *self.robot.joint_positions)
+        readings += (*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+        if self.robot.joint_names:
+            readings += (*stamp, *self.robot.joint_positions)
+        self._readings(*readings)
         if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
             assert self._marker_output
             self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))

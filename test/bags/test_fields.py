@@ -689,3 +689,14 @@ def test_numbers_of_every_kind_are_at_multiples_of_their_size():
         assert row == [float(expected[path]) for path in numbers]
     write = FieldWriter(message_type, numbers, {'text': 'κ'})
     assert write(*(content[path] for path in numbers)) == message_type.encode(message)
+
+
+def test_joined_writers_write_the_messages_one_after_another():
+    point = FieldWriter(of_type('geometry_msgs/msg/Point'), ('z', 'x'), {'y': 2.0})
+    flag = FieldWriter(of_type('std_msgs/msg/Bool'), ('data',))
+    text = FieldWriter(of_type('std_msgs/msg/String'), (), {'data': 'dome'})
+    joined = FieldWriter.joined([point, text, flag, point])
+    expected = [point(3.0, 1.0), text(), flag(True), point(6.0, 4.0)]
+    assert joined(3.0, 1.0, True, 6.0, 4.0) == b''.join(expected)
+    assert [each.size for each in (point, text, flag, point)] == [*map(len, expected)]
+    assert joined.size == sum(map(len, expected))

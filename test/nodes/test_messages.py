@@ -19,18 +19,26 @@ from std_msgs.msg import UInt8MultiArray
 from ros_pad.errors import BadMessage
 from ros_pad.nodes import topics
 from ros_pad.nodes.batches import BatchReader
-from ros_pad.nodes.batches import BatchWriter
+from ros_pad.nodes.batches import batch_head
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.messages import Once
 from ros_pad.nodes.simulator import SimulatorNode
 
 names = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=20)
+
+
+def batch_of(content):
+    """Return a batch of messages: topics and bytes."""
+    head = batch_head([name for name, _ in content], [len(data) for _, data in content])
+    return head + b''.join(data for _, data in content)
+
+
 contents = st.lists(st.tuples(names, st.binary(max_size=40)), max_size=8)
 
 
 @given(contents)
 def test_rclpy_reads_a_batch_as_an_ordinary_message(content):
-    batch = BatchWriter()([name for name, _ in content], [data for _, data in content])
+    batch = batch_of(content)
     message = deserialize_message(batch, UInt8MultiArray)
     assert bytes(message.data) == b''.join(data for _, data in content)
     start = 0
@@ -43,10 +51,9 @@ def test_rclpy_reads_a_batch_as_an_ordinary_message(content):
 @given(st.lists(contents, max_size=5))
 def test_a_batch_is_read_as_it_was_written(batches):
     """Repeated, because layouts are remembered."""
-    write, read = BatchWriter(), BatchReader()
+    read = BatchReader()
     for content in batches * 2:
-        found = read(write([name for name, _ in content], [data for _, data in content]))
-        assert list(found) == content
+        assert read(batch_of(content)) == content
 
 
 @given(contents)
@@ -70,7 +77,7 @@ def test_a_big_endian_batch_is_read():
 @given(contents, st.data())
 def test_bytes_that_are_no_batch_are_refused_or_read(content, data):
     """A wrong size, a wrong count and missing bytes raise nothing but BadMessage."""
-    batch = bytearray(BatchWriter()([name for name, _ in content], [each for _, each in content]))
+    batch = bytearray(batch_of(content))
     for _ in range(data.draw(st.integers(0, 3))):
         batch[data.draw(st.integers(0, len(batch) - 1))] = data.draw(st.integers(0, 255))
     read = BatchReader()
@@ -83,8 +90,7 @@ def test_bytes_that_are_no_batch_are_refused_or_read(content, data):
 
 
 def test_missing_bytes_are_refused_also_when_the_layout_is_known():
-    write, read = BatchWriter(), BatchReader()
-    batch = write(['/a', '/b'], [b'12', b'3456'])
+    read, batch = BatchReader(), batch_of([('/a', b'12'), ('/b', b'3456')])
     read(batch)
     with pytest.raises(BadMessage, match='too few for 2 messages'):
         read(batch[:-1])
@@ -210,7 +216,7 @@ def test_a_batch_may_only_have_topics_of_its_node(context, executor, until):
         ('/leg_1/pressure_setpoint', serialize_message(FluidPressure(fluid_pressure=2e5))),
         ('/leg_1/contact_load', serialize_message(topics.CONTACT_LOAD.message(data=7.0))),
     ]
-    batches.publish(BatchWriter()(*zip(*content, strict=True)))
+    batches.publish(batch_of(content))
     batches.publish(b'\0\1\0\0\xff\xff\xff\xff')
     until(lambda: loads and messages.refusals.counts)
     assert (pressures, loads) == ([], [7.0])
