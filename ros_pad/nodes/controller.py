@@ -132,7 +132,7 @@ class _LegTopics:
         self.stage.pressure(pressure - self._node.ambient)
 
     def _on_wetness(self, wet_probability: float) -> None:
-        now_ns = self._node.get_clock().now().nanoseconds
+        now_ns = self._node.messages.now_ns()
         decision = self.stage.estimate(now_ns * 1e-9, wet_probability)
         refusal = self._node.controller.refusals.get(self.leg)
         if refusal:

@@ -199,7 +199,7 @@ class EstimatorNode(Node):
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
         self._simulated: bool = self.get_parameter('use_sim_time').value
-        self._since_ns, self._counted = self.get_clock().now().nanoseconds, 0
+        self._since_ns, self._counted = self.messages.now_ns(), 0
         self._health_pace = Pace(TICK_PERIOD_NS)
         if not self._simulated:
             self._hold(round(1e9 / values['publish_rate']))

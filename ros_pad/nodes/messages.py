@@ -41,6 +41,7 @@ from ros_pad.nodes import topics
 from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.batches import batch_head
 from ros_pad.nodes.refusals import Refusals
+from ros_pad.nodes.stamps import clock_of
 from ros_pad.nodes.topics import Topic
 
 
@@ -182,10 +183,13 @@ class Messages:
     ----------
     refusals : Refusals
         Counts of messages that could not be read.
+    now_ns : callable
+        Returns the node's time, ns.
     """
 
     def __init__(self, node: Node) -> None:
         self.refusals = Refusals(node)
+        self.now_ns = clock_of(node)
         self._node = node
         self._hooks = _HOOKS.get(node.context)
         self._takers: dict[str, dict[str, _Take]] = {}  # of batches, by source and topic
@@ -398,11 +402,10 @@ class Messages:
 
             self.receive(topics.CLOCK, take, topics.CLOCK.schema.values)
         else:
-            clock = self._node.get_clock()
 
             def tick() -> None:
                 self._take_held()
-                callback(clock.now().nanoseconds)
+                callback(self.now_ns())
                 self.flush()
 
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)

@@ -332,7 +332,7 @@ class RegulatorNode(LifecycleNode):
         channel = self.channels.get(leg)
         if channel is None or not channel.active:
             return
-        now_ns = self.get_clock().now().nanoseconds
+        now_ns = self.messages.now_ns()
         elapsed_ns = self._elapsed(now_ns)
         # Many set-points of one leg may delay the tick that vents the pad of another leg.
         for each in self.channels.values():

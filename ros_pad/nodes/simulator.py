@@ -230,7 +230,7 @@ class SimulatorNode(Node):
 
     def _stamp_ns(self) -> int:
         """Return the time for stamps, ns."""
-        return self.time_ns if self._simulated else self.get_clock().now().nanoseconds
+        return self.time_ns if self._simulated else self.messages.now_ns()
 
     def step(self, samples: int = 1) -> None:
         """Advance the robot by some samples, and publish the readings of its sensors."""
