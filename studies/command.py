@@ -48,7 +48,7 @@ def parser(study: str, doc: str | None) -> argparse.ArgumentParser:
     part = argparse.ArgumentParser(
         prog=f'python -m studies {study}',
         # Lines of a paragraph are joined, those of a list are not.
-        description='\n\n'.join(re.sub(r'\n(?!- )', ' ', each) for each in paragraphs),
+        description='\n\n'.join(re.sub(r'\n(?!- )\s*', ' ', each) for each in paragraphs),
         formatter_class=Help,
     )
     part.add_argument('--json', action='store_true', help='print JSON in place of a table')

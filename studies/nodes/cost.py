@@ -5,6 +5,8 @@ Another checkout of ros_pad with its own .venv, given by --against, is measured 
 one. The ratios are those of the medians; processor times are those of all threads and children.
 
 - live: five processes, six legs, and a floor: a bare publisher and one bare subscriber
+- awake: the same while work of lowest priority keeps the cores awake, as other programs of a robot
+  do; a core that sleeps between two messages finds its caches cold, and takes longer
 - trial: pad run hexapod_patches on nodes, from start to report
 - reading: the trial in a recorded bag, decoded to arrays
 - loop: the closed loop without ROS on L2, per sample
@@ -13,6 +15,7 @@ one. The ratios are those of the medians; processor times are those of all threa
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import os
 import pathlib
@@ -24,6 +27,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Sequence
 
 import matplotlib as mpl
@@ -45,6 +49,7 @@ from studies.machine import processor_time
 
 UNITS = {
     'live': 'processor time of all processes per second of wall time (s/s)',
+    'awake': 'the same while the cores stay awake (s/s)',
     'trial': 'processor time of one run of the command (s)',
     'reading': 'processor time of reading one bag (s)',
     'loop': 'processor time of one sample (s)',
@@ -89,6 +94,26 @@ times = [time for _, _, time in BagReader(sys.argv[1]).messages(['/leg_1/wrench'
 last = [time for time in times if time > times[-1] - 8e9]
 print((len(last) - 1) / (last[-1] - last[0]) * 1e9)
 """
+
+
+_AWAKE = """
+import os
+os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+while True:
+    pass
+"""
+
+
+@contextlib.contextmanager
+def _awake() -> Iterator[None]:
+    """Keep all cores awake."""
+    loops = [subprocess.Popen([sys.executable, '-c', _AWAKE]) for _ in range(os.cpu_count() or 1)]
+    try:
+        yield
+    finally:
+        for each in loops:
+            each.kill()
+            each.wait()
 
 
 def _environment() -> dict[str, str]:
@@ -205,6 +230,7 @@ def _measures(
     """Return a function for each part, which measures it in a checkout."""
     return {
         'live': lambda checkout: live(checkout, options.seconds, options.rate),
+        'awake': lambda checkout: live(checkout, options.seconds, options.rate),
         'trial': lambda checkout: trial(checkout, options.cycles),
         'reading': lambda checkout: _used(checkout, _READING, bag),
         'loop': lambda checkout: _used(checkout, _LOOP, options.cycles),
@@ -226,10 +252,11 @@ def _measured(options: argparse.Namespace, bag: str) -> Result:
     rows: dict[str, dict[str, list[dict[str, float]]]] = {}
     for part in command.each(options.parts * options.repeats, 'nodes', 'part'):
         of_part = rows.setdefault(part, {})
-        for name, checkout in checkouts.items():
-            of_part.setdefault(name, []).append(measures[part](checkout))
-        if part == 'live':
-            of_part.setdefault('floor', []).append(floor(options.seconds))
+        with _awake() if part == 'awake' else contextlib.nullcontext():
+            for name, checkout in checkouts.items():
+                of_part.setdefault(name, []).append(measures[part](checkout))
+            if part in ('live', 'awake'):
+                of_part.setdefault('floor', []).append(floor(options.seconds))
     return {
         part: {name: _medians(each) for name, each in of_part.items()}
         for part, of_part in rows.items()
@@ -264,7 +291,7 @@ def chart(rows: dict[str, dict[str, float]]) -> Figure:
     """Draw the live processor time by process, as bars end to end."""
     colours = (BLUE, ORANGE, SKY, GREEN, PURPLE)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 2.4), layout='constrained')
+        figure = Figure(figsize=(7.0, 1.2 + 0.4 * len(rows)), layout='constrained')
         axes = figure.subplots()
         for row, values in enumerate(rows.values()):
             left = 0.0
@@ -300,7 +327,12 @@ def main(words: Sequence[str]) -> int:
     options = parser.parse_args(words)
     with tempfile.TemporaryDirectory() as folder:
         result = _measured(options, f'{folder}/bag')
-    pictures = {'nodes_live': chart(result['live'])} if 'live' in result else {}
+    drawn = {
+        f'{name}, awake' if part == 'awake' else name: values
+        for part in ('live', 'awake')
+        for name, values in result.get(part, {}).items()
+    }
+    pictures = {'nodes_live': chart(drawn)} if drawn else {}
     document = {'repeats': options.repeats, 'cycles': options.cycles, 'medians': result}
     kept = command.write(options.out, 'nodes', document, pictures)
     command.show(options, kept, table(result))

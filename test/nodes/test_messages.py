@@ -4,6 +4,8 @@
 import struct
 
 import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
 from hypothesis import settings
@@ -13,6 +15,8 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Float64
+from std_msgs.msg import Header
 from std_msgs.msg import MultiArrayDimension
 from std_msgs.msg import UInt8MultiArray
 
@@ -20,8 +24,12 @@ from ros_pad.errors import BadMessage
 from ros_pad.nodes import topics
 from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.batches import batch_head
+from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.messages import Hooks
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.messages import Once
+from ros_pad.nodes.messages import hook
+from ros_pad.nodes.messages import unhook
 from ros_pad.nodes.simulator import SimulatorNode
 
 names = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=20)
@@ -221,3 +229,79 @@ def test_a_batch_may_only_have_topics_of_its_node(context, executor, until):
     until(lambda: loads and messages.refusals.counts)
     assert (pressures, loads) == ([], [7.0])
     assert dict(messages.refusals.counts) == {'/batches/estimator': 1}
+
+
+def test_batches_wait_in_order_until_one_is_due_or_something_else_comes(context, executor, until):
+    receiver, sender = (Node(name, context=context) for name in ('receiver', 'sender'))
+    for node in (receiver, sender):
+        executor.add_node(node)
+    heard, seen = [], []
+    messages = Messages(receiver)
+    messages.receive(topics.CONTACT_LOAD, heard.append, ('data',), 1)
+    messages.receive(topics.PRESSURE_SETPOINT, heard.append, ('fluid_pressure',), 1)
+
+    def due(content):
+        (value,) = (deserialize_message(data, Float64).data for _, data in content)
+        seen.append(value)
+        return value == 3.0
+
+    messages.hold(due)
+    batches = topics.BATCHES['estimator'].publisher(sender)
+    setpoint = topics.PRESSURE_SETPOINT.publisher(sender, 1)
+    until(lambda: batches.get_subscription_count() and setpoint.get_subscription_count())
+
+    def send(value):
+        count = len(seen)
+        batches.publish(
+            batch_of([('/leg_1/contact_load', serialize_message(Float64(data=value)))])
+        )
+        until(lambda: len(seen) > count, what='a batch')
+
+    for value in (1.0, 2.0):
+        send(value)
+    assert heard == []
+    send(3.0)
+    assert heard == [1.0, 2.0, 3.0]
+    send(4.0)
+    setpoint.publish(FluidPressure(fluid_pressure=5.0))
+    until(lambda: 5.0 in heard)
+    assert heard == [1.0, 2.0, 3.0, 4.0, 5.0]
+    for value in range(10, 60):
+        send(float(value))
+    assert heard[5:] == [float(value) for value in range(10, 60)]  # no more than these wait
+    send(60.0)
+    messages.on_tick(0.01, lambda now_ns: None)
+    until(lambda: heard[-1] == 60.0, what='the tick')
+
+
+def test_samples_that_wait_give_the_same_estimates(context):
+    """In batches, of which an estimator in real time processes those of a period together."""
+
+    def estimates(alone):
+        sent = []
+        hook(context, Hooks(lambda name, data: sent.append((name, data)), lambda: None))
+        node = EstimatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
+        unhook(context)
+        by_name = {each.topic_name: each.callback for each in node.subscriptions}
+        for number in range(60):
+            stamp = Time(sec=9, nanosec=4_000_000 * number)
+            force = WrenchStamped(header=Header(stamp=stamp))
+            force.wrench.force.x, force.wrench.force.z = 0.02 * number, 7.0 + 0.01 * (number % 3)
+            place = PointStamped(header=Header(stamp=stamp))
+            place.point.x = 1e-4 * (number % 5)
+            air = FluidPressure(fluid_pressure=101325.0 + 1e3 * number)
+            content = [('/leg_1/wrench', force), ('/leg_1/position', place)]
+            content = [(name, serialize_message(each)) for name, each in content]
+            pressure = ('/leg_1/pressure', serialize_message(air))
+            if alone:
+                for name, data in [*content, pressure]:
+                    by_name[name](data)
+            else:
+                by_name['/batches/simulator'](batch_of(content))
+                by_name['/batches/regulator'](batch_of([pressure]))
+        node.destroy_node()
+        return sent
+
+    together = estimates(alone=False)
+    assert len(together) > 60
+    assert together == estimates(alone=True)
