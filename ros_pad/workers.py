@@ -16,6 +16,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
+from ros_pad.signals import children_spared
+
 CONTEXT = multiprocessing.get_context('spawn')
 """Makes what the processes share."""
 
@@ -44,6 +46,9 @@ def pool(
     """
     alive, parent = CONTEXT.Pipe(duplex=False)
     executor = ProcessPoolExecutor(count, CONTEXT, _start, (alive, start, *given))
+    with children_spared():
+        for _ in range(count):
+            executor.submit(int)  # starts a process
     try:
         yield executor
     finally:
@@ -55,6 +60,7 @@ def pool(
 def _start(alive: Connection, start: Callable[..., object] | None, *given: Any) -> None:
     # Ctrl-C in a terminal reaches all processes; only the first process shall act on it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
     if start:
         start(*given)

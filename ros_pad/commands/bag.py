@@ -185,6 +185,8 @@ def _print(found: Mapping[str, Any]) -> None:
         rate, gap = _in('Hz', topic['rate_hz']), _in('s', topic['longest_gap_s'])
         lost = f'  {found["lost"][name]} lost' if name in found['lost'] else ''
         print(f'{topic["messages"]:8d}  {rate:>11}  {gap:>11}  {name}  {topic["type"]}{lost}')
+    for name in sorted(set(found['lost']) - set(found['topics'])):
+        print(f'{found["lost"][name]} batches lost: {name}')
 
 
 def _in(unit: str, value: float | None) -> str:

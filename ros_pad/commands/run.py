@@ -158,7 +158,9 @@ def _run_in(
 ) -> int:
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
-    with Others(scene, compared, options.seed, level).beside() as others:
+    others = Others(scene, compared, options.seed, level)
+    # Real regulators may wait for set-points: nothing else takes their time.
+    with contextlib.nullcontext() if options.live else others.beside():
         return _run_beside(others, folder, options, scene, policy, level)
 
 

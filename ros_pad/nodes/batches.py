@@ -23,6 +23,8 @@ from ros_pad.errors import BadMessage
 
 _COUNT = struct.Struct('<I')  # length of `data`, which its bytes follow
 _MOST_LAYOUTS = 64  # that are remembered
+_MOST_MESSAGES = 1000
+_LARGEST = 262_144  # bytes; a batch of six legs has 3,000
 
 
 def batch_head(names: Sequence[str], sizes: Sequence[int]) -> bytes:
@@ -56,7 +58,7 @@ class BatchReader:
         Raises
         ------
         BadMessage
-            When these are not the bytes of a batch.
+            When these are not the bytes of a batch, or it is larger than any of a robot.
         """
         found = next(
             (each for head, each in self._layouts.items() if batch.startswith(head)), None
@@ -73,6 +75,11 @@ class BatchReader:
 
 def _layout(batch: bytes) -> tuple[bytes, list[tuple[str, slice]]]:
     """Return the bytes of a batch that come before its messages, and the place of each message."""
+    if len(batch) > _LARGEST:
+        raise BadMessage(f'{len(batch)} bytes are too many: at most {_LARGEST} are allowed')
+    count = int.from_bytes(batch[4:8], 'little' if batch[1:2] == b'\1' else 'big')
+    if count > _MOST_MESSAGES:
+        raise BadMessage(f'{count} messages are too many: at most {_MOST_MESSAGES} are allowed')
     try:
         layout = deserialize_message(batch, UInt8MultiArray).layout
     except Exception as error:  # rclpy raises various ones

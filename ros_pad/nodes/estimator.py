@@ -206,7 +206,10 @@ class EstimatorNode(Node):
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def _hold(self, period_ns: int) -> None:
-        """Process the samples of a period together, when the estimate of the period is due."""
+        """Process the samples of a period together, when the estimate of the period is due.
+
+        A leg without a sample at that moment has its estimate with the next ones, a period later.
+        """
         wrenches = {self.resolve_topic_name(topics.WRENCH.name(leg)) for leg in self.legs}
         read, pace = FieldReader(topics.WRENCH.message_type, STAMP), Pace(period_ns)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Take the messages of many topics in batches, with the times at which they were received.
+"""Take the messages of many topics together, with the times at which they were received.
 
 An executor calls a function for each message, which takes twice as long. rclpy's EventsExecutor
 gives no times, and may hang when the middleware reports lost messages (rmw_fastrtps #890), so that
@@ -29,6 +29,7 @@ class _Source:
 
     subscription: Subscription
     last: int | None = None
+    batches: str = ''  # topic on which the same messages come in batches
 
 
 class Intake:
@@ -56,7 +57,11 @@ class Intake:
         return [*self._replaced, *(each.subscription for each in self._sources.values())]
 
     def add(
-        self, name: str, message: type, profile: Callable[[list[QoSProfile]], QoSProfile]
+        self,
+        name: str,
+        message: type,
+        profile: Callable[[list[QoSProfile]], QoSProfile],
+        batches: str = '',
     ) -> None:
         """Subscribe to a topic.
 
@@ -69,8 +74,12 @@ class Intake:
         profile : callable
             Returns the QoS to request from the QoS that publishers are known to offer. It is
             called again when a publisher offers less.
+        batches : str
+            Full name of the topic on which the same messages may come in batches. While it has a
+            publisher, no loss is counted here.
         """
         self._subscribe(name, message, profile([]), profile)
+        self._sources[name].batches = batches
 
     def _subscribe(
         self,
@@ -91,7 +100,8 @@ class Intake:
             message, name, _unused, requested, raw=True,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=adapt),
         )  # fmt: skip
-        self._sources[name] = _Source(subscription)
+        before = self._sources.get(name)
+        self._sources[name] = _Source(subscription, batches=before.batches if before else '')
 
     def take(self, write: Callable[[str, bytes, int], None]) -> None:
         """Hand over topic, bytes and time of receipt, ns, of all messages, in order of receipt."""
@@ -119,6 +129,8 @@ class Intake:
         """Count the messages that are missing before the one with this number."""
         last, source.last = source.last, number
         if number is None or last is None or number <= last + 1:
+            return
+        if source.batches and self._node.count_publishers(source.batches):
             return
         # Each publisher has numbers of its own.
         if self._node.count_publishers(name) == 1:

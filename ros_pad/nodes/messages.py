@@ -73,41 +73,48 @@ def unhook(context: Context) -> None:
     _HOOKS.pop(context, None)
 
 
-_Take = Callable[[bytes], None]
+_Take = Callable[[bytes], bool]
+"""Processes a message; returns False when it cannot be read."""
 
 _MOST_HEADS = 64  # of batches, that are remembered
 _MOST_HELD = 50  # batches that wait at most
-_LOOK_PERIOD = 1.0  # s, between looks at the subscriptions of a topic that is published
+_LOOK_PERIOD = 1.0  # s, between looks at the subscriptions of a topic that others want
+_LONG_PERIOD = 10.0  # s, the same where none do
+_MEMORY = 1.0  # s, in which a message comes both ways
 
 
 class Once:
     """Drop messages that came before, once in a batch of a node and once alone."""
 
     def __init__(self) -> None:
-        self._batches: deque[list[tuple[str, bytes]]] = deque(maxlen=16)
-        self._alone: dict[str, deque[bytes]] = {}  # by topic
+        self._batches: deque[tuple[float, list[tuple[str, bytes]]]] = deque(maxlen=16)
+        self._alone: deque[tuple[float, tuple[str, bytes]]] = deque(maxlen=64)
 
     def of_batch(self, messages: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
         """Return the messages of a batch that have not come alone: topics and bytes."""
+        now = time.monotonic()
+        while self._alone and self._alone[0][0] < now - _MEMORY:
+            self._alone.popleft()
         if self._alone:
-            messages = [each for each in messages if not self._came_alone(*each)]
-        self._batches.append(messages)
+            messages = [each for each in messages if not self._came_alone(each)]
+        self._batches.append((now, [*messages]))
         return messages
 
-    def _came_alone(self, topic: str, data: bytes) -> bool:
-        before = self._alone.get(topic)
-        if before is None or data not in before:
-            return False
-        before.remove(data)
-        return True
+    def _came_alone(self, message: tuple[str, bytes]) -> bool:
+        for before in self._alone:
+            if before[1] == message:
+                self._alone.remove(before)
+                return True
+        return False
 
     def is_new(self, topic: str, data: bytes) -> bool:
         """Return whether a message that has come alone has not come in a batch."""
-        for batch in self._batches:
-            if (topic, data) in batch:
+        now = time.monotonic()
+        for at, batch in self._batches:
+            if at > now - _MEMORY and (topic, data) in batch:
                 batch.remove((topic, data))
                 return False
-        self._alone.setdefault(topic, deque(maxlen=16)).append(data)
+        self._alone.append((now, (topic, data)))
         return True
 
 
@@ -119,31 +126,36 @@ class _Output:
         self.publish = publisher.publish
         self._node = node
         self._batches = batches.topic_name
-        self.count = publisher.handle.get_subscription_count
+        self._count = publisher.handle.get_subscription_count
         self._counts = (0, 0)
         self._wanted = False
         self._look_at = 0.0  # monotonic time of the next look
 
-    def wanted(self, receivers: int) -> bool:
+    def wanted(self, receivers: int, now: float) -> bool:
         """Return whether a node that does not receive batches subscribes to the topic.
 
         Parameters
         ----------
         receivers : int
             Number of subscriptions to the batches.
+        now : float
+            Monotonic time, s.
         """
-        count = self.count()
-        changed = (count, receivers) != self._counts
-        if changed or (self._wanted and time.monotonic() > self._look_at):
-            self._counts, self._look_at = (count, receivers), time.monotonic() + _LOOK_PERIOD
-            self._wanted = self._has_others(count)
+        counts = self._count(), receivers
+        if counts != self._counts or now >= self._look_at:
+            again = counts == self._counts
+            self._counts = counts
+            self._wanted = counts[0] > 0 and self._has_others(counts[0])
+            # A first look may see a graph that is older than the counts.
+            self._look_at = now + (_LONG_PERIOD if again and not self._wanted else _LOOK_PERIOD)
         return self._wanted
 
     def _has_others(self, count: int) -> bool:
         owners = Counter(map(_owner, self._node.get_subscriptions_info_by_topic(self.name)))
         receivers = map(_owner, self._node.get_subscriptions_info_by_topic(self._batches))
-        # The graph may not yet know all that DDS has connected.
-        return owners.total() < count or owners != Counter(set(receivers) & set(owners))
+        # The graph may not yet know all that DDS has connected, nor all names.
+        unknown = owners.total() < count or any('UNKNOWN' in name for _, _, name in owners)
+        return unknown or owners != Counter(set(receivers) & set(owners))
 
 
 def _owner(peer: TopicEndpointInfo) -> tuple[bytes, str, str]:
@@ -192,9 +204,9 @@ class Messages:
         self.now_ns = clock_of(node)
         self._node = node
         self._hooks = _HOOKS.get(node.context)
-        self._takers: dict[str, dict[str, _Take]] = {}  # of batches, by source and topic
+        self._takers: dict[str, dict[str, list[_Take]]] = {}  # by source and topic
         self._once: dict[str, Once] = {}  # by source
-        self._held: list[tuple[dict[str, _Take], list[tuple[str, bytes]]]] = []
+        self._held: list[tuple[dict[str, list[_Take]], list[tuple[str, bytes]]]] = []
         self._due: Callable[[list[tuple[str, bytes]]], bool] = lambda messages: True
         self._batches: Publisher | None = None
         self._pending: list[tuple[_Part, bytes]] = []  # for the next batch
@@ -272,13 +284,13 @@ class Messages:
         assert self._batches is not None
         pending = [*self._pending]
         self._pending.clear()
-        receivers = self._batches.handle.get_subscription_count()
+        receivers, now = self._batches.handle.get_subscription_count(), time.monotonic()
         if receivers:
             head = self._head(tuple(part for part, _ in pending))
             self._batches.publish(head + b''.join([data for _, data in pending]))
         for part, data in pending:
             for place, output in enumerate(part.outputs):
-                if output.count() and output.wanted(receivers):
+                if output.wanted(receivers, now):
                     output.publish(data[part.places[place]])
 
     def _head(self, parts: tuple[_Part, ...]) -> bytes:
@@ -302,17 +314,28 @@ class Messages:
     ) -> None:
         """Call a function with some fields of each message, see :meth:`Topic.subscription`."""
         name = self._node.resolve_topic_name(topic.name(leg))
-        take, once = self._taker(topic, name, callback, paths), None
-        if topic.source:
-            if topic.source not in self._takers:
-                self._receive_batches(topic.source)
-            once = self._once[topic.source]
-            self._takers[topic.source][name] = take
+        take = self._taker(topic, name, callback, paths)
+        if not topic.source:
+
+            def take_only(data: bytes) -> None:
+                take(data)
+                self._finish()
+
+            topic.subscription(self._node, take_only, leg, raw=True, on_mismatch=on_mismatch)
+            return
+        if topic.source not in self._takers:
+            self._receive_batches(topic.source)
+        takers, once = self._takers[topic.source], self._once[topic.source]
+        if name in takers:  # topics of two legs may be remapped to one
+            takers[name].append(take)
+            return
+        takers[name] = [take]
 
         def take_alone(data: bytes) -> None:
-            if once is None or once.is_new(name, data):
+            if once.is_new(name, data):
                 self._take_held()
-                take(data)
+                for each in takers[name]:
+                    each(data)
                 self._finish()
 
         topic.subscription(self._node, take_alone, leg, raw=True, on_mismatch=on_mismatch)
@@ -323,7 +346,7 @@ class Messages:
         """Return a function that reads a message and calls another one with its fields."""
         read, refuse = FieldReader(topic.message_type, paths), self.refusals
 
-        def take(data: bytes) -> None:
+        def take(data: bytes) -> bool:
             try:
                 values = read(data)
             except UnknownEncoding:  # only the middleware knows it
@@ -332,17 +355,19 @@ class Messages:
                     values = tuple(field_of(message, path) for path in paths)
                 except Exception as error:  # rclpy raises various ones
                     refuse(name, error)
-                    return
+                    return False
             except BadMessage as error:
                 refuse(name, error)
-                return
+                return False
             callback(*values)
+            return True
 
         return take
 
     def _receive_batches(self, source: str) -> None:
-        takers = self._takers[source] = {}
-        once = self._once[source] = Once()
+        takers: dict[str, list[_Take]] = {}
+        once = Once()
+        self._takers[source], self._once[source] = takers, once
         batches = topics.BATCHES[source]
         name = self._node.resolve_topic_name(batches.name())
         read = BatchReader()
@@ -353,7 +378,7 @@ class Messages:
             except BadMessage as error:
                 self.refusals(name, error)
                 return
-            messages = once.of_batch(messages)
+            messages = once.of_batch([each for each in messages if each[0] in takers])
             self._held.append((takers, messages))
             if len(self._held) >= _MOST_HELD or self._due(messages):
                 self._take_held()
@@ -379,8 +404,9 @@ class Messages:
         self._held.clear()
         for takers, messages in held:
             for topic, data in messages:
-                if topic in takers:
-                    takers[topic](data)
+                # What follows a bad message in a batch is not worth the time.
+                if not all(take(data) for take in takers[topic]):
+                    break
 
     def _finish(self) -> None:
         """End the work on a message, or batch."""

@@ -157,7 +157,11 @@ class RecorderNode(Node):
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
             if subscribes:
-                self._intake.add(full_name, topic.message, partial(self._profile, topic))
+                batches = ''
+                if topic.source:
+                    batches = self.resolve_topic_name(topics.BATCHES[topic.source].name())
+                profile = partial(self._profile, topic)
+                self._intake.add(full_name, topic.message, profile, batches)
         if subscribes:
             for source, topic in topics.BATCHES.items():
                 names = [n for n, each in recorded.items() if each.source == source]
@@ -378,9 +382,8 @@ class RecorderNode(Node):
             except BadMessage as error:
                 self._refusals(name, error)
                 return
-            for each, data in once.of_batch(messages):
-                if each in writers:
-                    writers[each](data)
+            for each, data in once.of_batch([each for each in messages if each[0] in writers]):
+                writers[each](data)
 
         self._writers[name] = write
         self._intake.add(name, topic.message, partial(self._profile, topic))

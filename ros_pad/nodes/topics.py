@@ -183,11 +183,11 @@ DIAGNOSTICS = Topic(schemas.DIAGNOSTICS, DiagnosticArray, qos.DIAGNOSTICS, qos.D
 _BATCHES = 'std_msgs/msg/UInt8MultiArray'
 BATCHES = {
     **{
-        source: _measured(schemas.Topic(f'batches/{source}', _BATCHES), UInt8MultiArray)
+        source: _measured(schemas.Topic(f'_batches/{source}', _BATCHES), UInt8MultiArray)
         for source in ('simulator', 'regulator', 'estimator')
     },
     'controller': Topic(
-        schemas.Topic('batches/controller', _BATCHES), UInt8MultiArray, qos.COMMANDS, qos.COMMANDS
+        schemas.Topic('_batches/controller', _BATCHES), UInt8MultiArray, qos.COMMANDS, qos.COMMANDS
     ),
 }
 """The topic with the batches of each node that sends some, see `ros_pad.nodes.batches`."""

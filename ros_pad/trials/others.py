@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import MutableSequence
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager
 from contextlib import contextmanager
+from contextlib import suppress
 from typing import TypeAlias
 
 from ros_pad import workers
@@ -23,6 +27,9 @@ from ros_pad.trials.trial import Metrics
 SHORTEST = 15.0
 """Duration of a scene, s, from which processes are worth their start."""
 
+NICENESS = 5
+"""How much the other processes stand back behind the trial itself, see nice(2)."""
+
 Bar: TypeAlias = 'Callable[[str, float], AbstractContextManager[Progress]]'
 """Shows the progress of a text up to a total."""
 
@@ -33,6 +40,7 @@ _reached: MutableSequence[float]  # simulated time of each walk, s; only in othe
 def _share(reached: MutableSequence[float]) -> None:
     global _reached  # the only way to pass an array to a process of a pool
     _reached = reached
+    os.nice(NICENESS)
 
 
 def _walk(scene: Scene, policy: str, seed: int, level: str, place: int) -> Metrics | None:
@@ -48,23 +56,38 @@ class Others:
     def __init__(self, scene: Scene, policies: Sequence[str], seed: int, level: str) -> None:
         self._given = scene, seed, level
         self._policies = policies
-        self._reached = workers.CONTEXT.Array('d', len(policies))
+        self._left: deque[str] = deque()  # not begun
+        self._reached: MutableSequence[float] = []
         self._walks: dict[str, Future[Metrics | None]] = {}
 
     @contextmanager
     def beside(self) -> Iterator[Others]:
         """Walk in other processes as far as there are cores, until the block ends."""
-        scene, seed, level = self._given
         free = min(workers.cores() - 1, len(self._policies))
-        if free < 1 or scene.duration < SHORTEST:
+        if free < 1 or self._given[0].duration < SHORTEST:
             yield self
             return
+        # Without a lock, which a killed process might keep.
+        self._reached = workers.CONTEXT.RawArray('d', len(self._policies))
+        self._left.extend(self._policies)
         with workers.pool(free, _share, self._reached) as executor:
-            self._walks = {
-                policy: executor.submit(_walk, scene, policy, seed, level, place)
-                for place, policy in enumerate(self._policies)
-            }
+            for _ in range(free):
+                self._begin(executor)
             yield self
+            self._left.clear()
+
+    def _begin(self, executor: Executor) -> None:
+        """Begin the next walk, and another one when it ends."""
+        try:
+            policy = self._left.popleft()
+        except IndexError:
+            return
+        scene, seed, level = self._given
+        place = self._policies.index(policy)
+        with suppress(RuntimeError):  # the executor has ended, or its processes were killed
+            walk = executor.submit(_walk, scene, policy, seed, level, place)
+            self._walks[policy] = walk
+            walk.add_done_callback(lambda _: self._begin(executor))
 
     def metrics(self, bar: Bar) -> dict[str, Metrics]:
         """Return the metrics of the walks by policy; what has not begun is walked here.
@@ -75,16 +98,17 @@ class Others:
             As :func:`ros_pad.trials.loop.run`.
         """
         found: dict[str, Metrics | None] = {}
-        # From the last on: the others begin with the first.
-        for policy in reversed(self._policies):
-            walk = self._walks.get(policy)
-            if walk is None or walk.cancel():
-                found[policy] = self._here(policy, bar)
+        while True:
+            try:
+                policy = self._left.pop()  # from the last on: the others begin with the first
+            except IndexError:
+                break
+            found[policy] = self._here(policy, bar)
         for place, policy in enumerate(self._policies):
             if policy not in found:
                 try:
                     found[policy] = self._awaited(policy, place, bar)
-                except BrokenProcessPool:  # killed, possibly for lack of memory
+                except (KeyError, BrokenProcessPool):  # killed, possibly for lack of memory
                     found[policy] = self._here(policy, bar)
         return {policy: each for policy in self._policies if (each := found[policy]) is not None}
 

@@ -287,7 +287,7 @@ def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
 
     def watched(publisher, message):
         data = message if isinstance(message, bytes) else serialize_message(message)
-        if publisher.topic_name.startswith('/batches/'):
+        if publisher.topic_name.startswith('/_batches/'):
             batches.append(publisher.topic_name)
             published.extend(BatchReader()(data))
         else:
@@ -316,7 +316,7 @@ def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
     for name in reader.topics:
         assert of(name, recorded) == of(name, published), name
     # All of one moment are one message, and nobody wants them alone.
-    assert set(batches) == {f'/batches/{source}' for source in topics.BATCHES}
+    assert set(batches) == {f'/_batches/{source}' for source in topics.BATCHES}
     assert len(published) > 2 * len(batches)
     counts = collections.Counter(name for name, _ in published)
     always = {topic.name(1) for topic in topics.LEG_TOPICS} | {'clock', 'body/pose', 'diagnostics'}

@@ -132,7 +132,7 @@ class Pair:
         receive = Messages(self.receiver).receive
         receive(topics.WRENCH, lambda *force: self.heard.append(force), ('wrench.force.z',), 1)
         (self.wrench,) = self._publishers('/leg_1/wrench')
-        (self.batches,) = self._publishers('/batches/simulator')
+        (self.batches,) = self._publishers('/_batches/simulator')
         until(lambda: self.wrench.get_subscription_count() == 1)
         until(lambda: self.batches.get_subscription_count() == 1)
 
@@ -157,7 +157,7 @@ def test_among_nodes_of_ros_pad_only_batches_travel(pair, monkeypatch):
     pair.until(lambda: pair.step() or ('/leg_1/wrench' not in alone and not alone.clear()))
     alone.clear()
     pair.step(20)
-    assert set(alone) == {'/batches/simulator'}
+    assert set(alone) == {'/_batches/simulator'}
 
 
 def published(names_sent, publish):
@@ -228,7 +228,7 @@ def test_a_batch_may_only_have_topics_of_its_node(context, executor, until):
     batches.publish(b'\0\1\0\0\xff\xff\xff\xff')
     until(lambda: loads and messages.refusals.counts)
     assert (pressures, loads) == ([], [7.0])
-    assert dict(messages.refusals.counts) == {'/batches/estimator': 1}
+    assert dict(messages.refusals.counts) == {'/_batches/estimator': 1}
 
 
 def test_batches_wait_in_order_until_one_is_due_or_something_else_comes(context, executor, until):
@@ -276,7 +276,7 @@ def test_batches_wait_in_order_until_one_is_due_or_something_else_comes(context,
 def test_samples_that_wait_give_the_same_estimates(context):
     """In batches, of which an estimator in real time processes those of a period together."""
 
-    def estimates(alone):
+    def estimates(way):
         sent = []
         hook(context, Hooks(lambda name, data: sent.append((name, data)), lambda: None))
         node = EstimatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
@@ -292,15 +292,85 @@ def test_samples_that_wait_give_the_same_estimates(context):
             content = [('/leg_1/wrench', force), ('/leg_1/position', place)]
             content = [(name, serialize_message(each)) for name, each in content]
             pressure = ('/leg_1/pressure', serialize_message(air))
-            if alone:
+            if way != 'alone':
+                by_name['/_batches/simulator'](batch_of(content))
+                by_name['/_batches/regulator'](batch_of([pressure]))
+            if way != 'in batches':
                 for name, data in [*content, pressure]:
                     by_name[name](data)
-            else:
-                by_name['/batches/simulator'](batch_of(content))
-                by_name['/batches/regulator'](batch_of([pressure]))
         node.destroy_node()
         return sent
 
-    together = estimates(alone=False)
+    together = estimates('in batches')
     assert len(together) > 60
-    assert together == estimates(alone=True)
+    assert together == estimates('alone')
+    assert together == estimates('both ways')  # while others listen to all topics
+
+
+def test_topics_of_two_legs_may_be_one(context, executor, until):
+    remaps = ['--ros-args', '-r', 'leg_2/pressure:=leg_1/pressure']
+    receiver = Node('receiver', context=context, cli_args=remaps)
+    sender = Node('sender', context=context)
+    for node in (receiver, sender):
+        executor.add_node(node)
+    heard = {1: [], 2: []}
+    messages = Messages(receiver)
+    for leg in (1, 2):
+        messages.receive(topics.PRESSURE, heard[leg].append, ('fluid_pressure',), leg)
+    batches = topics.BATCHES['regulator'].publisher(sender)
+    alone = topics.PRESSURE.publisher(sender, 1)
+    until(lambda: batches.get_subscription_count() and alone.get_subscription_count())
+    for value in (1.0, 2.0):
+        message = serialize_message(FluidPressure(fluid_pressure=value))
+        batches.publish(batch_of([('/leg_1/pressure', message)]))
+        alone.publish(message)
+    alone.publish(serialize_message(FluidPressure(fluid_pressure=3.0)))
+    until(lambda: 3.0 in heard[2])
+    assert heard == {1: [1.0, 2.0, 3.0], 2: [1.0, 2.0, 3.0]}
+
+
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        ([('/leg_1/pressure', b'')] * 1001, '1001 messages are too many: at most 1000'),
+        ([('/leg_1/pressure', bytes(262_144))], 'bytes are too many: at most 262144'),
+    ],
+    ids=['messages', 'bytes'],
+)
+def test_a_batch_larger_than_any_of_a_robot_is_refused(content, reason):
+    with pytest.raises(BadMessage, match=reason):
+        BatchReader()(batch_of(content))
+
+
+def test_a_batch_is_read_up_to_its_first_bad_message(context):
+    """Thousands of refusals in one callback would keep the timer from venting."""
+    node = Node('receiver', context=context)
+    heard = []
+    messages = Messages(node)
+    messages.receive(topics.PRESSURE_SETPOINT, heard.append, ('fluid_pressure',), 1)
+    (take,) = (e.callback for e in node.subscriptions if e.topic_name == '/_batches/controller')
+    good = serialize_message(FluidPressure(fluid_pressure=1.0))
+    take(batch_of([('/leg_1/pressure_setpoint', each) for each in (good, b'bad', good)]))
+    assert heard == [1.0]
+    assert messages.refusals.counts['/leg_1/pressure_setpoint'] == 1
+    node.destroy_node()
+
+
+def test_a_node_whose_name_is_not_known_yet_may_want_messages(pair, monkeypatch):
+    """Endpoints of a new process appear on the graph before the names of its nodes."""
+    pair.step(3)
+    known = Node.get_subscriptions_info_by_topic
+
+    def nameless(node, name):
+        found = known(node, name)
+        for each in found:
+            each.node_name = '_NODE_NAME_UNKNOWN_'
+        return found
+
+    monkeypatch.setattr(Node, 'get_subscriptions_info_by_topic', nameless)
+    seen = []
+    pair.receiver.create_subscription(WrenchStamped, 'leg_1/wrench', seen.append, 100)
+    pair.until(lambda: pair.wrench.get_subscription_count() == 2)
+    pair.step(3)
+    pair.until(lambda: len(seen) == 3, what='all forces')
+    assert len(pair.heard) == 6
