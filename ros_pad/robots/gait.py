@@ -54,7 +54,7 @@ class Gait:
 
     @classmethod
     def named(
-        cls, name: str, hips: Sequence[Sequence[float]], period: float, duty: float, lift: float
+        cls, name: str, hips: npt.ArrayLike, period: float, duty: float, lift: float
     ) -> Gait:
         """Return a gait for legs at these places.
 
