@@ -74,9 +74,17 @@ class Chains:
         The joints of each leg, from the base to the foot.
     feet : array (legs, 4, 4)
         Transforms from the last joint of each leg to the centre of its foot.
+
+    Attributes
+    ----------
+    legs : tuple of tuple of Joint
+    feet : array (legs, 4, 4)
+        As the parameters.
     """
 
     def __init__(self, legs: Sequence[Sequence[Joint]], feet: Array) -> None:
+        self.legs = tuple(map(tuple, legs))
+        self.feet = np.asarray(feet, dtype=float)
         self.count, self.length = len(legs), len(legs[0])
         order = list(zip(*legs, strict=True))  # joint by joint, because chains are followed so
         at = np.array([[joint.at for joint in row] for row in order])
@@ -96,7 +104,6 @@ class Chains:
         self._turns = turns[..., None].astype(float)
         self._axes = axes[..., None]
         self._slides = slides
-        self._feet = np.asarray(feet, dtype=float)
         self._masses = np.array([[joint.mass for joint in row] for row in order])
         centres = np.array([[joint.centre for joint in row] for row in order])
         self._centres = np.concatenate([centres, np.ones((*centres.shape[:2], 1))], -1)[..., None]
@@ -119,7 +126,7 @@ class Chains:
             steps[0] = frame @ steps[0]
         for joint in range(1, self.length):
             steps[joint] = steps[joint - 1] @ steps[joint]
-        feet = steps[-1] @ self._feet
+        feet = steps[-1] @ self.feet
         places = feet[:, :3, 3]
         angular = (steps[..., :3, :3] @ self._axes)[..., 0]
         moving = cross(angular, places - steps[..., :3, 3])
