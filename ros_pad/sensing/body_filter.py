@@ -15,6 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dtrtri
 from scipy.linalg.lapack import dtrtrs
 
 from ros_pad.robots.rotation import Array
@@ -95,6 +96,7 @@ class BodyFilter:
         self._inputs = np.zeros((size, 6))  # what errors of gyro and accelerometer do in a step
         self._last: tuple[Array, Array] | None = None
         self._diagonal = self.covariance.ravel()[:: size + 1]
+        self._units = np.tile(_UNIT, (legs, 1))
         self._blocks = np.arange(3 * legs).reshape(legs, 3)
 
     def spread(self, turn: float, velocity: float, gyro_bias: float, force_bias: float) -> None:
@@ -149,11 +151,11 @@ class BodyFilter:
         inputs[_SPEED, 3:] = turned
         inputs[FEET:, :3] = (skew(self.footholds) @ turned).reshape(-1, 3)
         step[:, 9:15] = inputs
-        step[_GYRO, _GYRO] = step[_FORCE, _FORCE] = np.eye(3)
+        step[_GYRO, _GYRO] = step[_FORCE, _FORCE] = _UNIT
         step[_SPEED, _TURN] = dt * _FALL
         step[_PLACE, _TURN] = -dt * skew(self.velocity)
         step[_PLACE, _SPEED] = dt * _UNIT
-        step[FEET:, _SPEED] = np.tile(-dt * _UNIT, (self._legs, 1))
+        step[FEET:, _SPEED] = -dt * self._units
         gyro, force = self._noise
         noise = np.repeat((gyro, math.sqrt(force**2 + JUMP**2 * jump)), 3) * inputs
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
@@ -211,12 +213,12 @@ class BodyFilter:
         score, _ = dtrtrs(root, miss, lower=1)
         if score @ score > self._gate:
             root = self._judge(spread, diagonal, miss, standing, slipping)
-        rows, _ = dtrtrs(
-            root, np.concatenate([miss[:, None], self.covariance[FEET:]], axis=1), lower=1
-        )
-        self.apply(rows[:, 0] @ rows[:, 1:])
+        # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
+        inverse, _ = dtrtri(root, lower=1)
+        rows = inverse @ self.covariance[FEET:]
+        self.apply((inverse @ miss) @ rows)
         spread = self.covariance
-        spread -= rows[:, 1:].T @ rows[:, 1:]
+        spread -= rows.T @ rows
         spread += spread.T.copy()  # rounding must not make it unsymmetric
         spread *= 0.5
 

@@ -38,6 +38,13 @@ RECOVERY = 0.3
 """Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
 gap leaves one."""
 
+LOST = 0.5
+"""Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
+alike."""
+
+ALIKE = 0.03
+"""Largest difference of slip velocities that are alike, m/s."""
+
 STICKS = 0.03
 """Time for which a slipping foot has to be slow before it counts as sticking, s."""
 
@@ -57,6 +64,7 @@ BIAS_FLOOR = 3e-4
 """Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest."""
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
+_NONE = np.zeros(0)
 FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
 DAMPING = 1e-4  # m²: keeps forces finite where the leg is straight
 
@@ -188,6 +196,8 @@ class BodyEstimator:
         self._samples = max(1, round(number('window', window, 's', 0.0, 1.0) * rate))
         self._in_foot_axes = choice('force_axes', force_axes, ('base', 'foot')) == 'foot'
         self._rejection = rejection
+        self._to_base = np.zeros((9, 9))
+        self._to_base[:3, 6:9] = self._to_base[3:6, :3] = self._to_base[6:9, 3:6] = np.eye(3)
         self._to_imu = np.linalg.inv(robot.imu)
         self._reset()
 
@@ -270,6 +280,12 @@ class BodyEstimator:
             ('foot_forces', (joints[0], 3), 'N', 1e6),
             ('efforts', size, 'N m', 1e6),
         )
+        arrays = [np.asarray(each) for each in readings if each is not None]
+        shapes = [shape for (_, shape, _, _), each in zip(names, readings, strict=True) if each is not None]
+        if all(a.dtype == float and a.shape == s for a, s in zip(arrays, shapes, strict=True)):
+            # One look at all of them is enough if they are fine; NaN is not below the limit.
+            if np.abs(np.concatenate([a.ravel() for a in arrays])).max() < 1e3:
+                return time, [*(a.reshape(joints) if a.shape == size else a for a in arrays), _NONE]
         found = []
         for (name, shape, unit, most), reading in zip(names, readings, strict=True):
             if reading is None:
@@ -280,7 +296,7 @@ class BodyEstimator:
                     f'{name} of shape {values.shape} is not allowed: {shape} is needed'
                 )
             found.append(values.reshape(joints) if shape == size else values)
-        return time, [*found, np.zeros(0)]
+        return time, [*found, _NONE]
 
     def _forces(
         self, kinematics: Kinematics, accelerometer: Array, measured: bool, given: Array
@@ -426,8 +442,19 @@ class BodyEstimator:
             self._filter.set_down(self._slipping & ~lifted, places, noise, level=True)
         if lifted.any():
             self._filter.set_down(lifted, places, noise)
-        if (self._standing & ~self._slipping).any():
+        sticking = self._standing & ~self._slipping
+        if sticking.any():
             self._held = time
+        elif time - self._held > LOST and self._standing.sum() > 1:
+            self._regain(time, slips[self._standing])
+
+    def _regain(self, time: float, slips: Array) -> None:
+        """Take feet to stick that all slip alike for long: more likely the velocity is wrong."""
+        if np.ptp(slips[:, :2], axis=0).max() < ALIKE:
+            self._filter.lose()
+            self._slipping[:] = False
+            self._held = time
+            self._doubt_for(time, 'slipping: all feet slipped alike, velocity is estimated anew')
 
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
@@ -476,8 +503,7 @@ class BodyEstimator:
         )
         velocity = body.velocity + turn @ cross(rate, self._to_imu[:3, 3])
         # From the filter's errors to those of the base: rotation moves it about the IMU.
-        step = np.zeros((9, 9))
-        step[:3, 6:9] = step[3:6, :3] = step[6:9, 3:6] = np.eye(3)
+        step = self._to_base
         step[:3, :3] = -skew(arm)
         step[6:9, :3] = -skew(velocity)
         covariance = step @ body.covariance[:9, :9] @ step.T

@@ -122,7 +122,7 @@ def model_of(robot: Robot, drive: Drive) -> str:
   </worldbody>
   <contact>{''.join(pairs)}</contact>
   <actuator>{''.join(servos)}</actuator>
-  <sensor><gyro site="imu"/><accelerometer site="imu"/></sensor>
+  <sensor><gyro site="imu"/></sensor>
 </mujoco>
 """
 
@@ -197,8 +197,9 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
     data: Any = mujoco.MjData(model)
     home = robot.foot_positions(robot.home)
     q = robot.home
+    aim = q.ravel()
     data.qpos[2] = -home[:, 2].mean() + (robot.foot_radius or POINT)
-    data.qpos[7:] = data.ctrl[:] = q.ravel()
+    data.qpos[7:] = data.ctrl[:] = aim
     feet = [model.geom(f'foot_{index}').id for index in range(len(robot.legs))]
     rows: dict[str, list[Any]] = {field.name: [] for field in fields(Log)}
     force, until = np.zeros(2), 0.0
@@ -216,22 +217,55 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
             share = np.where(stands, robot.mass * 9.81 / max(stands.sum(), 1), 0.0)
             torque = -share[:, None] * robot.foot_jacobians(q)[:, 2]
             torque += 1.1 * drive.damping * (q - before) * RATE
-            data.ctrl[:] = (q + torque / drive.stiffness).ravel()
+            aim = (q + torque / drive.stiffness).ravel()
             if time > until:  # the next push, or a pause
                 until = time + generator.uniform(0.2, 0.6)
                 size = generator.choice((0.0, 1.0)) * generator.uniform(0.06, 0.12)
                 angle = generator.uniform(0.0, 2.0 * np.pi)
                 force = size * robot.mass * 9.81 * np.array((np.cos(angle), np.sin(angle)))
             data.xfrc_applied[1, :2] = force
-        for _ in range(SUBSTEPS):
+        # Servos follow a line between set-points: steps in time with the samples would alias.
+        change = (aim - data.ctrl) / SUBSTEPS
+        speeds = []
+        for part in range(SUBSTEPS):
+            data.ctrl += change
             for index, geom in enumerate(feet):
                 x, y, _ = data.geom_xpos[geom].tolist()
                 model.pair_friction[index, :2] = ground.friction(x, y)
             mujoco.mj_step(model, data)
-        mujoco.mj_forward(model, data)  # all readings are of this moment
-        _read(mujoco, model, data, feet, rows)
+            speeds.append(_imu_velocity(robot, data))
+            if part == SUBSTEPS - 2:
+                mujoco.mj_forward(model, data)  # all readings are of this moment
+                _read(mujoco, model, data, feet, rows)
+        # MuJoCo's accelerometer is of an explicit step, the motion that of an implicit one.
+        rows['accelerometer'].append(_specific_force(robot, rows, speeds[-1] - speeds[-3]))
         rows['time'].append(time)
     return _noisy(Log(**{key: np.array(value) for key, value in rows.items()}), generator, noise)
+
+
+def _imu_velocity(robot: Robot, data: Any) -> Array:
+    """Return the velocity of the IMU in the world, m/s."""
+    turn = _matrix(data.qpos[3:7])
+    return data.qvel[:3] + turn @ np.cross(data.qvel[3:6], robot.imu[:3, 3])
+
+
+def _specific_force(robot: Robot, rows: dict[str, list[Any]], change: Array) -> Array:
+    """Return what an accelerometer shows for a change of velocity over two steps, m/s²."""
+    x, y, z, w = rows['orientation'][-1]
+    acceleration = change * RATE * SUBSTEPS / 2.0 + np.array((0.0, 0.0, 9.81))
+    return acceleration @ _matrix((w, x, y, z)) @ robot.imu[:3, :3]
+
+
+def _matrix(turn: Any) -> Array:
+    """Return the rotation matrix of a quaternion w x y z."""
+    w, x, y, z = turn
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+    )
 
 
 def _read(mujoco: Any, model: Any, data: Any, feet: list[int], rows: dict[str, list[Any]]) -> None:
@@ -252,7 +286,6 @@ def _read(mujoco: Any, model: Any, data: Any, feet: list[int], rows: dict[str, l
         slips.append((found[3:] + np.cross(found[:3], lever))[:2])
     w, x, y, z = data.qpos[3:7]
     rows['gyro'].append(data.sensordata[:3].copy())
-    rows['accelerometer'].append(data.sensordata[3:6].copy())
     rows['joint_positions'].append(data.qpos[7:].copy())
     rows['joint_velocities'].append(data.qvel[6:].copy())
     rows['foot_forces'].append(forces @ turn)
