@@ -30,15 +30,21 @@ GATE = 11.34
 """Squared Mahalanobis distance of a foot's innovation above which it slips: 99 % of χ² with 3
 degrees of freedom."""
 
-JUMP = 0.3
+JUMP = 0.2
 """Deviation of an acceleration between two samples over its jump from one to the other: impacts are
 shorter than a sample."""
 
-STRAY = 5e-4
+STRAY = 3e-4
 """Random motion of a foot that stands, m after 1 s, growing with the root of time."""
+
+SINKING = 6e-3
+"""Random sinking and rising of a foot that stands, m after 1 s, as its load changes."""
 
 ROLLING_ERROR = 0.15
 """Relative error of the speed of rolling: feet are no spheres, and sink in."""
+
+FASTEST = 100.0
+"""Speed, m/s, above which the filter has diverged."""
 
 _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
@@ -163,6 +169,7 @@ class BodyFilter:
         self._diagonal[_FORCE] += FORCE_DRIFT**2 * dt
         stray = STRAY**2 * dt + (ROLLING_ERROR * dt) ** 2 * (rolling * rolling).sum(1)
         self._diagonal[FEET:] += np.repeat(stray, 3)
+        self._diagonal[FEET + 2 :: 3] += SINKING**2 * dt
 
     def set_down(self, feet: Flags, places: Array, noise: Array, level: bool = False) -> None:
         """Make new footholds where these feet are.
@@ -256,6 +263,12 @@ class BodyFilter:
         gain = np.linalg.solve(rows[:, _GYRO] + noise**2 * _UNIT, rows).T
         self.apply(gain @ (gyro - self.gyro_bias))
         self.covariance -= gain @ rows
+
+    def sound(self) -> bool:
+        """Return whether velocity and covariance are such as a robot can have."""
+        speed = float(self.velocity @ self.velocity)
+        least, most = float(self._diagonal.min()), float(self._diagonal.max())
+        return speed < FASTEST**2 and least > -1e-9 and most < math.inf  # false for NaN, too
 
     def apply(self, error: Array) -> None:
         """Correct the state by an estimated error, (15 + 3 legs,)."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 from typing import NamedTuple
 
 import numpy as np
@@ -261,7 +262,7 @@ class BodyEstimator:
             self._reset()
             self._doubt_for(time, 'clock: time went back, odom begins anew')
         if math.isnan(self._time):
-            self._begin(time, gyro, accelerometer, q, dq)
+            self._begin(time, gyro, accelerometer, dq)
         self._advance(time, gyro, accelerometer)
         return self._process(time, gyro, accelerometer, kinematics, dq, forces)
 
@@ -315,9 +316,7 @@ class BodyEstimator:
         square = lines @ lines.transpose(0, 2, 1) + DAMPING * np.eye(3)
         return np.asarray(np.linalg.solve(square, lines @ (holding - given)[..., None])[..., 0])
 
-    def _begin(
-        self, time: float, gyro: Array, accelerometer: Array, q: Array, dq: Array
-    ) -> None:
+    def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
         """Begin with the base at the origin, heading along x, upright as the accelerometer says."""
         strength = math.sqrt(accelerometer @ accelerometer)
         calm = (
@@ -341,7 +340,7 @@ class BodyEstimator:
         body.turn = turn @ self._robot.imu[:3, :3]
         body.position = -body.turn @ self._to_imu[:3, 3]
         self._time = self._held = time
-        if not calm:
+        if not calm and time >= self._unsure_until:
             self._doubt_for(time, 'start: the robot may be moving')
 
     def _doubt_for(self, time: float, reason: str) -> None:
@@ -383,6 +382,8 @@ class BodyEstimator:
         body.set_down(lands, places, noise)
         if self._standing.any():
             body.stand(places, noise, self._standing, self._slipping)
+        if not body.sound():
+            return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
         self._rest(time, gyro, dq)
         turn = body.turn
         rate = gyro - body.gyro_bias
@@ -403,6 +404,14 @@ class BodyEstimator:
         deviations = np.sqrt(window.lever_noise**2 * lever + common)
         self._judge(time, window.velocity, deviations, places, noise)
         return self._estimate(time, rate, places, velocities, forces, deviations)
+
+    def _anew(self, time: float, *readings: Any) -> BodyEstimate:
+        """Begin anew after readings that no robot can have made."""
+        self._reset()
+        self._begin(time, readings[0], readings[1], readings[3])
+        self._doubt_for(time, 'diverged: odom begins anew')
+        self._advance(time, readings[0], readings[1])
+        return self._process(time, *readings)
 
     def _load(self, kinematics: Kinematics, forces: Array | None, time: float) -> Flags:
         """Update which feet stand; return those that landed with this sample."""
