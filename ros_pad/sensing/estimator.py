@@ -206,7 +206,10 @@ class BodyEstimator:
         """Discard everything."""
         robot, legs = self._robot, len(self._robot.legs)
         self._filter = BodyFilter(
-            legs, self._gyro_noise, self._accelerometer_noise, GATE if self._rejection else math.inf
+            legs,
+            self._gyro_noise,
+            self._accelerometer_noise,
+            GATE if self._rejection else math.inf,
         )
         self._window = SlipWindow(legs, self._samples, self._encoder_noise, self._velocity_noise)
         self._time = math.nan
@@ -282,11 +285,18 @@ class BodyEstimator:
             ('efforts', size, 'N m', 1e6),
         )
         arrays = [np.asarray(each) for each in readings if each is not None]
-        shapes = [shape for (_, shape, _, _), each in zip(names, readings, strict=True) if each is not None]
+        shapes = [
+            shape
+            for (_, shape, _, _), each in zip(names, readings, strict=True)
+            if each is not None
+        ]
         if all(a.dtype == float and a.shape == s for a, s in zip(arrays, shapes, strict=True)):
             # One look at all of them is enough if they are fine; NaN is not below the limit.
             if np.abs(np.concatenate([a.ravel() for a in arrays])).max() < 1e3:
-                return time, [*(a.reshape(joints) if a.shape == size else a for a in arrays), _NONE]
+                return time, [
+                    *(a.reshape(joints) if a.shape == size else a for a in arrays),
+                    _NONE,
+                ]
         found = []
         for (name, shape, unit, most), reading in zip(names, readings, strict=True):
             if reading is None:
@@ -388,7 +398,9 @@ class BodyEstimator:
         turn = body.turn
         rate = gyro - body.gyro_bias
         turning = (kinematics.angular @ dq[..., None])[..., 0] + rate
-        swaying = (kinematics.jacobians @ dq[..., None])[..., 0] + kinematics.positions @ skew(rate).T
+        swaying = (kinematics.jacobians @ dq[..., None])[..., 0] + kinematics.positions @ skew(
+            rate
+        ).T
         moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
         velocities = body.velocity + moving
         radius = self._robot.foot_radius

@@ -81,7 +81,9 @@ class SlipWindow:
         self._ages = np.where(begins, 0, np.minimum(self._ages + 1, self._samples))
         ages = self._ages
         first = (self._count - ages) % (self._samples + 1)
-        change, total = (self._sums - self._ring[first, :, self._legs].transpose(1, 0, 2))[..., None]
+        change, total = (self._sums - self._ring[first, :, self._legs].transpose(1, 0, 2))[
+            ..., None
+        ]
         length = time - self._times[first]
         weight = length * length / (2.0 * self._positions)
         other = ages / self._velocities

@@ -141,8 +141,9 @@ class Floor:
 
     def __init__(self, kind: str, generator: np.random.Generator) -> None:
         count = 200
-        dry, wet = generator.uniform(0.6, 0.8, (count, count)), generator.uniform(
-            0.08, 0.2, (count, count)
+        dry, wet = (
+            generator.uniform(0.6, 0.8, (count, count)),
+            generator.uniform(0.08, 0.2, (count, count)),
         )
         share = {'dry': 0.0, 'patches': 0.4, 'ice': 1.0}[kind]
         self._values = np.where(generator.random((count, count)) < share, wet, dry).tolist()
