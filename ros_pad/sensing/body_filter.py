@@ -119,7 +119,7 @@ class BodyFilter:
         self.covariance[_SPEED] = 0.0
         self.covariance[:, _SPEED] = 0.0
         self._diagonal[_SPEED] = 1.0
-        self._diagonal[_TURN] += 0.1**2
+        self._diagonal[:2] += 0.01**2
         self._diagonal[_PLACE] += 1.0
         self._last = None
 

@@ -26,6 +26,7 @@ from ros_pad.robots.rotation import rotation
 from ros_pad.sensing import BodyEstimator
 from studies import command
 from studies.samples import runs
+from studies.sensing.walks import PUSH
 from studies.sensing.walks import RAMP
 from studies.sensing.walks import RATE
 from studies.sensing.walks import REST
@@ -189,10 +190,10 @@ def judge_alarms(track: Track, log: Log, walking: Array) -> dict[str, Any]:
     }
 
 
-def measure(name: str, floor: str, seed: int, duration: float) -> list[Row]:
+def measure(name: str, floor: str, seed: int, duration: float, push: float = PUSH) -> list[Row]:
     """Return the figures of every method on one walk."""
     robot = Robot.load(name)
-    log = walk(name, floor, seed, duration)
+    log = walk(name, floor, seed, duration, push)
     walking = log.time > REST + RAMP
     path = float(np.linalg.norm(np.diff(log.position[:, :2], axis=0), axis=1).sum())
     total = np.concatenate([np.zeros((1, *log.slip.shape[1:])), np.cumsum(log.slip, axis=0)])
@@ -271,6 +272,8 @@ def main(words: Sequence[str]) -> int:
     part = command.parser('sensing', __doc__)
     command.add_count(part, '--seeds', 2, 'walks of each kind')
     command.add_count(part, '--duration', 30, 'length of a walk, s', least=6)
+    add = 'length of a push, ms; from 200 on all feet slide on ice for longer than IMUs bridge'
+    command.add_count(part, '--push', round(1e3 * PUSH), add)
     options = part.parse_args(words)
     cases = [
         (name, floor, FIRST_SEED + seed) for name, floor in CASES for seed in range(options.seeds)
@@ -278,7 +281,7 @@ def main(words: Sequence[str]) -> int:
     rows = [
         row
         for name, floor, seed in command.each(cases, 'sensing', 'walk')
-        for row in measure(name, floor, seed, float(options.duration))
+        for row in measure(name, floor, seed, float(options.duration), 1e-3 * options.push)
     ]
     command.show(options, [dataclasses.asdict(row) for row in rows], table(rows))
     return 0

@@ -21,7 +21,9 @@ REST = 2.0  # s at rest before the walk
 SETTLE = 1.0  # s before the log, in which the robot comes to rest on its feet
 RAMP = 1.0  # s until the full stride
 FLOORS = ('dry', 'patches', 'ice')
+PUSH = 0.1  # s, length of a push
 PATCH = 0.4  # m, edge of the squares of a floor
+START_FRICTION = 0.7  # of the ground at rest
 POINT = 1e-4  # m, radius of the ball that stands for a foot that does not roll
 
 
@@ -56,8 +58,8 @@ class Log:
     """Samples of a walk, one row each. Base axes but for ``gyro`` and ``accelerometer`` (IMU).
 
     The truth is in the axes of the world: ``position``, ``orientation`` (x y z w), ``velocity`` of
-    the base, ``feet`` (centres of the spheres), ``slip`` (velocity of the contact points, x and y),
-    ``load`` (normal forces).
+    the base, ``feet`` (centres of the spheres), ``slip`` (velocity of the contact points, x
+    and y), ``load`` (normal forces).
     """
 
     time: Array
@@ -171,7 +173,14 @@ def foot_targets(
     return feet
 
 
-def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None = None) -> Log:
+def walk(
+    name: str,
+    floor: str,
+    seed: int,
+    duration: float,
+    push: float = PUSH,
+    noise: Noise | None = None,
+) -> Log:
     """Simulate a walk of a shipped robot in its usual gait, with pushes of the trunk.
 
     Parameters
@@ -184,6 +193,8 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
         Of floor, pushes and noise.
     duration : float
         Length of the log, s, with :data:`REST` s at rest first.
+    push : float
+        Length of a push, s.
     noise : Noise, optional
         Noise of the sensors.
     """
@@ -203,7 +214,7 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
     data.qpos[7:] = data.ctrl[:] = aim
     feet = [model.geom(f'foot_{index}').id for index in range(len(robot.legs))]
     rows: dict[str, list[Any]] = {field.name: [] for field in fields(Log)}
-    force, until = np.zeros(2), 0.0
+    force, until, ends = np.zeros(2), 0.0, 0.0
     for _ in range(round(SETTLE * RATE * SUBSTEPS)):
         mujoco.mj_step(model, data)
     for tick in range(round(duration * RATE)):
@@ -219,12 +230,13 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
             torque = -share[:, None] * robot.foot_jacobians(q)[:, 2]
             torque += 1.1 * drive.damping * (q - before) * RATE
             aim = (q + torque / drive.stiffness).ravel()
-            if time > until:  # the next push, or a pause
-                until = time + generator.uniform(0.2, 0.6)
-                size = generator.choice((0.0, 1.0)) * generator.uniform(0.06, 0.12)
+            if time > until:  # the next push, after a pause
+                until = time + generator.uniform(0.4, 1.0)
+                size = generator.uniform(0.06, 0.12) * robot.mass * 9.81
                 angle = generator.uniform(0.0, 2.0 * np.pi)
-                force = size * robot.mass * 9.81 * np.array((np.cos(angle), np.sin(angle)))
-            data.xfrc_applied[1, :2] = force
+                force = size * np.array((np.cos(angle), np.sin(angle)))
+                ends = time + push
+            data.xfrc_applied[1, :2] = force if time < ends else 0.0
         # Servos follow a line between set-points: steps in time with the samples would alias.
         change = (aim - data.ctrl) / SUBSTEPS
         speeds = []
@@ -232,7 +244,8 @@ def walk(name: str, floor: str, seed: int, duration: float, noise: Noise | None 
             data.ctrl += change
             for index, geom in enumerate(feet):
                 x, y, _ = data.geom_xpos[geom].tolist()
-                model.pair_friction[index, :2] = ground.friction(x, y)
+                grip = ground.friction(x, y) if time > REST else START_FRICTION
+                model.pair_friction[index, :2] = grip
             mujoco.mj_step(model, data)
             speeds.append(_imu_velocity(robot, data))
             if part == SUBSTEPS - 2:
