@@ -2,10 +2,10 @@
 """Error-state Kalman filter of an IMU and of feet that stand.
 
 State: rotation R from IMU to odom, velocity v, position p, biases of gyro and accelerometer, and
-for each foot the vector d in odom axes from the IMU to the point where the foot was set down. Their
+for each foot the vector d in odom axes from the IMU to its foothold, where it was set down. Their
 errors: rotation φ in odom axes, δv - φ x v, δp, the biases' own, δd - φ x d. With these a standing
-foot measures its own error and no other, wherever the robot is (right-invariant, Hartley 2020, with
-the body as the origin), so rotation about the vertical stays unobservable, as it is.
+foot measures its own error and no other, wherever the robot is (right-invariant, Hartley 2020,
+with the body as the origin), so rotation about the vertical stays unobservable, as it is.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from ros_pad.robots.rotation import skew
 Flags = npt.NDArray[np.bool_]
 
 GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
-GATE = 11.34
-"""Squared Mahalanobis distance of a foot's innovation above which it slips: 99 % of χ² with 3
+GATE = 16.27
+"""Squared Mahalanobis distance of a foot's innovation above which it slips: 99.9 % of χ² with 3
 degrees of freedom."""
 
 JUMP = 0.2
-"""Deviation of an acceleration between two samples over its jump from one to the other: impacts are
-shorter than a sample."""
+"""Deviation of an acceleration between two samples over its jump from one to the other: impacts
+are shorter than a sample."""
 
 STRAY = 3e-4
 """Random motion of a foot that stands, m after 1 s, growing with the root of time."""
@@ -124,10 +124,12 @@ class BodyFilter:
         self._last = None
 
     def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> Array:
-        """Advance by ``dt`` s; return the mean velocity of the step, (3,), m/s.
+        """Advance by a step; return its mean velocity, (3,), m/s.
 
         Parameters
         ----------
+        dt : float
+            Length of the step, s.
         gyro, force : array (3,)
             Angular velocity, rad/s, and specific force, m/s², as measured at the end of the step.
         rolling : array (legs, 3)
@@ -177,6 +179,7 @@ class BodyFilter:
         Parameters
         ----------
         feet : array of bool (legs,)
+            Which feet.
         places : array (legs, 3)
             All feet as measured, from the IMU, in odom axes, m.
         noise : array (legs, 3, 3)

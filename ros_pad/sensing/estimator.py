@@ -30,10 +30,12 @@ from ros_pad.sensing.slip_window import SlipWindow
 WEIGHT = -float(GRAVITY[2])  # m/s²
 
 LONGEST_STEP = 0.03
-"""Longest time between samples over which a foot keeps its foothold, s: later it may have stepped."""
+"""Longest time between samples over which a foot keeps its foothold, s: then it may have
+stepped."""
 
 LONGEST_GAP = 0.2
-"""Longest time between samples that the IMU is taken to bridge, s; then the velocity is unknown."""
+"""Longest time between samples that the IMU is taken to bridge, s: then the velocity is
+unknown."""
 
 RECOVERY = 0.3
 """Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
@@ -55,7 +57,7 @@ SETTLES = 0.012
 SLOW = 2.5
 """Standard deviations of the slip speed up to which a foot is slow."""
 
-FAST = 3.5
+FAST = 4.0
 """Standard deviations of the slip speed from which on a foot slips."""
 
 REST_TIME = 0.2
@@ -87,7 +89,8 @@ class FootMotion(NamedTuple):
         Standard deviation of each of its components, m/s. It includes that of the body's
         velocity, which is common to all feet and lasts for about a stance.
     slipping : bool
-        Whether the foot carries load but is not consistent with standing still.
+        Whether the foot carries load but is not consistent with standing still, or has landed
+        less than 12 ms ago.
     """
 
     position: Array
@@ -199,7 +202,7 @@ class BodyEstimator:
         self._rejection = rejection
         self._to_base = np.zeros((9, 9))
         self._to_base[:3, 6:9] = self._to_base[3:6, :3] = self._to_base[6:9, 3:6] = np.eye(3)
-        self._to_imu = np.linalg.inv(robot.imu)
+        self._to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
         self._reset()
 
     def _reset(self) -> None:
@@ -219,6 +222,7 @@ class BodyEstimator:
         self._patience = np.full(legs, STICKS)
         self._rolling = np.zeros((legs, 3))
         self._held = math.inf  # when a foot last stuck
+        self._sliding_since = math.inf  # since when feet stand and none of them sticks
         self._unsure_until, self._reason = -math.inf, ''
         self._rest_since, self._rest_sum, self._rest_count = math.nan, np.zeros(3), 0
         self._pull = WEIGHT
@@ -284,19 +288,15 @@ class BodyEstimator:
             ('foot_forces', (joints[0], 3), 'N', 1e6),
             ('efforts', size, 'N m', 1e6),
         )
-        arrays = [np.asarray(each) for each in readings if each is not None]
-        shapes = [
-            shape
-            for (_, shape, _, _), each in zip(names, readings, strict=True)
-            if each is not None
+        pairs = [
+            (np.asarray(r), n[1]) for r, n in zip(readings, names, strict=True) if r is not None
         ]
-        if all(a.dtype == float and a.shape == s for a, s in zip(arrays, shapes, strict=True)):
-            # One look at all of them is enough if they are fine; NaN is not below the limit.
-            if np.abs(np.concatenate([a.ravel() for a in arrays])).max() < 1e3:
-                return time, [
-                    *(a.reshape(joints) if a.shape == size else a for a in arrays),
-                    _NONE,
-                ]
+        # One look at all of them is enough if they are fine; NaN is not below the limit.
+        if (
+            all(array.dtype == float and array.shape == shape for array, shape in pairs)
+            and np.abs(np.concatenate([array.ravel() for array, _ in pairs])).max() < 1e3
+        ):
+            return time, [*(a.reshape(joints) if s == size else a for a, s in pairs), _NONE]
         found = []
         for (name, shape, unit, most), reading in zip(names, readings, strict=True):
             if reading is None:
@@ -327,7 +327,7 @@ class BodyEstimator:
         return np.asarray(np.linalg.solve(square, lines @ (holding - given)[..., None])[..., 0])
 
     def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
-        """Begin with the base at the origin, heading along x, upright as the accelerometer says."""
+        """Begin with the base at the origin, heading along x, tilted as the IMU shows."""
         strength = math.sqrt(accelerometer @ accelerometer)
         calm = (
             abs(strength - WEIGHT) < 0.5
@@ -349,7 +349,7 @@ class BodyEstimator:
         turn = rotation((0.0, 0.0, -heading)) @ turn
         body.turn = turn @ self._robot.imu[:3, :3]
         body.position = -body.turn @ self._to_imu[:3, 3]
-        self._time = self._held = time
+        self._time = self._held = self._sliding_since = time
         if not calm and time >= self._unsure_until:
             self._doubt_for(time, 'start: the robot may be moving')
 
@@ -362,8 +362,8 @@ class BodyEstimator:
         if dt > LONGEST_GAP:
             self._doubt_for(time, f'gap: no readings for {dt:.2g} s')
             self._filter.lose()
-            self._standing[:] = False
-        elif dt > LONGEST_STEP:
+        if dt > LONGEST_STEP:
+            self._sliding_since = time
             self._standing[:] = False  # their footholds are made anew
         self._rolling[~self._standing] = 0.0
         # What happened in a gap is unknown: the body is taken to have stood.
@@ -466,7 +466,9 @@ class BodyEstimator:
         sticking = self._standing & ~self._slipping
         if sticking.any():
             self._held = time
-        elif time - self._held > LOST and self._standing.sum() > 1:
+        if sticking.any() or not self._standing.any():
+            self._sliding_since = time
+        elif time - self._sliding_since > LOST and self._standing.sum() > 1:
             self._regain(time, slips[self._standing])
 
     def _regain(self, time: float, slips: Array) -> None:
@@ -474,7 +476,7 @@ class BodyEstimator:
         if np.ptp(slips[:, :2], axis=0).max() < ALIKE:
             self._filter.lose()
             self._slipping[:] = False
-            self._held = time
+            self._held = self._sliding_since = time
             self._doubt_for(time, 'slipping: all feet slipped alike, velocity is estimated anew')
 
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Body and feet estimated from IMU, joints and foot forces, on simulated walks with known truth.
 
-Beside the estimator: the same filter without rejection of slipping feet, and legged odometry (gyro,
-and the mean velocity of the feet that stand). Errors are vectors of x and y. Slips are of settled
-stances, 24 ms after touch-down, faster than 10 mm/s; the alarm is that of ros_pad.estimation with a
-noise of 15 mm/s. A false alarm has no speed above 5 mm/s in its last 60 ms.
+Beside the estimator: the same filter without rejection of slipping feet, and legged odometry
+(gyro, and the mean velocity of the feet that stand). Errors are vectors of x and y. Slips are of
+settled stances, 24 ms after touch-down, faster than 10 mm/s; the alarm is that of
+ros_pad.estimation with a noise of 15 mm/s. A false alarm has no speed above 5 mm/s in its last 60 ms.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from ros_pad.robots.rotation import cross
 from ros_pad.robots.rotation import rotation
 from ros_pad.sensing import BodyEstimator
 from studies import command
+from studies.samples import Flags
 from studies.samples import runs
 from studies.sensing.walks import PUSH
 from studies.sensing.walks import RAMP
@@ -50,7 +51,7 @@ class Track(NamedTuple):
     deviation: Array  # of velocity x and y
     slip: Array
     slip_deviation: Array
-    standing: Array
+    standing: Flags
     force: Array
     seconds: float  # an update
 
@@ -130,7 +131,7 @@ def odometry(robot: Robot, log: Log) -> Track:
     return Track(places, speeds, none[:, :2], slips[..., :2], none, stands, forces, seconds)
 
 
-def alarms_of(track: Track) -> Array:
+def alarms_of(track: Track) -> Flags:
     """Return whether the slip alarm is on, (samples, legs), from the slip against the force."""
     tangential = track.force[..., :2]
     strength = np.maximum(np.linalg.norm(tangential, axis=2), 1e-9)
@@ -145,7 +146,7 @@ def alarms_of(track: Track) -> Array:
     return found
 
 
-def settled(standing: Array) -> Array:
+def settled(standing: Flags) -> Flags:
     """Return the samples of feet that stand, but for the first and last 24 ms of a stance."""
     found = standing.copy()
     for shift in range(1, SETTLED + 1):
@@ -154,7 +155,7 @@ def settled(standing: Array) -> Array:
     return found
 
 
-def judge_alarms(track: Track, log: Log, walking: Array) -> dict[str, Any]:
+def judge_alarms(track: Track, log: Log, walking: Flags) -> dict[str, Any]:
     """Return missed slips by size and number of feet, false alarms, latency."""
     speed = np.linalg.norm(log.slip, axis=2)
     within = settled(track.standing) & walking[:, None]
@@ -234,10 +235,10 @@ def measure(name: str, floor: str, seed: int, duration: float, push: float = PUS
 def table(rows: Sequence[Row]) -> str:
     """Return the figures, means over the seeds, as a table."""
     lines = [
-        'Means over seeds. v: body velocity x y, RMSE; drift: of the path; slip: velocity over 20 ms'
-        ' of sticking feet;\nratio: error of v over its deviation, rms; in 2 sd: share of errors of'
-        ' v / of slip; missed of slips > 5 / > 10 mm,\nfirst where some feet stick, then where all'
-        ' slip; false: alarms a stick-minute; late: median of fresh slips.',
+        'Means over seeds. v: body velocity x y, RMSE; drift: of the path; slip: velocity over'
+        ' 20 ms of sticking feet;\nratio: error of v over its deviation, rms; in 2 sd: share of'
+        ' errors of v / of slip; missed of slips > 5 / > 10 mm,\nfirst where some feet stick, then'
+        ' where all slip; false: alarms a stick-minute; late: median of fresh slips.',
         'walk            method        v mm/s  drift %  slip mm/s  ratio  in 2 sd    missed some'
         '     missed all      false   late ms, mm  µs',
     ]

@@ -31,7 +31,9 @@ def test_logs_agree_with_themselves():
     mean = 0.5 * (log.velocity[1:] + log.velocity[:-1])
     assert np.abs(moved - mean).max() < 0.02
     turned = np.diff(log.joint_positions, axis=0) * walks.RATE
-    assert np.abs(turned - 0.5 * (log.joint_velocities[1:] + log.joint_velocities[:-1])).std() < 0.1
+    assert (
+        np.abs(turned - 0.5 * (log.joint_velocities[1:] + log.joint_velocities[:-1])).std() < 0.1
+    )
     assert log.accelerometer[:400].mean(0) == pytest.approx([0.0, 0.0, 9.81], abs=0.05)
     assert log.load.sum(1)[:400].mean() == pytest.approx(2.09 * 9.81, rel=0.02)
     assert log.position[-1, 0] > 0.1
