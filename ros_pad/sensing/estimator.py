@@ -216,6 +216,7 @@ class BodyEstimator:
         )
         self._window = SlipWindow(legs, self._samples, self._encoder_noise, self._velocity_noise)
         self._time = math.nan
+        self._measured = True  # whether forces are measured, not computed from torques
         self._standing = np.zeros(legs, dtype=bool)
         self._slipping = np.zeros(legs, dtype=bool)
         self._slow_since = np.full(legs, math.inf)
@@ -278,6 +279,7 @@ class BodyEstimator:
         time = number('time', time, 's', -1e12, 1e12)
         if time == self._time:
             raise InvalidInput(f'time = {time} s is not allowed: it is that of the last sample')
+        foot_forces = readings[4]
         joints = self._robot.home.shape
         size = (joints[0] * joints[1],)
         names = (
@@ -288,26 +290,25 @@ class BodyEstimator:
             ('foot_forces', (joints[0], 3), 'N', 1e6),
             ('efforts', size, 'N m', 1e6),
         )
-        pairs = [
-            (np.asarray(r), n[1]) for r, n in zip(readings, names, strict=True) if r is not None
-        ]
+        given = [(n, r) for n, r in zip(names, readings, strict=True) if r is not None]
         # One look at all of them is enough if they are fine; NaN is not below the limit.
-        if (
-            all(array.dtype == float and array.shape == shape for array, shape in pairs)
-            and np.abs(np.concatenate([array.ravel() for array, _ in pairs])).max() < 1e3
+        if not (
+            all(
+                isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
+                for (_, shape, _, _), values in given
+            )
+            and np.abs(np.concatenate([np.ravel(values) for _, values in given])).max() < 1e3
         ):
-            return time, [*(a.reshape(joints) if s == size else a for a, s in pairs), _NONE]
-        found = []
-        for (name, shape, unit, most), reading in zip(names, readings, strict=True):
-            if reading is None:
-                continue
-            values = quantity(name, reading, unit, -most, most)
-            if values.shape != shape:
-                raise InvalidInput(
-                    f'{name} of shape {values.shape} is not allowed: {shape} is needed'
-                )
-            found.append(values.reshape(joints) if shape == size else values)
-        return time, [*found, _NONE]
+            for (name, shape, unit, most), values in given:
+                found = quantity(name, values, unit, -most, most)
+                if found.shape != shape:
+                    raise InvalidInput(
+                        f'{name} of shape {found.shape} is not allowed: {shape} is needed'
+                    )
+        arrays = [np.asarray(values, dtype=float) for _, values in given]
+        for index in (2, 3) if foot_forces is not None else (2, 3, 4)[: len(arrays) - 2]:
+            arrays[index] = arrays[index].reshape(joints)
+        return time, [*arrays, _NONE]
 
     def _forces(
         self, kinematics: Kinematics, accelerometer: Array, measured: bool, given: Array
@@ -315,6 +316,7 @@ class BodyEstimator:
         """Return the forces on the feet, (legs, 3), N, in IMU axes, or None."""
         if not given.size:
             return None
+        self._measured = measured
         if measured:
             if self._in_foot_axes:
                 return np.asarray((kinematics.rotations @ given[..., None])[..., 0])
@@ -433,7 +435,7 @@ class BodyEstimator:
             self._doubt_for(time, 'force: neither foot forces nor efforts')
             return self._standing
         loads = forces @ self._filter.turn[2]
-        share = self._contact_share or 0.1
+        share = self._contact_share or (0.1 if self._measured else 0.25)
         gate = share * self._expected
         self._standing = loads > np.where(before, gate, gate + 3.0 * self._force_noise)
         lands = self._standing & ~before

@@ -4,7 +4,8 @@
 Beside the estimator: the same filter without rejection of slipping feet, and legged odometry
 (gyro, and the mean velocity of the feet that stand). Errors are vectors of x and y. Slips are of
 settled stances, 24 ms after touch-down, faster than 10 mm/s; the alarm is that of
-ros_pad.estimation with a noise of 15 mm/s. A false alarm has no speed above 5 mm/s in its last 60 ms.
+ros_pad.estimation with a noise of 15 mm/s.
+A false alarm has no speed above 5 mm/s in its last 60 ms.
 """
 
 from __future__ import annotations

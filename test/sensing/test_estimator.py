@@ -343,3 +343,13 @@ def test_the_same_readings_give_the_same_estimates():
         motion = Motion(noise=1.0, seed=5)
         found.append([motion.step(speed_at(tick * DT)).velocity for tick in range(100)])
     assert np.array_equal(found[0], found[1])
+
+
+def test_lists_do_and_ragged_lists_are_refused():
+    q = POINTED.home.ravel()
+    readings = ([0, 0, 0], [0, 0, 9.81], q.tolist(), [0] * 12, STANDING.tolist())
+    found = BodyEstimator(POINTED).update(0, *readings)
+    other = BodyEstimator(POINTED).update(0.0, *map(np.array, readings))
+    assert np.array_equal(found.position, other.position)
+    with pytest.raises(InvalidInput, match='foot_forces'):
+        BodyEstimator(POINTED).update(0.0, *readings[:4], [[1.0], [1.0, 2.0]])
