@@ -274,8 +274,7 @@ def main(words: Sequence[str]) -> int:
     part = command.parser('sensing', __doc__)
     command.add_count(part, '--seeds', 2, 'walks of each kind')
     command.add_count(part, '--duration', 30, 'length of a walk, s', least=6)
-    add = 'length of a push, ms; from 200 on all feet slide on ice for longer than IMUs bridge'
-    command.add_count(part, '--push', round(1e3 * PUSH), add)
+    command.add_count(part, '--push', round(1e3 * PUSH), 'length of a push, ms')
     options = part.parse_args(words)
     cases = [
         (name, floor, FIRST_SEED + seed) for name, floor in CASES for seed in range(options.seeds)
