@@ -440,6 +440,32 @@ class Table:
         """Read a string."""
         return self.value(Setting(key, str, ''), default)
 
+    def vector(
+        self,
+        key: str,
+        unit: str,
+        size: int = 3,
+        low: float = -math.inf,
+        high: float = math.inf,
+        default: Any = _REQUIRED,
+    ) -> npt.NDArray[np.float64]:
+        """Read a list of ``size`` finite numbers in [low, high]."""
+        value = self._take(key, default)
+        try:
+            numbers = quantity(key, value, unit, low, high)
+        except InvalidInput as error:
+            raise ConfigError(f'{self.origin}: {error}') from None
+        if numbers.shape != (size,):
+            raise ConfigError(
+                f'{self.origin}: {_not_allowed(key, value, f"a list of {size} numbers")}'
+            )
+        return numbers
+
+    @property
+    def keys(self) -> tuple[Any, ...]:
+        """The keys of the mapping, in the order of the file."""
+        return tuple(self._values)
+
     @contextmanager
     def table(self, key: str, default: Any = _REQUIRED) -> Iterator[Table]:
         """Read a nested table; at the end of the block, unknown keys raise `ConfigError`."""

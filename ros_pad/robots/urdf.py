@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Legs, masses and IMU of a robot from a URDF file (http://wiki.ros.org/urdf/XML)."""
+
+from __future__ import annotations
+
+import math
+import os
+import pathlib
+import xml.etree.ElementTree as xml
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.errors import ConfigError
+from ros_pad.robots.chains import Joint
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import from_rpy
+from ros_pad.robots.rotation import transform
+
+MOVING = ('revolute', 'continuous', 'prismatic')
+
+
+class _Joint(NamedTuple):
+    name: str
+    kind: str
+    parent: str
+    child: str
+    at: Array
+    axis: Array
+
+
+class Urdf:
+    """The tree of links and joints in a URDF file.
+
+    Parameters
+    ----------
+    path : path
+        The file: URDF, not xacro.
+
+    Attributes
+    ----------
+    name : str
+        Name of the robot.
+    root : str
+        The link without a parent: its axes are those of the base.
+    mass : float
+        Mass of all links, kg.
+
+    Raises
+    ------
+    ConfigError
+        When the file cannot be read or is not a tree of links.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._origin = os.fspath(path)
+        try:
+            tree = xml.fromstring(pathlib.Path(path).read_bytes())
+        except (OSError, xml.ParseError, ValueError, LookupError) as error:
+            raise ConfigError(f'{self._origin}: not a readable URDF file: {error}') from error
+        if tree.tag != 'robot':
+            raise self._error(f'expected <robot>, found <{tree.tag}>')
+        self.name = tree.get('name', pathlib.Path(path).stem)
+        self._links = {
+            self._text(link, 'name'): self._inertial(link) for link in tree.iter('link')
+        }
+        self._joints: dict[str, _Joint] = {}  # by child
+        # Transmissions and ros2_control have elements <joint> too, but deeper in the tree.
+        for element in tree.findall('joint'):
+            joint = self._joint(element)
+            if joint.child in self._joints:
+                raise self._error(f'link {joint.child!r} has two parents')
+            self._joints[joint.child] = joint
+        roots = [name for name in self._links if name not in self._joints]
+        if len(roots) != 1:
+            raise self._error(f'one link without a parent is needed, found {roots}')
+        self.root = roots[0]
+        self.mass = sum(mass for mass, _ in self._links.values())
+
+    def leg(self, foot: str) -> tuple[list[Joint], Array]:
+        """Return the joints from the base to a link, and the transform of that link in the last.
+
+        Raises
+        ------
+        ConfigError
+            When there is no such link, no moving joint before it, or a joint of another type.
+        """
+        joints: list[Joint] = []
+        at = np.eye(4)
+        for joint in reversed(self._path(foot)):
+            at = at @ joint.at
+            if joint.kind == 'fixed':
+                continue
+            if joint.kind not in MOVING:
+                raise self._error(
+                    f'joint {joint.name!r}: type = {joint.kind!r} is not allowed:'
+                    f' one of fixed, {", ".join(MOVING)} is needed'
+                )
+            mass, centre = self._carried(joint.child)
+            slides = joint.kind == 'prismatic'
+            joints.append(Joint(joint.name, at, joint.axis, slides, mass, centre))
+            at = np.eye(4)
+        if not joints:
+            raise self._error(f'no moving joint between {self.root!r} and foot {foot!r}')
+        return joints, at
+
+    def pose(self, link: str) -> Array:
+        """Return the transform from a link that is fixed to the base, (4, 4), m.
+
+        Raises
+        ------
+        ConfigError
+            When there is no such link, or it can move against the base.
+        """
+        at = np.eye(4)
+        for joint in reversed(self._path(link)):
+            if joint.kind != 'fixed':
+                raise self._error(f'link {link!r} moves: joint {joint.name!r} is not fixed')
+            at = at @ joint.at
+        return at
+
+    def _path(self, link: str) -> list[_Joint]:
+        """Return the joints from a link up to the root."""
+        if link not in self._links:
+            raise self._error(f'no link {link!r}; there are: {", ".join(self._links)}')
+        path = []
+        while link in self._joints:
+            path.append(self._joints[link])
+            link = path[-1].parent
+            if len(path) > len(self._joints):
+                raise self._error(f'joint {path[0].name!r} is in a loop')
+        return path
+
+    def _carried(self, link: str) -> tuple[float, Array]:
+        """Return mass and centre of a link and all that is fixed to it, in the link's frame."""
+        mass, moment = self._links[link][0], self._links[link][0] * self._links[link][1]
+        for joint in self._joints.values():
+            if joint.parent == link and joint.kind == 'fixed':
+                other, centre = self._carried(joint.child)
+                mass += other
+                moment = moment + other * (joint.at @ np.append(centre, 1.0))[:3]
+        return mass, moment / mass if mass > 0.0 else np.zeros(3)
+
+    def _joint(self, element: xml.Element) -> _Joint:
+        name = self._text(element, 'name')
+        parent, child, axis = (element.find(tag) for tag in ('parent', 'child', 'axis'))
+        if parent is None or child is None:
+            raise self._error(f'joint {name!r} needs <parent> and <child>')
+        kind = self._text(element, 'type')
+        line = np.array((1.0, 0.0, 0.0)) if axis is None else self._numbers(axis, 'xyz', name)
+        length = math.sqrt(line @ line)
+        if kind in MOVING and length < 1e-6:
+            raise self._error(f'joint {name!r}: axis {line.tolist()} has no direction')
+        made = _Joint(
+            name,
+            kind,
+            self._text(parent, 'link'),
+            self._text(child, 'link'),
+            self._placed(element, name),
+            line / (length or 1.0),
+        )
+        for link in (made.parent, made.child):
+            if link not in self._links:
+                raise self._error(f'joint {name!r} names a link {link!r} that is not there')
+        return made
+
+    def _inertial(self, link: xml.Element) -> tuple[float, Array]:
+        """Return mass, kg, and centre of mass, m, of a link."""
+        inertial = link.find('inertial')
+        if inertial is None:
+            return 0.0, np.zeros(3)
+        name = link.get('name', '')
+        element = inertial.find('mass')
+        mass = 0.0 if element is None else float(self._numbers(element, 'value', name, 1)[0])
+        if mass < 0.0:
+            raise self._error(f'{name!r}: mass = {mass:g} is not allowed: at least 0 kg is needed')
+        return mass, self._placed(inertial, name)[:3, 3]
+
+    def _placed(self, element: xml.Element, name: str) -> Array:
+        origin = element.find('origin')
+        if origin is None:
+            return np.eye(4)
+        place, angles = (self._numbers(origin, key, name) for key in ('xyz', 'rpy'))
+        return transform(place, from_rpy(angles))
+
+    def _numbers(self, element: xml.Element, key: str, name: str, count: int = 3) -> Array:
+        text = element.get(key, ' '.join(count * ['0']))
+        try:
+            numbers = np.array([float(word) for word in text.split()])
+        except ValueError:
+            numbers = np.array([])
+        if numbers.shape != (count,) or not np.isfinite(numbers).all():
+            raise self._error(
+                f'{name!r}: {key} = {text!r} is not allowed: {count} finite number(s) needed'
+            )
+        return numbers
+
+    def _text(self, element: xml.Element, key: str) -> str:
+        text = element.get(key)
+        if not text:
+            raise self._error(f'<{element.tag}> needs {key}="…"')
+        return text
+
+    def _error(self, problem: str) -> ConfigError:
+        return ConfigError(f'{self._origin}: {problem}')
+
+
+def read(
+    path: str | os.PathLike[str], feet: Sequence[str]
+) -> tuple[Urdf, list[list[Joint]], Array]:
+    """Return a URDF file, the joints of the legs to these links, and the feet in the last joints.
+
+    Raises
+    ------
+    ConfigError
+        When the file is not valid, or the legs have not all the same number of joints.
+    """
+    file = Urdf(path)
+    legs = [file.leg(foot) for foot in feet]
+    counts = sorted({len(joints) for joints, _ in legs})
+    if len(counts) > 1:
+        raise ConfigError(
+            f'{os.fspath(path)}: legs with {" and ".join(map(str, counts))} joints: each leg needs'
+            ' the same number'
+        )
+    return file, [joints for joints, _ in legs], np.array([at for _, at in legs])

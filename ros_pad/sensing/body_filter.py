@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Error-state Kalman filter of an IMU and of feet that stand.
+
+State: rotation R from IMU to odom, velocity v, position p, biases of gyro and accelerometer, and
+for each foot the vector d in odom axes from the IMU to its foothold, where it was set down. Their
+errors: rotation φ in odom axes, δv - φ x v, δp, the biases' own, δd - φ x d. With these a standing
+foot measures its own error and no other, wherever the robot is (right-invariant, Hartley 2020,
+with the body as the origin), so rotation about the vertical stays unobservable, as it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dtrtri
+from scipy.linalg.lapack import dtrtrs
+
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import cross
+from ros_pad.robots.rotation import rotation
+from ros_pad.robots.rotation import skew
+
+Flags = npt.NDArray[np.bool_]
+
+GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
+GATE = 16.27
+"""Squared Mahalanobis distance of a foot's innovation above which it slips: 99.9 % of χ² with 3
+degrees of freedom."""
+
+JUMP = 0.2
+"""Deviation of an acceleration between two samples over its jump from one to the other: impacts
+are shorter than a sample."""
+
+STRAY = 3e-4
+"""Random motion of a foot that stands, m after 1 s, growing with the root of time."""
+
+SINKING = 6e-3
+"""Random sinking and rising of a foot that stands, m after 1 s, as its load changes."""
+
+ROLLING_ERROR = 0.15
+"""Relative error of the speed of rolling: feet are no spheres, and sink in."""
+
+FASTEST = 100.0
+"""Speed, m/s, above which the filter has diverged."""
+
+_APART = 1e2  # m²: variance of a measurement that must not count
+_TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
+_GYRO, _FORCE, FEET = slice(9, 12), slice(12, 15), 15
+
+
+class BodyFilter:
+    """Rotation, velocity and position of an IMU, its biases, and the footholds.
+
+    Parameters
+    ----------
+    legs : int
+        Number of legs.
+    gyro_noise, accelerometer_noise : float
+        Standard deviation of a sample, rad/s and m/s².
+    gate : float
+        Squared Mahalanobis distance above which a foot is rejected.
+
+    Attributes
+    ----------
+    turn : array (3, 3)
+        Rotation from the IMU to odom.
+    velocity, position : array (3,)
+        In odom, m/s and m.
+    gyro_bias, force_bias : array (3,)
+        Biases of gyro and accelerometer, rad/s and m/s².
+    footholds : array (legs, 3)
+        From the IMU to the footholds, in odom axes, m.
+    covariance : array (15 + 3 legs, 15 + 3 legs)
+        Of the errors above.
+    rejected : array of bool (legs,)
+        Feet whose last measurement was not consistent with standing still.
+    lifted : array of bool (legs,)
+        Of these, the ones whose height was not either.
+    """
+
+    def __init__(
+        self,
+        legs: int,
+        gyro_noise: float,
+        accelerometer_noise: float,
+        gate: float = GATE,
+    ) -> None:
+        size = FEET + 3 * legs
+        self.turn = np.eye(3)
+        self.velocity, self.position = np.zeros(3), np.zeros(3)
+        self.gyro_bias, self.force_bias = np.zeros(3), np.zeros(3)
+        self.footholds = np.zeros((legs, 3))
+        self.covariance = np.zeros((size, size))
+        self.rejected, self.lifted = np.zeros((2, legs), dtype=bool)
+        self._legs = legs
+        self._gate = gate
+        self._noise = gyro_noise, accelerometer_noise
+        self._step = np.eye(size)
+        self._inputs = np.zeros((size, 6))  # what errors of gyro and accelerometer do in a step
+        self._last: tuple[Array, Array] | None = None
+        self._diagonal = self.covariance.ravel()[:: size + 1]
+        self._units = np.tile(_UNIT, (legs, 1))
+        self._blocks = np.arange(3 * legs).reshape(legs, 3)
+
+    def spread(self, turn: float, velocity: float, gyro_bias: float, force_bias: float) -> None:
+        """Set standard deviations, without correlations: rad (tilt), m/s, rad/s, m/s²."""
+        self.covariance[:] = 0.0
+        self._diagonal[0:2] = turn**2
+        self._diagonal[_SPEED] = velocity**2
+        self._diagonal[_GYRO] = gyro_bias**2
+        self._diagonal[_FORCE] = force_bias**2
+        self._last = None
+
+    def lose(self) -> None:
+        """Let the velocity be unknown, as after a gap without readings."""
+        self.covariance[_SPEED] = 0.0
+        self.covariance[:, _SPEED] = 0.0
+        self._diagonal[_SPEED] = 1.0
+        self._diagonal[:2] += 0.01**2
+        self._diagonal[_PLACE] += 1.0
+        self._last = None
+
+    def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> Array:
+        """Advance by a step; return its mean velocity, (3,), m/s.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step, s.
+        gyro, force : array (3,)
+            Angular velocity, rad/s, and specific force, m/s², as measured at the end of the step.
+        rolling : array (legs, 3)
+            Velocity with which the feet roll, m/s, odom axes.
+        """
+        before = self._last or (gyro, force)
+        self._last = gyro, force
+        old, v = self.turn, self.velocity
+        rate = 0.5 * (before[0] + gyro) - self.gyro_bias
+        self.turn = turn = old @ rotation(rate * dt)
+        start, end = old @ (before[1] - self.force_bias), turn @ (force - self.force_bias)
+        acceleration = 0.5 * (start + end) + GRAVITY
+        mean = v + 0.5 * dt * acceleration
+        self.velocity = v + dt * acceleration
+        self.position = self.position + dt * mean
+        self.footholds += dt * (rolling - mean)
+        jump = end - start
+        self._spread_on(dt, turn, float(jump @ jump), rolling)
+        return mean
+
+    def _spread_on(self, dt: float, turn: Array, jump: float, rolling: Array) -> None:
+        """Advance the covariance."""
+        turned = -dt * turn
+        step, inputs = self._step, self._inputs
+        inputs[_TURN, :3] = turned
+        inputs[_SPEED, :3] = skew(self.velocity) @ turned
+        inputs[_SPEED, 3:] = turned
+        inputs[FEET:, :3] = (skew(self.footholds) @ turned).reshape(-1, 3)
+        step[:, 9:15] = inputs
+        step[_GYRO, _GYRO] = step[_FORCE, _FORCE] = _UNIT
+        step[_SPEED, _TURN] = dt * _FALL
+        step[_PLACE, _TURN] = -dt * skew(self.velocity)
+        step[_PLACE, _SPEED] = dt * _UNIT
+        step[FEET:, _SPEED] = -dt * self._units
+        gyro, force = self._noise
+        noise = np.repeat((gyro, math.sqrt(force**2 + JUMP**2 * jump)), 3) * inputs
+        self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
+        self._diagonal[_GYRO] += GYRO_DRIFT**2 * dt
+        self._diagonal[_FORCE] += FORCE_DRIFT**2 * dt
+        stray = STRAY**2 * dt + (ROLLING_ERROR * dt) ** 2 * (rolling * rolling).sum(1)
+        self._diagonal[FEET:] += np.repeat(stray, 3)
+        self._diagonal[FEET + 2 :: 3] += SINKING**2 * dt
+
+    def set_down(self, feet: Flags, places: Array, noise: Array, level: bool = False) -> None:
+        """Make new footholds where these feet are.
+
+        Parameters
+        ----------
+        feet : array of bool (legs,)
+            Which feet.
+        places : array (legs, 3)
+            All feet as measured, from the IMU, in odom axes, m.
+        noise : array (legs, 3, 3)
+            Covariance of these places, m².
+        level : bool
+            Keep the height of the foothold.
+        """
+        cells = 2 if level else 3
+        for foot in np.flatnonzero(feet):
+            at = FEET + 3 * foot
+            self.footholds[foot, :cells] = places[foot, :cells]
+            # A new foothold shares no error with the body: its own is that of the joints alone.
+            self.covariance[at : at + cells] = 0.0
+            self.covariance[:, at : at + cells] = 0.0
+            self.covariance[at : at + cells, at : at + cells] = noise[foot, :cells, :cells]
+
+    def stand(self, places: Array, noise: Array, standing: Flags, slipping: Flags) -> None:
+        """Correct everything with feet that stand; `rejected` are those that do not stick.
+
+        Parameters
+        ----------
+        places, noise
+            As for :meth:`set_down`.
+        standing : array of bool (legs,)
+            Feet that carry load.
+        slipping : array of bool (legs,)
+            Of these, the ones that only keep their height.
+        """
+        legs = self._legs
+        miss = np.where(standing[:, None], places - self.footholds, 0.0)
+        spread = self.covariance[FEET:, FEET:].copy()
+        cells = spread.reshape(legs, 3, legs, 3)
+        each = np.arange(legs)
+        cells[each, :, each] += noise
+        diagonal = spread.ravel()[:: 3 * legs + 1].reshape(legs, 3)
+        diagonal[~standing] += _APART
+        diagonal[slipping, :2] += _APART
+        self.rejected[:] = self.lifted[:] = False
+        miss = miss.ravel()
+        root, _ = dpotrf(spread, lower=1)
+        score, _ = dtrtrs(root, miss, lower=1)
+        if score @ score > self._gate:
+            root = self._judge(spread, diagonal, miss, standing, slipping)
+        # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
+        inverse, _ = dtrtri(root, lower=1)
+        rows = inverse @ self.covariance[FEET:]
+        self.apply((inverse @ miss) @ rows)
+        spread = self.covariance
+        spread -= rows.T @ rows
+        spread += spread.T.copy()  # rounding must not make it unsymmetric
+        spread *= 0.5
+
+    def _judge(
+        self, spread: Array, diagonal: Array, miss: Array, standing: Flags, slipping: Flags
+    ) -> Array:
+        """Reject feet one by one, judged in order of consistency; return the root of the rest."""
+        legs = self._legs
+        each = np.arange(legs)
+        own = spread.reshape(legs, 3, legs, 3)[each, :, each]
+        rows = miss.reshape(legs, 3)
+        alone = (rows * np.linalg.solve(own, rows[..., None])[..., 0]).sum(1)
+        order = self._blocks[np.argsort(alone)]
+        weak = slipping.copy()
+        for _ in range(2 * legs):
+            chosen = order.ravel()
+            root, _ = dpotrf(spread[np.ix_(chosen, chosen)], lower=1)
+            score, _ = dtrtrs(root, miss[chosen], lower=1)
+            bad = np.flatnonzero((score.reshape(legs, 3) ** 2).sum(1) > self._gate)
+            if not bad.size:
+                break
+            foot = int(order[bad[0], 0]) // 3
+            if weak[foot]:
+                diagonal[foot] += _APART
+                self.lifted[foot] = True
+            else:
+                diagonal[foot, :2] += _APART
+            weak[foot] = self.rejected[foot] = True
+        root, _ = dpotrf(spread, lower=1)
+        return root
+
+    def rest(self, gyro: Array, noise: float) -> None:
+        """Correct with a mean gyro reading, (3,), of a body at rest, and its deviation, rad/s."""
+        rows = self.covariance[_GYRO]
+        gain = np.linalg.solve(rows[:, _GYRO] + noise**2 * _UNIT, rows).T
+        self.apply(gain @ (gyro - self.gyro_bias))
+        self.covariance -= gain @ rows
+
+    def sound(self) -> bool:
+        """Return whether velocity and covariance are such as a robot can have."""
+        speed = float(self.velocity @ self.velocity)
+        least, most = float(self._diagonal.min()), float(self._diagonal.max())
+        return speed < FASTEST**2 and least > -1e-9 and most < math.inf  # false for NaN, too
+
+    def apply(self, error: Array) -> None:
+        """Correct the state by an estimated error, (15 + 3 legs,)."""
+        turn = error[_TURN]
+        self.velocity = self.velocity + error[_SPEED] + cross(turn, self.velocity)
+        self.position = self.position + error[_PLACE]
+        self.gyro_bias = self.gyro_bias + error[_GYRO]
+        self.force_bias = self.force_bias + error[_FORCE]
+        self.footholds += error[FEET:].reshape(-1, 3) + cross(turn, self.footholds)
+        self.turn = rotation(turn) @ self.turn
+
+
+GYRO_DRIFT = 2e-5
+"""Random walk of the bias of the gyro, rad/s after 1 s."""
+
+FORCE_DRIFT = 1e-3
+"""Random walk of the bias of the accelerometer, m/s² after 1 s."""
+
+_UNIT = np.eye(3)
+_FALL = skew(GRAVITY)

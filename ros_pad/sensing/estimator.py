@@ -1,0 +1,554 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimator of a legged robot's motion: body, feet and slip from IMU, joints and foot forces."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.configuration import choice
+from ros_pad.configuration import number
+from ros_pad.configuration import quantity
+from ros_pad.errors import InvalidInput
+from ros_pad.robots import Kinematics
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import cross
+from ros_pad.robots.rotation import quaternion
+from ros_pad.robots.rotation import rotation
+from ros_pad.robots.rotation import skew
+from ros_pad.sensing.body_filter import GATE
+from ros_pad.sensing.body_filter import GRAVITY
+from ros_pad.sensing.body_filter import BodyFilter
+from ros_pad.sensing.body_filter import Flags
+from ros_pad.sensing.slip_window import SlipWindow
+
+WEIGHT = -float(GRAVITY[2])  # m/s²
+
+LONGEST_STEP = 0.03
+"""Longest time between samples over which a foot keeps its foothold, s: then it may have
+stepped."""
+
+LONGEST_GAP = 0.2
+"""Longest time between samples that the IMU is taken to bridge, s: then the velocity is
+unknown."""
+
+RECOVERY = 0.3
+"""Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
+gap leaves one."""
+
+LOST = 0.5
+"""Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
+alike."""
+
+ALIKE = 0.03
+"""Largest difference of slip velocities that are alike, m/s."""
+
+STICKS = 0.03
+"""Time for which a slipping foot has to be slow before it counts as sticking, s."""
+
+SETTLES = 0.012
+"""The same for a foot that has just landed, s: it skids first."""
+
+SLOW = 2.5
+"""Standard deviations of the slip speed up to which a foot is slow."""
+
+FAST = 4.0
+"""Standard deviations of the slip speed from which on a foot slips."""
+
+REST_TIME = 0.2
+"""Time over which the gyro is averaged when the body is at rest, s."""
+
+BIAS_FLOOR = 3e-4
+"""Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest."""
+
+UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
+_NONE = np.zeros(0)
+FOOT_NOISE = 1e-4  # m: kinematics that are not quite right
+DAMPING = 1e-4  # m²: keeps forces finite where the leg is straight
+
+
+class FootMotion(NamedTuple):
+    """One foot after a sample; all vectors in odom axes.
+
+    Attributes
+    ----------
+    position, velocity : array (3,)
+        Centre of the foot, m, m/s.
+    force : array (3,)
+        Force of the ground on the foot, N.
+    in_contact : bool
+        Whether the foot carries load.
+    slip_velocity : array (2,)
+        Velocity of the contact point, x and y, m/s: mean of the last samples, see ``window``.
+    slip_velocity_sd : float
+        Standard deviation of each of its components, m/s. It includes that of the body's
+        velocity, which is common to all feet and lasts for about a stance.
+    slipping : bool
+        Whether the foot carries load but is not consistent with standing still, or has landed
+        less than 12 ms ago.
+    """
+
+    position: Array
+    velocity: Array
+    force: Array
+    in_contact: bool
+    slip_velocity: Array
+    slip_velocity_sd: float
+    slipping: bool
+
+
+class BodyEstimate(NamedTuple):
+    """Estimate after a sample, in odom: z up, world-fixed, at the body when estimation began.
+
+    Attributes
+    ----------
+    time : float
+        Time of the sample, s.
+    position, velocity : array (3,)
+        Of the base, m, m/s.
+    orientation : array (4,)
+        Quaternion x y z w from the base to odom.
+    covariance : array (9, 9)
+        Of position, m, rotation in odom axes, rad, and velocity, m/s.
+    feet : tuple of FootMotion
+    doubt : str
+        Why this must not be relied on: a kind, a colon, and details; empty if it may be.
+    """
+
+    time: float
+    position: Array
+    orientation: Array
+    velocity: Array
+    covariance: Array
+    feet: tuple[FootMotion, ...]
+    doubt: str
+
+
+class BodyEstimator:
+    """Estimate motion of body and feet from IMU, joints and foot forces.
+
+    Parameters
+    ----------
+    robot : Robot
+    gyro_noise : float
+        Standard deviation of a sample of the gyro, rad/s, above 0 up to 1.
+    accelerometer_noise : float
+        Of the accelerometer, m/s², above 0 up to 10.
+    encoder_noise : float
+        Of a joint position, rad, above 0 up to 0.1.
+    velocity_noise : float
+        Of a joint velocity, rad/s, above 0 up to 10.
+    force_noise : float
+        Of a component of a foot's force, N, 0 to 1000.
+    accelerometer_bias : float
+        Standard deviation of the accelerometer's bias, m/s², 0 to 5.
+    contact_share : float, optional
+        Share of the expected load above which a foot stands, 0.01 to 0.9; by default 0.1, and 0.25
+        where the force comes from joint torques. The expected load is the weight over half of the
+        legs.
+    window : float
+        Length of the window of slip velocities, s, 0 to 1.
+    rate : float
+        Samples a second that are expected, Hz, 10 to 10000; it sets the size of that window.
+    force_axes : str
+        ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
+        of the feet.
+    rejection : bool
+        Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
+
+    Raises
+    ------
+    InvalidInput
+        When a value is outside its range; the message names it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gyro_noise: float = 0.005,
+        accelerometer_noise: float = 0.05,
+        encoder_noise: float = 5e-4,
+        velocity_noise: float = 0.03,
+        force_noise: float = 0.3,
+        accelerometer_bias: float = 0.05,
+        contact_share: float | None = None,
+        window: float = 0.02,
+        rate: float = 250.0,
+        force_axes: str = 'base',
+        rejection: bool = True,
+    ) -> None:
+        self._robot = robot
+        self._gyro_noise = number('gyro_noise', gyro_noise, 'rad/s', 0.0, 1.0, above=True)
+        self._accelerometer_noise = number(
+            'accelerometer_noise', accelerometer_noise, 'm/s2', 0.0, 10.0, above=True
+        )
+        self._encoder_noise = number('encoder_noise', encoder_noise, 'rad', 0.0, 0.1, above=True)
+        self._velocity_noise = number(
+            'velocity_noise', velocity_noise, 'rad/s', 0.0, 10.0, above=True
+        )
+        self._force_noise = number('force_noise', force_noise, 'N', 0.0, 1000.0)
+        self._bias = number('accelerometer_bias', accelerometer_bias, 'm/s2', 0.0, 5.0)
+        if contact_share is not None:
+            number('contact_share', contact_share, '(share)', 0.01, 0.9)
+        self._contact_share = contact_share
+        rate = number('rate', rate, 'Hz', 10.0, 10000.0)
+        self._samples = max(1, round(number('window', window, 's', 0.0, 1.0) * rate))
+        self._in_foot_axes = choice('force_axes', force_axes, ('base', 'foot')) == 'foot'
+        self._rejection = rejection
+        self._to_base = np.zeros((9, 9))
+        self._to_base[:3, 6:9] = self._to_base[3:6, :3] = self._to_base[6:9, 3:6] = np.eye(3)
+        self._to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
+        self._reset()
+
+    def _reset(self) -> None:
+        """Discard everything."""
+        robot, legs = self._robot, len(self._robot.legs)
+        self._filter = BodyFilter(
+            legs,
+            self._gyro_noise,
+            self._accelerometer_noise,
+            GATE if self._rejection else math.inf,
+        )
+        self._window = SlipWindow(legs, self._samples, self._encoder_noise, self._velocity_noise)
+        self._time = math.nan
+        self._measured = True  # whether forces are measured, not computed from torques
+        self._standing = np.zeros(legs, dtype=bool)
+        self._slipping = np.zeros(legs, dtype=bool)
+        self._slow_since = np.full(legs, math.inf)
+        self._patience = np.full(legs, STICKS)
+        self._rolling = np.zeros((legs, 3))
+        self._held = math.inf  # when a foot last stuck
+        self._sliding_since = math.inf  # since when feet stand and none of them sticks
+        self._unsure_until, self._reason = -math.inf, ''
+        self._rest_since, self._rest_sum, self._rest_count = math.nan, np.zeros(3), 0
+        self._pull = WEIGHT
+        self._expected = robot.mass * WEIGHT / (0.5 * legs)
+
+    def update(
+        self,
+        time: float,
+        gyro: npt.ArrayLike,
+        accelerometer: npt.ArrayLike,
+        joint_positions: npt.ArrayLike,
+        joint_velocities: npt.ArrayLike,
+        foot_forces: npt.ArrayLike | None = None,
+        efforts: npt.ArrayLike | None = None,
+    ) -> BodyEstimate:
+        """Process the readings of one moment.
+
+        Parameters
+        ----------
+        time : float
+            Time of the readings, s. Where it goes back, estimation begins anew.
+        gyro, accelerometer : array (3,)
+            Angular velocity, rad/s, and specific force, m/s² (+9.81 upwards at rest), IMU axes.
+        joint_positions, joint_velocities : array (joints,)
+            In the order of ``robot.joint_names``, rad and rad/s.
+        foot_forces : array (legs, 3), optional
+            Forces of the ground on the feet, N, in the axes of ``force_axes``.
+        efforts : array (joints,), optional
+            Joint torques, N m, from which forces are taken where there are no foot forces.
+
+        Raises
+        ------
+        InvalidInput
+            When a reading is not finite, has another shape, or has the time of the last one; the
+            estimator is then as it was before.
+        """
+        time, given = self._checked(
+            time, gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts
+        )
+        gyro, accelerometer, q, dq = given[:4]
+        kinematics = self._robot.chains.solve(q, self._to_imu)
+        forces = self._forces(kinematics, accelerometer, foot_forces is not None, given[4])
+        if time < self._time:
+            self._reset()
+            self._doubt_for(time, 'clock: time went back, odom begins anew')
+        if math.isnan(self._time):
+            self._begin(time, gyro, accelerometer, dq)
+        self._advance(time, gyro, accelerometer)
+        return self._process(time, gyro, accelerometer, kinematics, dq, forces)
+
+    def _checked(self, time: float, *readings: npt.ArrayLike | None) -> tuple[float, list[Array]]:
+        """Return time and readings as arrays; raise `InvalidInput` for those not allowed."""
+        time = number('time', time, 's', -1e12, 1e12)
+        if time == self._time:
+            raise InvalidInput(f'time = {time} s is not allowed: it is that of the last sample')
+        foot_forces = readings[4]
+        joints = self._robot.home.shape
+        size = (joints[0] * joints[1],)
+        names = (
+            ('gyro', (3,), 'rad/s', 1e3),
+            ('accelerometer', (3,), 'm/s2', 1e4),
+            ('joint_positions', size, 'rad', 1e4),
+            ('joint_velocities', size, 'rad/s', 1e4),
+            ('foot_forces', (joints[0], 3), 'N', 1e6),
+            ('efforts', size, 'N m', 1e6),
+        )
+        given = [(n, r) for n, r in zip(names, readings, strict=True) if r is not None]
+        # One look at all of them is enough if they are fine; NaN is not below the limit.
+        if not (
+            all(
+                isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape
+                for (_, shape, _, _), values in given
+            )
+            and np.abs(np.concatenate([np.ravel(values) for _, values in given])).max() < 1e3
+        ):
+            for (name, shape, unit, most), values in given:
+                found = quantity(name, values, unit, -most, most)
+                if found.shape != shape:
+                    raise InvalidInput(
+                        f'{name} of shape {found.shape} is not allowed: {shape} is needed'
+                    )
+        arrays = [np.asarray(values, dtype=float) for _, values in given]
+        for index in (2, 3) if foot_forces is not None else (2, 3, 4)[: len(arrays) - 2]:
+            arrays[index] = arrays[index].reshape(joints)
+        return time, [*arrays, _NONE]
+
+    def _forces(
+        self, kinematics: Kinematics, accelerometer: Array, measured: bool, given: Array
+    ) -> Array | None:
+        """Return the forces on the feet, (legs, 3), N, in IMU axes, or None."""
+        if not given.size:
+            return None
+        self._measured = measured
+        if measured:
+            if self._in_foot_axes:
+                return np.asarray((kinematics.rotations @ given[..., None])[..., 0])
+            return np.asarray(given @ self._robot.imu[:3, :3])
+        # The specific force has weight and inertia of the legs in one, as far as they move with
+        # the body.
+        lines = kinematics.jacobians
+        holding = self._robot.chains.gravity_torques(kinematics, -accelerometer)
+        square = lines @ lines.transpose(0, 2, 1) + DAMPING * np.eye(3)
+        return np.asarray(np.linalg.solve(square, lines @ (holding - given)[..., None])[..., 0])
+
+    def _begin(self, time: float, gyro: Array, accelerometer: Array, dq: Array) -> None:
+        """Begin with the base at the origin, heading along x, tilted as the IMU shows."""
+        strength = math.sqrt(accelerometer @ accelerometer)
+        calm = (
+            abs(strength - WEIGHT) < 0.5
+            and np.abs(gyro).max() < 0.05 + 4.0 * self._gyro_noise
+            and np.abs(dq).max() < 0.05 + 4.0 * self._velocity_noise
+        )
+        tilt = math.hypot(self._accelerometer_noise, self._bias) / WEIGHT
+        body = self._filter
+        body.spread(
+            *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)), UNKNOWN_BIAS, max(self._bias, 1e-3)
+        )
+        # The least rotation that turns the reading of the IMU upright, then the base to x.
+        up = self._robot.imu[:3, :3] @ accelerometer / max(strength, 1e-9)
+        axis = cross(up, np.array((0.0, 0.0, 1.0)))
+        sine = math.sqrt(axis @ axis)
+        angle = math.atan2(sine, up[2])
+        turn = rotation(axis / sine * angle if sine > 1e-9 else (angle, 0.0, 0.0))
+        heading = math.atan2(turn[1, 0], turn[0, 0])
+        turn = rotation((0.0, 0.0, -heading)) @ turn
+        body.turn = turn @ self._robot.imu[:3, :3]
+        body.position = -body.turn @ self._to_imu[:3, 3]
+        self._time = self._held = self._sliding_since = time
+        if not calm and time >= self._unsure_until:
+            self._doubt_for(time, 'start: the robot may be moving')
+
+    def _doubt_for(self, time: float, reason: str) -> None:
+        self._unsure_until, self._reason = time + RECOVERY, reason
+
+    def _advance(self, time: float, gyro: Array, accelerometer: Array) -> None:
+        """Advance the filter to the time of the readings."""
+        dt, self._time = time - self._time, time
+        if dt > LONGEST_GAP:
+            self._doubt_for(time, f'gap: no readings for {dt:.2g} s')
+            self._filter.lose()
+        if dt > LONGEST_STEP:
+            self._sliding_since = time
+            self._standing[:] = False  # their footholds are made anew
+        self._rolling[~self._standing] = 0.0
+        # What happened in a gap is unknown: the body is taken to have stood.
+        step = dt if dt <= LONGEST_GAP else 0.0
+        mean = self._filter.predict(step, gyro, accelerometer, self._rolling)
+        self._moved = step * (mean - self._rolling)
+        self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * min(1.0, dt)
+
+    def _process(
+        self,
+        time: float,
+        gyro: Array,
+        accelerometer: Array,
+        kinematics: Kinematics,
+        dq: Array,
+        forces: Array | None,
+    ) -> BodyEstimate:
+        """Correct the filter with the feet, and return the estimate."""
+        body, legs = self._filter, len(self._standing)
+        lands = self._load(kinematics, forces, time)
+        turn = body.turn
+        places = kinematics.positions @ turn.T
+        lines = turn @ kinematics.jacobians
+        squares = lines @ lines.transpose(0, 2, 1)
+        noise = self._encoder_noise**2 * squares + FOOT_NOISE**2 * np.eye(3)
+        body.set_down(lands, places, noise)
+        if self._standing.any():
+            body.stand(places, noise, self._standing, self._slipping)
+        if not body.sound():
+            return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
+        self._rest(time, gyro, dq)
+        turn = body.turn
+        rate = gyro - body.gyro_bias
+        turning = (kinematics.angular @ dq[..., None])[..., 0] + rate
+        swaying = (kinematics.jacobians @ dq[..., None])[..., 0] + kinematics.positions @ skew(
+            rate
+        ).T
+        moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
+        velocities = body.velocity + moving
+        radius = self._robot.foot_radius
+        self._rolling = np.stack(
+            [radius * turning[:, 1], -radius * turning[:, 0], np.zeros(legs)], axis=1
+        )
+        slips = velocities - self._rolling
+        window = self._window
+        window.update(time, self._moved, places, slips, lands)
+        variance = body.covariance
+        common = 0.5 * (variance[3, 3] + variance[4, 4])
+        lever = 0.5 * (squares[:, 0, 0] + squares[:, 1, 1])
+        deviations = np.sqrt(window.lever_noise**2 * lever + common)
+        self._judge(time, window.velocity, deviations, places, noise)
+        return self._estimate(time, rate, places, velocities, forces, deviations)
+
+    def _anew(self, time: float, *readings: Any) -> BodyEstimate:
+        """Begin anew after readings that no robot can have made."""
+        self._reset()
+        self._begin(time, readings[0], readings[1], readings[3])
+        self._doubt_for(time, 'diverged: odom begins anew')
+        self._advance(time, readings[0], readings[1])
+        return self._process(time, *readings)
+
+    def _load(self, kinematics: Kinematics, forces: Array | None, time: float) -> Flags:
+        """Update which feet stand; return those that landed with this sample."""
+        before = self._standing
+        if forces is None:
+            self._standing = np.zeros_like(before)
+            self._doubt_for(time, 'force: neither foot forces nor efforts')
+            return self._standing
+        loads = forces @ self._filter.turn[2]
+        share = self._contact_share or (0.1 if self._measured else 0.25)
+        gate = share * self._expected
+        self._standing = loads > np.where(before, gate, gate + 3.0 * self._force_noise)
+        lands = self._standing & ~before
+        self._slipping &= self._standing
+        if self._rejection:
+            self._slipping |= lands
+            self._patience[lands] = SETTLES
+            self._slow_since[lands] = math.inf
+        return lands
+
+    def _judge(
+        self, time: float, slips: Array, deviations: Array, places: Array, noise: Array
+    ) -> None:
+        """Update which feet slip: those that slip have a foothold only in height."""
+        if not self._rejection:
+            return
+        speeds = np.hypot(slips[:, 0], slips[:, 1])
+        fresh = self._standing & ~self._slipping
+        fresh &= self._filter.rejected | (speeds > FAST * deviations)
+        self._patience[fresh] = STICKS
+        slow = self._standing & (speeds < SLOW * deviations) & ~fresh
+        self._slow_since = np.where(slow, np.minimum(self._slow_since, time), math.inf)
+        self._slipping |= fresh
+        self._slipping &= ~(time - self._slow_since >= self._patience)
+        lifted = self._filter.lifted
+        if self._slipping.any():
+            self._filter.set_down(self._slipping & ~lifted, places, noise, level=True)
+        if lifted.any():
+            self._filter.set_down(lifted, places, noise)
+        sticking = self._standing & ~self._slipping
+        if sticking.any():
+            self._held = time
+        if sticking.any() or not self._standing.any():
+            self._sliding_since = time
+        elif time - self._sliding_since > LOST and self._standing.sum() > 1:
+            self._regain(time, slips[self._standing])
+
+    def _regain(self, time: float, slips: Array) -> None:
+        """Take feet to stick that all slip alike for long: more likely the velocity is wrong."""
+        if np.ptp(slips[:, :2], axis=0).max() < ALIKE:
+            self._filter.lose()
+            self._slipping[:] = False
+            self._held = self._sliding_since = time
+            self._doubt_for(time, 'slipping: all feet slipped alike, velocity is estimated anew')
+
+    def _rest(self, time: float, gyro: Array, dq: Array) -> None:
+        """Average the gyro while nothing moves, and correct its bias."""
+        still = bool(
+            self._standing.all()
+            and np.abs(dq).max() < 0.02 + 5.0 * self._velocity_noise
+            and np.abs(gyro - self._filter.gyro_bias).max()
+            < 0.02 + 5.0 * self._gyro_noise + 3.0 * math.sqrt(self._filter.covariance[9, 9])
+        )
+        if not still or self._rest_count == 0:
+            self._rest_since, self._rest_sum, self._rest_count = time, np.zeros(3), 0
+        if still:
+            self._rest_sum, self._rest_count = self._rest_sum + gyro, self._rest_count + 1
+            if time - self._rest_since >= REST_TIME:
+                noise = math.hypot(self._gyro_noise / math.sqrt(self._rest_count), BIAS_FLOOR)
+                self._filter.rest(self._rest_sum / self._rest_count, noise)
+                self._rest_count = 0
+
+    def _estimate(
+        self,
+        time: float,
+        rate: Array,
+        places: Array,
+        velocities: Array,
+        forces: Array | None,
+        deviations: Array,
+    ) -> BodyEstimate:
+        body = self._filter
+        turn = body.turn
+        arm = turn @ self._to_imu[:3, 3]
+        to_odom = turn @ self._to_imu[:3, :3]
+        centres = places + body.position
+        loads = np.zeros_like(places) if forces is None else forces @ turn.T
+        slips = self._window.velocity[:, :2]
+        feet = tuple(
+            map(
+                FootMotion,
+                centres,
+                velocities,
+                loads,
+                self._standing.tolist(),
+                slips,
+                deviations.tolist(),
+                (self._standing & self._slipping).tolist(),
+            )
+        )
+        velocity = body.velocity + turn @ cross(rate, self._to_imu[:3, 3])
+        # From the filter's errors to those of the base: rotation moves it about the IMU.
+        step = self._to_base
+        step[:3, :3] = -skew(arm)
+        step[6:9, :3] = -skew(velocity)
+        covariance = step @ body.covariance[:9, :9] @ step.T
+        return BodyEstimate(
+            time,
+            body.position + arm,
+            quaternion(to_odom),
+            velocity,
+            covariance,
+            feet,
+            self._doubt(time),
+        )
+
+    def _doubt(self, time: float) -> str:
+        if time < self._unsure_until:
+            return self._reason
+        if abs(self._pull - WEIGHT) > 1.0:
+            return f'gravity: the accelerometer shows {self._pull:.2g} m/s2 on average'
+        if time - self._held > RECOVERY:
+            if self._standing.any():
+                return 'slipping: all feet that stand may slip'
+            return 'no contact: no foot stands'
+        return ''

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Logs of simulated walks: what IMU, joints and feet measure, and the truth beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import fields
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.robots import Gait
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import quaternion
+
+RATE = 250.0  # samples a second
+SUBSTEPS = 4  # steps of MuJoCo in each of them
+REST = 2.0  # s at rest before the walk
+SETTLE = 1.0  # s before the log, in which the robot comes to rest on its feet
+RAMP = 1.0  # s until the full stride
+FLOORS = ('dry', 'patches', 'ice')
+PUSH = 0.1  # s, length of a push
+PATCH = 0.4  # m, edge of the squares of a floor
+START_FRICTION = 0.7  # of the ground at rest
+POINT = 1e-4  # m, radius of the ball that stands for a foot that does not roll
+
+
+class Noise(NamedTuple):
+    """Standard deviations of the sensors, and the bias of gyro and accelerometer, SI units."""
+
+    gyro: float = 0.005
+    accelerometer: float = 0.05
+    encoder: float = 5e-4
+    velocity: float = 0.03
+    force: float = 0.3
+    effort: float = 0.05
+    gyro_bias: float = 0.01
+    accelerometer_bias: float = 0.05
+
+
+class Drive(NamedTuple):
+    """Speed of a walk, m/s, and servos: stiffness, damping, largest torque, rotor inertia."""
+
+    speed: float
+    stiffness: float
+    damping: float
+    torque: float
+    armature: float
+
+
+DRIVES = {'go2': Drive(0.3, 80.0, 3.0, 40.0, 0.01), 'ch3r': Drive(0.13, 18.8, 0.18, 0.94, 2e-3)}
+
+
+@dataclass
+class Log:
+    """Samples of a walk, one row each. Base axes but for ``gyro`` and ``accelerometer`` (IMU).
+
+    The truth is in the axes of the world: ``position``, ``orientation`` (x y z w), ``velocity`` of
+    the base, ``feet`` (centres of the spheres), ``slip`` (velocity of the contact points, x
+    and y), ``load`` (normal forces).
+    """
+
+    time: Array
+    gyro: Array
+    accelerometer: Array
+    joint_positions: Array
+    joint_velocities: Array
+    foot_forces: Array
+    efforts: Array
+    position: Array
+    orientation: Array
+    velocity: Array
+    feet: Array
+    slip: Array
+    load: Array
+
+
+def model_of(robot: Robot, drive: Drive) -> str:
+    """Return a robot on a floor, one plane for each foot, in MuJoCo's XML."""
+    trees, pairs, servos = [], [], []
+    carried = 0.0
+    for index, joints in enumerate(robot.chains.legs):
+        tree, ends = '', ''
+        for joint in joints:
+            carried += joint.mass
+            # Links are taken for rods of 0.2 m in every direction: enough for test data.
+            inertia = max(joint.mass * 0.2**2 / 12.0, 1e-6)
+            tree += (
+                f'<body {_at(joint.at)}><joint name="{joint.name}" axis="{_words(joint.axis)}"'
+                f' damping="{0.1 * drive.damping}" armature="{drive.armature}"/>'
+                f'<inertial mass="{max(joint.mass, 1e-6)!r}" pos="{_words(joint.centre)}"'
+                f' diaginertia="{inertia} {inertia} {inertia}"/>'
+            )
+            ends += '</body>'
+            servos.append(
+                f'<position joint="{joint.name}" kp="{drive.stiffness}" kv="{drive.damping}"'
+                f' forcerange="{-drive.torque} {drive.torque}"/>'
+            )
+        place = _words(robot.chains.feet[index, :3, 3])
+        size = robot.foot_radius or POINT
+        trees.append(f'{tree}<geom name="foot_{index}" size="{size}" pos="{place}"/>{ends}')
+        pairs.append(
+            f'<pair name="foot_{index}" geom1="floor_{index}" geom2="foot_{index}" condim="3"/>'
+        )
+    trunk = robot.mass - carried
+    span = np.ptp(robot.hips, axis=0)[:2]
+    roll, pitch = trunk / 12.0 * (span[::-1] ** 2 + 0.1**2)
+    yaw = trunk / 12.0 * float(span @ span)
+    planes = ''.join(
+        f'<geom name="floor_{index}" type="plane" size="0 0 1"/>' for index in range(len(trees))
+    )
+    return f"""
+<mujoco>
+  <option timestep="{1.0 / RATE / SUBSTEPS}" integrator="implicitfast" cone="elliptic"
+          impratio="100"/>
+  <default><geom contype="0" conaffinity="0" solref="0.005 1"/></default>
+  <worldbody>{planes}
+    <body name="base"><freejoint/>
+      <inertial mass="{trunk!r}" pos="0 0 0" diaginertia="{roll} {pitch} {yaw}"/>
+      <site name="imu" {_at(robot.imu)}/>{''.join(trees)}
+    </body>
+  </worldbody>
+  <contact>{''.join(pairs)}</contact>
+  <actuator>{''.join(servos)}</actuator>
+  <sensor><gyro site="imu"/></sensor>
+</mujoco>
+"""
+
+
+def _words(numbers: Array) -> str:
+    return ' '.join(repr(float(each)) for each in numbers)
+
+
+def _at(frame: Array) -> str:
+    turn = quaternion(frame[:3, :3])[[3, 0, 1, 2]]
+    return f'pos="{_words(frame[:3, 3])}" quat="{_words(turn)}"'
+
+
+class Floor:
+    """Friction of a floor in squares: dry 0.6 to 0.8, slippery 0.08 to 0.2; all of ice 0.08."""
+
+    def __init__(self, kind: str, generator: np.random.Generator) -> None:
+        count = 200
+        dry, wet = (
+            generator.uniform(0.6, 0.8, (count, count)),
+            generator.uniform(0.08, 0.2, (count, count)),
+        )
+        share = {'dry': 0.0, 'patches': 0.4, 'ice': 1.0}[kind]
+        self._values = np.where(generator.random((count, count)) < share, wet, dry).tolist()
+        self._count = count
+
+    def friction(self, x: float, y: float) -> float:
+        """Return the coefficient at a place, m."""
+        row, column = int(x // PATCH) % self._count, int(y // PATCH) % self._count
+        return float(self._values[row][column])
+
+
+def foot_targets(
+    robot: Robot, gait: Gait, home: Array, stride: float, time: float, size: float
+) -> Array:
+    """Return places of the feet in the base, (legs, 3), m, at a time of the gait, s.
+
+    ``stride`` is the distance of the body in a stance, m, ``size`` a factor on stride and lift.
+    """
+    phase = gait.phase(time)
+    rest = np.maximum(phase - gait.duty, 0.0) / (1.0 - gait.duty)
+    ahead = np.where(phase < gait.duty, 0.5 - phase / gait.duty, -0.5 * np.cos(np.pi * rest))
+    feet = home.copy()
+    feet[:, 0] += size * stride * ahead
+    feet[:, 2] += size * gait.lift * np.sin(np.pi * rest) ** 2
+    return feet
+
+
+def walk(
+    name: str,
+    floor: str,
+    seed: int,
+    duration: float,
+    push: float = PUSH,
+    noise: Noise | None = None,
+) -> Log:
+    """Simulate a walk of a shipped robot in its usual gait, with pushes of the trunk.
+
+    Parameters
+    ----------
+    name : str
+        ``go2`` or ``ch3r``.
+    floor : str
+        ``dry``, ``patches`` or ``ice``.
+    seed : int
+        Of floor, pushes and noise.
+    duration : float
+        Length of the log, s, with :data:`REST` s at rest first.
+    push : float
+        Length of a push, s.
+    noise : Noise, optional
+        Noise of the sensors.
+    """
+    import mujoco
+
+    robot, drive = Robot.load(name), DRIVES[name]
+    gait = robot.gait
+    assert gait is not None
+    generator = np.random.default_rng(seed)
+    ground = Floor(floor, generator)
+    model: Any = mujoco.MjModel.from_xml_string(model_of(robot, drive))
+    data: Any = mujoco.MjData(model)
+    home = robot.foot_positions(robot.home)
+    q = robot.home
+    aim = q.ravel()
+    data.qpos[2] = -home[:, 2].mean() + (robot.foot_radius or POINT)
+    data.qpos[7:] = data.ctrl[:] = aim
+    feet = [model.geom(f'foot_{index}').id for index in range(len(robot.legs))]
+    rows: dict[str, list[Any]] = {field.name: [] for field in fields(Log)}
+    force, until, ends = np.zeros(2), 0.0, 0.0
+    for _ in range(round(SETTLE * RATE * SUBSTEPS)):
+        mujoco.mj_step(model, data)
+    for tick in range(round(duration * RATE)):
+        time = tick / RATE
+        if time > REST:
+            size = min(1.0, (time - REST) / RAMP)
+            stride = drive.speed * gait.duty * gait.period
+            goal = foot_targets(robot, gait, home, stride, time - REST, size)
+            before, q = q, robot.joint_positions(goal, near=q)
+            # Set-points lead by what servos need for their damping and for the robot's weight.
+            stands = gait.stands(time - REST)
+            share = np.where(stands, robot.mass * 9.81 / max(stands.sum(), 1), 0.0)
+            torque = -share[:, None] * robot.foot_jacobians(q)[:, 2]
+            torque += 1.1 * drive.damping * (q - before) * RATE
+            aim = (q + torque / drive.stiffness).ravel()
+            if time > until:  # the next push, after a pause
+                until = time + generator.uniform(0.4, 1.0)
+                size = generator.uniform(0.06, 0.12) * robot.mass * 9.81
+                angle = generator.uniform(0.0, 2.0 * np.pi)
+                force = size * np.array((np.cos(angle), np.sin(angle)))
+                ends = time + push
+            data.xfrc_applied[1, :2] = force if time < ends else 0.0
+        # Servos follow a line between set-points: steps in time with the samples would alias.
+        change = (aim - data.ctrl) / SUBSTEPS
+        speeds = []
+        for part in range(SUBSTEPS):
+            data.ctrl += change
+            for index, geom in enumerate(feet):
+                x, y, _ = data.geom_xpos[geom].tolist()
+                grip = ground.friction(x, y) if time > REST else START_FRICTION
+                model.pair_friction[index, :2] = grip
+            mujoco.mj_step(model, data)
+            speeds.append(_imu_velocity(robot, data))
+            if part == SUBSTEPS - 2:
+                mujoco.mj_forward(model, data)  # all readings are of this moment
+                _read(mujoco, model, data, feet, rows)
+        # MuJoCo's accelerometer is of an explicit step, the motion that of an implicit one.
+        rows['accelerometer'].append(_specific_force(robot, rows, speeds[-1] - speeds[-3]))
+        rows['time'].append(time)
+    return _noisy(Log(**{key: np.array(value) for key, value in rows.items()}), generator, noise)
+
+
+def _imu_velocity(robot: Robot, data: Any) -> Array:
+    """Return the velocity of the IMU in the world, m/s."""
+    turn = _matrix(data.qpos[3:7])
+    return data.qvel[:3] + turn @ np.cross(data.qvel[3:6], robot.imu[:3, 3])
+
+
+def _specific_force(robot: Robot, rows: dict[str, list[Any]], change: Array) -> Array:
+    """Return what an accelerometer shows for a change of velocity over two steps, m/s²."""
+    x, y, z, w = rows['orientation'][-1]
+    acceleration = change * RATE * SUBSTEPS / 2.0 + np.array((0.0, 0.0, 9.81))
+    return acceleration @ _matrix((w, x, y, z)) @ robot.imu[:3, :3]
+
+
+def _matrix(turn: Any) -> Array:
+    """Return the rotation matrix of a quaternion w x y z."""
+    w, x, y, z = turn
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+    )
+
+
+def _read(mujoco: Any, model: Any, data: Any, feet: list[int], rows: dict[str, list[Any]]) -> None:
+    """Append the state of the simulation to the rows of a log, without noise."""
+    turn = data.xmat[1].reshape(3, 3)
+    forces = np.zeros((len(feet), 3))
+    found = np.zeros(6)
+    for index in range(data.ncon):
+        contact = data.contact[index]
+        mujoco.mj_contactForce(model, data, index, found)
+        forces[feet.index(contact.geom2)] += contact.frame.reshape(3, 3).T @ found[:3]
+    slips = []
+    for geom in feet:
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, found, 0)
+        # MuJoCo's contact point is in the middle of the penetration, from which feet roll.
+        radius, height = model.geom_size[geom, 0], data.geom_xpos[geom, 2]
+        lever = np.array((0.0, 0.0, -min(radius, 0.5 * (radius + height))))
+        slips.append((found[3:] + np.cross(found[:3], lever))[:2])
+    w, x, y, z = data.qpos[3:7]
+    rows['gyro'].append(data.sensordata[:3].copy())
+    rows['joint_positions'].append(data.qpos[7:].copy())
+    rows['joint_velocities'].append(data.qvel[6:].copy())
+    rows['foot_forces'].append(forces @ turn)
+    rows['efforts'].append(data.qfrc_actuator[6:].copy())
+    rows['position'].append(data.qpos[:3].copy())
+    rows['orientation'].append(np.array((x, y, z, w)))
+    rows['velocity'].append(data.qvel[:3].copy())
+    rows['feet'].append(data.geom_xpos[feet].copy())
+    rows['slip'].append(np.array(slips))
+    rows['load'].append(forces[:, 2])
+
+
+def _noisy(log: Log, generator: np.random.Generator, noise: Noise | None) -> Log:
+    """Return a log with noise and bias on what sensors measure."""
+    noise = noise or Noise()
+
+    def white(values: Array, deviation: float) -> Array:
+        return values + deviation * generator.standard_normal(values.shape)
+
+    def biased(values: Array, deviation: float, bias: float) -> Array:
+        line = generator.standard_normal(3)
+        return white(values, deviation) + bias * line / np.linalg.norm(line)
+
+    log.gyro = biased(log.gyro, noise.gyro, noise.gyro_bias)
+    log.accelerometer = biased(log.accelerometer, noise.accelerometer, noise.accelerometer_bias)
+    log.joint_positions = white(log.joint_positions, noise.encoder)
+    log.joint_velocities = white(log.joint_velocities, noise.velocity)
+    log.foot_forces = white(log.foot_forces, noise.force)
+    log.efforts = white(log.efforts, noise.effort)
+    return log

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kinematics and masses of robots, against pinocchio and by hand; refusals of their files."""
+
+import json
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.robots import Gait
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import from_rpy
+from ros_pad.robots.rotation import quaternion
+from ros_pad.robots.rotation import rotation
+from ros_pad.simulation.mujoco_model import legs_of
+from ros_pad.simulation.scene import Scene
+
+REFERENCE = pathlib.Path(__file__).resolve().parent.parent / 'reference'
+URDF = REFERENCE / 'robot.urdf'
+FEET = ['a_foot', 'b_foot', 'c_foot']
+Q = np.array([[0.3, -0.7, 0.12], [-1.1, 0.4, 0.9], [0.5, 0.2, -1.3]])
+GRAVITY = np.array([1.5, -0.8, -9.6])
+
+
+def odd() -> Robot:
+    return Robot.load(URDF, feet=FEET, imu='imu', foot_radius=0.02)
+
+
+def pinocchio_figures() -> dict[str, object]:
+    """Compute the same robot with pinocchio: ``python test/robots/test_robot.py`` keeps it."""
+    pin = pytest.importorskip('pinocchio')
+    model = pin.buildModelFromUrdf(str(URDF))
+    model.gravity.linear[:] = GRAVITY
+    data = model.createData()
+    q = pin.neutral(model)
+    columns = []
+    for name, angle in zip(odd().joint_names, Q.ravel(), strict=True):
+        joint = model.joints[model.getJointId(name)]
+        turned = (np.cos(angle), np.sin(angle)) if joint.nq == 2 else (angle,)
+        q[joint.idx_q : joint.idx_q + joint.nq] = turned
+        columns.append(joint.idx_v)
+    torques = pin.computeGeneralizedGravity(model, data, q)[columns].reshape(3, 3)
+    source = f'pinocchio {pin.__version__} on robot.urdf, with Q and GRAVITY of test_robot.py'
+    found: dict[str, object] = {'source': source, 'torques': torques.tolist()}
+    for leg, foot in enumerate(FEET):
+        frame = model.getFrameId(foot)
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        lines = pin.computeFrameJacobian(model, data, q, frame, axes)
+        pin.framesForwardKinematics(model, data, q)
+        found[foot] = {
+            'position': data.oMf[frame].translation.tolist(),
+            'rotation': data.oMf[frame].rotation.tolist(),
+            'jacobian': lines[:, columns[3 * leg : 3 * leg + 3]].tolist(),
+        }
+    found['imu'] = data.oMf[model.getFrameId('imu')].homogeneous.tolist()
+    return found
+
+
+def same(figures: dict) -> None:
+    robot = odd()
+    for leg, foot in enumerate(FEET):
+        row = figures[foot]
+        assert robot.foot_positions(Q)[leg] == pytest.approx(np.array(row['position']), abs=1e-12)
+        assert robot.foot_rotations(Q)[leg] == pytest.approx(np.array(row['rotation']), abs=1e-12)
+        lines = np.array(row['jacobian'])
+        assert robot.foot_jacobians(Q)[leg] == pytest.approx(lines[:3], abs=1e-12)
+        assert robot.angular_jacobians(Q)[leg] == pytest.approx(lines[3:], abs=1e-12)
+    torques = robot.gravity_torques(Q, GRAVITY)
+    assert torques == pytest.approx(np.array(figures['torques']), abs=1e-12)
+    assert robot.imu == pytest.approx(np.array(figures['imu']), abs=1e-12)
+
+
+def test_kinematics_are_those_that_pinocchio_gave():
+    same(json.loads((REFERENCE / 'robot_pinocchio.json').read_text()))
+
+
+def test_kinematics_are_those_of_pinocchio_now():
+    same(pinocchio_figures())
+
+
+def test_a_urdf_has_names_and_masses():
+    robot = odd()
+    assert robot.name == 'odd'
+    assert robot.legs == tuple(FEET)
+    assert robot.joint_names == (
+        *('a_j1', 'a_j2', 'a_j3'), *('b_j1', 'b_j2', 'b_j3'), *('c_j1', 'c_j2', 'c_j3'),
+    )  # fmt: skip
+    assert robot.mass == pytest.approx(5.0 + 0.7 + 0.4 + 0.3 + 0.05 + 0.6 + 0.2 + 0.3)
+    assert robot.foot_radius == 0.02
+
+
+@pytest.mark.parametrize('name', ['go2', 'ch3r'])
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_jacobians_are_derivatives_of_places_and_rotations(name, seed):
+    robot = Robot.load(name)
+    generator = np.random.default_rng(seed)
+    q = generator.uniform(-1.5, 1.5, robot.home.shape)
+    step = 1e-6
+    for joint in range(q.shape[1]):
+        ahead, behind = q.copy(), q.copy()
+        ahead[:, joint] += step
+        behind[:, joint] -= step
+        line = (robot.foot_positions(ahead) - robot.foot_positions(behind)) / (2 * step)
+        assert robot.foot_jacobians(q)[:, :, joint] == pytest.approx(line, abs=1e-8)
+        turn = robot.foot_rotations(ahead) @ robot.foot_rotations(behind).transpose(0, 2, 1)
+        twice = turn - turn.transpose(0, 2, 1)
+        rate = np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1) / (4 * step)
+        assert robot.angular_jacobians(q)[:, :, joint] == pytest.approx(rate, abs=1e-8)
+
+
+def test_the_hexapod_is_that_of_the_scenes():
+    robot = Robot.load('ch3r')
+    scene = Scene.load('hexapod_patches')
+    assert robot.mass == scene.body.mass
+    homes = np.array(scene.body.homes)
+    assert robot.foot_positions(robot.home)[:, :2] == pytest.approx(homes, abs=1e-9)
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 3))
+    expected = [leg.foot(*angles) for leg, angles in zip(legs_of(scene), q.tolist(), strict=True)]
+    assert robot.foot_positions(q) == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_a_quadruped_stands_as_its_lengths_say():
+    robot = Robot.load('go2')
+    places = robot.foot_positions(np.zeros(12))
+    # Thigh and calf hang down: 2 x 0.213 m below the hip, 0.0955 m aside of it.
+    assert places[0] == pytest.approx([0.1934, 0.0465 + 0.0955, -0.426])
+    assert places[3] == pytest.approx([-0.1934, -0.142, -0.426])
+    # Thigh forward by a right angle, calf straight down.
+    places = robot.foot_positions(np.tile([0.0, -np.pi / 2, np.pi / 2], 4))
+    assert places[1] == pytest.approx([0.1934 + 0.213, -0.142, -0.213])
+
+
+@pytest.mark.parametrize('name', ['go2', 'ch3r'])
+def test_joint_positions_bring_the_feet_to_their_places(name):
+    robot = Robot.load(name)
+    goal = robot.foot_positions(robot.home) + np.array([0.03, -0.02, 0.02])
+    q = robot.joint_positions(goal)
+    assert robot.foot_positions(q) == pytest.approx(goal, abs=1e-8)
+    with pytest.raises(InvalidInput, match='does not reach'):
+        robot.joint_positions(goal - 1.0)
+
+
+def test_gaits_by_phase():
+    hexapod, quadruped = Robot.load('ch3r'), Robot.load('go2')
+    assert hexapod.gait.phases == (0.0, 0.5, 0.0, 0.5, 0.0, 0.5)
+    assert quadruped.gait.phases == (0.0, 0.5, 0.5, 0.0)  # FL FR RL RR: diagonals together
+    for name, robot, duty, standing in (
+        ('tripod', hexapod, 0.5, 3),
+        ('wave', hexapod, 5.0 / 6.0, 5),
+        ('ripple', hexapod, 2.0 / 3.0, 4),
+        ('crawl', quadruped, 0.75, 3),
+        ('trot', quadruped, 0.5, 2),
+    ):
+        gait = Gait.named(name, robot.hips, 0.8, duty, 0.03)
+        for time in np.linspace(0.0013, 5.0, 97):
+            assert gait.stands(time).sum() == standing, name
+    crawl = Gait.named('crawl', quadruped.hips, 1.0, 0.75, 0.03)
+    # Touch-downs: left rear, left front, right rear, right front.
+    assert crawl.phases == (0.25, 0.75, 0.0, 0.5)
+    assert crawl.phase(0.25) == pytest.approx([0.0, 0.5, 0.25, 0.75])
+
+
+@pytest.mark.parametrize(
+    ('name', 'legs', 'duty', 'message'),
+    [
+        ('gallop', 4, 0.6, 'one of tripod'),
+        ('trot', 6, 0.6, '4 legs'),
+        ('crawl', 4, 0.6, 'at least 0.75'),
+        ('wave', 5, 0.99, 'duty'),
+    ],
+)
+def test_gaits_that_are_not_allowed(name, legs, duty, message):
+    angles = np.linspace(0.1, 6.0, legs)
+    with pytest.raises(InvalidInput, match=message):
+        Gait.named(name, np.stack([np.cos(angles), np.sin(angles)], 1), 0.6, duty, 0.03)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        ('mass: 15.02', 'mass: 3.0', 'the links of the legs have'),
+        ('mass: 15.02', 'mas: 15.02', "key 'mass' is missing"),
+        ('[0.0, 0.0, -0.213]\n\ngait', '[0.0, -0.213]\n\ngait', 'a list of 3 numbers'),
+        ('axis: [1.0, 0.0, 0.0]', 'axis: [0.0, 0.0, 0.0]', 'no direction'),
+        ('kind: trot', 'kind: tripod', '6 or 8 legs'),
+        ('side: right', 'side: top', 'one of left, right'),
+        (
+            '  RR: {at: [-0.1934, -0.0465, 0.0], side: right}\n',
+            '  true: {at: [0, 0, 0]}\n',
+            'True',
+        ),
+        ('home: 0.9', 'hom: 0.9', "unknown key 'hom'"),
+    ],
+)
+def test_yaml_files_that_are_not_valid(old, new, message, tmp_path):
+    shipped = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'robots' / 'go2.yaml'
+    text = shipped.read_text()
+    assert old in text
+    path = tmp_path / 'mine.yaml'
+    path.write_text(text)
+    assert Robot.load(path).name == 'mine'
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ConfigError, match=message):
+        Robot.load(path)
+
+
+def test_an_own_gait_and_fewer_legs(tmp_path):
+    shipped = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'robots' / 'go2.yaml'
+    text = shipped.read_text().replace('kind: trot', 'kind: own\n  phases: [0.0, 0.1, 0.9]')
+    path = tmp_path / 'three.yaml'
+    path.write_text(text.replace('  RR: {at: [-0.1934, -0.0465, 0.0], side: right}\n', ''))
+    robot = Robot.load(path, foot_radius=0.015)
+    assert robot.legs == ('FL', 'FR', 'RL')
+    assert (robot.gait.phases, robot.foot_radius) == ((0.0, 0.1, 0.9), 0.015)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        ('<robot name="odd">', '<robot name="odd"', 'not a readable URDF'),
+        ('<robot', '<model', 'not a readable URDF'),
+        ('"continuous"', '"floating"', "type = 'floating'"),
+        ('<axis xyz="1 2 -1"/>', '<axis xyz="0 0 0"/>', 'no direction'),
+        ('<axis xyz="1 2 -1"/>', '<axis xyz="1 2 nan"/>', 'finite'),
+        ('<child link="a1"/>', '<child link="none"/>', "'none'"),
+        ('<child link="a1"/>', '<child link="b1"/>', 'two parents'),
+        ('"base"/><child link="a1"/>', '"a2"/><child link="a1"/>', 'loop'),
+        ('<mass value="0.7"/>', '<mass value="-1"/>', 'at least 0 kg'),
+        ('<joint name="c_j3" type="revolute">', '<joint name="c_j3" type="fixed">', '2 and 3'),
+        ('name="imu_joint" type="fixed"', 'name="imu_joint" type="revolute"', 'moves'),
+    ],
+)  # fmt: skip
+def test_urdf_files_that_are_not_valid(old, new, message, tmp_path):
+    text = URDF.read_text()
+    assert old in text
+    path = tmp_path / 'odd.urdf'
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ConfigError, match=message):
+        Robot.load(path, feet=FEET, imu='imu')
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ({'feet': FEET[:2]}, '3 to 8'),
+        ({'feet': [*FEET[:2], FEET[0]]}, 'different'),
+        ({'feet': FEET, 'foot_radius': -1.0}, 'foot_radius'),
+    ],
+)
+def test_arguments_that_are_not_allowed(arguments, message):
+    with pytest.raises(InvalidInput, match=message):
+        Robot.load(URDF, **arguments)
+
+
+def test_names_and_links_that_are_not_there():
+    with pytest.raises(ConfigError, match='There are: ch3r, go2'):
+        Robot.load('go3')
+    with pytest.raises(ConfigError, match="no link 'd_foot'"):
+        Robot.load(URDF, feet=[*FEET, 'd_foot'])
+    with pytest.raises(InvalidInput, match='for URDF'):
+        Robot.load('go2', imu='imu')
+
+
+@pytest.mark.parametrize('q', [np.zeros(11), np.full(12, np.nan), np.zeros((4, 4)), 'zero'])
+def test_joint_positions_that_are_not_allowed(q):
+    with pytest.raises(InvalidInput, match='q'):
+        Robot.load('go2').foot_positions(q)
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
+def test_rotations_and_quaternions(angles):
+    scipy = pytest.importorskip('scipy.spatial.transform').Rotation
+    made = rotation(angles)
+    assert made == pytest.approx(scipy.from_rotvec(angles).as_matrix(), abs=1e-9)
+    assert from_rpy(angles) == pytest.approx(scipy.from_euler('xyz', angles).as_matrix(), abs=1e-9)
+    kept = scipy.from_quat(quaternion(made)).as_matrix()
+    assert kept == pytest.approx(made, abs=1e-9)
+
+
+if __name__ == '__main__':
+    text = json.dumps(pinocchio_figures(), indent=1)
+    (REFERENCE / 'robot_pinocchio.json').write_text(text + '\n')
