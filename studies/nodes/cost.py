@@ -62,6 +62,11 @@ Result = dict[str, dict[str, dict[str, float]]]
 OTHERS = ('rate', 'memory', 'wall')
 """Quantities that are no processor time: Hz, MB and s."""
 
+_COLOURS = {
+    **{'recorder': BLUE, 'regulator': ORANGE, 'estimator': SKY, 'controller': GREEN},
+    **{'simulator': PURPLE, 'publish': '0.7', 'subscribe': '0.8'},
+}
+
 NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')
 WARM_UP = 8.0  # s, until all nodes have found one another
 _HERE = pathlib.Path(__file__).resolve().parents[2]
@@ -289,16 +294,17 @@ def table(result: Result) -> str:
 
 def chart(rows: dict[str, dict[str, float]]) -> Figure:
     """Draw the live processor time by process, as bars end to end."""
-    colours = (BLUE, ORANGE, SKY, GREEN, PURPLE)
+    widest = max(map(_total, rows.values()))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 1.2 + 0.4 * len(rows)), layout='constrained')
         axes = figure.subplots()
         for row, values in enumerate(rows.values()):
             left = 0.0
             parts = {name: value for name, value in values.items() if name not in OTHERS}
-            for (part, share), colour in zip(parts.items(), colours, strict=False):
-                axes.barh(row, share, left=left, color=colour, edgecolor='white')
-                axes.text(left + share / 2, row, part, ha='center', va='center', fontsize=6.5)
+            for part, share in parts.items():
+                axes.barh(row, share, left=left, color=_COLOURS[part], edgecolor='white')
+                if share > 0.1 * widest:  # wide enough for the word
+                    axes.text(left + share / 2, row, part, ha='center', va='center', fontsize=6.5)
                 left += share
             rate = f' at {values["rate"]:.0f} Hz' if 'rate' in values else ''
             axes.text(left, row, f' {left:.2f}{rate}', va='center')
