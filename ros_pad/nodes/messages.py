@@ -159,7 +159,7 @@ class _Output:
 
 
 def _owner(peer: TopicEndpointInfo) -> tuple[bytes, str, str]:
-    """Return what tells a node from all others: its process and its name."""
+    """Return what distinguishes a node from all others: its process and its name."""
     return bytes(peer.endpoint_gid)[:12], peer.node_namespace, peer.node_name
 
 

@@ -315,7 +315,7 @@ def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
 
     for name in reader.topics:
         assert of(name, recorded) == of(name, published), name
-    # All of one moment are one message, and nobody wants them alone.
+    # All of one moment are one message; no other node subscribes to them alone.
     assert set(batches) == {f'/_batches/{source}' for source in topics.BATCHES}
     assert len(published) > 2 * len(batches)
     counts = collections.Counter(name for name, _ in published)

@@ -61,7 +61,7 @@ def pinocchio_figures() -> dict[str, object]:
     return found
 
 
-def same(figures: dict) -> None:
+def assert_kinematics(figures: dict) -> None:
     robot = odd()
     for leg, foot in enumerate(FEET):
         row = figures[foot]
@@ -76,11 +76,11 @@ def same(figures: dict) -> None:
 
 
 def test_kinematics_are_those_that_pinocchio_gave():
-    same(json.loads((REFERENCE / 'robot_pinocchio.json').read_text()))
+    assert_kinematics(json.loads((REFERENCE / 'robot_pinocchio.json').read_text()))
 
 
 def test_kinematics_are_those_of_pinocchio_now():
-    same(pinocchio_figures())
+    assert_kinematics(pinocchio_figures())
 
 
 def test_a_urdf_has_names_and_masses():

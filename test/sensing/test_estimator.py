@@ -21,7 +21,7 @@ STANDING = np.tile((0.0, 0.0, POINTED.mass * 9.81 / 4.0), (4, 1))
 
 
 class Motion:
-    """Readings of a robot whose body and feet move as told, with its axes along the world's."""
+    """Readings of a robot whose body and feet move as given, with its axes along the world's."""
 
     def __init__(self, robot=POINTED, noise=0.0, seed=0, **arguments):
         self.robot = robot

@@ -99,8 +99,7 @@ def test_the_end_of_the_block_ends_walks_under_way(monkeypatch):
         while not walks._reached[0] and time.monotonic() < deadline:
             time.sleep(0.05)
         assert walks._reached[0] > 0.0
-        left = time.monotonic()
-    assert time.monotonic() - left < 10.0
+    assert walks._walks['flat'].exception() is not None  # it would take hours
 
 
 def test_a_short_scene_starts_no_process(monkeypatch, shown):
