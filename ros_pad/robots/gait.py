@@ -10,9 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import Setting
+from ros_pad.configuration import Table
 from ros_pad.configuration import choice
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.robots.rotation import Array
 
@@ -26,7 +29,7 @@ class Gait:
 
     Attributes
     ----------
-    period : float
+    cycle : float
         Duration of a gait cycle, s, 0.05 to 60.
     duty : float
         Share of the cycle in which a leg stands, 0.05 to 0.95.
@@ -34,6 +37,9 @@ class Gait:
         Share of the cycle at which each leg touches down, 0 to 1.
     lift : float
         Height of a foot in the middle of its swing, m, 0 to 1.
+    pushes : bool
+        Whether the body speeds up and brakes twice a cycle, once for each of two groups of legs
+        that stand in turn; otherwise its speed is constant.
 
     Raises
     ------
@@ -41,21 +47,25 @@ class Gait:
         When a value is outside its range; the message names it.
     """
 
-    period: float
+    cycle: float
     duty: float
     phases: tuple[float, ...]
     lift: float
+    pushes: bool = False
 
     def __post_init__(self) -> None:
-        number('period', self.period, 's', 0.05, 60.0)
+        number('cycle', self.cycle, 's', 0.05, 60.0)
         number('duty', self.duty, '(share)', 0.05, 0.95)
         quantity('phases', self.phases, '(share)', 0.0, 1.0)
         number('lift', self.lift, 'm', 0.0, 1.0)
+        if self.pushes and (sorted(set(self.phases)) != [0.0, 0.5] or self.duty <= 0.5):
+            raise InvalidInput(
+                'pushes = True is not allowed: two groups of legs half a cycle apart, with a duty'
+                ' above 0.5, are needed'
+            )
 
     @classmethod
-    def named(
-        cls, name: str, hips: npt.ArrayLike, period: float, duty: float, lift: float
-    ) -> Gait:
+    def named(cls, name: str, hips: npt.ArrayLike, cycle: float, duty: float, lift: float) -> Gait:
         """Return a gait for legs at these places.
 
         ``tripod`` and ``trot``: neighbours round the body stand in turn. ``wave`` and ``crawl``:
@@ -68,7 +78,7 @@ class Gait:
             One of :data:`GAITS`.
         hips : array (legs, 2 or more)
             Places of the hips on the base, x fore and y left, m.
-        period, duty, lift : float
+        cycle, duty, lift : float
             As for :class:`Gait`.
 
         Raises
@@ -90,11 +100,43 @@ class Gait:
             phases = _waves(places, apart=name == 'ripple')
             if name != 'ripple':
                 number('duty', duty, f'(share) for a {name} of {legs} legs', 1.0 - 1.0 / legs)
-        return cls(period, duty, tuple(phases.tolist()), lift)
+        return cls(cycle, duty, tuple(phases.tolist()), lift)
+
+    @classmethod
+    def read(cls, table: Table, hips: npt.ArrayLike, usual: Gait | None = None) -> Gait:
+        """Read a gait for legs at these places; ``usual`` has what the table does not have.
+
+        Raises
+        ------
+        ConfigError
+            When a value is missing or not allowed.
+        """
+
+        def given(key: str, unit: str, low: float, high: float) -> float:
+            if usual is None:
+                return table.number(key, unit, low, high)
+            return table.number(key, unit, low, high, default=getattr(usual, key))
+
+        cycle, duty = given('cycle', 's', 0.05, 60.0), given('duty', '(share)', 0.05, 0.95)
+        lift = given('lift', 'm', 0.0, 1.0)
+        try:
+            if 'kind' not in table and usual is not None:
+                phases, pushes = usual.phases, usual.pushes
+            elif (kind := table.choice('kind', (*GAITS, 'own'))) == 'own':
+                size = len(np.asarray(hips))
+                phases = tuple(table.vector('phases', '(share)', size, 0.0, 1.0).tolist())
+                pushes = False
+            else:
+                phases = cls.named(kind, hips, cycle, duty, lift).phases
+                pushes = False
+            pushes = table.value(Setting('pushes', bool, ''), pushes)
+            return cls(cycle, duty, phases, lift, pushes)
+        except InvalidInput as error:
+            raise ConfigError(f'{table.origin}: {error}') from error
 
     def phase(self, time: float) -> Array:
         """Return the time since each leg's last touch-down, (legs,), as a share of the cycle."""
-        return np.asarray((time / self.period - np.array(self.phases)) % 1.0)
+        return np.asarray((time / self.cycle - np.array(self.phases)) % 1.0)
 
     def stands(self, time: float) -> npt.NDArray[np.bool_]:
         """Return whether each leg stands at a time, s."""

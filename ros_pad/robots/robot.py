@@ -3,14 +3,21 @@
 
 from __future__ import annotations
 
+import math
 import os
+import pathlib
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad import configuration
+from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -21,7 +28,6 @@ from ros_pad.robots import urdf
 from ros_pad.robots.chains import Chains
 from ros_pad.robots.chains import Joint
 from ros_pad.robots.chains import Kinematics
-from ros_pad.robots.gait import GAITS
 from ros_pad.robots.gait import Gait
 from ros_pad.robots.rotation import Array
 from ros_pad.robots.rotation import from_rpy
@@ -30,8 +36,53 @@ from ros_pad.robots.rotation import transform
 LEGS = (3, 8)
 """Fewest and most legs of a robot."""
 
+SAG = 7e-3
+"""Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
+the stiffness of its legs."""
+
 _DOWN = np.array((0.0, 0.0, -9.81))
 _MIRROR = np.array((1.0, -1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A servo, the same in all joints: a spring to its set-point, up to a largest torque.
+
+    Attributes
+    ----------
+    torque : float
+        Largest torque, N m.
+    stiffness : float
+        Torque for each angle to the set-point, N m/rad.
+    damping : float
+        Torque against the speed of the joint, N m s/rad.
+    rotor_inertia : float
+        Inertia of the motor as seen from the joint, behind its gears, kg m².
+    travel : float
+        Largest angle to either side of home, rad.
+    feedforward : bool
+        Whether the set-points lead by the torque that carries the robot and overcomes the damping,
+        as with torque-controlled motors; hobby servos sag instead.
+    """
+
+    torque: float
+    stiffness: float
+    damping: float
+    rotor_inertia: float
+    travel: float
+    feedforward: bool
+
+    @classmethod
+    def read(cls, table: Table) -> Servo:
+        """Read the table ``servo`` of a robot's file."""
+        return cls(
+            torque=table.number('torque', 'N m', 1e-3, 1e5),
+            stiffness=table.number('stiffness', 'N m/rad', 1e-2, 1e6),
+            damping=table.number('damping', 'N m s/rad', 0.0, 1e5),
+            rotor_inertia=table.number('rotor_inertia', 'kg m2', 1e-6, 1e3),
+            travel=table.number('travel', 'rad', 0.01, 10.0, default=math.pi),
+            feedforward=table.value(Setting('feedforward', bool, ''), False),
+        )
 
 
 @dataclass(frozen=True)
@@ -44,6 +95,8 @@ class Robot:
     Attributes
     ----------
     name : str
+    source : str
+        Name of a shipped robot, or absolute path of its file.
     legs : tuple of str or int
         Name or number of each leg.
     joint_names : tuple of str
@@ -61,10 +114,22 @@ class Robot:
     home : array (legs, joints a leg)
         Joint positions in which the robot stands, rad.
     gait : Gait or None
-        Its usual gait; None from URDF.
+        Its usual gait; None from a bare URDF file.
+    servo : Servo or None
+        Its servos; None from a bare URDF file.
+    centre : array (2,)
+        Centre of mass at home, fore and left in the base, m.
+    height : float
+        Height of the centre of mass above the feet at home, m.
+    inertia : float
+        Moment of inertia of the whole robot about the vertical axis at home, kg m².
+    leg_stiffness : float
+        Vertical stiffness of a leg and its foot, N/m: load that a foot gains for each metre by
+        which its ground is higher.
     """
 
     name: str
+    source: str
     legs: tuple[str | int, ...]
     joint_names: tuple[str, ...]
     mass: float
@@ -73,7 +138,12 @@ class Robot:
     chains: Chains
     hips: Array
     home: Array
-    gait: Gait | None = None
+    gait: Gait | None
+    servo: Servo | None
+    centre: Array
+    height: float
+    inertia: float
+    leg_stiffness: float
 
     @classmethod
     def load(
@@ -106,19 +176,17 @@ class Robot:
         path = os.fspath(source)
         if foot_radius is not None:
             number('foot_radius', foot_radius, 'm', 0.0, 1.0)
-        if not path.endswith('.urdf'):
-            if feet or imu:
-                raise InvalidInput('feet and imu are for URDF files; a YAML file has its own')
-            found = configuration.locate('robots', path)
-            return _from_table(Table.load(found), found.stem, foot_radius)
-        names = [text('feet', foot) for foot in feet]
-        if not LEGS[0] <= len(set(names)) == len(names) <= LEGS[1]:
-            raise InvalidInput(f'feet = {names} is not allowed: 3 to 8 different links are needed')
-        file, joints, tips = urdf.read(path, names)
-        pose = file.pose(imu) if imu else np.eye(4)
-        return _assembled(
-            file.name, tuple(names), joints, tips, file.mass, foot_radius or 0.0, pose
-        )
+        if path.endswith('.urdf'):
+            return _from_urdf(path, feet, imu)._loaded(path, foot_radius)
+        if feet or imu:
+            raise InvalidInput('feet and imu are for URDF files; a YAML file has its own')
+        found = configuration.locate('robots', path)
+        return _from_table(Table.load(found), found)._loaded(path, foot_radius)
+
+    def _loaded(self, path: str, foot_radius: float | None) -> Robot:
+        source = os.path.abspath(path) if os.path.exists(path) else path
+        radius = self.foot_radius if foot_radius is None else foot_radius
+        return replace(self, source=source, foot_radius=radius)
 
     def kinematics(self, q: npt.ArrayLike) -> Kinematics:
         """Return positions, rotations and Jacobians of all feet in the axes of the base.
@@ -188,39 +256,142 @@ class Robot:
         return checked.reshape(self.home.shape)
 
 
+class _Trunk(NamedTuple):
+    """The part of a robot that is not legs: mass, kg, its centre, m, and yaw inertia, kg m²."""
+
+    mass: float
+    centre: Array
+    inertia: float
+
+
 def _assembled(
     name: str,
-    legs: tuple[str | int, ...],
+    legs: Sequence[str | int],
     joints: Sequence[Sequence[Joint]],
     feet: Array,
-    mass: float,
-    foot_radius: float,
-    imu: Array,
+    trunk: _Trunk,
+    home: Array | None = None,
+    **others: Any,
 ) -> Robot:
-    """Return a robot without gait that stands with all joints at zero."""
+    """Return a robot with the centre of mass and the inertia that follow from its links."""
+    chains = Chains(joints, feet)
+    home = np.zeros((chains.count, chains.length)) if home is None else home
+    places = chains.solve(home)
+    ends = np.concatenate([places.frames[1:, :, :3, 3], places.positions[None]])
+    masses, centres, yaw = [trunk.mass], [trunk.centre], trunk.inertia
+    for row, frames, after in zip(zip(*joints, strict=True), places.frames, ends, strict=True):
+        for joint, frame, end in zip(row, frames, after, strict=True):
+            masses.append(joint.mass)
+            centres.append((frame @ np.append(joint.centre, 1.0))[:3])
+            rod = end[:2] - frame[:2, 3]  # as seen from above
+            yaw += joint.mass * float(rod @ rod) / 12.0
+    weights, points = np.array(masses), np.array(centres)
+    mass = float(weights.sum())
+    centre = weights @ points / max(mass, 1e-9)
+    away = points[:, :2] - centre[:2]
+    whole: dict[str, Any] = {
+        'mass': mass,
+        'foot_radius': 0.0,
+        'imu': np.eye(4),
+        'gait': None,
+        'servo': None,
+        'centre': centre[:2].round(12),
+        'height': float(centre[2] - places.positions[:, 2].min()),
+        'inertia': yaw + float(weights @ (away * away).sum(1)),
+        'leg_stiffness': mass * 9.81 / SAG,
+    }
     return Robot(
         name=name,
-        legs=legs,
+        source=name,
+        legs=tuple(legs),
         joint_names=tuple(joint.name for leg in joints for joint in leg),
-        mass=mass,
-        foot_radius=foot_radius,
-        imu=imu,
-        chains=Chains(joints, feet),
+        chains=chains,
         hips=np.array([leg[0].at[:3, 3] for leg in joints]),
-        home=np.zeros((len(joints), len(joints[0]))),
+        home=home,
+        **(whole | {key: value for key, value in others.items() if value is not None}),
     )
 
 
-def _from_table(table: Table, name: str, foot_radius: float | None) -> Robot:
+def _from_urdf(path: str, feet: Sequence[str], imu: str, **others: Any) -> Robot:
+    """Read a robot from a URDF file."""
+    names = [text('feet', foot) for foot in feet]
+    if not LEGS[0] <= len(set(names)) == len(names) <= LEGS[1]:
+        raise InvalidInput(f'feet = {names} is not allowed: 3 to 8 different links are needed')
+    file, joints, tips = urdf.read(path, names)
+    home = _posture(joints, others.pop('home', {}), path)
+    pose = file.pose(imu) if imu else np.eye(4)
+    centre, yaw = file.trunk()
+    names_of_joints = [joint.name for leg in joints for joint in leg]
+    for joint in names_of_joints:
+        if names_of_joints.count(joint) > 1:
+            raise ConfigError(
+                f'{path}: joint {joint!r} is in two legs: each leg needs joints of its own, with'
+                ' different names'
+            )
+    rest = file.mass - sum(joint.mass for leg in joints for joint in leg)
+    trunk = _Trunk(rest, centre, yaw or _plate(rest, joints))
+    return _assembled(file.name, names, joints, tips, trunk, home, imu=pose, **others)
+
+
+def _posture(joints: Sequence[Sequence[Joint]], wanted: Mapping[Any, Any], origin: str) -> Array:
+    """Return joint positions by the ends of the joints' names, (legs, joints), others zero."""
+    home = np.zeros((len(joints), len(joints[0])))
+    unused = dict.fromkeys(wanted)
+    for row, leg in zip(home, joints, strict=True):
+        for place, joint in enumerate(leg):
+            # The longest name that fits: that of one joint goes before that of its kind.
+            for key in sorted((k for k in wanted if joint.name.endswith(str(k))), key=len)[-1:]:
+                unused.pop(key, None)
+                row[place] = number(f'{origin}: home: {key}', wanted[key], 'rad', -10.0, 10.0)
+    if unused:
+        names = ', '.join(joint.name for leg in joints for joint in leg)
+        wrong = next(iter(unused))
+        raise ConfigError(f'{origin}: home: no joint ends in {wrong!r}; there are: {names}')
+    return home
+
+
+def _from_table(table: Table, path: pathlib.Path) -> Robot:
     """Read a robot from the table of its YAML file."""
     table.text('description', default='')
+    others: dict[str, Any] = {'foot_radius': table.number('foot_radius', 'm', 0.0, 1.0, 0.0)}
+    for key, unit, low, high in (
+        ('height', 'm', 0.0, 5.0),
+        ('inertia', 'kg m2', 1e-6, 1e4),
+        ('leg_stiffness', 'N/m', 1.0, 1e8),
+    ):
+        if key in table:
+            others[key] = table.number(key, unit, low, high)
+    if 'servo' in table:
+        with table.table('servo') as part:
+            others['servo'] = Servo.read(part)
+    robot = _of_file(table, path, others) if 'urdf' in table else _of_links(table, path, others)
+    if 'gait' in table:
+        robot = replace(robot, gait=_gait(table, robot))
+    table.finish()
+    return robot
+
+
+def _of_file(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
+    """Return the robot of the URDF file that a YAML file names."""
+    feet = table.texts('feet')
+    with table.table('home', default={}) as part:
+        others['home'] = {key: part.number(key, 'rad', -10.0, 10.0) for key in part.keys}
+    file = path.parent / table.text('urdf')
+    try:
+        robot = _from_urdf(os.fspath(file), feet, table.text('imu', default=''), **others)
+    except InvalidInput as error:
+        raise ConfigError(f'{table.origin}: {error}') from error
+    return replace(robot, name=path.stem)
+
+
+def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
+    """Return the robot whose links a YAML file has."""
     with table.table('imu', default={}) as part:
-        imu = transform(
+        others['imu'] = transform(
             part.vector('at', 'm', default=(0.0, 0.0, 0.0)),
             from_rpy(part.vector('rpy', 'rad', default=(0.0, 0.0, 0.0))),
         )
     mass = table.number('mass', 'kg', 1e-3, 1e5)
-    radius = table.number('foot_radius', 'm', 0.0, 1.0)
     prefix = table.text('prefix', default='')
     links = _links(table)
     foot = table.vector('foot', 'm')
@@ -239,19 +410,25 @@ def _from_table(table: Table, name: str, foot_radius: float | None) -> Robot:
             f'{table.origin}: mass = {mass:g} is not allowed: the links of the legs have'
             f' {carried:g} kg'
         )
-    made = _assembled(
-        name,
-        tuple(legs),
-        joints,
-        np.array(feet),
-        mass,
-        radius if foot_radius is None else foot_radius,
-        imu,
-    )
     home = np.array([[link.home for link in links]] * len(legs))
-    gait = _gait(table, made) if 'gait' in table else None
-    table.finish()
-    return Robot(**(vars(made) | {'home': home, 'gait': gait}))
+    trunk = _trunk(table, mass - carried, joints)
+    return _assembled(path.stem, legs, joints, np.array(feet), trunk, home, mass=mass, **others)
+
+
+def _plate(mass: float, joints: Sequence[Sequence[Joint]]) -> float:
+    """Return the yaw inertia, kg m², of a plate of a mass, kg, between the hips."""
+    span = np.ptp(np.array([leg[0].at[:2, 3] for leg in joints]), axis=0)
+    return mass * float(span @ span) / 12.0
+
+
+def _trunk(table: Table, mass: float, joints: Sequence[Sequence[Joint]]) -> _Trunk:
+    """Read the table ``trunk``; its inertia is that of a plate between the hips by default."""
+    with table.table('trunk', default={}) as part:
+        return _Trunk(
+            mass,
+            part.vector('centre', 'm', default=(0.0, 0.0, 0.0)),
+            part.number('inertia', 'kg m2', 0.0, 1e4, default=_plate(mass, joints)),
+        )
 
 
 @dataclass(frozen=True)
@@ -326,14 +503,4 @@ def _leg(prefix: str, links: Sequence[_Link], hip: Array, mirrored: bool) -> lis
 def _gait(table: Table, robot: Robot) -> Gait:
     """Read the table ``gait``."""
     with table.table('gait') as part:
-        kind = part.choice('kind', (*GAITS, 'own'))
-        period = part.number('period', 's', 0.05, 60.0)
-        duty = part.number('duty', '(share)', 0.05, 0.95)
-        lift = part.number('lift', 'm', 0.0, 1.0)
-        try:
-            if kind == 'own':
-                phases = part.vector('phases', '(share)', len(robot.legs), 0.0, 1.0)
-                return Gait(period, duty, tuple(phases.tolist()), lift)
-            return Gait.named(kind, robot.hips, period, duty, lift)
-        except InvalidInput as error:
-            raise ConfigError(f'{part.origin}: {error}') from error
+        return Gait.read(part, robot.hips)

@@ -78,3 +78,15 @@ def quaternion(turn: Array) -> Array:
     sign = math.copysign(1.0, rows[largest][3])
     scale = 0.5 * sign / math.sqrt(squares[largest])
     return np.array(rows[largest]) * scale
+
+
+def matrix(turn: Any) -> Array:
+    """Return the rotation of a unit quaternion x y z w."""
+    x, y, z, w = turn
+    return np.array(
+        (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+            (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+            (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+        )
+    )

@@ -7,6 +7,7 @@ import math
 import os
 import pathlib
 import xml.etree.ElementTree as xml
+from collections.abc import Iterator
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -76,6 +77,9 @@ class Urdf:
         if len(roots) != 1:
             raise self._error(f'one link without a parent is needed, found {roots}')
         self.root = roots[0]
+        self._inertias = {
+            self._text(link, 'name'): self._tensor(link) for link in tree.iter('link')
+        }
         self.mass = sum(mass for mass, _ in self._links.values())
 
     def leg(self, foot: str) -> tuple[list[Joint], Array]:
@@ -120,6 +124,20 @@ class Urdf:
             at = at @ joint.at
         return at
 
+    def trunk(self) -> tuple[Array, float]:
+        """Return the centre of mass, m, and the yaw inertia, kg m², of what is fixed to the base.
+
+        The base is often an empty link: body and IMU are fixed to it.
+        """
+        centre = self._carried(self.root)[1]
+        inertia = 0.0
+        for link, at in self._fixed(self.root, np.eye(4)):
+            mass, middle = self._links[link]
+            away = (at @ np.append(middle, 1.0))[:2] - centre[:2]
+            turned = at[:3, :3] @ self._inertias[link] @ at[:3, :3].T
+            inertia += float(turned[2, 2] + mass * (away @ away))
+        return centre, inertia
+
     def _path(self, link: str) -> list[_Joint]:
         """Return the joints from a link up to the root."""
         if link not in self._links:
@@ -141,6 +159,13 @@ class Urdf:
                 mass += other
                 moment = moment + other * (joint.at @ np.append(centre, 1.0))[:3]
         return mass, moment / mass if mass > 0.0 else np.zeros(3)
+
+    def _fixed(self, link: str, at: Array) -> Iterator[tuple[str, Array]]:
+        """Yield a link and all that is fixed to it, with their transforms to a frame."""
+        yield link, at
+        for joint in self._joints.values():
+            if joint.parent == link and joint.kind == 'fixed':
+                yield from self._fixed(joint.child, at @ joint.at)
 
     def _joint(self, element: xml.Element) -> _Joint:
         name = self._text(element, 'name')
@@ -164,6 +189,20 @@ class Urdf:
             if link not in self._links:
                 raise self._error(f'joint {name!r} names a link {link!r} that is not there')
         return made
+
+    def _tensor(self, link: xml.Element) -> Array:
+        """Return the inertia of a link about its centre of mass, kg m², in axes of the link."""
+        inertial, element = link.find('inertial'), link.find('inertial/inertia')
+        if inertial is None or element is None:
+            return np.zeros((3, 3))
+        name = link.get('name', '')
+        xx, yy, zz, xy, xz, yz = (
+            float(self._numbers(element, key, name, 1)[0])
+            for key in ('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz')
+        )
+        turn = self._placed(inertial, name)[:3, :3]
+        tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+        return np.asarray(turn @ tensor @ turn.T)
 
     def _inertial(self, link: xml.Element) -> tuple[float, Array]:
         """Return mass, kg, and centre of mass, m, of a link."""

@@ -17,7 +17,7 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import from_rpy
 from ros_pad.robots.rotation import quaternion
 from ros_pad.robots.rotation import rotation
-from ros_pad.simulation.mujoco_model import legs_of
+from ros_pad.robots.urdf import Urdf
 from ros_pad.simulation.scene import Scene
 
 REFERENCE = pathlib.Path(__file__).resolve().parent.parent / 'reference'
@@ -120,9 +120,17 @@ def test_the_hexapod_is_that_of_the_scenes():
     assert robot.mass == scene.body.mass
     homes = np.array(scene.body.homes)
     assert robot.foot_positions(robot.home)[:, :2] == pytest.approx(homes, abs=1e-9)
-    q = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 3))
-    expected = [leg.foot(*angles) for leg, angles in zip(legs_of(scene), q.tolist(), strict=True)]
-    assert robot.foot_positions(q) == pytest.approx(np.array(expected), abs=1e-9)
+    # Hips are at (119, 69) and (0, 138) mm, links 29, 57 and 141 mm long, the femur level.
+    hips = [(0.119, 0.069), (0, 0.138), (-0.119, 0.069)]
+    assert robot.hips[:3, :2] == pytest.approx(np.array(hips), abs=6e-4)
+    assert robot.hips[3:, :2] == pytest.approx(np.array(hips)[::-1] * (1, -1), abs=6e-4)
+    assert robot.inertia == 0.03 and robot.height == 0.12
+    # Coxa turned by a right angle: the foot moves on a circle of 86 mm about its hip.
+    places = robot.foot_positions(np.tile([np.pi / 2, 0.0, 0.0], 6))
+    assert places[1] == pytest.approx([-0.086, 0.138, -0.141], abs=1e-9)
+    # Femur up by a right angle: the tibia then points outwards.
+    places = robot.foot_positions(np.tile([0.0, np.pi / 2, 0.0], 6))
+    assert places[4] == pytest.approx([0.0, -0.138 - 0.029 - 0.141, 0.057], abs=1e-9)
 
 
 def test_a_quadruped_stands_as_its_lengths_say():
@@ -245,6 +253,40 @@ def test_urdf_files_that_are_not_valid(old, new, message, tmp_path):
         Robot.load(path, feet=FEET, imu='imu')
 
 
+def test_an_empty_base_has_the_inertia_of_what_is_fixed_to_it(tmp_path):
+    """As in the URDF of many quadrupeds: base without mass, and the trunk is fixed to it."""
+    fixed = (
+        '<link name="{0}"><inertial><origin xyz="{2}" rpy="0 1.5707963267948966 0"/><mass'
+        ' value="{1}"/><inertia ixx="0.3" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.1"/></inertial>'
+        '</link><joint name="{0}_fixed" type="fixed"><origin xyz="0 0 0.1" rpy="0 0'
+        ' 0.7853981633974483"/><parent link="base"/><child link="{0}"/></joint>'
+    )
+    text = URDF.read_text()
+    start = text.index('<link name="base">')
+    end = text.index('</link>', start) + len('</link>')
+    path = tmp_path / 'odd.urdf'
+    parts = fixed.format('front', 2.0, '0.5 0 0'), fixed.format('rear', 2.0, '-0.5 0 0')
+    path.write_text(text[:start] + '<link name="base"/>' + ''.join(parts) + text[end:])
+    centre, inertia = Urdf(path).trunk()
+    assert centre == pytest.approx((0.0, 0.0, 0.1))
+    # About y by 90 degrees: x of each inertia is upright. Each 2 kg are half a metre off.
+    assert inertia == pytest.approx(2.0 * (0.3 + 2.0 * 0.25))
+
+
+def test_legs_that_share_a_joint_are_refused(tmp_path):
+    path = tmp_path / 'odd.urdf'
+    path.write_text(URDF.read_text().replace('"b_j1"', '"a_j1"'))
+    with pytest.raises(ConfigError, match="'a_j1' is in two legs"):
+        Robot.load(path, feet=FEET)
+
+
+def test_a_home_of_joints_that_are_not_there(tmp_path):
+    path = tmp_path / 'odd.yaml'
+    path.write_text(f'urdf: {URDF}\nfeet: {FEET}\nhome: {{knee: 1, 5: 2}}\n')
+    with pytest.raises(ConfigError, match="no joint ends in 'knee'"):
+        Robot.load(path)
+
+
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
@@ -273,6 +315,7 @@ def test_joint_positions_that_are_not_allowed(q):
         Robot.load('go2').foot_positions(q)
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
 def test_rotations_and_quaternions(angles):
     scipy = pytest.importorskip('scipy.spatial.transform').Rotation
