@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated robots on three fidelity levels, floor, sensors, pneumatics, faults, and scenes."""
 
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.pneumatics import Hose
 from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
@@ -12,7 +12,7 @@ from ros_pad.simulation.terrain import Floor
 __all__ = [
     'Floor',
     'Hose',
-    'PlanarHexapod',
+    'PlanarRobot',
     'PneumaticChannel',
     'RailLeg',
     'RegulatorModel',

@@ -40,6 +40,11 @@ Faults of the sensors of a foot:
     The force sensor limits each component to ``load``.
 ``marker_frozen``
     The position repeats its last reading.
+
+Faults of the sensors of a body with joints:
+
+``imu_silent``, ``joints_silent``
+    IMU or joints send nothing.
 """
 
 from __future__ import annotations
@@ -84,13 +89,21 @@ _QUANTITIES: dict[str, dict[str, tuple[str, float, float, float | None]]] = {
     'force_offset': {'load': ('N', -1e4, 1e4, None)},
     'force_range': {'load': ('N', 1e-3, 1e5, None)},
     'marker_frozen': {},
+    'imu_silent': {},
+    'joints_silent': {},
 }
-_LEGS = Setting('legs', list, 'Legs that have the fault.', low=1, high=6)
+_LEGS = Setting('legs', list, 'Legs that have the fault.', low=1, high=8)
 KINDS = tuple(_QUANTITIES)
 """Kinds of fault."""
 
-SENSOR_KINDS = tuple(kind for kind in KINDS if kind.startswith(('force', 'marker')))
-"""Kinds of fault of a foot's sensors."""
+BODY_KINDS = ('imu_silent', 'joints_silent')
+"""Kinds of fault of the sensors of a body with joints."""
+
+SENSOR_KINDS = (
+    *(kind for kind in KINDS if kind.startswith(('force', 'marker'))),
+    *BODY_KINDS,
+)
+"""Kinds of fault of sensors of feet and body."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +118,7 @@ class Fault:
         Simulated time, s, 0 <= start < end: the fault acts at times start <= t < end. ``end`` may
         be infinite.
     legs : tuple of int
-        Legs whose regulators or sensors have the fault, 1 to 6; empty for all.
+        Legs whose regulators or sensors have the fault, 1 to 8; empty for all.
     pressure, time_constant : float
         Of a supply loss: remaining pressure, gauge Pa, 0 to 1e6, and time constant of the fall,
         s, 0 to 3600.
@@ -142,7 +155,11 @@ class Fault:
         if self.end != math.inf:
             number('end', self.end, 's', self.start, LATEST, above=True)
         for leg in self.legs:
-            integer('legs', leg, 1, 6)
+            integer('legs', leg, 1, 8)
+        if self.legs and self.kind in BODY_KINDS:
+            raise InvalidInput(
+                f'legs = {self.legs!r} is not allowed: a fault of kind {self.kind} is of the body'
+            )
         own = _QUANTITIES[self.kind]
         for quantities in _QUANTITIES.values():
             for name in quantities:
@@ -307,7 +324,9 @@ def sensor_faults_of(leg: int, faults: Iterable[Fault]) -> tuple[Fault, ...]:
     return tuple(
         fault
         for fault in faults
-        if fault.kind in SENSOR_KINDS and (not fault.legs or leg in fault.legs)
+        if fault.kind in SENSOR_KINDS
+        and fault.kind not in BODY_KINDS
+        and (not fault.legs or leg in fault.legs)
     )
 
 
@@ -328,6 +347,6 @@ def parsed(faults: Sequence[Fault | str]) -> tuple[Fault, ...]:
         if fault.kind in SENSOR_KINDS:
             raise InvalidInput(
                 f'faults: kind = {fault.kind!r} is not allowed: it is a fault of the sensors of a'
-                ' foot, not of a regulator'
+                f' {"body" if fault.kind in BODY_KINDS else "foot"}, not of a regulator'
             )
     return found

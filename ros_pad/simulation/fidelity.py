@@ -29,18 +29,19 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation.full_hexapod import FullHexapod
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.rail_leg import walk_many
-from ros_pad.simulation.robot import Robot
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.robot import SimulatedRobot
+from ros_pad.simulation.scene import RAIL_LEG
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
-_LEVELS = {'rail_leg': ('L0',), 'hexapod': ('L1', 'L2')}  # the cheapest first
 _MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
 
@@ -130,7 +131,7 @@ class ErrorTable:
                     name: (float(low), float(high))
                     for name, (low, high) in values['ranges'][robot].items()
                 }
-                for robot in _LEVELS
+                for robot in values['ranges']
             }
             assert reserves[0] == 0.0 and list(reserves) == sorted(reserves)
             assert all(len(row) == len(reserves) for row in bounds.values())
@@ -147,18 +148,36 @@ class ErrorTable:
 
     def beyond(self, scene: Scene) -> str:
         """Return as text the values of a scene outside the measured ranges; empty if none are."""
-        return ', '.join(
+        if self.ranges and scene.robot not in self.ranges:
+            return f'robot = {scene.robot}, measured for {", ".join(self.ranges)}'
+        found = [
             f'{name} = {value:g}, measured from {low:g} to {high:g}'
             for name, (low, high) in self.ranges.get(scene.robot, {}).items()
             if not low <= (value := operator.attrgetter(name)(scene)) <= high
-        )
+        ]
+        if self.ranges and isinstance(scene.gait, WalkingGait) and not _walks_as_usual(scene):
+            found.append(f'phases or pushes of the gait, measured for those of {scene.robot}')
+        return ', '.join(found)
+
+
+def _walks_as_usual(scene: Scene) -> bool:
+    """Return whether the gait has the phases and pushes of the robot's own."""
+    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
+    usual, gait = scene.body.robot.gait, scene.gait
+    if usual is None or usual.pushes != gait.pushes:
+        return False
+    apart = (
+        a - b - (gait.middles[0] - usual.phases[0])
+        for a, b in zip(gait.middles, usual.phases, strict=True)
+    )
+    return all(abs(math.remainder(each, 1.0)) < 1e-6 for each in apart)
 
 
 def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> ChosenLevel:
     """Return the level for a scene, and the bound on its error.
 
     ``auto`` takes the cheapest level whose bound is within ``scene.accuracy``, else the best
-    available one; for a hexapod without MuJoCo that is L1.
+    available one; for a legged robot without MuJoCo that is L1.
 
     Parameters
     ----------
@@ -199,8 +218,22 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
     return ChosenLevel(level, bound, own, note)
 
 
-def level(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> str:
-    """Return the name of the level that :func:`choose` returns, with the same errors."""
+def level(
+    scene: Scene, fidelity: str = 'auto', policy: str | None = None, joints: bool = False
+) -> str:
+    """Return the name of the level that :func:`choose` returns, with the same errors.
+
+    With ``joints`` it must be one with joints: ``auto`` takes L2, others are refused.
+    """
+    if joints:
+        known = _levels(scene, fidelity)
+        if fidelity not in ('auto', 'L2') or 'L2' not in known:
+            given = f'scene {scene.name!r}' if 'L2' not in known else f'fidelity = {fidelity!r}'
+            raise InvalidInput(
+                f"sensing = 'joints' is not allowed with {given}: it needs fidelity L2, which"
+                ' has joints'
+            )
+        return 'L2'
     if fidelity == 'auto':
         return choose(scene, fidelity, policy).level
     _levels(scene, fidelity)
@@ -213,16 +246,16 @@ def _levels(scene: Scene, fidelity: str) -> tuple[str, ...]:
     Raise `InvalidInput` if ``fidelity`` is neither ``auto`` nor one of them.
     """
     choice('fidelity', fidelity, FIDELITIES)
-    known = _LEVELS[scene.robot]
+    known = ('L0',) if scene.robot == RAIL_LEG else ('L1', 'L2')  # the cheapest first
     if fidelity not in ('auto', *known):
         raise InvalidInput(
-            f'fidelity = {fidelity!r} is not allowed: scene {scene.name!r} has a {scene.robot},'
+            f'fidelity = {fidelity!r} is not allowed: scene {scene.name!r} has {scene.robot},'
             f' which only {" and ".join(known)} model{"s" if len(known) == 1 else ""}'
         )
     return known
 
 
-def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> Robot:
+def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> SimulatedRobot:
     """Return the robot of a scene on a floor, with a step of ``period`` seconds.
 
     Raises
@@ -230,14 +263,14 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
     InvalidInput
         As by :func:`choose`, and when the period is not finite and above 0.
     ConfigError
-        For L2 when MuJoCo is missing, or the scene cannot be built as :class:`FullHexapod`.
+        For L2 when MuJoCo is missing, or the scene cannot be built as :class:`FullRobot`.
     """
     name = level(scene, fidelity)
     if name == 'L0':
         return RailLeg(scene, floor, period)
     if name == 'L1':
-        return PlanarHexapod(scene, floor, period)
-    return FullHexapod(scene, floor, period)
+        return PlanarRobot(scene, floor, period)
+    return FullRobot(scene, floor, period)
 
 
 def reserve(scene: Scene, policy: str | None = None) -> float:
@@ -268,8 +301,8 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
         morphologies = (False, True) if scene.faults else (dome,)
         grip = min(grip, *(mid_stance_grip(scene, each, wet) for each in morphologies))
     body, gait, slope = scene.body, scene.gait, scene.floor.slope
-    if isinstance(gait, RailGait) or not isinstance(body, HexapodBody):
-        assert isinstance(gait, RailGait) and not isinstance(body, HexapodBody)
+    if isinstance(gait, RailGait) or not isinstance(body, LeggedBody):
+        assert isinstance(gait, RailGait) and not isinstance(body, LeggedBody)
         peak = 0.5 * gait.stroke * (math.pi / gait.stance) ** 2
         demand = body.mass * (peak + GRAVITY * abs(math.sin(slope))) + body.rolling_drag
         return grip * body.load / demand

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tripod gait: phases of the feet, and intended motion of body and feet.
+"""Gait of a simulated robot: phases of the feet, and intended motion of body and feet.
 
-The body's intended speed is a raised cosine with two pushes a cycle, one for each tripod,
-U(t) = V (1 - cos 4πt/T), V = stride/T. It is zero in the middle of the times at which both tripods
-stand. The peak acceleration 4πV/T sets the demand on level ground.
+In a gait with pushes, as that of the thesis' hexapod, the legs stand in two groups in turn. The
+body's intended speed is a raised cosine with two pushes a cycle, one for each group, U(t) = V (1 -
+cos 4πt/T), V = stride/T. It is zero in the middle of the times at which both groups stand. The
+peak acceleration 4πV/T sets the demand on level ground. In other gaits the speed rises to V in the
+first cycle and then stays.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
-TRIPODS = ((1, 3, 5), (2, 4, 6))
+SHORTEST_OVERLAP = 0.02
+"""Least share of the cycle in which a foot takes over its load."""
 
 
 @dataclass(frozen=True)
-class TripodGait:
-    """Tripod gait, in which legs 1, 3, 5 and legs 2, 4, 6 push in turn.
+class WalkingGait:
+    """When each leg stands, and how the body moves meanwhile.
 
     Attributes
     ----------
@@ -25,36 +29,72 @@ class TripodGait:
     stride : float
         Advance of the body in a cycle without slip, m.
     duty : float
-        Share of the cycle in which a foot stands, 0.5 to 0.9.
+        Share of the cycle in which a foot stands.
     lift : float
         Height of the foot in the middle of its swing, m.
+    middles : tuple of float
+        Share of the cycle at which the stance of each leg is in its middle.
+    pushes : bool
+        Whether the body speeds up and brakes twice a cycle; the middles are then 0.25 and 0.75.
     """
 
     cycle: float
     stride: float
     duty: float
     lift: float
+    middles: tuple[float, ...]
+    pushes: bool
+
+    @cached_property
+    def fewest(self) -> int:
+        """Fewest legs that stand at once, at least 1."""
+        # The number falls only where a leg lifts off.
+        ends = [middle + 0.5 * self.duty + 1e-9 for middle in self.middles]
+        return max(1, min(sum(map(self._stands, [end] * len(ends), self.middles)) for end in ends))
+
+    def _stands(self, share: float, middle: float) -> bool:
+        return (share - middle + 0.5 * self.duty) % 1.0 < self.duty
+
+    @cached_property
+    def overlap(self) -> float:
+        """Share of the cycle in which load passes from a leg that lifts off to one that landed."""
+        if self.pushes:
+            return self.duty - 0.5
+        waits = [
+            (other - each + self.duty) % 1.0 for each in self.middles for other in self.middles
+        ]
+        shortest = min(wait for wait in waits if wait > 0.5 * SHORTEST_OVERLAP)
+        return max(SHORTEST_OVERLAP, min(shortest, 0.5 * self.duty))
 
     def body_advance(self, time: float) -> float:
         """Return the intended advance of the body since time zero, m."""
-        angle = 4.0 * math.pi * time / self.cycle
-        return self.stride / self.cycle * (time - self.cycle / (4.0 * math.pi) * math.sin(angle))
+        speed = self.stride / self.cycle
+        if self.pushes:
+            angle = 4.0 * math.pi * time / self.cycle
+            return speed * (time - self.cycle / (4.0 * math.pi) * math.sin(angle))
+        if time <= 0.0:  # feet are placed as if the gait had run before
+            return speed * time
+        if time >= self.cycle:
+            return speed * (time - 0.5 * self.cycle)
+        angle = math.pi * time / self.cycle
+        return 0.5 * speed * (time - self.cycle / math.pi * math.sin(angle))
 
     @property
     def peak_acceleration(self) -> float:
         """Largest acceleration of the body, m/s²."""
-        return 4.0 * math.pi * self.stride / self.cycle**2
+        return (4.0 if self.pushes else 0.5) * math.pi * self.stride / self.cycle**2
 
-    def phase(self, leg: int, time: float) -> float:
-        """Return the time since the leg's last touch-down, as a share of the cycle in [0, 1).
+    def phase(self, index: int, time: float) -> float:
+        """Return the time since a leg's last touch-down, as a share of the cycle in [0, 1).
 
-        The foot stands while this is below ``duty``.
+        The foot stands while this is below ``duty``. Legs count from 0.
         """
-        middle = 0.25 if leg in TRIPODS[0] else 0.75
-        return (time / self.cycle - middle + self.duty / 2.0) % 1.0
+        return (time / self.cycle - self.middles[index] + self.duty / 2.0) % 1.0
 
     def reach(self) -> float:
         """Return the distance of a foot ahead of its home position at touch-down, m."""
+        if not self.pushes:
+            return 0.5 * self.duty * self.stride
         half = self.duty * self.cycle / 2.0
         middle = self.cycle / 4.0
         return self.body_advance(middle + half) - self.body_advance(middle)

@@ -8,7 +8,7 @@ operations that plain and compiled code round in the same way (``sqrt``, but no 
 functions are in one file because numba renews its copy on disk only when the file of the outermost
 function has changed.
 
-Gait, film and resistance are those of :class:`ros_pad.simulation.gait.TripodGait`,
+Gait, film and resistance are those of :class:`ros_pad.simulation.gait.WalkingGait`,
 :class:`ros_pad.contact.film.Film` and :class:`ros_pad.contact.Foot`; tests compare them.
 """
 
@@ -57,7 +57,7 @@ BODY = 17
     PULL_X, PULL_Y,  # force of the towed load on the body, N
     SLED_X, SLED_Y,  # stretch of the line to the towed load, m
     LOST,  # work lost in slip, J
-    TIPPED, TIPPED_AT,  # 1 to 6: foot that would have to pull, 7: no balance, 0: upright; time, s
+    TIPPED, TIPPED_AT,  # foot that would have to pull, one more than feet: no balance; time, s
     PUSH_X, PUSH_Y,  # force of all feet, N
     SLED_CAP,  # friction of the towed load, N
 ) = range(BODY)  # fmt: skip
@@ -73,10 +73,15 @@ class PlanarModel(NamedTuple):
     duty: float
     lift: float
     reach: float
+    pushes: bool  # whether the body's speed is zero twice a cycle
+    overlap: float  # share of the cycle in which load passes from foot to foot
+    rocks: float  # m²: lets feet in a line carry the body; 0 if it must be in balance
     heading_gain: float
     middle: tuple[float, ...]  # time of the middle of each leg's push, as a share of the cycle
     home_x: tuple[float, ...]
     home_y: tuple[float, ...]
+    centre_x: float  # of mass, in the body, m
+    centre_y: float
     soles_turn: bool
     hip_x: tuple[float, ...]
     hip_y: tuple[float, ...]
@@ -196,7 +201,7 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
     lifted_x, lifted_y = feet[LIFTED_X], feet[LIFTED_Y]
     heights, step_x, step_y = feet[HEIGHT], feet[STEP_X], feet[STEP_Y]
     share = time / cycle
-    for index in range(6):
+    for index in range(len(model.middle)):
         phase = (share - model.middle[index] + duty / 2.0) % 1.0
         x, y = offset_x[index], offset_y[index]
         stood = phases[index] < duty
@@ -229,13 +234,19 @@ def move_feet(model: PlanarModel, body: Any, feet: Any, before: float, time: flo
 
 def body_advance(model: PlanarModel, time: float) -> float:
     """Return the intended advance of the body since time zero, m."""
-    angle = 4.0 * pi * time / model.cycle
-    return model.stride / model.cycle * (time - model.cycle / (4.0 * pi) * sin(angle))
+    speed = model.stride / model.cycle
+    if model.pushes:
+        angle = 4.0 * pi * time / model.cycle
+        return speed * (time - model.cycle / (4.0 * pi) * sin(angle))
+    if time <= 0.0:
+        return speed * time
+    if time >= model.cycle:
+        return speed * (time - 0.5 * model.cycle)
+    return 0.5 * speed * (time - model.cycle / pi * sin(pi * time / model.cycle))
 
 
-def load_share(duty: float, phase: float) -> float:
+def load_share(duty: float, overlap: float, phase: float) -> float:
     """Return the factor, 0 in swing to 1, with which a foot takes part in carrying the body."""
-    overlap = duty - 0.5
     if phase >= duty:
         return 0.0
     edge = phase if phase < duty - phase else duty - phase
@@ -277,36 +288,45 @@ def share_loads(model: PlanarModel, body: Any, feet: Any) -> None:
     centre of pressure (x_p, y_p) lags behind the centre of mass when the body speeds up. The
     horizontal forces are those of the step before. Feet that would pull are left out, and included
     again when they would press. If no loads balance the weight, the robot tips over.
+
+    A gait in which only two feet stand, such as a trot, is in balance on average only. There
+    ``rocks`` lets the line between them carry the weight, without the moment about that line.
     """
     duty = model.duty
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     lift = model.tow_height - model.height
     lean_x = lift * body[PULL_X] - model.height * body[PUSH_X]
     lean_y = lift * body[PULL_Y] - model.height * body[PUSH_Y]
-    wanted = model.weight, cosine * lean_x + sine * lean_y, cosine * lean_y - sine * lean_x
+    wanted = (
+        model.weight,
+        cosine * lean_x + sine * lean_y + model.weight * model.centre_x,
+        cosine * lean_y - sine * lean_x + model.weight * model.centre_y,
+    )
     phases, offset_x, offset_y, ground = feet[PHASE], feet[OFFSET_X], feet[OFFSET_Y], feet[GROUND]
     loads = feet[LOAD]
     legs = []
-    for index in range(6):
+    for index in range(len(model.middle)):
         loads[index] = 0.0
-        share = load_share(duty, phases[index])
+        share = load_share(duty, model.overlap, phases[index])
         if share > 0.0:
             x = model.home_x[index] + offset_x[index]
             y = model.home_y[index] + offset_y[index]
             legs.append((index, share, x, y, model.leg_stiffness * ground[index]))
-    presses = 63  # set of feet that press, with a bit for each foot
+    count = len(model.middle)
+    sets = 1 << count
+    presses = sets - 1  # set of feet that press, with a bit for each foot
     pulling = 0
     # Feet are removed or added one after another, the worst first, which nearly always ends in
     # balance. If not, every set of feet is tried.
-    for attempt in range(12 + 64):
-        if attempt >= 12:
-            presses = attempt - 12
-        wrong = balance(legs, presses, wanted, loads)
+    for attempt in range(2 * count + sets):
+        if attempt >= 2 * count:
+            presses = attempt - 2 * count
+        wrong = balance(legs, presses, wanted, model.rocks, loads)
         if wrong == 0:
             return
         if pulling == 0:
             pulling = wrong
-        if attempt < 12:
+        if attempt < 2 * count:
             presses ^= 1 << (wrong - 1)
     if body[TIPPED] == 0.0:
         body[TIPPED] = pulling
@@ -317,6 +337,7 @@ def balance(
     legs: Sequence[tuple[int, float, float, float, float]],
     presses: int,
     wanted: tuple[float, float, float],
+    rocks: float,
     loads: Any,
 ) -> int:
     """Set the loads with which the feet in the set ``presses`` balance the robot, 0 for others.
@@ -325,7 +346,8 @@ def balance(
     -------
     int
         Number, from 1, of the foot in the set that pulls most. If none pulls, number of the foot
-        outside the set that would press most; 0 if there is none. 7 if the set has no balance.
+        outside the set that would press most; 0 if there is none. One more than there are feet if
+        the set has no balance.
     """
     total, mx, my = wanted
     s = sx = sy = sxx = sxy = syy = 0.0
@@ -342,13 +364,13 @@ def balance(
             mx -= wx * preload
             my -= wy * preload
     if s <= 0.0:
-        return 7
+        return len(loads) + 1
     # Gauss elimination of the symmetric 3 x 3 system.
-    axx, axy, bx = sxx - sx * sx / s, sxy - sx * sy / s, mx - sx * total / s
-    ayy, by = syy - sy * sy / s, my - sy * total / s
+    axx, axy, bx = sxx - sx * sx / s + rocks, sxy - sx * sy / s, mx - sx * total / s
+    ayy, by = syy - sy * sy / s + rocks, my - sy * total / s
     determinant = axx * ayy - axy * axy
     if determinant <= 1e-12 * sxx * syy:
-        return 7  # two feet, or feet in a line
+        return len(loads) + 1  # two feet, or feet in a line
     slope_x = (bx * ayy - by * axy) / determinant
     slope_y = (by * axx - bx * axy) / determinant
     level = (total - sx * slope_x - sy * slope_y) / s
@@ -385,7 +407,7 @@ def grip(
     dt = model.period
     stiffness, radius = model.shear_stiffness, model.turning_radius
     contacts = []
-    for index in range(6):
+    for index in range(len(model.middle)):
         load = feet[LOAD][index]
         if load <= 0.0:
             feet[CAP][index] = 0.0
@@ -627,7 +649,7 @@ def report(
     cosine, sine = cos(body[HEADING]), sin(body[HEADING])
     total_x = total_y = 0.0
     place = 0
-    for index in range(6):
+    for index in range(len(model.middle)):
         fx = fy = moment = slid = 0.0
         if feet[CAP][index] > 0.0:
             fx, fy, moment, slid, lost = push(vx, vy, yaw_rate, contacts[place], dt)

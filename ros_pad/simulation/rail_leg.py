@@ -25,6 +25,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
+from ros_pad.simulation.scene import RAIL_LEG
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
@@ -283,8 +284,8 @@ def _constants(
 ) -> _Legs:
     rows = []
     for scene, pressure in zip(scenes, pressures, strict=True):
-        if scene.robot != 'rail_leg':
-            raise InvalidInput(f'scene {scene.name!r} has a {scene.robot}: a rail_leg is needed')
+        if scene.robot != RAIL_LEG:
+            raise InvalidInput(f'scene {scene.name!r} has {scene.robot}: {RAIL_LEG} is needed')
         number('pressure', pressure, 'Pa', high=scene.foot.ceiling)
         rows.append(_row(scene, pressure))
     # With a depth of zero wet ground is dry: 1/h² is infinite.

@@ -5,11 +5,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 from typing import Protocol
 
 from ros_pad.errors import InvalidInput
 
 Vector = tuple[float, float, float]
+
+
+class Proprioception(NamedTuple):
+    """What the sensors on a robot with joints measure, without noise.
+
+    Attributes
+    ----------
+    gyro, accelerometer : tuple of float
+        Angular velocity, rad/s, and specific force, m/s² (+9.81 upwards at rest), IMU axes.
+    positions, velocities, efforts : list of float
+        Of the joints, in the order of ``joint_names``: rad, rad/s, and the torques of the motors
+        behind their gears, N m.
+    forces : list of tuple of float
+        Force of the ground on each foot, N, in the axes of the link that carries the foot.
+    """
+
+    gyro: Vector
+    accelerometer: Vector
+    positions: list[float]
+    velocities: list[float]
+    efforts: list[float]
+    forces: list[Vector]
 
 
 class FootState:
@@ -55,13 +78,13 @@ class FootState:
         self.overload_time = 0.0
 
 
-class Robot(Protocol):
+class SimulatedRobot(Protocol):
     """A simulated robot: step it with the pads' gauge pressures, then read its feet and body.
 
     Attributes
     ----------
     legs : tuple of int
-        Numbers of the legs, as in the thesis.
+        Numbers of the legs.
     period : float
         Length of a step, s.
     time : float
@@ -107,8 +130,8 @@ class Robot(Protocol):
 
 
 def check_pressures(pressures: Sequence[float], legs: int) -> None:
-    """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg, 1 or 6."""
+    """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg."""
     # If one value is not finite, the sum is not finite either.
     if len(pressures) != legs or not math.isfinite(sum(pressures)):
-        needed = 'six finite numbers are' if legs == 6 else 'one finite number is'
+        needed = 'one finite number is' if legs == 1 else f'{legs} finite numbers are'
         raise InvalidInput(f'pressures = {pressures!r} Pa: {needed} needed, one for each leg')

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import pathlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from dataclasses import field
+from functools import cached_property
 from typing import Any
 from typing import TypeVar
 
@@ -17,72 +20,71 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.robots import Gait
+from ros_pad.robots import Robot
 from ros_pad.simulation.faults import SENSOR_KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import listed
-from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.terrain import FLOORS
 from ros_pad.simulation.terrain import Floor
 from ros_pad.simulation.terrain import patch_lengths
 
 T = TypeVar('T')
 
+RAIL_LEG = 'rail_leg'
+"""The robot of a scene with the leg on its rail."""
+
 
 @dataclass(frozen=True)
-class HexapodBody:
-    """Masses and geometry of a hexapod.
+class LeggedBody:
+    """Masses and legs of a robot. Its feet are soles on ankles, so they do not roll.
 
     Attributes
     ----------
+    robot : Robot
+        Legs, kinematics and servos.
     mass : float
-        Mass of the robot, kg.
+        Mass of the robot, kg; that of each link is in proportion.
     inertia : float
         Moment of inertia of the robot about the vertical axis, kg m².
     height : float
         Height of the centre of mass above the floor, m.
     homes : tuple of (float, float)
-        Home positions of feet 1 to 6 in the body, fore and left, m.
-    coxa, femur, tibia : float
-        Lengths of a leg's links, m; those of a Lynxmotion CH3-R by default.
+        Home positions of the feet in the base, fore and left, m.
     leg_stiffness : float
         Vertical stiffness of a leg and its foot, N/m: load that a foot gains for each metre by
         which its ground is higher.
     """
 
+    robot: Robot = field(compare=False, repr=False)
     mass: float
     inertia: float
     height: float
     homes: tuple[tuple[float, float], ...]
-    coxa: float = 0.029
-    femur: float = 0.057
-    tibia: float = 0.141
-    leg_stiffness: float = 3000.0
+    leg_stiffness: float
+
+    @cached_property
+    def ground(self) -> float:
+        """Height of the ground at home in the base, m, below 0: that of the lowest foot."""
+        return float(self.robot.foot_positions(self.robot.home)[:, 2].min().round(12))
 
     @classmethod
-    def read(cls, table: Table) -> HexapodBody:
-        """Read the table ``body`` of a scene."""
-        corner_x = table.number('corner_fore', 'm', 0.01, 1.0)
-        corner_y = table.number('corner_side', 'm', 0.01, 1.0)
-        middle_y = table.number('middle_side', 'm', 0.01, 1.0)
+    def read(cls, table: Table, robot: Robot) -> LeggedBody:
+        """Read the table ``body`` of a scene: what is not as in the robot's file."""
+        if not robot.mass > 0.0:
+            raise ConfigError(f'{table.origin}: the links of robot {robot.name!r} have no mass')
+        mass = table.number('mass', 'kg', 0.05, 2000.0, default=robot.mass)
+        inertia = robot.inertia * mass / robot.mass
+        feet = robot.foot_positions(robot.home)[:, :2].round(12)
         return cls(
-            mass=table.number('mass', 'kg', 0.05, 200.0),
-            inertia=table.number('inertia', 'kg m2', 1e-5, 100.0),
-            height=table.number('height', 'm', 0.0, 2.0),
-            # Order: left front, left middle, left rear, right rear, right middle, right front. A
-            # tripod is both corners of one side and the middle leg of the other.
-            homes=(
-                (corner_x, corner_y),
-                (0.0, middle_y),
-                (-corner_x, corner_y),
-                (-corner_x, -corner_y),
-                (0.0, -middle_y),
-                (corner_x, -corner_y),
-            ),
-            coxa=table.number('coxa', 'm', 1e-3, 1.0, default=cls.coxa),
-            femur=table.number('femur', 'm', 1e-3, 1.0, default=cls.femur),
-            tibia=table.number('tibia', 'm', 1e-3, 1.0, default=cls.tibia),
+            robot=robot,
+            mass=mass,
+            inertia=table.number('inertia', 'kg m2', 1e-5, 1000.0, default=inertia),
+            height=table.number('height', 'm', 0.0, 5.0, default=robot.height),
+            homes=tuple((float(x), float(y)) for x, y in feet),
             leg_stiffness=table.number(
-                'leg_stiffness', 'N/m', 1.0, 1e7, default=cls.leg_stiffness
+                'leg_stiffness', 'N/m', 1.0, 1e7, default=robot.leg_stiffness
             ),
         )
 
@@ -194,7 +196,9 @@ class Tow:
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Rate and white noise of the foot sensors.
+    """Rate and white noise of the sensors, and the bias of gyro and accelerometer.
+
+    The defaults are about twice what data sheets of cheap parts promise (docs/model/sensors.md).
 
     Attributes
     ----------
@@ -206,12 +210,25 @@ class SensorNoise:
         Standard deviation of each marker coordinate, m.
     moment : float
         Standard deviation of the yaw moment, N m; 0 for sensors that do not measure it.
+    gyro, accelerometer : float
+        Standard deviation of each component of the IMU, rad/s and m/s².
+    gyro_bias, accelerometer_bias : float
+        Length of their biases, which have a random direction, rad/s and m/s².
+    encoder, joint_velocity, effort : float
+        Standard deviation of position, rad, velocity, rad/s, and torque, N m, of a joint.
     """
 
     rate: float
     force: float
     position: float
     moment: float = 0.0
+    gyro: float = 0.005
+    accelerometer: float = 0.05
+    gyro_bias: float = 0.01
+    accelerometer_bias: float = 0.05
+    encoder: float = 5e-4
+    joint_velocity: float = 0.03
+    effort: float = 0.02
 
     @classmethod
     def read(cls, table: Table) -> SensorNoise:
@@ -221,6 +238,19 @@ class SensorNoise:
             force=table.number('force_noise', 'N', 0.0, 10.0),
             position=table.number('position_noise', 'm', 0.0, 0.01),
             moment=table.number('moment_noise', 'N m', 0.0, 1.0, default=cls.moment),
+            gyro=table.number('gyro_noise', 'rad/s', 1e-6, 1.0, default=cls.gyro),
+            accelerometer=table.number(
+                'accelerometer_noise', 'm/s2', 1e-6, 10.0, default=cls.accelerometer
+            ),
+            gyro_bias=table.number('gyro_bias', 'rad/s', 0.0, 1.0, default=cls.gyro_bias),
+            accelerometer_bias=table.number(
+                'accelerometer_bias', 'm/s2', 0.0, 5.0, default=cls.accelerometer_bias
+            ),
+            encoder=table.number('encoder_noise', 'rad', 1e-6, 0.1, default=cls.encoder),
+            joint_velocity=table.number(
+                'joint_velocity_noise', 'rad/s', 1e-6, 10.0, default=cls.joint_velocity
+            ),
+            effort=table.number('effort_noise', 'N m', 0.0, 100.0, default=cls.effort),
         )
 
 
@@ -313,9 +343,9 @@ class Scene:
     name, description : str
         Name without folder, and the text ``description`` of the file.
     robot : str
-        ``hexapod`` or ``rail_leg``.
-    body : HexapodBody or RailBody
-    gait : TripodGait or RailGait
+        Name or path of the robot as the file has it; ``rail_leg`` for the leg on its rail.
+    body : LeggedBody or RailBody
+    gait : WalkingGait or RailGait
     heading_gain : float
         Rate at which the gait steers back to heading zero, 1/s; 0 for a rail leg.
     foot : Foot
@@ -342,8 +372,8 @@ class Scene:
     name: str
     description: str
     robot: str
-    body: HexapodBody | RailBody
-    gait: TripodGait | RailGait
+    body: LeggedBody | RailBody
+    gait: WalkingGait | RailGait
     heading_gain: float
     foot: Foot
     floor: FloorPlan
@@ -364,14 +394,17 @@ class Scene:
 
     @property
     def legs(self) -> tuple[int, ...]:
-        """Numbers of the robot's legs."""
-        return (1, 2, 3, 4, 5, 6) if self.robot == 'hexapod' else (1,)
+        """Numbers of the robot's legs, in the order of its file."""
+        if isinstance(self.gait, WalkingGait):
+            return tuple(range(1, len(self.gait.middles) + 1))
+        return (1,)
 
     @property
     def expected_load(self) -> float:
-        """Normal force that a foot carries in stance on average, N."""
-        if isinstance(self.body, HexapodBody):
-            return self.body.mass * GRAVITY / 3.0
+        """Normal force of a foot when the fewest feet stand, N; that of the spring on a rail."""
+        if isinstance(self.gait, WalkingGait):
+            return self.body.mass * GRAVITY / self.gait.fewest
+        assert isinstance(self.body, RailBody)
         return self.body.load
 
     @property
@@ -386,7 +419,7 @@ class Scene:
     @property
     def stride(self) -> float:
         """Distance of the body in a gait cycle without slip, m."""
-        return self.gait.stride if isinstance(self.gait, TripodGait) else self.gait.stroke
+        return self.gait.stride if isinstance(self.gait, WalkingGait) else self.gait.stroke
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Scene:
@@ -409,17 +442,20 @@ class Scene:
                 f'{table.origin}: is a bench scene, in which no robot walks: compute it with '
                 f'pad run {source}, or with studies.thesis.bench.run'
             )
-        robot = table.choice('robot', ('hexapod', 'rail_leg'))
+        robot = table.text('robot')
         description = table.text('description', default='')
         foot = foot_of(table)
-        body: HexapodBody | RailBody
-        gait: TripodGait | RailGait
-        if robot == 'hexapod':
-            body = _part(table, 'body', HexapodBody.read)
-            gait, heading_gain = _part(table, 'gait', _tripod_gait)
-        else:
+        body: LeggedBody | RailBody
+        gait: WalkingGait | RailGait
+        if robot == RAIL_LEG:
             body = _part(table, 'body', RailBody.read)
             gait, heading_gain = _part(table, 'gait', RailGait.read), 0.0
+        else:
+            legs = _robot_of(table, robot)
+            with table.table('body', default={}) as part:
+                body = LeggedBody.read(part, legs)
+            with table.table('gait', default={}) as part:
+                gait, heading_gain = _walking_gait(part, legs)
         scene = cls(
             source=source,
             name=name,
@@ -450,7 +486,7 @@ class Scene:
             if missing:
                 raise ConfigError(
                     f'{table.origin}: faults: legs = {list(fault.legs)} is not allowed: '
-                    f'a {robot} has no leg {missing[0]}'
+                    f'{robot} has no leg {missing[0]}'
                 )
         return scene
 
@@ -472,14 +508,43 @@ def foot_of(table: Table) -> Foot:
         raise ConfigError(f'{table.origin}: foot: {error}') from error
 
 
-def _tripod_gait(table: Table) -> tuple[TripodGait, float]:
-    """Read the gait of a hexapod, and the rate at which it steers back to heading zero, 1/s."""
-    gait = TripodGait(
-        cycle=table.number('cycle', 's', 0.1, 60.0),
-        stride=table.number('stride', 'm', 1e-3, 1.0),
-        duty=table.number('duty', '(share)', 0.51, 0.9),
-        lift=table.number('lift', 'm', 1e-3, 0.2),
+def _robot_of(table: Table, name: str) -> Robot:
+    """Return the robot that a scene names; a path is relative to the scene's folder."""
+    if name.endswith(('.yaml', '.yml')):
+        name = os.fspath(pathlib.Path(table.origin).parent / name)
+    elif name.endswith('.urdf'):
+        raise ConfigError(
+            f'{table.origin}: robot = {name!r}: a scene needs feet, posture, gait and servos too:'
+            ' name a YAML file with the key urdf, see docs/robots.md'
+        )
+    try:
+        robot = Robot.load(name, foot_radius=0.0)
+    except ConfigError as error:
+        raise ConfigError(f'{table.origin}: robot: {error}') from error
+    if robot.gait is None:
+        raise ConfigError(f'{table.origin}: robot = {name!r}: its file has no gait')
+    return robot
+
+
+def _walking_gait(table: Table, robot: Robot) -> tuple[WalkingGait, float]:
+    """Read a gait, and the rate at which it steers back to heading zero, 1/s.
+
+    What the table does not have is as in the robot's file.
+    """
+    steps = Gait.read(table, robot.hips, robot.gait)
+    gait = WalkingGait(
+        cycle=steps.cycle,
+        stride=table.number('stride', 'm', 1e-3, 2.0),
+        duty=steps.duty,
+        lift=steps.lift,
+        middles=tuple((0.25 + phase) % 1.0 for phase in steps.phases),
+        pushes=steps.pushes,
     )
+    if not gait.pushes:
+        # A walk begins in the middle of the time in which one leg has landed and none lifted off.
+        start = 0.5 * (gait.duty - gait.overlap)
+        middles = tuple((start + phase) % 1.0 for phase in steps.phases)
+        gait = dataclasses.replace(gait, middles=middles)
     return gait, table.number('heading_gain', '1/s', 0.0, 10.0, default=0.0)
 
 

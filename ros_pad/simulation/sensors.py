@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force sensors and markers of the feet, with white noise and faults."""
+"""Force sensors and markers of the feet, and IMU and joints of the body, with noise and faults."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from ros_pad.simulation.faults import BODY_KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import sensor_faults_of
-from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.robot import Proprioception
+from ros_pad.simulation.robot import SimulatedRobot
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
@@ -61,7 +65,7 @@ class Sensors:
         faults = [sensor_faults_of(leg, scene.faults) for leg in scene.legs]
         return cls(scene.sensors, len(scene.legs), seed, faults)
 
-    def read(self, robot: Robot) -> list[Reading]:
+    def read(self, robot: SimulatedRobot) -> list[Reading]:
         """Return the next reading of each foot: force, N, and position, m, with their noise."""
         if self._next == len(self._block):
             drawn = self._generator.normal(size=(_BLOCK, 6 * self._legs)) * self._scale
@@ -83,7 +87,7 @@ class Sensors:
             self._last = readings
         return readings
 
-    def read_moments(self, robot: Robot) -> list[float | None]:
+    def read_moments(self, robot: SimulatedRobot) -> list[float | None]:
         """Return the yaw moment of each foot, N m, with noise; None where it is not measured.
 
         Call it once for each :meth:`read`.
@@ -124,3 +128,86 @@ def _faulty(reading: Reading, before: Reading, faults: Sequence[Fault], time: fl
         else:
             position = before[1]
     return force, position
+
+
+class BodyReading(NamedTuple):
+    """What IMU, joints and feet of a robot measure at one moment, as in `Proprioception`.
+
+    Attributes
+    ----------
+    imu : tuple or None
+        Angular velocity, rad/s, and specific force, m/s²; None where the IMU is silent.
+    joints : tuple or None
+        Positions, velocities and efforts; None where the joints are silent.
+    forces : list of tuple of float
+        Force on each foot, N, in the axes of its link.
+    """
+
+    imu: tuple[list[float], list[float]] | None
+    joints: tuple[list[float], list[float], list[float]] | None
+    forces: list[Vector]
+
+
+class BodySensors:
+    """IMU, joints, and force sensors in the feet of a robot with joints.
+
+    Their noise is independent of that of :class:`Sensors`, and each kind has its own.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the noise and the faults.
+    seed : int
+        Whole number from 0; the same seed gives the same noise.
+    joints : int
+        Number of joints.
+    """
+
+    def __init__(self, scene: Scene, seed: int, joints: int) -> None:
+        noise = scene.sensors
+        self._noise = noise
+        self._imu, self._joints, self._forces = (
+            np.random.default_rng([seed, stream]) for stream in (4, 5, 6)
+        )
+        self._biases = np.concatenate(
+            [
+                _of_length(noise.gyro_bias, self._imu),
+                _of_length(noise.accelerometer_bias, self._imu),
+            ]
+        )
+        self._imu_scale = np.repeat((noise.gyro, noise.accelerometer), 3)
+        self._joint_scale = np.repeat(
+            (noise.encoder, noise.joint_velocity, noise.effort), joints
+        ).reshape(3, joints)
+        self._faults = [fault for fault in scene.faults if fault.kind in BODY_KINDS]
+        self._of_feet = [sensor_faults_of(leg, scene.faults) for leg in scene.legs]
+        self._last: list[Vector] = []
+
+    def read(self, truth: Proprioception, time: float) -> BodyReading:
+        """Return the next reading of the true values at a time, s."""
+        values = np.array((*truth.gyro, *truth.accelerometer)) + self._biases
+        values += self._imu_scale * self._imu.standard_normal(6)
+        gyro, accelerometer = values.reshape(2, 3).tolist()
+        given = np.array((truth.positions, truth.velocities, truth.efforts))
+        given += self._joint_scale * self._joints.standard_normal(given.shape)
+        positions, velocities, efforts = given.tolist()
+        felt = np.array(truth.forces)
+        felt += self._noise.force * self._forces.standard_normal(felt.shape)
+        forces: list[Vector] = [(x, y, z) for x, y, z in felt.tolist()]
+        for index, faults in enumerate(self._of_feet):
+            before = self._last[index] if self._last else forces[index]
+            nowhere = (0.0, 0.0, 0.0)
+            forces[index], _ = _faulty((forces[index], nowhere), (before, nowhere), faults, time)
+        self._last = forces
+        silent = {fault.kind for fault in self._faults if fault.acts_at(time)}
+        return BodyReading(
+            None if 'imu_silent' in silent else (gyro, accelerometer),
+            None if 'joints_silent' in silent else (positions, velocities, efforts),
+            forces,
+        )
+
+
+def _of_length(length: float, generator: np.random.Generator) -> npt.NDArray[np.float64]:
+    """Return a vector of a length and of random direction."""
+    vector = generator.standard_normal(3)
+    return vector * (length / np.linalg.norm(vector))

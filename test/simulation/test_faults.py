@@ -292,6 +292,15 @@ def test_regulators_and_sensors_get_their_own():
         parsed([str(leak), str(dead)])
 
 
+def test_faults_of_the_body_are_of_no_leg():
+    silent = Fault('imu_silent', 1.0)
+    assert faults_of(2, (silent,)) == sensor_faults_of(2, (silent,)) == ()
+    with pytest.raises(InvalidInput, match=r"'imu_silent' is not allowed.* of a body"):
+        parsed([str(silent)])
+    with pytest.raises(InvalidInput, match=r'legs = .* is of the body'):
+        Fault('joints_silent', legs=(1,))
+
+
 # --- text -------------------------------------------------------------------------------------
 
 EXAMPLES = [
@@ -305,6 +314,8 @@ EXAMPLES = [
     Fault('force_offset', 0.5, load=-2.5),
     Fault('force_range', load=5.0),
     Fault('marker_frozen', 2.0, 3.0),
+    Fault('imu_silent', 2.0, 3.0),
+    Fault('joints_silent', 2.0),
 ]
 
 
@@ -328,7 +339,7 @@ BAD = [
     ('{kind: silence, start: -1}', 'start = -1 is not allowed: a number from 0 to 1000000000 s'),
     ('{kind: silence, start: 2, end: 2}', 'end = 2 is not allowed: a number from 2 to'),
     ('{kind: silence, start: .nan}', 'start = nan is not allowed'),
-    ('{kind: silence, legs: [7]}', 'legs = [7] is not allowed: a list of different whole'),
+    ('{kind: silence, legs: [9]}', 'legs = [9] is not allowed: a list of different whole'),
     ('{kind: silence, legs: []}', 'legs = [] is not allowed'),
     ('{kind: silence, legs: [1, 1]}', 'legs = [1, 1] is not allowed'),
     ('{kind: silence, legs: [true]}', 'legs = [True] is not allowed'),
@@ -401,7 +412,7 @@ def test_scene_lists_faults(tmp_path):
             [{'kind': 'silence'}, {'kind': 'leek'}],
             "fault 2: kind = 'leek' is not allowed",
         ),
-        ('leg_wet_dome_60', [{'kind': 'silence', 'legs': [2]}], 'a rail_leg has no leg 2'),
+        ('leg_wet_dome_60', [{'kind': 'silence', 'legs': [2]}], 'rail_leg has no leg 2'),
     ],
 )
 def test_bad_faults_of_a_scene(tmp_path, name, faults, message):

@@ -12,8 +12,8 @@ from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.full_hexapod import FullHexapod
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 
 HEXAPOD, LEG = Scene.load('hexapod_patches'), Scene.load('leg_wet_flat')
@@ -23,7 +23,7 @@ def test_levels_of_robots():
     assert fidelity.level(HEXAPOD, 'L1') == 'L1'
     assert fidelity.level(HEXAPOD, 'L2') == 'L2'
     assert fidelity.level(LEG) == fidelity.level(LEG, 'L0') == 'L0'
-    with pytest.raises(InvalidInput, match=r"'L1' .* 'leg_wet_flat' has a rail_leg, which only"):
+    with pytest.raises(InvalidInput, match=r"'L1' .* 'leg_wet_flat' has rail_leg, which only"):
         fidelity.level(LEG, 'L1')
     with pytest.raises(InvalidInput, match=r"'L0' .* 'hexapod_patches' .* only L1 and L2 model"):
         fidelity.level(HEXAPOD, 'L0')
@@ -33,10 +33,10 @@ def test_levels_of_robots():
 
 @pytest.mark.parametrize(
     'scene, name, kind',
-    [(HEXAPOD, 'L1', PlanarHexapod), (HEXAPOD, 'L2', FullHexapod), (LEG, 'auto', RailLeg)],
+    [(HEXAPOD, 'L1', PlanarRobot), (HEXAPOD, 'L2', FullRobot), (LEG, 'auto', RailLeg)],
 )
 def test_robots(scene, name, kind):
-    if kind is FullHexapod:
+    if kind is FullRobot:
         pytest.importorskip('mujoco')
     robot = fidelity.build(scene, scene.floor.build(0), 0.004, name)
     assert isinstance(robot, kind)
@@ -91,7 +91,7 @@ def test_no_bound_outside_the_measured_ranges():
     dry = dataclasses.replace(Scene.load('hexapod_smooth_dry_flat'), accuracy=0.2)
     assert fidelity.choose(dry).level == 'L1'
     for robot, ranges in fidelity.ErrorTable.load().ranges.items():
-        scene = dry if robot == 'hexapod' else LEG
+        scene = dry if robot == 'ch3r' else LEG
         for name, (low, high) in ranges.items():
             part, _, key = name.partition('.')
 
@@ -104,7 +104,7 @@ def test_no_bound_outside_the_measured_ranges():
             choice = fidelity.choose(changed(1.01 * high))
             assert choice.bound == math.inf
             assert f'{name} = {1.01 * high:g}, measured from {low:g} to {high:g}' in choice.note
-            if robot == 'hexapod' and importlib.util.find_spec('mujoco'):
+            if robot == 'ch3r' and importlib.util.find_spec('mujoco'):
                 assert choice.level == 'L2'
 
 

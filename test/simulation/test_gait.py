@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from ros_pad.simulation.gait import TRIPODS
-from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.planar_step import load_share
 
-GAIT = TripodGait(cycle=1.2, stride=0.16, duty=0.6, lift=0.03)
-LEGS = range(1, 7)
+MIDDLES = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
+GAIT = WalkingGait(1.2, 0.16, 0.6, 0.03, MIDDLES, pushes=True)
+LEGS = range(6)
+TRIPODS = ((0, 2, 4), (1, 3, 5))
 DUTIES = (0.51, 0.6, 0.75, 0.9)
 
 
@@ -20,7 +21,7 @@ def body_speed(time):
 
 
 def gait_of(duty):
-    return TripodGait(cycle=1.2, stride=0.16, duty=duty, lift=0.03)
+    return WalkingGait(1.2, 0.16, duty, 0.03, MIDDLES, pushes=True)
 
 
 @pytest.mark.parametrize('time', [0.05, 0.3, 1.0, 1.2, 7.7])
@@ -61,7 +62,9 @@ def test_stance_is_centred_on_the_push(duty):
 def test_shares_of_the_two_tripods_make_one(duty):
     gait = gait_of(duty)
     for time in np.linspace(0.0, 2.4, 997):
-        shares = [load_share(duty, gait.phase(tripod[0], time)) for tripod in TRIPODS]
+        shares = [
+            load_share(duty, gait.overlap, gait.phase(tripod[0], time)) for tripod in TRIPODS
+        ]
         assert all(0.0 <= share <= 1.0 for share in shares)
         assert sum(shares) == pytest.approx(1.0, abs=1e-9)
 
@@ -69,8 +72,8 @@ def test_shares_of_the_two_tripods_make_one(duty):
 @pytest.mark.parametrize('duty', DUTIES)
 def test_share_comes_and_goes_softly(duty):
     phases = np.linspace(0.0, 1.0, 20001)
-    shares = np.array([load_share(duty, phase) for phase in phases])
-    assert load_share(duty, duty) == load_share(duty, 0.999) == 0.0
+    shares = np.array([load_share(duty, duty - 0.5, phase) for phase in phases])
+    assert load_share(duty, duty - 0.5, duty) == load_share(duty, duty - 0.5, 0.999) == 0.0
     steepest = 1.5 / (duty - 0.5)  # slope of the smooth step
     assert np.abs(np.diff(shares)).max() < 1.01 * steepest * (phases[1] - phases[0])
 
@@ -79,7 +82,7 @@ def test_tripods():
     assert sorted(TRIPODS[0] + TRIPODS[1]) == list(LEGS)
     for tripod in TRIPODS:
         assert len({GAIT.phase(leg, 0.37) for leg in tripod}) == 1
-    shift = (GAIT.phase(1, 0.37) - GAIT.phase(2, 0.37)) % 1.0
+    shift = (GAIT.phase(0, 0.37) - GAIT.phase(1, 0.37)) % 1.0
     assert shift == pytest.approx(0.5)
 
 

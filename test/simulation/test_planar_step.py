@@ -17,9 +17,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from ros_pad.simulation import compiled
 from ros_pad.simulation import planar_step
-from ros_pad.simulation.gait import TripodGait
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
-from ros_pad.simulation.planar_hexapod import model_of
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.planar_robot import PlanarRobot
+from ros_pad.simulation.planar_robot import model_of
 
 SCENE = Scene.load('hexapod_patches')
 FLOOR = SCENE.floor.build(0)
@@ -43,7 +43,7 @@ def table():
     st.floats(1e-3, 1.0),
 )
 def test_gait(time, cycle, duty, stride):
-    gait = TripodGait(cycle, stride, duty, 0.03)
+    gait = WalkingGait(cycle, stride, duty, 0.03, SCENE.gait.middles, pushes=True)
     own = MODEL._replace(
         cycle=cycle, stride=stride, duty=duty, lift=0.03, reach=gait.reach(), heading_gain=0.0
     )
@@ -51,7 +51,7 @@ def test_gait(time, cycle, duty, stride):
     planar_step.move_feet(own, body, feet, time, time)
     assert planar_step.body_advance(own, time) == gait.body_advance(time)
     for index, leg in enumerate(LEGS):
-        phase = gait.phase(leg, time)
+        phase = gait.phase(leg - 1, time)
         assert feet[planar_step.PHASE][index] == phase
         if phase >= duty:
             progress, height = gait.swing(phase)
@@ -143,7 +143,9 @@ def test_loads_by_trying_every_set_of_feet():
         lean = rng.choice([0.0, 10.0, 60.0]) * rng.uniform(-1.0, 1.0, 2)
         body[planar_step.PUSH_X], body[planar_step.PUSH_Y] = lean
         planar_step.share_loads(own, body, feet)
-        weights = np.array([planar_step.load_share(own.duty, p) for p in feet[planar_step.PHASE]])
+        weights = np.array(
+            [planar_step.load_share(own.duty, own.overlap, p) for p in feet[planar_step.PHASE]]
+        )
         places = np.array(SCENE.body.homes) + np.column_stack(
             [feet[planar_step.OFFSET_X], np.zeros(6)]
         )
@@ -185,7 +187,7 @@ def test_compiled_walk_is_the_same_to_the_bit(name, soles_turn):
     scene = Scene.load(name)
     floor = scene.floor.build(1)
     plain, fast = (
-        PlanarHexapod(scene, floor, 0.004, compile_steps, soles_turn)
+        PlanarRobot(scene, floor, 0.004, compile_steps, soles_turn)
         for compile_steps in (False, True)
     )
     # Pads fill and empty, so that feet are domes, overloaded domes and flat.
@@ -210,14 +212,14 @@ def test_compiled_tip_over_and_refusals_are_the_same():
     from dataclasses import replace
 
     tall = replace(SCENE, body=replace(SCENE.body, height=1.5), settle=0.0)
-    robots = [PlanarHexapod(tall, FLOOR, 0.004, each) for each in (False, True)]
+    robots = [PlanarRobot(tall, FLOOR, 0.004, each) for each in (False, True)]
     steps = [robot.walk([0.0] * 6, 1000) for robot in robots]
     assert steps[0] == steps[1] < 1000
     assert robots[0].verdict == robots[1].verdict
     assert 'would have to pull' in robots[0].verdict
     for robot in robots:
         for bad in ([0.0] * 5, [0.0] * 7, [math.nan] + [0.0] * 5, [math.inf] * 6):
-            with pytest.raises(InvalidInput, match='six finite numbers'):
+            with pytest.raises(InvalidInput, match='6 finite numbers'):
                 robot.step(bad)
         robot.step([0] * 6)
 
@@ -226,7 +228,7 @@ def test_compiled_tip_over_and_refusals_are_the_same():
 def test_walk_is_as_many_steps(fast):
     if fast:
         pytest.importorskip('numba')
-    one, other = (PlanarHexapod(SCENE, FLOOR, 0.004, fast) for _ in range(2))
+    one, other = (PlanarRobot(SCENE, FLOOR, 0.004, fast) for _ in range(2))
     assert one.walk([70e3] * 6, 700) == 700
     for _ in range(700):
         other.step([70e3] * 6)

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
+
 import numpy as np
 import pytest
 
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.robot import Proprioception
+from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
+from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Sensors
 
 NOISE = SensorNoise(rate=250.0, force=0.03, position=1.5e-4)
@@ -120,3 +125,82 @@ def test_a_frozen_marker_leaves_the_force():
     assert len(set(positions)) == 125
     assert len({force for _, (force, _) in read}) == 250
     assert len({place for (_, place), _ in read}) == 250
+
+
+# --- IMU and joints ---------------------------------------------------------------------------
+
+SCENE = Scene.load('hexapod_patches')
+TRUTH = Proprioception(
+    (0.1, -0.2, 0.3),
+    (0.5, -0.5, 9.81),
+    [0.01 * joint for joint in range(18)],
+    [0.1 * joint for joint in range(18)],
+    [0.02 * joint for joint in range(18)],
+    [(1.0, -2.0, 7.0 + leg) for leg in range(6)],
+)
+LOUD = SensorNoise(
+    250.0, 0.03, 1.5e-4, gyro=0.004, accelerometer=0.06, gyro_bias=0.02, accelerometer_bias=0.1,
+    encoder=6e-4, joint_velocity=0.04, effort=0.03,
+)  # fmt: skip
+
+
+def body_readings(seed=0, count=3000, noise=LOUD, faults=()):
+    scene = dataclasses.replace(SCENE, sensors=noise, faults=tuple(faults))
+    sensors = BodySensors(scene, seed, 18)
+    return [sensors.read(TRUTH, 0.004 * index) for index in range(count)]
+
+
+def test_imu_and_joints_have_the_noise_and_bias_that_are_asked_for():
+    readings = body_readings()
+    imu = np.array([each.imu for each in readings])
+    joints = np.array([each.joints for each in readings])
+    forces = np.array([each.forces for each in readings])
+    assert imu.std(axis=0) == pytest.approx(np.array([[0.004] * 3, [0.06] * 3]), rel=0.07)
+    biases = imu.mean(axis=0) - [TRUTH.gyro, TRUTH.accelerometer]
+    # Means are within 5 standard errors of 0.004 and 0.06.
+    assert np.linalg.norm(biases, axis=1) == pytest.approx([0.02, 0.1], rel=0.06)
+    deviations = np.repeat([[6e-4], [0.04], [0.03]], 18, axis=1)
+    assert joints.std(axis=0) == pytest.approx(deviations, rel=0.08)
+    truth = [TRUTH.positions, TRUTH.velocities, TRUTH.efforts]
+    assert (np.abs(joints.mean(axis=0) - truth) < 5 * deviations / 3000**0.5).all()
+    assert forces.std(axis=0) == pytest.approx(np.full((6, 3), 0.03), rel=0.08)
+    assert forces.mean(axis=0) == pytest.approx(np.array(TRUTH.forces), abs=5 * 0.03 / 3000**0.5)
+
+
+def test_body_sensors_repeat_with_their_seed():
+    one, same, other = body_readings(3, 20), body_readings(3, 20), body_readings(4, 20)
+    assert one == same
+    assert one != other
+    biases = [
+        np.mean([each.imu[0] for each in body_readings(seed, 200)], axis=0) - TRUTH.gyro
+        for seed in (3, 4)
+    ]
+    assert np.linalg.norm(biases[0] - biases[1]) > 0.002  # directions differ
+
+
+def test_noise_of_imu_and_joints_leaves_that_of_forces_alone():
+    quiet = dataclasses.replace(LOUD, gyro=1e-6, encoder=1e-6)
+    assert [each.forces for each in body_readings(count=50)] == [
+        each.forces for each in body_readings(count=50, noise=quiet)
+    ]
+
+
+def test_silent_imu_and_joints_and_dead_forces():
+    faults = (
+        Fault('imu_silent', 0.02, 0.06),
+        Fault('joints_silent', 0.04, 0.08),
+        Fault('force_dead', 0.02, legs=(2,)),
+        Fault('force_frozen', 0.02, legs=(3,)),
+    )
+    readings = body_readings(count=30, faults=faults)
+    for index, reading in enumerate(readings):
+        time = 0.004 * index
+        assert (reading.imu is None) == (0.02 <= time < 0.06)
+        assert (reading.joints is None) == (0.04 <= time < 0.08)
+        assert (reading.forces[1] == (0.0, 0.0, 0.0)) == (time >= 0.02)
+        if time >= 0.02:
+            assert reading.forces[2] == readings[4].forces[2]
+    # A gap changes nothing of what comes later.
+    assert [each.imu for each in readings[20:]] == [
+        each.imu for each in body_readings(count=30)[20:]
+    ]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""L2: a hexapod with eighteen servos, in MuJoCo.
+"""L2: a legged robot with servos in its joints, in MuJoCo.
 
-Body and legs are rigid. Hobby servos with the torque and speed of real ones drive the joints.
+Body and legs are rigid. Servos with the torque and speed of real ones drive the joints.
 Landing, scuffing and slip of the feet follow from contact. Before every step of MuJoCo the
 friction of each foot is set from the same film and the same law of resistance as on the other
 fidelity levels.
@@ -17,23 +17,27 @@ from collections.abc import Sequence
 from operator import sub
 from typing import Any
 
+import numpy as np
+
 from ros_pad.configuration import number
 from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
-from ros_pad.simulation.gait import TripodGait
-from ros_pad.simulation.mujoco_model import LINKS
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.mujoco_model import RECOMMENDED
 from ros_pad.simulation.mujoco_model import SolverSettings
-from ros_pad.simulation.mujoco_model import legs_of
+from ros_pad.simulation.mujoco_model import check_reach
 from ros_pad.simulation.mujoco_model import mjcf
 from ros_pad.simulation.mujoco_model import tow_step
 from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.robot import Proprioception
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
@@ -68,26 +72,26 @@ class FootPath:
 
     Parameters
     ----------
-    gait : TripodGait
+    gait : WalkingGait
         Gait, whose clock starts at zero; the feet are placed as if the gait had run before.
-    homes : sequence of (float, float)
-        Home positions of feet 1 to 6 in the body, fore and left, m.
+    homes : sequence of (float, float, float)
+        Home positions of the feet in the body, fore, left and up, m.
 
     Attributes
     ----------
     feet : list of tuple
-        Positions of feet 1 to 6 in the body: fore, left, and above the ground, m.
-    swings : tuple of bool
+        Positions of the feet in the body: fore, left and up, m.
+    swings : list of bool
         For each of these feet, whether it is in swing.
     """
 
-    def __init__(self, gait: TripodGait, homes: Sequence[tuple[float, float]]) -> None:
+    def __init__(self, gait: WalkingGait, homes: Sequence[Vector]) -> None:
         self._gait = gait
         self._homes = homes
         self._reach = gait.reach()
         self._advance = gait.body_advance(0.0)
         self._offsets: list[tuple[float, float]] = []
-        for leg in range(1, 7):
+        for leg in range(len(homes)):
             phase = gait.phase(leg, 0.0)
             if phase < gait.duty:
                 ahead = self._reach + gait.body_advance(-phase * gait.cycle)
@@ -95,7 +99,7 @@ class FootPath:
                 ahead = (2.0 * gait.swing(phase)[0] - 1.0) * self._reach
             self._offsets.append((ahead, 0.0))
         self._lifted = list(self._offsets)
-        self.swings = tuple(gait.phase(leg, 0.0) >= gait.duty for leg in range(1, 7))
+        self.swings = [gait.phase(leg, 0.0) >= gait.duty for leg in range(len(homes))]
         self.feet: list[Vector] = []
         self.move(0.0, 0.0)
 
@@ -104,12 +108,17 @@ class FootPath:
         gait = self._gait
         before, self._advance = self._advance, gait.body_advance(time)
         advance = self._advance - before
-        phases = (gait.phase(1, time), gait.phase(2, time))  # of the two tripods
-        strokes = [gait.swing(each) if each >= gait.duty else None for each in phases]
-        offsets, feet = [], []
-        places = zip(self._homes, self._offsets, strict=True)
-        for index, ((home_x, home_y), (x, y)) in enumerate(places):
-            stroke = strokes[index % 2]
+        # Legs of one group have one phase: only that of the first of them is computed.
+        strokes: dict[float, tuple[float, float] | None] = {}
+        for index, middle in enumerate(gait.middles):
+            if middle not in strokes:
+                phase = gait.phase(index, time)
+                strokes[middle] = gait.swing(phase) if phase >= gait.duty else None
+        offsets, feet, swings = [], [], []
+        places = zip(self._homes, self._offsets, gait.middles, strict=True)
+        for index, ((home_x, home_y, home_z), (x, y), middle) in enumerate(places):
+            stroke = strokes[middle]
+            swings.append(stroke is not None)
             if stroke is None:
                 # The foot moves in the body against the motion of the body.
                 height = 0.0
@@ -121,9 +130,8 @@ class FootPath:
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
             offsets.append((x, y))
-            feet.append((home_x + x, home_y + y, height))
-        self._offsets, self.feet = offsets, feet
-        self.swings = (strokes[0] is not None, strokes[1] is not None) * 3
+            feet.append((home_x + x, home_y + y, home_z + height))
+        self._offsets, self.feet, self.swings = offsets, feet, swings
 
 
 def _import_mujoco() -> Any:
@@ -137,13 +145,13 @@ def _import_mujoco() -> Any:
     return mujoco
 
 
-class FullHexapod:
-    """Six feet on eighteen servos in a tripod gait on a floor with wet patches, towing a load.
+class FullRobot:
+    """A robot of three to eight legs on a floor with wet patches, towing a load.
 
     Parameters
     ----------
     scene : Scene
-        A scene with a hexapod.
+        A scene with a legged robot.
     floor : Floor
         The ground.
     period : float
@@ -155,15 +163,16 @@ class FullHexapod:
     Attributes
     ----------
     joint_names : tuple of str
-        ``leg_1_coxa``, ``leg_1_femur``, ``leg_1_tibia``, ``leg_2_coxa`` and so on.
+        Leg by leg from the body to the foot, as in the robot's file.
     model, data : mujoco.MjModel, mujoco.MjData
         The simulation, for a viewer or to push the robot.
 
     Raises
     ------
     ConfigError
-        When the legs cannot walk the scene's gait or have more inertia than the scene's body, when
-        the towed load is too light for so stiff a line, or when MuJoCo is missing.
+        When the robot has no servos, when its legs cannot walk the scene's gait or have more
+        inertia than the scene's body, when the towed load is too light for so stiff a line, or
+        when MuJoCo is missing.
     InvalidInput
         When the period is not finite and above 0.
 
@@ -182,15 +191,20 @@ class FullHexapod:
         settings: SolverSettings = RECOMMENDED,
     ) -> None:
         mujoco = _import_mujoco()
-        assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
+        assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
-        self.legs: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
-        self.joint_names = tuple(f'leg_{leg}_{link}' for leg in self.legs for link in LINKS)
+        self._solver = check_reach(scene)
+        self.legs = scene.legs
+        self.joint_names = scene.body.robot.joint_names
+        count, self._joints = len(self.legs), slice(7, 7 + len(self.joint_names))
         self.period = period
         self.time = 0.0
         self.feet = [FootState() for _ in self.legs]
         self.dissipation = 0.0
         self.verdict: str | None = None
+        assert scene.body.robot.servo is not None
+        self._robot, self._servo = scene.body.robot, scene.body.robot.servo
+        self._weight = scene.body.mass * GRAVITY
         self._heading_gain = scene.heading_gain
         self._settle = scene.settle
         self._foot = foot = scene.foot.on_rough(scene.floor.roughness)
@@ -201,37 +215,36 @@ class FullHexapod:
         longest = min(settings.timestep, tow_step(scene))
         self._substeps = max(1, math.ceil(period / longest - 1e-9))
         self._dt = period / self._substeps
-        self._geometry = legs_of(scene)
-        self._path = FootPath(scene.gait, scene.body.homes)
+        low = scene.body.ground
+        self._path = FootPath(scene.gait, [(x, y, low) for x, y in scene.body.homes])
         self._films = [Film(foot, scene.floor.viscosity) for _ in self.legs]
-        self._cleared = [True] * 6  # whether a foot left the ground in its present or last swing
-        self._loads = [0.0] * 6
-        self._lefts = [0.0] * 6
-        self._backs = [0.0] * 6
-        self._moments = [0.0] * 6
-        self._ratios = [0.0] * 6
-        self._pressures = [0.0] * 6
-        self._limits = [0.0] * 6  # force limits of the domes at these pressures, N
-        self._ahead: list[tuple[float, bool, bool] | None] = [None] * 6  # see `_approach`
+        self._cleared = [
+            True
+        ] * count  # whether a foot left the ground in its present or last swing
+        self._loads = [0.0] * count
+        self._lefts = [0.0] * count
+        self._backs = [0.0] * count
+        self._moments = [0.0] * count
+        self._ratios = [0.0] * count
+        self._pressures = [0.0] * count
+        self._limits = [0.0] * count  # force limits of the domes at these pressures, N
+        self._ahead: list[tuple[float, bool, bool] | None] = [None] * count  # see `_approach`
         self._mujoco = mujoco
-        text = mjcf(scene, self._geometry, floor.heights is not None, settings, self._dt)
+        text = mjcf(scene, floor.heights is not None, settings, self._dt)
         self.model: Any = mujoco.MjModel.from_xml_string(text)
         self.data: Any = mujoco.MjData(self.model)
         self._keep_views()
-        self._targets = [
-            angle
-            for leg, (x, y, _) in zip(self._geometry, self._path.feet, strict=True)
-            for angle in leg.angles(x, y, -leg.tibia)
-        ]
-        self._place(scene.body.tibia)
+        self._targets = self._solver.angles([(x, y, low) for x, y, _ in self._path.feet])
+        self._place(-low)
 
     def _keep_views(self) -> None:
         """Keep views of MuJoCo's arrays, because it would take time to make them in every step."""
         first = self.model.geom('foot_1').id
-        self._state = self.data.qpos[:25]
+        feet = slice(first, first + len(self.legs))
+        self._state = self.data.qpos[: self._joints.stop]
         self._ctrl = self.data.ctrl
-        self._places = self.data.geom_xpos[first : first + 6]
-        self._axes = self.data.geom_xmat[first : first + 6, :6]  # x and y rows of their rotation
+        self._places = self.data.geom_xpos[feet]
+        self._axes = self.data.geom_xmat[feet, :6]  # x and y rows of their rotation
         # Scalars go through a memoryview faster than through an array.
         self._pose: Any = memoryview(self._state)
         self._frictions: list[Any] = [
@@ -241,6 +254,8 @@ class FullHexapod:
             self._sled_place: Any = memoryview(self.data.geom('sled').xpos)
             self._sled_friction: Any = memoryview(self.model.pair('sled').friction)
         self._contacts = self.data.sensordata  # force and moment of each foot's contact
+        self._turns = self.data.geom_xmat[feet].reshape(-1, 3, 3)
+        self._before = self.data.qpos.copy(), self.data.qvel.copy()  # a step ago
 
     @property
     def body(self) -> Vector:
@@ -250,27 +265,61 @@ class FullHexapod:
 
     @property
     def joint_positions(self) -> tuple[float, ...]:
-        """Angles of the eighteen joints, rad, in the order of ``joint_names``."""
+        """Angles of the joints, rad, in the order of ``joint_names``."""
         return tuple(self._state[7:].tolist())
+
+    def proprioception(self) -> Proprioception:
+        """Return what gyro, accelerometer, joints and force sensors of the feet measure.
+
+        The accelerometer shows the change of velocity over the step: MuJoCo's own sensor is of an
+        explicit step, and the motion that of an implicit one; a shorter time would alias with the
+        set-points of the servos. Joints are those of rigid feet: pads that shear do not move them.
+        """
+        data, to_imu = self.data, self._robot.imu[:3, :3]
+        turn, after = self._imu_motion(data.qpos, data.qvel)
+        pull = (after - self._imu_motion(*self._before)[1]) / self.period - self.model.opt.gravity
+        forces = [
+            tuple((turn_of_foot.T @ state.force).tolist())
+            for turn_of_foot, state in zip(self._turns, self.feet, strict=True)
+        ]
+        moving = slice(6, 6 + len(self.joint_names))
+        # The damping of the joints is the back-EMF of their motors.
+        efforts = data.qfrc_actuator[moving] + data.qfrc_passive[moving]
+        return Proprioception(
+            tuple((data.qvel[3:6] @ to_imu).tolist()),
+            tuple((pull @ turn @ to_imu).tolist()),
+            self._state[7:].tolist(),
+            data.qvel[moving].tolist(),
+            efforts.tolist(),
+            forces,
+        )
+
+    def _imu_motion(self, places: Array, speeds: Array) -> tuple[Array, Array]:
+        """Return the rotation from the body to the world, and the IMU's velocity there, m/s."""
+        turn = np.empty(9)
+        self._mujoco.mju_quat2Mat(turn, places[3:7])
+        matrix = turn.reshape(3, 3)
+        around = np.cross(speeds[3:6], self._robot.imu[:3, 3])
+        return matrix, np.asarray(speeds[:3] + matrix @ around)
 
     def _place(self, height: float) -> None:
         """Place the robot at rest on its planned feet, and the load behind it."""
         data = self.data
-        data.qpos[7:25] = data.ctrl[:] = self._targets
+        data.qpos[self._joints] = data.ctrl[:] = self._targets
         feet = self._path.feet
         grounds = [self._floor.height(x, y) for x, y, _ in feet]
         if self._floor.heights is not None:
             data.mocap_pos[:, 2] = grounds
         data.qpos[2] = height + max(grounds)
         if self._tow.weight:
-            data.qpos[25] = -self._tow.distance
+            data.qpos[self._joints.stop] = -self._tow.distance
         for film, state, (x, y, _) in zip(self._films, self.feet, feet, strict=True):
             film.touch_down(self._floor.depth(x, y))
             state.wet = self._floor.wet(x, y)
         self._mujoco.mj_kinematics(self.model, data)
         self._last = self._places.tolist()
         self._last_axes = self._axes.tolist()
-        self.update_feet([0.0] * 6)
+        self.update_feet([0.0] * len(self.legs))
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
@@ -280,7 +329,7 @@ class FullHexapod:
         Raises
         ------
         InvalidInput
-            When there are not six finite pressures.
+            When there is not one finite pressure for each leg.
         """
         self._fill(pressures)
         self._steps += 1
@@ -290,6 +339,7 @@ class FullHexapod:
         if not abs(pose[0]) < _FAR:
             return
         self._aim()
+        self._before[0][:], self._before[1][:] = data.qpos, data.qvel
         for _ in range(self._substeps):
             self._set_friction()
             mj_step(model, data)
@@ -305,7 +355,7 @@ class FullHexapod:
     def _fill(self, pressures: Sequence[float]) -> None:
         """Set the gauge pressures of the pads, Pa."""
         if pressures != self._pressures:  # they change more rarely than the robot steps
-            check_pressures(pressures, 6)
+            check_pressures(pressures, len(self.legs))
             self._pressures = list(pressures)
             self._limits = [self._foot.dome_load(math.inf, each) for each in pressures]
 
@@ -315,20 +365,27 @@ class FullHexapod:
         heading = self.body[2]
         path, swung = self._path, self._path.swings
         path.move(max(0.0, self.time - self._settle), -self._heading_gain * heading * self.period)
-        for index in range(6) if path.swings != swung else ():
+        for index in range(len(swung)) if path.swings != swung else ():
             if not swung[index] and path.swings[index]:
                 self._cleared[index] = False
             elif swung[index] and not path.swings[index] and not self._cleared[index]:
                 self._end(f'leg {index + 1} does not clear the ground in its swing')
-        targets: list[float] = []
         try:
-            for leg, (x, y, height) in zip(self._geometry, self._path.feet, strict=True):
-                targets += leg.angles(x, y, height - leg.tibia)
+            targets = self._solver.angles(self._path.feet)
         except InvalidInput as error:
-            self._end(f'leg {len(targets) // 3 + 1}: {error}')
+            self._end(str(error))
             return
-        self._targets = targets
-        self._ctrl[:] = targets
+        before, self._targets = self._targets, targets
+        self._ctrl[:] = self._led(targets, before) if self._servo.feedforward else targets
+
+    def _led(self, targets: Sequence[float], before: Sequence[float]) -> Array:
+        """Return set-points that lead by what carries the robot and overcomes the damping."""
+        servo, stands = self._servo, [not swings for swings in self._path.swings]
+        aim = np.array(targets)
+        share = np.array(stands) * self._weight / max(sum(stands), 1)
+        torque = -share[:, None] * self._robot.foot_jacobians(aim)[:, 2]
+        speed = (aim - before) / self.period
+        return np.asarray(aim + (torque.ravel() + servo.damping * speed) / servo.stiffness)
 
     def _set_friction(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last one.
@@ -374,8 +431,8 @@ class FullHexapod:
         axes, last_axes = self._axes.tolist(), self._last_axes
         self._last, self._last_axes = places, axes
         feet = zip(
-            range(6), self.feet, places, self._loads, self._backs, self._lefts, self._moments,
-            self._ratios, self._pressures, self._limits, strict=True,
+            range(len(places)), self.feet, places, self._loads, self._backs, self._lefts,
+            self._moments, self._ratios, self._pressures, self._limits, strict=True,
         )  # fmt: skip
         for index, state, (x, y, z), load, back, push_y, moment, ratio, pressure, limit in feet:
             push_x = 0.0 - back  # not -0.0 in the air

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""L1: a hexapod that slides, turns and pushes in the plane.
+"""L1: a legged robot that slides, turns and pushes in the plane.
 
 The body has the three degrees of freedom of SE(2). The gait moves the feet under the body. Normal
 loads follow from the balance of weight, pitch and roll. Bouncing, inertia of swinging legs, servo
 compliance and scuffing at touch-down are left out. The level suits paths and Monte-Carlo runs, see
-docs/model/planar_hexapod.md.
+docs/model/planar_robot.md.
 
 The step itself is :mod:`ros_pad.simulation.planar_step`, in plain Python or compiled.
 """
@@ -22,26 +22,25 @@ from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.simulation import compiled
 from ros_pad.simulation import planar_step
-from ros_pad.simulation.gait import TRIPODS
-from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.planar_step import PlanarModel
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL
 from ros_pad.simulation.terrain import WIDTH
 from ros_pad.simulation.terrain import Floor
 
 
-class PlanarHexapod:
-    """Six feet in a tripod gait on a floor with wet patches, towing a load.
+class PlanarRobot:
+    """A robot of three to eight legs on a floor with wet patches, towing a load.
 
     Parameters
     ----------
     scene : Scene
-        A scene with a hexapod.
+        A scene with a legged robot.
     floor : Floor
         The ground.
     period : float
@@ -76,11 +75,11 @@ class PlanarHexapod:
         compile_steps: bool | None = None,
         soles_turn: bool = False,
     ) -> None:
-        assert isinstance(scene.body, HexapodBody) and isinstance(scene.gait, TripodGait)
+        assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
         if compile_steps is None:
             compile_steps = compiled.worth_loading(scene.duration / period)
-        self.legs: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+        self.legs = scene.legs
         self.period = period
         self.time = 0.0
         self.dissipation = 0.0
@@ -91,7 +90,7 @@ class PlanarHexapod:
         self._fresh = False
         self.model = model_of(scene, floor, period, soles_turn)
         self.state: Any = [0.0] * planar_step.BODY
-        self.table: Any = [[0.0] * 6 for _ in range(planar_step.FEET)]
+        self.table: Any = [[0.0] * len(self.legs) for _ in range(planar_step.FEET)]
         self._plant()
         self._walk: compiled.Walk = planar_step.walk
         if compile_steps:
@@ -101,7 +100,7 @@ class PlanarHexapod:
     def _plant(self) -> None:
         """Place the feet as if the gait had been running before time zero."""
         model, table = self.model, self.table
-        for index in range(6):
+        for index in range(len(self.legs)):
             phase = (model.duty / 2.0 - model.middle[index]) % 1.0
             offset = model.reach
             if phase < model.duty:
@@ -119,7 +118,9 @@ class PlanarHexapod:
         self.model = model._replace(
             limits=np.array(model.limits), wet=np.array(model.wet), heights=np.array(model.heights)
         )
-        self._walk = compiled.walk(self.model, self.state, self.table, (0.0,) * 6, 1, True)
+        self._walk = compiled.walk(
+            self.model, self.state, self.table, (0.0,) * len(self.legs), 1, True
+        )
 
     @property
     def body(self) -> Vector:
@@ -133,7 +134,7 @@ class PlanarHexapod:
         Raises
         ------
         InvalidInput
-            When there are not six finite pressures.
+            When there is not one finite pressure for each leg.
         ArithmeticError
             When the friction step does not converge.
         """
@@ -153,7 +154,8 @@ class PlanarHexapod:
         Raises
         ------
         InvalidInput
-            When there are not six finite pressures, or ``steps`` is not a whole number from 0.
+            When there is not one finite pressure for each leg, or ``steps`` is not a whole
+            number from 0.
         ArithmeticError
             When a friction step does not converge.
         """
@@ -163,7 +165,7 @@ class PlanarHexapod:
         return round(self.state[planar_step.STEPS] - before)
 
     def _advance(self, pressures: Sequence[float], steps: int, upright: bool) -> None:
-        check_pressures(pressures, 6)
+        check_pressures(pressures, len(self.legs))
         converged = self._walk(
             self.model, self.state, self.table, tuple(pressures), steps, upright
         )
@@ -181,9 +183,8 @@ class PlanarHexapod:
         self._fresh = False
         if self.verdict is None and body[planar_step.TIPPED] > 0.0:
             leg = int(body[planar_step.TIPPED])
-            why = (
-                f'leg {leg} would have to pull' if leg <= 6 else 'no loads on its feet balance it'
-            )
+            pulls = leg <= len(self.legs)
+            why = f'leg {leg} would have to pull' if pulls else 'no loads on its feet balance it'
             self.verdict = f'tip-over at {body[planar_step.TIPPED_AT]:.3f} s: {why}'
 
     @property
@@ -218,7 +219,7 @@ _SHOWN = (
 
 
 def model_of(scene: Scene, floor: Floor, period: float, soles_turn: bool = False) -> PlanarModel:
-    """Return the constants of a walk of a scene's hexapod on a floor."""
+    """Return the constants of a walk of a scene's robot on a floor."""
     return PlanarModel(
         period=period,
         settle=scene.settle,
@@ -232,32 +233,36 @@ def model_of(scene: Scene, floor: Floor, period: float, soles_turn: bool = False
 
 def _of_gait(scene: Scene) -> dict[str, Any]:
     gait = scene.gait
-    assert isinstance(gait, TripodGait)
+    assert isinstance(scene.body, LeggedBody)
+    assert isinstance(gait, WalkingGait)
+    reach = max(x * x + y * y for x, y in scene.body.homes)
     return {
         'cycle': gait.cycle,
         'stride': gait.stride,
         'duty': gait.duty,
         'lift': gait.lift,
         'reach': gait.reach(),
+        'pushes': gait.pushes,
+        'overlap': gait.overlap,
+        'rocks': 0.0 if gait.fewest >= 3 and len(gait.middles) > 4 else 1e-9 * reach,
         'heading_gain': scene.heading_gain,
-        'middle': tuple(0.25 if leg in TRIPODS[0] else 0.75 for leg in range(1, 7)),
+        'middle': gait.middles,
     }
 
 
 def _of_body(scene: Scene) -> dict[str, Any]:
     """Return constants of body, legs and towed load."""
     body, tow, slope = scene.body, scene.tow, scene.floor.slope
-    assert isinstance(body, HexapodBody)
+    assert isinstance(body, LeggedBody)
     across = math.cos(slope)
-    leg = body.coxa + body.femur
-    # A leg at home points straight away from the middle of the body, with its tibia upright: the
-    # distance of the hip from the middle, as a share of that of the foot.
-    hips = [1.0 - leg / math.hypot(x, y) for x, y in body.homes]
+    hips = body.robot.hips.tolist()
     return {
         'home_x': tuple(x for x, _ in body.homes),
         'home_y': tuple(y for _, y in body.homes),
-        'hip_x': tuple(x * hip for (x, _), hip in zip(body.homes, hips, strict=True)),
-        'hip_y': tuple(y * hip for (_, y), hip in zip(body.homes, hips, strict=True)),
+        'centre_x': float(body.robot.centre[0]),
+        'centre_y': float(body.robot.centre[1]),
+        'hip_x': tuple(hip[0] for hip in hips),
+        'hip_y': tuple(hip[1] for hip in hips),
         'mass': body.mass,
         'inertia': body.inertia,
         'height': body.height,

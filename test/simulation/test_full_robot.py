@@ -5,19 +5,18 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import example
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.robots import Robot
 from ros_pad.simulation import Scene
-from ros_pad.simulation.full_hexapod import FullHexapod
-from ros_pad.simulation.mujoco_model import BEARINGS
-from ros_pad.simulation.mujoco_model import LegGeometry
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.mujoco_model import SolverSettings
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor
 
@@ -42,7 +41,7 @@ def scene_of(friction=None, **changes):
 def standing(friction=0.5, floor=DRY, **changes):
     """Return a robot that stands still and does not walk."""
     settings = changes.pop('settings', SolverSettings())
-    robot = FullHexapod(scene_of(friction, settle=100.0, **changes), floor, 0.004, settings)
+    robot = FullRobot(scene_of(friction, settle=100.0, **changes), floor, 0.004, settings)
     advance(robot, 0.8)
     return robot
 
@@ -69,35 +68,6 @@ def contacts(robot):
 # --- geometry ---------------------------------------------------------------------------------
 
 
-def test_home_of_the_ch3_r():
-    """Hips are at (119, 69) and (0, 138) mm, links 29, 57 and 141 mm long, the femur level."""
-    leg = LegGeometry(0.119, 0.069, math.radians(30.0), 0.029, 0.057, 0.141)
-    assert leg.foot(0.0, 0.0, 0.0) == pytest.approx((0.1935, 0.112, -0.141), abs=1e-4)
-    for home, bearing, hip in zip(
-        BODY.homes,
-        BEARINGS,
-        [(0.119, 0.069), (0, 0.138), (-0.119, 0.069), (-0.119, -0.069), (0, -0.138),
-         (0.119, -0.069)],
-        strict=True,
-    ):  # fmt: skip
-        found = LegGeometry.standing_at(home, bearing, BODY)
-        assert (found.hip_x, found.hip_y) == pytest.approx(hip, abs=6e-4)
-
-
-@given(
-    st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-1.5, 1.5), st.integers(0, 5),
-    st.floats(0.01, 0.1), st.floats(0.02, 0.2), st.floats(0.02, 0.2),
-)  # fmt: skip
-@example(0.0, -1.0, -1.5, 0, 0.0625, 0.03125, 0.0625)  # behind the femur's axis and above it
-def test_inverse_kinematics_inverts(turn, lift, bend, which, coxa, femur, tibia):
-    leg = LegGeometry(0.1, -0.2, BEARINGS[which], coxa, femur, tibia)
-    if femur * math.cos(lift) + tibia * math.sin(lift + bend) < -0.9 * coxa:
-        return  # the foot is below or behind the hip's axis: other angles reach it
-    angles = leg.angles(*leg.foot(turn, lift, bend))
-    assert leg.foot(*angles) == pytest.approx(leg.foot(turn, lift, bend), abs=1e-9)
-    assert angles == pytest.approx((turn, lift, bend), abs=1e-4)
-
-
 @hypothesis_settings(max_examples=30)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=18, max_size=18))
 def test_kinematics_against_mujoco(angles):
@@ -106,46 +76,41 @@ def test_kinematics_against_mujoco(angles):
     robot.data.qpos[7:25] = angles
     mujoco.mj_kinematics(robot.model, robot.data)
     assert robot.joint_positions == tuple(angles)
-    for index, (home, bearing) in enumerate(zip(BODY.homes, BEARINGS, strict=True)):
-        x, y, z = LegGeometry.standing_at(home, bearing, BODY).foot(
-            *angles[3 * index : 3 * index + 3]
-        )
+    places = BODY.robot.foot_positions(angles) + np.array((0.3, -0.2, 0.5))
+    for index, place in enumerate(places):
         tibia = robot.model.body(f'leg_{index + 1}_tibia').id
         tip = robot.data.xpos[tibia] + robot.data.xmat[tibia].reshape(3, 3) @ [0.0, 0.0, -0.141]
-        assert tip == pytest.approx([x + 0.3, y - 0.2, z + 0.5], abs=1e-12)
+        assert tip == pytest.approx(place, abs=1e-12)
     names = [robot.model.joint(j).name for j in range(1, 19)]
     assert tuple(names) == robot.joint_names
 
 
-KINEMATIC = FullHexapod(scene_of(), DRY, 0.004)
-
-
-def test_out_of_reach():
-    leg = LegGeometry(0.0, 0.0, 0.0, 0.03, 0.057, 0.141)
-    assert leg.angles(0.03 + 0.198 - 1e-9, 0.0, 0.0)[2] == pytest.approx(math.pi / 2, abs=1e-3)
-    for x in (0.03 + 0.199, 0.03 + 0.083):
-        with pytest.raises(InvalidInput, match=r'out of reach: 0\.084 to 0\.198 m'):
-            leg.angles(x, 0.0, 0.0)
+KINEMATIC = FullRobot(scene_of(), DRY, 0.004)
 
 
 @pytest.mark.parametrize(
     'part, message',
     [
-        ({'gait': dataclasses.replace(GAIT, stride=0.6)}, 'leg 1 .*(reach|must turn)'),
-        ({'gait': dataclasses.replace(GAIT, lift=0.19)}, 'leg 1 .*(reach|must turn)'),
-        ({'body': dataclasses.replace(BODY, femur=0.5)}, 'hip'),
+        (
+            {'gait': dataclasses.replace(GAIT, stride=0.6)},
+            'ahead of home .*(reach|must turn)',
+        ),
+        (
+            {'gait': dataclasses.replace(GAIT, lift=0.19)},
+            'ahead of home .*(reach|must turn)',
+        ),
         ({'body': dataclasses.replace(BODY, inertia=0.01)}, 'inertia = 0.01 kg m2'),
     ],
 )
 def test_scene_that_legs_cannot_walk(part, message):
     with pytest.raises(ConfigError, match=message):
-        FullHexapod(scene_of(**part), DRY, 0.004)
+        FullRobot(scene_of(**part), DRY, 0.004)
 
 
 def test_missing_mujoco_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, 'mujoco', None)
     with pytest.raises(ConfigError, match=r'ros_pad\[mujoco\]'):
-        FullHexapod(scene_of(), DRY, 0.004)
+        FullRobot(scene_of(), DRY, 0.004)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +129,7 @@ def test_wrong_settings(wrong):
 
 def test_masses():
     """Mass, height of the centre of mass and inertia about the vertical are those of the scene."""
-    robot = FullHexapod(scene_of(), DRY, 0.004)
+    robot = FullRobot(scene_of(), DRY, 0.004)
     robot.data.qpos[7:25] = 0.0
     mujoco.mj_forward(robot.model, robot.data)
     assert robot.model.body_subtreemass[1:].max() == pytest.approx(2.09, rel=1e-12)
@@ -197,7 +162,7 @@ def test_loads_at_rest():
 
 def test_loads_of_three_feet():
     """On a tripod the loads follow from balance alone."""
-    robot = FullHexapod(scene_of(0.8, gait=dataclasses.replace(GAIT, cycle=20.0)), DRY, 0.004)
+    robot = FullRobot(scene_of(0.8, gait=dataclasses.replace(GAIT, cycle=20.0)), DRY, 0.004)
     advance(robot, 0.5 + 5.0)
     places = np.array([foot.position for foot in robot.feet])[[0, 2, 4]]
     centre = robot.data.subtree_com[robot.model.body('trunk').id]
@@ -212,7 +177,7 @@ def test_loads_of_three_feet():
 def test_slope():
     """On a slope of 0.1 rad tangential forces add up to W sin, normal forces to W cos."""
     floor = dataclasses.replace(SHIPPED.floor, slope=0.1)
-    robot = FullHexapod(dataclasses.replace(scene_of(0.5, settle=100.0), floor=floor), DRY, 0.004)
+    robot = FullRobot(dataclasses.replace(scene_of(0.5, settle=100.0), floor=floor), DRY, 0.004)
     advance(robot, 1.0)
     force = np.sum([foot.force for foot in robot.feet], axis=0)
     assert force == pytest.approx([WEIGHT * math.sin(0.1), 0.0, WEIGHT * math.cos(0.1)], abs=0.01)
@@ -288,7 +253,7 @@ def test_moments_of_the_feet_hold_a_robot_that_is_turned():
 
 def test_sliding_and_turning_feet_are_on_the_ellipsoid():
     """Force and moment of a slipping foot are on the limit surface √(T² + (M/(2/3 R))²) = μ N."""
-    robot = FullHexapod(scene_of(0.5, cycles=3), DRY, 0.004)
+    robot = FullRobot(scene_of(0.5, cycles=3), DRY, 0.004)
     used = []
 
     def note():
@@ -307,7 +272,7 @@ def test_sliding_and_turning_feet_are_on_the_ellipsoid():
 
 def test_light_feet_do_not_slip():
     """With up to 1 N a contact does not count as landed, and its motion is no slip."""
-    robot = FullHexapod(scene_of(0.2, tow=SHIPPED.tow), DRY, 0.004)
+    robot = FullRobot(scene_of(0.2, tow=SHIPPED.tow), DRY, 0.004)
     seen, last = {'light': 0, 'slips': 0}, [contacts(robot), np.zeros(6)]
 
     def note():
@@ -354,7 +319,7 @@ def test_work_lost_in_turning_is_moment_times_angle():
 
 def test_work_lost_is_what_the_contacts_of_mujoco_lose():
     """On a dry walk most work is lost in torsion, as feet turn with their legs."""
-    robot = FullHexapod(scene_of(0.5), DRY, 0.002)  # one MuJoCo step per period
+    robot = FullRobot(scene_of(0.5), DRY, 0.002)  # one MuJoCo step per period
     slid = turned = 0.0
 
     def note():
@@ -373,7 +338,7 @@ def test_work_lost_is_what_the_contacts_of_mujoco_lose():
 
 
 def test_grip_is_the_cone_of_the_step():
-    robot = FullHexapod(scene_of(tow=SHIPPED.tow), WET, 0.004)
+    robot = FullRobot(scene_of(tow=SHIPPED.tow), WET, 0.004)
     slipped = 0
 
     def check():
@@ -395,7 +360,7 @@ def test_pressures_reach_the_feet():
     """On wet ground domes hold and flat feet float; at 60 kPa 37 pads are overloaded."""
     grips, overloads = {}, {}
     for pressure in (0.0, 60e3, 75e3):
-        robot = FullHexapod(scene_of(), WET, 0.004)
+        robot = FullRobot(scene_of(), WET, 0.004)
         advance(robot, 0.5 + 0.3, pressures=[pressure] * 6)
         foot = robot.feet[0]
         grips[pressure] = foot.grip / foot.force[2]
@@ -407,7 +372,7 @@ def test_pressures_reach_the_feet():
 
 def test_film_is_whole_again_after_each_swing():
     """The film drains while a foot stands, and is thick again at the next touch-down."""
-    robot = FullHexapod(scene_of(), WET, 0.004)
+    robot = FullRobot(scene_of(), WET, 0.004)
     advance(robot, 0.5 + GAIT.cycle, pressures=[70e3] * 6)
     ratios, foot = [], robot.feet[0]
 
@@ -437,7 +402,7 @@ def test_marker_rides_on_sheared_pads():
 def test_dry_walk_against_the_planar_robot():
     """With 2.5 times the friction that the gait needs, both levels agree to 2 %."""
     scene = dataclasses.replace(SHIPPED, settle=0.5)
-    full, flat = FullHexapod(scene, DRY, 0.004), PlanarHexapod(scene, DRY, 0.004)
+    full, flat = FullRobot(scene, DRY, 0.004), PlanarRobot(scene, DRY, 0.004)
     for robot in (full, flat):
         advance(robot, 0.5 + 5.0)
     assert full.body[0] == pytest.approx(flat.body[0], rel=0.02)
@@ -454,9 +419,7 @@ def test_convergence_in_the_step():
     """At 2 ms distance and slip of a dry walk are within 1 % and 15 % of those at 0.25 ms."""
     ends = []
     for timestep in (0.002, 0.00025):
-        robot = FullHexapod(
-            scene_of(tow=SHIPPED.tow), DRY, 0.004, SolverSettings(timestep=timestep)
-        )
+        robot = FullRobot(scene_of(tow=SHIPPED.tow), DRY, 0.004, SolverSettings(timestep=timestep))
         x, _, _ = advance(robot, 0.5 + 2.0)
         ends.append((x, sum(foot.slip_path for foot in robot.feet)))
     assert ends[0][0] == pytest.approx(ends[1][0], rel=0.01)
@@ -464,7 +427,7 @@ def test_convergence_in_the_step():
 
 
 def test_the_same_twice():
-    one, other = (FullHexapod(scene_of(tow=SHIPPED.tow), WET, 0.004) for _ in range(2))
+    one, other = (FullRobot(scene_of(tow=SHIPPED.tow), WET, 0.004) for _ in range(2))
     assert advance(one, 1.5) == advance(other, 1.5)
     assert [foot.force for foot in one.feet] == [foot.force for foot in other.feet]
     assert one.joint_positions == other.joint_positions
@@ -476,7 +439,7 @@ def test_tow():
     In the mean over cycles the feet push as hard as the line pulls.
     """
     tow = Tow(weight=12.0, friction_dry=0.2, friction_wet=0.0, distance=0.4, height=0.03)
-    robot = FullHexapod(scene_of(0.8, tow=tow), DRY, 0.002)
+    robot = FullRobot(scene_of(0.8, tow=tow), DRY, 0.002)
     advance(robot, 0.5 + 1.0)
     rows = []
 
@@ -496,7 +459,7 @@ def test_tow():
 def test_tow_feels_the_ground_below_it():
     floor = Floor(np.array([[True, False]]), 50.0, (0.0, -1.0), 3e-4)  # wet from x = 0 to 50
     tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.1, distance=0.1, height=0.03)
-    robot = FullHexapod(scene_of(0.8, tow=tow), floor, 0.004)
+    robot = FullRobot(scene_of(0.8, tow=tow), floor, 0.004)
     seen = set()
 
     def note():
@@ -525,18 +488,18 @@ def test_stiff_lines_take_shorter_steps():
     ways = {}
     for stiffness in (2e3, 1e6):
         tow = Tow(0.5, 0.5, 0.5, 0.25, 0.03, stiffness)
-        robot = FullHexapod(scene_of(tow=tow), DRY, 0.004)
+        robot = FullRobot(scene_of(tow=tow), DRY, 0.004)
         ways[stiffness] = advance(robot, 2.5)[0]
         assert robot.verdict is None
         reduced = 1.0 / (9.81 / 0.5 + 1.0 / 2.09)
         assert robot.model.opt.timestep < 2.0 * math.sqrt(reduced / stiffness)
     assert ways[1e6] == pytest.approx(ways[2e3], rel=0.01)
     with pytest.raises(ConfigError, match=r'tow.weight = 1e-09 N on a line of .* 2000 N/m needs'):
-        FullHexapod(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
+        FullRobot(scene_of(tow=Tow(1e-9, 0.5, 0.5, 0.25, 0.03)), DRY, 0.004)
 
 
 def test_steering():
-    robot = FullHexapod(scene_of(heading_gain=1.0), DRY, 0.004)
+    robot = FullRobot(scene_of(heading_gain=1.0), DRY, 0.004)
     robot.data.qpos[3:7] = (math.cos(0.1), 0.0, 0.0, math.sin(0.1))
     _, _, heading = advance(robot, 0.5 + 2.0)
     # The heading decays with exp(-gain t) over 2.5 s, also while the robot settles.
@@ -545,7 +508,7 @@ def test_steering():
 
 def test_uneven_ground():
     floor = DRY.uneven(2e-3, 3)
-    robot = FullHexapod(scene_of(), floor, 0.004)
+    robot = FullRobot(scene_of(), floor, 0.004)
     tops = []
 
     def note():
@@ -580,9 +543,7 @@ def test_tip_over():
 
 def test_servos_that_are_too_weak():
     """With 15 kg on six femurs of 57 mm each servo would need 1.4 N m, more than its 0.94 N m."""
-    robot = FullHexapod(
-        scene_of(body=dataclasses.replace(BODY, mass=15.0, inertia=0.3)), DRY, 0.004
-    )
+    robot = FullRobot(scene_of(body=dataclasses.replace(BODY, mass=15.0, inertia=0.3)), DRY, 0.004)
     advance(robot, 1.0)
     assert robot.verdict.startswith('servo leg_')
 
@@ -597,8 +558,8 @@ def test_lost_solution(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize('pressures', [[0.0] * 5, [0.0] * 7, [math.nan] * 6, [math.inf] * 6])
 def test_bad_pressures(pressures):
-    robot = FullHexapod(scene_of(), DRY, 0.004)
-    with pytest.raises(InvalidInput, match='six finite numbers'):
+    robot = FullRobot(scene_of(), DRY, 0.004)
+    with pytest.raises(InvalidInput, match='6 finite numbers'):
         robot.step(pressures)
     assert robot.time == 0.0
 
@@ -616,8 +577,76 @@ def test_a_foot_that_does_not_clear_the_ground_ends_the_walk(lift, unevenness, c
         gait=dataclasses.replace(scene.gait, lift=lift),
         floor=dataclasses.replace(scene.floor, unevenness=unevenness),
     )
-    robot = FullHexapod(scene, scene.floor.build(0), 0.004)
+    robot = FullRobot(scene, scene.floor.build(0), 0.004)
     while robot.verdict is None and robot.time < scene.duration:
         robot.step([0.0] * 6)
     assert (robot.verdict is None) == clears
     assert clears or 'does not clear the ground in its swing' in robot.verdict
+
+
+# --- sensors on the robot ---------------------------------------------------------------------
+
+
+def walked(seconds=2.5):
+    """Yield the state of a walk after each sample: time, what sensors show, and the robot."""
+    robot = FullRobot(scene_of(), DRY, 0.004)
+    for _ in range(round(seconds * 250)):
+        robot.step(FLAT)
+        yield robot.time, robot.proprioception(), robot
+
+
+def test_kinematics_of_the_ch3_r_file_are_those_of_the_simulated_robot():
+    ch3r = Robot.load('ch3r')
+    for time, felt, robot in walked():
+        if time < 2.2:
+            continue
+        assert ch3r.joint_names == robot.joint_names
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, robot.data.qpos[3:7])
+        turn = turn.reshape(3, 3)
+        found = ch3r.kinematics(felt.positions)
+        feet = found.positions @ turn.T + robot.data.qpos[:3]
+        mujoco.mj_kinematics(robot.model, robot.data)  # places of feet at the end of the step
+        first = robot.model.geom('foot_1').id
+        true = robot.data.geom_xpos[first : first + 6] - [0.0, 0.0, POINT]
+        assert np.abs(feet - true).max() < 3e-5  # the ball is upright only at home
+        # Forces are those at the beginning of the last step of 2 ms, in which links turn a little.
+        forces = np.einsum('lij,lj->li', found.rotations, np.array(felt.forces)) @ turn.T
+        for found_force, foot in zip(forces, robot.feet, strict=True):
+            assert found_force == pytest.approx(
+                np.array(foot.force), abs=0.02 + 0.01 * foot.force[2]
+            )
+
+
+def test_gyro_and_accelerometer_integrate_to_the_motion():
+    rows = [
+        (*felt.gyro, *felt.accelerometer, *robot.data.qvel[:3], *robot.data.qpos[3:7])
+        for _, felt, robot in walked()
+    ]
+    rows = np.array(rows)
+    turns = np.empty((len(rows), 9))
+    for turn, state in zip(turns, rows, strict=True):
+        mujoco.mju_quat2Mat(turn, state[9:])
+    turns = turns.reshape(-1, 3, 3)
+    pulls = np.einsum('nij,nj->ni', turns, rows[:, 3:6]) - [0.0, 0.0, 9.81]
+    change = 0.004 * np.cumsum(pulls[250:], axis=0)
+    assert np.abs(change - (rows[250:, 6:9] - rows[249, 6:9])).max() < 1e-9
+    assert np.ptp(rows[250:, 6]) > 0.15  # the walk is not trivial
+    angles = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
+    assert 0.004 * rows[:, 2].sum() == pytest.approx(angles[-1], abs=2e-3)
+
+
+def test_velocities_and_efforts_of_the_joints():
+    rows = [(felt.positions, felt.velocities) for _, felt, _ in walked()]
+    positions, velocities = np.array(rows).transpose(1, 0, 2)
+    moved = 0.004 * 0.5 * (velocities[1:] + velocities[:-1])
+    assert np.abs(np.diff(positions, axis=0) - moved).max() < 2e-3
+    assert np.abs(np.diff(positions, axis=0)).max() > 0.01
+    # At rest the joints carry the weight of the links and the forces of the ground on the feet.
+    ch3r = Robot.load('ch3r')
+    *_, (_, felt, robot) = walked(0.4)
+    forces = np.array([foot.force for foot in robot.feet])
+    assert np.abs(forces).max() > 2.0
+    lines = ch3r.foot_jacobians(felt.positions)
+    held = ch3r.gravity_torques(felt.positions) - np.einsum('lij,li->lj', lines, forces)
+    assert np.array(felt.efforts).reshape(6, 3) == pytest.approx(held, abs=2e-3)
