@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Error-state Kalman filter of an IMU and of feet that stand.
 
-State: rotation R from IMU to odom, velocity v, position p, biases of gyro and accelerometer, and
-for each foot the vector d in odom axes from the IMU to its foothold, where it was set down. Their
-errors: rotation φ in odom axes, δv - φ x v, δp, the biases' own, δd - φ x d. With these a standing
-foot measures its own error and no other, wherever the robot is (right-invariant, Hartley 2020,
-with the body as the origin), so rotation about the vertical stays unobservable, as it is.
+State: rotation R from IMU to odom, velocity v, position p, biases of gyro and accelerometer, for
+each foot the vector d in odom axes from the IMU to its foothold, where it was set down; and for
+all feet, the radius of rolling and the relative error of the length of the legs. Errors:
+rotation φ in odom axes, δv - φ x v, δp, the others' own, δd - φ x d. With these a standing foot
+measures its own error and that of the length of the legs and no other, wherever the robot is
+(right-invariant, Hartley 2020, with the body as the origin), so rotation about the vertical stays
+unobservable, as it is.
 """
 
 from __future__ import annotations
@@ -43,12 +45,16 @@ SINKING = 6e-3
 ROLLING_ERROR = 0.15
 """Relative error of the speed of rolling: feet are no spheres, and sink in."""
 
+ROLLING_TIME = 0.008
+"""Time for which that error stays the same, s."""
+
 FASTEST = 100.0
 """Speed, m/s, above which the filter has diverged."""
 
 _APART = 1e2  # m²: variance of a measurement that must not count
 _TURN, _SPEED, _PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
-_GYRO, _FORCE, FEET = slice(9, 12), slice(12, 15), 15
+_GYRO, _FORCE = slice(9, 12), slice(12, 15)
+RADIUS, SCALE, FEET = 15, 16, 17
 
 
 class BodyFilter:
@@ -73,7 +79,9 @@ class BodyFilter:
         Biases of gyro and accelerometer, rad/s and m/s².
     footholds : array (legs, 3)
         From the IMU to the footholds, in odom axes, m.
-    covariance : array (15 + 3 legs, 15 + 3 legs)
+    radius, scale : float
+        With which feet roll, m; relative error of the length of the legs.
+    covariance : array (17 + 3 legs, 17 + 3 legs)
         Of the errors above.
     rejected : array of bool (legs,)
         Feet whose last measurement was not consistent with standing still.
@@ -93,6 +101,7 @@ class BodyFilter:
         self.velocity, self.position = np.zeros(3), np.zeros(3)
         self.gyro_bias, self.force_bias = np.zeros(3), np.zeros(3)
         self.footholds = np.zeros((legs, 3))
+        self.radius = self.scale = 0.0
         self.covariance = np.zeros((size, size))
         self.rejected, self.lifted = np.zeros((2, legs), dtype=bool)
         self._legs = legs
@@ -105,25 +114,45 @@ class BodyFilter:
         self._units = np.tile(_UNIT, (legs, 1))
         self._blocks = np.arange(3 * legs).reshape(legs, 3)
 
-    def spread(self, turn: float, velocity: float, gyro_bias: float, force_bias: float) -> None:
-        """Set standard deviations, without correlations: rad (tilt), m/s, rad/s, m/s²."""
+    def spread(
+        self,
+        turn: float,
+        velocity: float,
+        gyro_bias: float,
+        force_bias: float,
+        radius: float,
+        scale: float,
+    ) -> None:
+        """Set standard deviations in SI units, without correlations; of ``turn``, only tilt."""
         self.covariance[:] = 0.0
         self._diagonal[0:2] = turn**2
         self._diagonal[_SPEED] = velocity**2
         self._diagonal[_GYRO] = gyro_bias**2
         self._diagonal[_FORCE] = force_bias**2
+        self._diagonal[RADIUS], self._diagonal[SCALE] = radius**2, scale**2
         self._last = None
 
-    def lose(self) -> None:
-        """Let the velocity be unknown, as after a gap without readings."""
-        self.covariance[_SPEED] = 0.0
-        self.covariance[:, _SPEED] = 0.0
-        self._diagonal[_SPEED] = 1.0
-        self._diagonal[:2] += 0.01**2
-        self._diagonal[_PLACE] += 1.0
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """Standard deviations of :attr:`radius`, m, and :attr:`scale`."""
+        radius, scale = np.sqrt(np.maximum(self._diagonal[RADIUS:FEET], 0.0)).tolist()
+        return radius, scale
+
+    def reshape(self, radius: float, radius_sd: float, scale: float, scale_sd: float) -> None:
+        """Discard what was learnt about rolling and legs; set values and deviations."""
+        self.covariance[RADIUS:FEET] = 0.0
+        self.covariance[:, RADIUS:FEET] = 0.0
+        self.radius, self.scale = radius, scale
+        self._diagonal[RADIUS], self._diagonal[SCALE] = radius_sd**2, scale_sd**2
+
+    def lose(self, turn: float = 0.01, velocity: float = 1.0) -> None:
+        """Let rotation and velocity be less known, by so much, rad and m/s, as after a gap."""
+        self._diagonal[_SPEED] += velocity**2
+        self._diagonal[_TURN] += turn**2
+        self._diagonal[_PLACE] += velocity**2
         self._last = None
 
-    def predict(self, dt: float, gyro: Array, force: Array, rolling: Array) -> Array:
+    def predict(self, dt: float, gyro: Array, force: Array, spin: Array) -> Array:
         """Advance by a step; return its mean velocity, (3,), m/s.
 
         Parameters
@@ -132,8 +161,8 @@ class BodyFilter:
             Length of the step, s.
         gyro, force : array (3,)
             Angular velocity, rad/s, and specific force, m/s², as measured at the end of the step.
-        rolling : array (legs, 3)
-            Velocity with which the feet roll, m/s, odom axes.
+        spin : array (legs, 3)
+            Velocity with which feet of radius 1 m roll, 1/s, odom axes.
         """
         before = self._last or (gyro, force)
         self._last = gyro, force
@@ -145,12 +174,12 @@ class BodyFilter:
         mean = v + 0.5 * dt * acceleration
         self.velocity = v + dt * acceleration
         self.position = self.position + dt * mean
-        self.footholds += dt * (rolling - mean)
+        self.footholds += dt * (self.radius * spin - mean)
         jump = end - start
-        self._spread_on(dt, turn, float(jump @ jump), rolling)
+        self._spread_on(dt, turn, float(jump @ jump), spin)
         return mean
 
-    def _spread_on(self, dt: float, turn: Array, jump: float, rolling: Array) -> None:
+    def _spread_on(self, dt: float, turn: Array, jump: float, spin: Array) -> None:
         """Advance the covariance."""
         turned = -dt * turn
         step, inputs = self._step, self._inputs
@@ -164,16 +193,20 @@ class BodyFilter:
         step[_PLACE, _TURN] = -dt * skew(self.velocity)
         step[_PLACE, _SPEED] = dt * _UNIT
         step[FEET:, _SPEED] = -dt * self._units
+        step[FEET:, RADIUS] = dt * spin.ravel()
         gyro, force = self._noise
-        noise = np.repeat((gyro, math.sqrt(force**2 + JUMP**2 * jump)), 3) * inputs
+        noise = np.array((gyro, math.sqrt(force**2 + JUMP**2 * jump)))[_SIX] * inputs
         self.covariance[:] = step @ self.covariance @ step.T + noise @ noise.T
         self._diagonal[_GYRO] += GYRO_DRIFT**2 * dt
         self._diagonal[_FORCE] += FORCE_DRIFT**2 * dt
-        stray = STRAY**2 * dt + (ROLLING_ERROR * dt) ** 2 * (rolling * rolling).sum(1)
-        self._diagonal[FEET:] += np.repeat(stray, 3)
+        unsure = ROLLING_ERROR * self.radius
+        stray = (STRAY**2 + ROLLING_TIME * unsure**2 * (spin * spin).sum(1)) * dt
+        self._diagonal[FEET:].reshape(-1, 3)[:] += stray[:, None]
         self._diagonal[FEET + 2 :: 3] += SINKING**2 * dt
 
-    def set_down(self, feet: Flags, places: Array, noise: Array, level: bool = False) -> None:
+    def set_down(
+        self, feet: Flags, places: Array, hips: Array, noise: Array, level: bool = False
+    ) -> None:
         """Make new footholds where these feet are.
 
         Parameters
@@ -182,6 +215,8 @@ class BodyFilter:
             Which feet.
         places : array (legs, 3)
             All feet as measured, from the IMU, in odom axes, m.
+        hips : array (legs, 3)
+            The hips, likewise.
         noise : array (legs, 3, 3)
             Covariance of these places, m².
         level : bool
@@ -191,30 +226,49 @@ class BodyFilter:
         for foot in np.flatnonzero(feet):
             at = FEET + 3 * foot
             self.footholds[foot, :cells] = places[foot, :cells]
-            # A new foothold shares no error with the body: its own is that of the joints alone.
-            self.covariance[at : at + cells] = 0.0
-            self.covariance[:, at : at + cells] = 0.0
-            self.covariance[at : at + cells, at : at + cells] = noise[foot, :cells, :cells]
+            # A new foothold shares no error with the body: its own is that of leg and joints.
+            line = places[foot, :cells] - hips[foot, :cells]
+            row = line[:, None] * self.covariance[SCALE]
+            row[:, at : at + cells] = 0.0
+            self.covariance[at : at + cells] = row
+            self.covariance[:, at : at + cells] = row.T
+            self.covariance[at : at + cells, at : at + cells] = (
+                noise[foot, :cells, :cells] + row[:, SCALE, None] * line
+            )
 
-    def stand(self, places: Array, noise: Array, standing: Flags, slipping: Flags) -> None:
+    def stand(
+        self,
+        places: Array,
+        hips: Array,
+        noise: Array,
+        standing: Flags,
+        slipping: Flags,
+        fixed: bool,
+    ) -> None:
         """Correct everything with feet that stand; `rejected` are those that do not stick.
 
         Parameters
         ----------
-        places, noise
+        places, hips, noise
             As for :meth:`set_down`.
         standing : array of bool (legs,)
             Feet that carry load.
         slipping : array of bool (legs,)
             Of these, the ones that only keep their height.
+        fixed : bool
+            Whether radius and length of legs are kept: nothing can be learnt about legs at rest,
+            but noise would look like it.
         """
-        legs = self._legs
         miss = np.where(standing[:, None], places - self.footholds, 0.0)
-        spread = self.covariance[FEET:, FEET:].copy()
-        cells = spread.reshape(legs, 3, legs, 3)
-        each = np.arange(legs)
+        # Not from the measured places: their noise would look like legs of another length.
+        lines = (self.footholds - hips).reshape(-1, 1)
+        seen = self.covariance[FEET:] - lines * self.covariance[SCALE]
+        spread = seen[:, FEET:] - seen[:, SCALE, None] * lines.T
+        count = self._legs
+        cells = spread.reshape(count, 3, count, 3)
+        each = np.arange(count)
         cells[each, :, each] += noise
-        diagonal = spread.ravel()[:: 3 * legs + 1].reshape(legs, 3)
+        diagonal = spread.ravel()[:: 3 * count + 1].reshape(count, 3)
         diagonal[~standing] += _APART
         diagonal[slipping, :2] += _APART
         self.rejected[:] = self.lifted[:] = False
@@ -225,10 +279,15 @@ class BodyFilter:
             root = self._judge(spread, diagonal, miss, standing, slipping)
         # Not dtrtrs for many columns: OpenBLAS wakes threads for it, for 100 µs or ms.
         inverse, _ = dtrtri(root, lower=1)
-        rows = inverse @ self.covariance[FEET:]
-        self.apply((inverse @ miss) @ rows)
+        rows = inverse @ seen
+        error = (inverse @ miss) @ rows
         spread = self.covariance
+        shapes = spread[RADIUS:FEET, RADIUS:FEET].copy()
         spread -= rows.T @ rows
+        if fixed:  # considered, not estimated (Schmidt 1966)
+            error[RADIUS:FEET] = 0.0
+            spread[RADIUS:FEET, RADIUS:FEET] = shapes
+        self.apply(error)
         spread += spread.T.copy()  # rounding must not make it unsymmetric
         spread *= 0.5
 
@@ -274,12 +333,14 @@ class BodyFilter:
         return speed < FASTEST**2 and least > -1e-9 and most < math.inf  # false for NaN, too
 
     def apply(self, error: Array) -> None:
-        """Correct the state by an estimated error, (15 + 3 legs,)."""
+        """Correct the state by an estimated error, (17 + 3 legs,)."""
         turn = error[_TURN]
         self.velocity = self.velocity + error[_SPEED] + cross(turn, self.velocity)
         self.position = self.position + error[_PLACE]
         self.gyro_bias = self.gyro_bias + error[_GYRO]
         self.force_bias = self.force_bias + error[_FORCE]
+        self.radius += float(error[RADIUS])
+        self.scale += float(error[SCALE])
         self.footholds += error[FEET:].reshape(-1, 3) + cross(turn, self.footholds)
         self.turn = rotation(turn) @ self.turn
 
@@ -291,4 +352,5 @@ FORCE_DRIFT = 1e-3
 """Random walk of the bias of the accelerometer, m/s² after 1 s."""
 
 _UNIT = np.eye(3)
+_SIX = np.array((0, 0, 0, 1, 1, 1))
 _FALL = skew(GRAVITY)

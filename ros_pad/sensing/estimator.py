@@ -25,6 +25,11 @@ from ros_pad.sensing.body_filter import GATE
 from ros_pad.sensing.body_filter import GRAVITY
 from ros_pad.sensing.body_filter import BodyFilter
 from ros_pad.sensing.body_filter import Flags
+from ros_pad.sensing.plausibility import Delay
+from ros_pad.sensing.plausibility import Joints
+from ros_pad.sensing.plausibility import Legs
+from ros_pad.sensing.plausibility import Repeats
+from ros_pad.sensing.plausibility import Shift
 from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²
@@ -65,6 +70,35 @@ REST_TIME = 0.2
 
 BIAS_FLOOR = 3e-4
 """Deviation of such a mean from the bias of the gyro, rad/s: nothing is quite at rest."""
+
+BLIND_TURN = 0.1
+"""Deviation of the rotation after a time without readings of the IMU, rad."""
+
+BLIND_RATE, BLIND_ACCELERATION = 0.5, 4.0
+"""Deviations of angular velocity, rad/s, and acceleration, m/s², of a body between samples that
+are far apart."""
+
+CALM = 0.05
+"""Slip speed up to which feet show a delay, m/s."""
+
+LOOK = 0.25
+"""Time between two looks at the length of the legs, s."""
+
+WRONG_LENGTH = 0.06
+"""Relative error of the length of the legs above which that of the robot's file is wrong."""
+
+LEARNT = 0.05
+"""Share of its variance that walking must have taken away before."""
+
+UNKNOWN_LENGTH = 0.05
+"""Its deviation from then on."""
+
+KNOWN_LENGTH = 0.012
+"""Its deviation below which it is known again."""
+
+UNSTEADY = 1.5
+"""Factor on the variance of a mean of slip velocities, as they vary in their window: neighbours
+are not independent."""
 
 UNKNOWN_BIAS = 0.02  # rad/s, of a gyro before any rest
 _NONE = np.zeros(0)
@@ -154,10 +188,18 @@ class BodyEstimator:
     window : float
         Length of the window of slip velocities, s, 0 to 1.
     rate : float
-        Samples a second that are expected, Hz, 10 to 10000; it sets the size of that window.
+        Most samples a second that are expected, Hz, 10 to 10000: with more, the window is shorter.
     force_axes : str
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
+    radius_error : float
+        Standard deviation of the radius with which feet roll over the robot's ``foot_radius``, 0
+        to 1: soft feet sink in.
+    length_error : float
+        Standard deviation of the relative error of the length of all legs, 0 to 0.5.
+    joint_delay : float
+        Time by which joints and forces are later than the IMU, s, -0.05 to 0.05: what came first
+        waits, so estimates are as late. :attr:`delay` shows it after some seconds of walking.
     rejection : bool
         Whether feet that slip are kept out; without it this is the plain filter of Bloesch (2012).
 
@@ -178,10 +220,15 @@ class BodyEstimator:
         accelerometer_bias: float = 0.05,
         contact_share: float | None = None,
         window: float = 0.02,
-        rate: float = 250.0,
+        rate: float = 1000.0,
         force_axes: str = 'base',
+        radius_error: float = 0.2,
+        length_error: float = 0.003,
+        joint_delay: float = 0.0,
         rejection: bool = True,
     ) -> None:
+        if not robot.mass > 0.0:
+            raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
         self._gyro_noise = number('gyro_noise', gyro_noise, 'rad/s', 0.0, 1.0, above=True)
         self._accelerometer_noise = number(
@@ -197,12 +244,18 @@ class BodyEstimator:
             number('contact_share', contact_share, '(share)', 0.01, 0.9)
         self._contact_share = contact_share
         rate = number('rate', rate, 'Hz', 10.0, 10000.0)
-        self._samples = max(1, round(number('window', window, 's', 0.0, 1.0) * rate))
+        self._length = number('window', window, 's', 0.0, 1.0)
+        self._samples = max(1, round(self._length * rate))
         self._in_foot_axes = choice('force_axes', force_axes, ('base', 'foot')) == 'foot'
+        self._radius_error = number('radius_error', radius_error, '(share)', 0.0, 1.0)
+        self._late = number('joint_delay', joint_delay, 's', -0.05, 0.05)
+        self._length_error = number('length_error', length_error, '(share)', 0.0, 0.5)
         self._rejection = rejection
         self._to_base = np.zeros((9, 9))
         self._to_base[:3, 6:9] = self._to_base[3:6, :3] = self._to_base[6:9, 3:6] = np.eye(3)
         self._to_imu = np.asarray(np.linalg.inv(robot.imu), dtype=np.float64)
+        hips = np.concatenate([robot.hips, np.ones((len(robot.legs), 1))], axis=1)
+        self._hips = (hips @ self._to_imu.T)[:, :3]
         self._reset()
 
     def _reset(self) -> None:
@@ -214,17 +267,26 @@ class BodyEstimator:
             self._accelerometer_noise,
             GATE if self._rejection else math.inf,
         )
-        self._window = SlipWindow(legs, self._samples, self._encoder_noise, self._velocity_noise)
+        self._window = SlipWindow(
+            legs, self._length, self._samples, self._encoder_noise, self._velocity_noise
+        )
+        self._shift = Shift(abs(self._late))
         self._time = math.nan
         self._measured = True  # whether forces are measured, not computed from torques
         self._standing = np.zeros(legs, dtype=bool)
         self._slipping = np.zeros(legs, dtype=bool)
         self._slow_since = np.full(legs, math.inf)
         self._patience = np.full(legs, STICKS)
-        self._rolling = np.zeros((legs, 3))
+        self._spin = np.zeros((legs, 3))  # velocity of rolling for a radius of 1 m, 1/s
         self._held = math.inf  # when a foot last stuck
         self._sliding_since = math.inf  # since when feet stand and none of them sticks
         self._unsure_until, self._reason = -math.inf, ''
+        self._repeats = Repeats(self._gyro_noise, self._velocity_noise)
+        self._joints = Joints(robot.joint_names)
+        self._agreement = Legs(robot)
+        self._delay = Delay(self._gyro_noise)
+        self._stretched = False  # whether legs of another length were found
+        self._look = math.nan  # when their length is looked at again
         self._rest_since, self._rest_sum, self._rest_count = math.nan, np.zeros(3), 0
         self._pull = WEIGHT
         self._expected = robot.mass * WEIGHT / (0.5 * legs)
@@ -263,6 +325,10 @@ class BodyEstimator:
         time, given = self._checked(
             time, gyro, accelerometer, joint_positions, joint_velocities, foot_forces, efforts
         )
+        if self._late > 0.0:
+            given[:2] = self._shift.update(time, given[:2])
+        elif self._late < 0.0:
+            given[2:] = self._shift.update(time, given[2:])
         gyro, accelerometer, q, dq = given[:4]
         kinematics = self._robot.chains.solve(q, self._to_imu)
         forces = self._forces(kinematics, accelerometer, foot_forces is not None, given[4])
@@ -271,8 +337,32 @@ class BodyEstimator:
             self._doubt_for(time, 'clock: time went back, odom begins anew')
         if math.isnan(self._time):
             self._begin(time, gyro, accelerometer, dq)
-        self._advance(time, gyro, accelerometer)
-        return self._process(time, gyro, accelerometer, kinematics, dq, forces)
+        contradiction = self._repeats.update(time, gyro, accelerometer, q, dq, forces)
+        contradiction = self._joints.update(time, time - self._time, q, dq) or contradiction
+        if contradiction:
+            self._doubt_for(time, contradiction)
+            if contradiction.startswith('imu'):
+                self._filter.lose(BLIND_TURN)
+        dt = self._advance(time, gyro, accelerometer)
+        return self._process(time, dt, gyro, accelerometer, kinematics, dq, forces)
+
+    @property
+    def delay(self) -> tuple[float, float]:
+        """Delay of the joints behind the IMU, and its standard deviation, s.
+
+        It is apart from ``joint_delay``, and NaN before it is known.
+        """
+        return self._delay.value, self._delay.deviation
+
+    @property
+    def foot_radius(self) -> tuple[float, float]:
+        """Radius with which feet roll, as estimated, and its standard deviation, m."""
+        return self._filter.radius, self._filter.deviations[0]
+
+    @property
+    def length_error(self) -> tuple[float, float]:
+        """Relative error of the length of the legs, as estimated, and its standard deviation."""
+        return self._filter.scale, self._filter.deviations[1]
 
     def _checked(self, time: float, *readings: npt.ArrayLike | None) -> tuple[float, list[Array]]:
         """Return time and readings as arrays; raise `InvalidInput` for those not allowed."""
@@ -339,8 +429,11 @@ class BodyEstimator:
         tilt = math.hypot(self._accelerometer_noise, self._bias) / WEIGHT
         body = self._filter
         body.spread(
-            *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)), UNKNOWN_BIAS, max(self._bias, 1e-3)
+            *((tilt + 2e-3, 0.02) if calm else (0.2, 0.5)),
+            *(UNKNOWN_BIAS, max(self._bias, 1e-3)),
+            *(self._radius_error * self._robot.foot_radius, self._length_error),
         )
+        body.radius = self._robot.foot_radius
         # The least rotation that turns the reading of the IMU upright, then the base to x.
         up = self._robot.imu[:3, :3] @ accelerometer / max(strength, 1e-9)
         axis = cross(up, np.array((0.0, 0.0, 1.0)))
@@ -358,25 +451,30 @@ class BodyEstimator:
     def _doubt_for(self, time: float, reason: str) -> None:
         self._unsure_until, self._reason = time + RECOVERY, reason
 
-    def _advance(self, time: float, gyro: Array, accelerometer: Array) -> None:
-        """Advance the filter to the time of the readings."""
+    def _advance(self, time: float, gyro: Array, accelerometer: Array) -> float:
+        """Advance the filter to the time of the readings; return the step, s, 0 after a gap."""
         dt, self._time = time - self._time, time
         if dt > LONGEST_GAP:
             self._doubt_for(time, f'gap: no readings for {dt:.2g} s')
-            self._filter.lose()
+            self._filter.lose(BLIND_TURN)
+        elif dt > LONGEST_STEP:
+            self._filter.lose(BLIND_RATE * dt, BLIND_ACCELERATION * dt)
         if dt > LONGEST_STEP:
             self._sliding_since = time
             self._standing[:] = False  # their footholds are made anew
-        self._rolling[~self._standing] = 0.0
+        self._spin[~self._standing] = 0.0
         # What happened in a gap is unknown: the body is taken to have stood.
         step = dt if dt <= LONGEST_GAP else 0.0
-        mean = self._filter.predict(step, gyro, accelerometer, self._rolling)
-        self._moved = step * (mean - self._rolling)
-        self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * min(1.0, dt)
+        mean = self._filter.predict(step, gyro, accelerometer, self._spin)
+        self._moved = step * (mean - self._filter.radius * self._spin)
+        # One reading after a gap says nothing about the time without readings.
+        self._pull += (math.sqrt(accelerometer @ accelerometer) - self._pull) * step
+        return step
 
     def _process(
         self,
         time: float,
+        dt: float,
         gyro: Array,
         accelerometer: Array,
         kinematics: Kinematics,
@@ -387,37 +485,52 @@ class BodyEstimator:
         body, legs = self._filter, len(self._standing)
         lands = self._load(kinematics, forces, time)
         turn = body.turn
-        places = kinematics.positions @ turn.T
+        places, hips = self._placed(kinematics, turn)
         lines = turn @ kinematics.jacobians
         squares = lines @ lines.transpose(0, 2, 1)
         noise = self._encoder_noise**2 * squares + FOOT_NOISE**2 * np.eye(3)
-        body.set_down(lands, places, noise)
+        body.set_down(lands, places, hips, noise)
         if self._standing.any():
-            body.stand(places, noise, self._standing, self._slipping)
+            fixed = not self._agreement.agree or bool(
+                np.abs(dq).max() < 0.02 + 5.0 * self._velocity_noise
+            )
+            trusted = self._standing & ~self._agreement.against
+            body.stand(places, hips, noise, trusted, self._slipping, fixed)
         if not body.sound():
             return self._anew(time, gyro, accelerometer, kinematics, dq, forces)
         self._rest(time, gyro, dq)
         turn = body.turn
+        places, hips = self._placed(kinematics, turn)
         rate = gyro - body.gyro_bias
         turning = (kinematics.angular @ dq[..., None])[..., 0] + rate
-        swaying = (kinematics.jacobians @ dq[..., None])[..., 0] + kinematics.positions @ skew(
-            rate
-        ).T
+        swaying = (1.0 + body.scale) * (kinematics.jacobians @ dq[..., None])[..., 0]
+        swaying += (places @ turn) @ skew(rate).T
         moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
         velocities = body.velocity + moving
-        radius = self._robot.foot_radius
-        self._rolling = np.stack(
-            [radius * turning[:, 1], -radius * turning[:, 0], np.zeros(legs)], axis=1
-        )
-        slips = velocities - self._rolling
+        self._spin = np.stack([turning[:, 1], -turning[:, 0], np.zeros(legs)], axis=1)
+        slips = velocities - body.radius * self._spin
         window = self._window
         window.update(time, self._moved, places, slips, lands)
         variance = body.covariance
         common = 0.5 * (variance[3, 3] + variance[4, 4])
         lever = 0.5 * (squares[:, 0, 0] + squares[:, 1, 1])
-        deviations = np.sqrt(window.lever_noise**2 * lever + common)
-        self._judge(time, window.velocity, deviations, places, noise)
+        white = window.lever_noise**2 * lever
+        deviations = np.sqrt(white + common)
+        latest = np.sqrt(window.latest_noise**2 * lever + common)
+        self._judge(time, window.velocity, deviations, latest, (places, hips, noise))
+        speeds = np.hypot(window.velocity[:, 0], window.velocity[:, 1])
+        self._delay.update(time, turn @ rate, places, slips, self._standing & (speeds < CALM))
+        moves = np.hypot(moving[:, 0], moving[:, 1])
+        if self._compare(time, dt, speeds, moves):
+            body.set_down(self._standing, places, hips, noise)
+        deviations = np.sqrt(np.maximum(white, UNSTEADY * window.unsteady) + common)
         return self._estimate(time, rate, places, velocities, forces, deviations)
+
+    def _placed(self, kinematics: Kinematics, turn: Array) -> tuple[Array, Array]:
+        """Return feet and hips from the IMU, (legs, 3), m, in odom axes."""
+        hips = self._hips @ turn.T
+        places = kinematics.positions @ turn.T
+        return places + self._filter.scale * (places - hips), hips
 
     def _anew(self, time: float, *readings: Any) -> BodyEstimate:
         """Begin anew after readings that no robot can have made."""
@@ -425,7 +538,7 @@ class BodyEstimator:
         self._begin(time, readings[0], readings[1], readings[3])
         self._doubt_for(time, 'diverged: odom begins anew')
         self._advance(time, readings[0], readings[1])
-        return self._process(time, *readings)
+        return self._process(time, 0.0, *readings)
 
     def _load(self, kinematics: Kinematics, forces: Array | None, time: float) -> Flags:
         """Update which feet stand; return those that landed with this sample."""
@@ -447,7 +560,12 @@ class BodyEstimator:
         return lands
 
     def _judge(
-        self, time: float, slips: Array, deviations: Array, places: Array, noise: Array
+        self,
+        time: float,
+        slips: Array,
+        deviations: Array,
+        latest: Array,
+        feet: tuple[Array, Array, Array],
     ) -> None:
         """Update which feet slip: those that slip have a foothold only in height."""
         if not self._rejection:
@@ -456,15 +574,16 @@ class BodyEstimator:
         fresh = self._standing & ~self._slipping
         fresh &= self._filter.rejected | (speeds > FAST * deviations)
         self._patience[fresh] = STICKS
-        slow = self._standing & (speeds < SLOW * deviations) & ~fresh
+        now = self._window.latest
+        slow = self._standing & ~fresh & (np.hypot(now[:, 0], now[:, 1]) < SLOW * latest)
         self._slow_since = np.where(slow, np.minimum(self._slow_since, time), math.inf)
         self._slipping |= fresh
         self._slipping &= ~(time - self._slow_since >= self._patience)
         lifted = self._filter.lifted
         if self._slipping.any():
-            self._filter.set_down(self._slipping & ~lifted, places, noise, level=True)
+            self._filter.set_down(self._slipping & ~lifted, *feet, level=True)
         if lifted.any():
-            self._filter.set_down(lifted, places, noise)
+            self._filter.set_down(lifted, *feet)
         sticking = self._standing & ~self._slipping
         if sticking.any():
             self._held = time
@@ -480,6 +599,39 @@ class BodyEstimator:
             self._slipping[:] = False
             self._held = self._sliding_since = time
             self._doubt_for(time, 'slipping: all feet slipped alike, velocity is estimated anew')
+
+    def _compare(self, time: float, dt: float, slips: Array, moves: Array) -> bool:
+        """Compare the legs with each other, and their length with that of the robot's file.
+
+        Return whether what was learnt about them was discarded.
+        """
+        radius = self._radius_error * self._robot.foot_radius
+        if self._agreement.update(dt, self._standing, self._slipping, slips, moves):
+            # What such legs have shown about the others is wrong.
+            self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._length_error)
+            return True
+        if not time < self._look:
+            self._look = time + LOOK
+            scale, deviation = self._filter.scale, self._filter.deviations[1]
+            learnt = self._length_error**2 - deviation**2
+            if self._stretched:
+                if deviation > KNOWN_LENGTH:
+                    self._doubt_for(
+                        time,
+                        'kinematics: legs seem to be longer or shorter than in the file of the'
+                        f' robot, by {100.0 * scale:.0f} +- {100.0 * deviation:.0f} %',
+                    )
+            # Feet that slip for most of their stances look like legs of another length.
+            elif (
+                self._agreement.sticks
+                and learnt > LEARNT * self._length_error**2
+                and abs(scale)
+                > max(WRONG_LENGTH * learnt / self._length_error**2, 4.0 * math.sqrt(learnt))
+            ):
+                self._stretched = True
+                self._filter.reshape(self._robot.foot_radius, radius, 0.0, UNKNOWN_LENGTH)
+                return True
+        return False
 
     def _rest(self, time: float, gyro: Array, dq: Array) -> None:
         """Average the gyro while nothing moves, and correct its bias."""
@@ -547,6 +699,8 @@ class BodyEstimator:
             return self._reason
         if abs(self._pull - WEIGHT) > 1.0:
             return f'gravity: the accelerometer shows {self._pull:.2g} m/s2 on average'
+        if doubt := self._agreement.doubt() or self._delay.doubt():
+            return doubt
         if time - self._held > RECOVERY:
             if self._standing.any():
                 return 'slipping: all feet that stand may slip'

@@ -3,10 +3,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad.robots.rotation import Array
+
+SHORT = 0.4
+"""Length of the short window over that of the long one: whether a foot has come to rest is known
+sooner than its speed."""
 
 
 class SlipWindow:
@@ -21,33 +27,40 @@ class SlipWindow:
     ----------
     legs : int
         Number of legs.
+    length : float
+        Largest length of the window, s.
     samples : int
-        Largest number of intervals of a window.
+        Largest number of intervals that it can have.
     encoder_noise, velocity_noise : float
         Standard deviations of joint positions, rad, and joint velocities, rad/s.
 
     Attributes
     ----------
-    velocity : array (legs, 3)
-        Mean slip velocity, m/s.
-    lever_noise : array (legs,)
-        Its white noise over the length of the lever from joints to foot, rad/s.
+    velocity, latest : array (legs, 3)
+        Mean slip velocity in the window, and in the last part of it, m/s.
+    lever_noise, latest_noise : array (legs,)
+        Their white noise over the length of the lever from joints to foot, rad/s.
+    unsteady : array (legs,)
+        Variance of the mean of the horizontal velocities, as they vary in the window, m²/s².
     """
 
     def __init__(
-        self, legs: int, samples: int, encoder_noise: float, velocity_noise: float
+        self, legs: int, length: float, samples: int, encoder_noise: float, velocity_noise: float
     ) -> None:
-        self.velocity = np.zeros((legs, 3))
-        self.lever_noise = np.full(legs, velocity_noise)
-        self._positions, self._velocities = encoder_noise**2, velocity_noise**2
-        self._samples = samples
+        self.velocity = self.latest = np.zeros((legs, 3))
+        self.lever_noise = self.latest_noise = np.full(legs, velocity_noise)
+        self.unsteady = np.zeros(legs)
+        self._positions, self._velocities = 2.0 * encoder_noise**2, velocity_noise**2
+        self._lengths = length, SHORT * length
         self._legs = np.arange(legs)
-        self._ages = np.zeros(legs, dtype=int)
+        self._begins = np.zeros(legs, dtype=np.int64)  # count at which the window began
+        self._size = samples + 1
         self._count = 0
+        self._firsts = [0, 0]  # counts of the first samples within the lengths
         self._path = np.zeros((legs, 3))
-        self._sums = np.zeros((2, legs, 3))  # place over the ground; sum of velocities
-        self._ring = np.zeros((samples + 1, 2, legs, 3))
-        self._times = np.zeros(samples + 1)
+        self._sums = np.zeros((legs, 3, 3))  # place over the ground; velocities; their squares
+        self._ring = np.zeros((self._size, legs, 3, 3))
+        self._times = np.full(self._size, -math.inf)
 
     def update(
         self,
@@ -73,25 +86,34 @@ class SlipWindow:
             Feet whose window begins with this sample.
         """
         self._count += 1
-        now = self._count % (self._samples + 1)
+        now = self._count % self._size
         self._path += moved
-        self._sums[0] = self._path + places
-        self._sums[1] += slip
+        self._sums[:, 0] = self._path + places
+        self._sums[:, 1] += slip
+        self._sums[:, 2] += slip * slip
         self._ring[now], self._times[now] = self._sums, time
-        self._ages = np.where(begins, 0, np.minimum(self._ages + 1, self._samples))
-        ages = self._ages
-        first = (self._count - ages) % (self._samples + 1)
-        change, total = (self._sums - self._ring[first, :, self._legs].transpose(1, 0, 2))[
-            ..., None
-        ]
-        length = time - self._times[first]
-        weight = length * length / (2.0 * self._positions)
-        other = ages / self._velocities
-        both = weight + other
-        fresh = ages == 0
-        safe = np.where(fresh, 1.0, both)
-        mean = (change[..., 0] * (length / (2.0 * self._positions))[:, None]) + (
-            total[..., 0] / self._velocities
-        )
-        self.velocity = np.where(fresh[:, None], slip, mean / safe[:, None])
-        self.lever_noise = np.sqrt(np.where(fresh, self._velocities, 1.0 / safe))
+        self._begins[begins] = self._count
+        for index, length in enumerate(self._lengths):
+            first = max(self._firsts[index], self._count - self._size + 1)
+            while time - self._times[first % self._size] > 1.001 * length:  # but for rounding
+                first += 1
+            self._firsts[index] = first
+        self._average(time, slip)
+
+    def _average(self, time: float, slip: Array) -> None:
+        """Take the means over both windows, the longer one first."""
+        firsts = np.maximum(self._begins, np.array(self._firsts)[:, None])  # (2, legs)
+        rows = firsts % self._size
+        change, total, squares = (self._sums - self._ring[rows, self._legs]).transpose(2, 0, 1, 3)
+        length = (time - self._times[rows])[..., None]
+        count = (self._count - firsts)[..., None]
+        weight = length / self._positions
+        both = weight * length + count / self._velocities
+        fresh = count == 0
+        both[fresh] = 1.0 / self._velocities
+        means = (change * weight + total / self._velocities) / both
+        self.velocity, self.latest = np.where(fresh, slip, means)
+        self.lever_noise, self.latest_noise = np.sqrt(1.0 / both[..., 0])
+        several = np.maximum(count[0], 1)
+        spread = (squares[0] - total[0] * total[0] / several) / (several * several)
+        self.unsteady = 0.5 * (spread[:, 0] + spread[:, 1])

@@ -12,6 +12,7 @@ from ros_pad.robots import Robot
 from ros_pad.robots.rotation import from_rpy
 from ros_pad.robots.rotation import transform
 from ros_pad.sensing import BodyEstimator
+from ros_pad.sensing.plausibility import Shift
 
 DT = 0.004
 UP = np.array((0.0, 0.0, 9.81))
@@ -311,6 +312,9 @@ def test_bad_readings_are_refused_and_change_nothing(index, value, message):
         ({'rate': 1.0}, 'rate'),
         ({'window': 2.0}, 'window'),
         ({'force_axes': 'world'}, 'force_axes'),
+        ({'radius_error': -0.1}, 'radius_error'),
+        ({'length_error': 0.6}, 'length_error'),
+        ({'joint_delay': 0.1}, 'joint_delay'),
     ],
 )
 def test_arguments_that_are_not_allowed(arguments, message):
@@ -353,3 +357,50 @@ def test_lists_do_and_ragged_lists_are_refused():
     assert np.array_equal(found.position, other.position)
     with pytest.raises(InvalidInput, match='foot_forces'):
         BodyEstimator(POINTED).update(0.0, *readings[:4], [[1.0], [1.0, 2.0]])
+
+
+def test_motion_without_noise_and_forces_from_contacts_leave_no_doubt():
+    motion = Motion()
+    motion.velocity = np.array((0.2, 0.0, 0.0))
+    found = [motion.step((0.2, 0.0, 0.0)) for _ in range(200)]
+    assert {each.doubt for each in found[100:]} == {''}
+
+
+def test_joints_whose_velocity_is_not_theirs_are_named():
+    estimator = BodyEstimator(POINTED)
+    q = POINTED.home.ravel()
+    for tick in range(400):
+        rates = np.full(12, 0.4)
+        found = estimator.update(
+            tick * DT,
+            np.zeros(3),
+            UP,
+            q + tick * DT * rates * (np.arange(12) != 7),
+            rates,
+            STANDING,
+        )
+    assert found.doubt == 'joints: the position of RL_thigh_joint does not follow its velocity'
+
+
+def test_readings_wait_for_joints_that_are_late():
+    shift = Shift(0.006)
+    ticks = [DT * tick for tick in range(20)]
+    found = [shift.update(time, [np.array((time, 2.0 * time))]) for time in ticks]
+    for time, (values,) in list(zip(ticks, found, strict=True))[5:]:
+        assert values == pytest.approx([time - 0.006, 2.0 * (time - 0.006)])
+    assert shift.update(-1.0, [np.zeros(2)])[0] == pytest.approx(np.zeros(2))
+
+
+def test_one_reading_after_a_gap_says_nothing_about_the_gap():
+    """A foot lands with a jolt just when the readings come back."""
+    times = [0.004 * step for step in range(250)]
+    times += [times[-1] + 5.0 + 0.004 * step for step in range(250)]
+    estimator = BodyEstimator(POINTED)
+    q = POINTED.home.ravel()
+    still, share = np.zeros(q.size), POINTED.mass * 9.81 / len(POINTED.legs)
+    forces = np.tile((0.0, 0.0, share), (len(POINTED.legs), 1))
+    doubts = set()
+    for step, time in enumerate(times):
+        pull = 14.0 if step == 250 else 9.81
+        doubts.add(estimator.update(time, np.zeros(3), (0.0, 0.0, pull), q, still, forces).doubt)
+    assert {each.partition(':')[0] for each in doubts} == {'', 'gap'}

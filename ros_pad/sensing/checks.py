@@ -1,0 +1,786 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults in what a robot's IMU, joints and feet report: units, axes, signs, rates, stamps.
+
+Each check looks at a :class:`Recording` of some seconds in which the robot stands, and better
+walks too, and returns what it found in plain sentences; readings without faults give nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import cross
+from ros_pad.sensing.estimator import DAMPING
+from ros_pad.sensing.estimator import LONGEST_STEP
+from ros_pad.sensing.estimator import WEIGHT
+
+Flags = npt.NDArray[np.bool_]
+
+SLOWEST, FASTEST = 200.0, 500.0  # Hz, rates that are wanted
+GRAVITY_ERROR = 0.3  # m/s², at rest; twice as much where the robot never rests
+CALM = 0.1  # rad/s, of body and joints at rest
+QUIET = 0.25  # s, length of a window in which the robot rests
+LARGEST = 7.0  # rad, of a joint: more than a turn
+UNEVEN = 0.03  # m, largest height of a standing foot over the plane of all
+STEEPEST = 0.35  # slope of the ground on which a robot may stand
+DELAY = 2e-3  # s, between IMU and joints, from which on the body's velocity suffers
+LONGEST_DELAY = 0.03  # s, that is looked for
+WINDOW = 0.06  # s, over which feet are taken to stand still
+FEWEST = 30  # windows in which pairs of feet stand while the robot moves
+SUNK = 0.05  # m, below the floor
+SURE = 6.0  # standard deviations
+
+
+class Finding(NamedTuple):
+    """What a check found; ``status`` is ``problem`` or ``warning``."""
+
+    what: str
+    status: str
+    found: str
+    advice: str
+
+
+def _problem(what: str, found: str, advice: str) -> Finding:
+    return Finding(what, 'problem', found, advice)
+
+
+def _warning(what: str, found: str, advice: str) -> Finding:
+    return Finding(what, 'warning', found, advice)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Readings of some seconds, each sensor with its own times.
+
+    Attributes
+    ----------
+    robot : Robot
+    imu_time, joint_time : array (n,), (m,)
+        Stamps, s.
+    gyro, accelerometer : array (n, 3)
+        In the axes of the IMU, rad/s and m/s².
+    positions : array (m, joints)
+        In the order of ``robot.joint_names``, rad (m).
+    velocities, efforts : array (m, joints) or None
+        The same, rad/s (m/s) and N m (N).
+    forces : array (m, legs, 3) or None
+        Forces of the ground on the feet at the times of the joints, N.
+    force_axes : str
+        ``base`` or ``foot``.
+    force_kind : str
+        ``vector``, ``normal`` (one axis) or ``contact`` (flags).
+    imu_arrival, joint_arrival : array (n,), (m,), optional
+        Times of arrival, s.
+    """
+
+    robot: Robot
+    imu_time: Array
+    gyro: Array
+    accelerometer: Array
+    joint_time: Array
+    positions: Array
+    velocities: Array | None = None
+    efforts: Array | None = None
+    forces: Array | None = None
+    force_axes: str = 'base'
+    force_kind: str = 'vector'
+    imu_arrival: Array = field(default_factory=lambda: np.zeros(0))
+    joint_arrival: Array = field(default_factory=lambda: np.zeros(0))
+
+    def at_joints(self, values: Array, delay: float = 0.0) -> Array:
+        """Return readings of the IMU at the times of the joints, in the axes of the base."""
+        times = self.joint_time - delay
+        columns = [np.interp(times, self.imu_time, each) for each in values.T]
+        return np.stack(columns, axis=1) @ self.robot.imu[:3, :3].T
+
+    @cached_property
+    def speeds(self) -> Array:
+        """Joint velocities, from differences where there are none, (m, joints)."""
+        if self.velocities is not None:
+            return self.velocities
+        return np.gradient(self.positions, self.joint_time, axis=0)
+
+    @cached_property
+    def rate(self) -> Array:
+        """Angular velocity of the base at the times of the joints, (m, 3), rad/s."""
+        return self.at_joints(self.gyro)
+
+    @cached_property
+    def pull(self) -> Array:
+        """Specific force at the times of the joints, (m, 3), m/s², base axes."""
+        return self.at_joints(self.accelerometer)
+
+    @cached_property
+    def kinematics(self) -> tuple[Array, Array, Array, Array]:
+        """Places, rotations, Jacobians and angular Jacobians of the feet, each (m, legs, ...)."""
+        found = [self.robot.kinematics(each) for each in self.positions]
+        return (
+            np.array([each.positions for each in found]),
+            np.array([each.rotations for each in found]),
+            np.array([each.jacobians for each in found]),
+            np.array([each.angular for each in found]),
+        )
+
+    @cached_property
+    def ground_forces(self) -> Array | None:
+        """Forces of the ground on the feet in base axes, (m, legs, 3), N, or None.
+
+        Where there are no foot forces, they come from the efforts.
+        """
+        if self.forces is None:
+            return self.forces_of_efforts
+        if self.force_axes == 'base':
+            return self.forces
+        return np.asarray((self.kinematics[1] @ self.forces[..., None])[..., 0])
+
+    @cached_property
+    def forces_of_efforts(self) -> Array | None:
+        """The same from efforts and the weight of the legs, or None."""
+        if self.efforts is None:
+            return None
+        lines, pull = self.kinematics[2], -WEIGHT * self.up
+        holding = np.array([self.robot.gravity_torques(q, pull) for q in self.positions])
+        square = lines @ lines.transpose(0, 1, 3, 2) + DAMPING * np.eye(3)
+        rest = holding - self.efforts.reshape(holding.shape)
+        return np.asarray(np.linalg.solve(square, lines @ rest[..., None])[..., 0])
+
+    @cached_property
+    def rests(self) -> Flags:
+        """Whether the robot rests, at the times of the joints."""
+        moving = np.abs(self.rate - np.median(self.rate, axis=0)).max(1) > CALM
+        # Noise of single velocities is no motion: joints are looked at over a window.
+        span = max(1, round(QUIET / self._step))
+        later = np.minimum(np.arange(len(moving)) + span, len(moving) - 1)
+        moving |= np.abs(self.positions[later] - self.positions).max(1) > CALM * QUIET
+        blurred = np.convolve(moving, np.ones(2 * span + 1))[span : span + len(moving)]
+        return np.asarray(blurred <= 0.2 * span)
+
+    @cached_property
+    def stands(self) -> Flags:
+        """Which feet stand for sure, (m, legs): loaded, and neither landing nor lifting."""
+        forces = self.ground_forces
+        if forces is None:
+            heights = self.kinematics[0] @ self.up
+            loaded = heights < heights.min(1)[:, None] + 0.01
+        else:
+            # The size alone: axes, signs and units may be wrong.
+            sizes = np.linalg.norm(forces, axis=2)
+            loaded = sizes > 0.3 * np.quantile(sizes, 0.9, axis=0)
+        before, after = (max(1, round(each / self._step)) for each in (0.04, 0.012))
+        kept = loaded.copy()
+        for shift in range(1, before + 1):
+            kept[shift:] &= loaded[:-shift]
+        for shift in range(1, after + 1):
+            kept[:-shift] &= loaded[shift:]
+        return kept
+
+    @cached_property
+    def up(self) -> Array:
+        """Direction against gravity, (3,), base axes; z where the accelerometer is wrong."""
+        if gravity(self):
+            return np.array((0.0, 0.0, 1.0))
+        mean = self.calm(self.pull).mean(0)
+        return np.asarray(mean / np.linalg.norm(mean))
+
+    def calm(self, values: Array) -> Array:
+        """Return values at rest, or all of them if the robot never rests."""
+        return values[self.rests] if self.rests.any() else values
+
+    @property
+    def _step(self) -> float:
+        return float(np.median(np.diff(self.joint_time)))
+
+    @property
+    def span(self) -> int:
+        """Samples of the joints in a window of 60 ms."""
+        return max(2, round(WINDOW / self._step))
+
+    @cached_property
+    def pairs(self) -> _Pairs:
+        """Pairs of standing feet, while the robot moves."""
+        found = _pairs(self, self.stands, self.span)
+        moves = ~self.rests[found.first]
+        return _Pairs(found.first[moves], found.arm[moves], found.drift[moves])
+
+    def with_gyro(self, gyro: Array) -> Recording:
+        """Return the recording with other readings of the gyro."""
+        other = replace(self, gyro=gyro)
+        # What does not depend on the gyro is not computed again.
+        for name in ('speeds', 'kinematics', 'ground_forces', 'stands', 'rests', 'pairs', 'pull'):
+            if name in vars(self):
+                vars(other)[name] = vars(self)[name]
+        return other
+
+    def reversed(self, joint: int) -> Recording:
+        """Return the recording with one joint the other way round."""
+        signs = np.ones(len(self.robot.joint_names))
+        signs[joint] = -1.0
+        other = replace(
+            self,
+            positions=self.positions * signs,
+            velocities=None if self.velocities is None else self.velocities * signs,
+            efforts=None if self.efforts is None else self.efforts * signs,
+        )
+        # Feet that stand are those of the sizes of the forces, which hardly change.
+        vars(other).update(stands=self.stands, rests=self.rests, rate=self.rate, pull=self.pull)
+        return other
+
+
+def _axis(vector: Array) -> str:
+    """Return the name of the axis nearest to a vector, with its sign."""
+    index = int(np.abs(vector).argmax())
+    return ('-' if vector[index] < 0.0 else '') + 'xyz'[index]
+
+
+def rates(recording: Recording) -> list[Finding]:
+    """Check how many samples a second arrive, and gaps between them."""
+    found = []
+    for what, times in (('imu', recording.imu_time), ('joints', recording.joint_time)):
+        steps = np.diff(times)
+        rate = 1.0 / max(float(np.median(steps)), 1e-9)
+        if rate < 0.97 * SLOWEST:
+            advice = f'{SLOWEST:g} to {FASTEST:g} Hz are wanted: set it in the driver'
+            found.append(_warning(what, f'{rate:.0f} samples a second', advice))
+        gaps = steps > max(LONGEST_STEP, 3.0 / rate)
+        if gaps.any():
+            advice = 'feet count as lifted in a gap: look for a busy computer or network'
+            text = f'{gaps.sum()} gaps in the stamps, the longest of {steps.max():.3g} s'
+            found.append(_warning(what, text, advice))
+    return found
+
+
+def stamps(recording: Recording) -> list[Finding]:
+    """Check that stamps rise, and that they are of the clock by which messages arrive."""
+    found, offsets, ratios = [], [], []
+    for what, times, arrival in (
+        ('imu', recording.imu_time, recording.imu_arrival),
+        ('joints', recording.joint_time, recording.joint_arrival),
+    ):
+        back = int((np.diff(times) <= 0.0).sum())
+        if back:
+            advice = 'each message needs its own time of measurement in header.stamp'
+            found.append(_problem(what, f'{back} stamps are not after the one before', advice))
+        elif len(arrival) == len(times):
+            ratios.append(float((arrival[-1] - arrival[0]) / (times[-1] - times[0])))
+            offsets.append(float(np.median(times - arrival)))
+    if found or not ratios:
+        return found
+    if max(ratios) - min(ratios) > 0.02:
+        for what, ratio in zip(('imu', 'joints'), ratios, strict=False):
+            if abs(ratio - 1.0) > 0.02:
+                text = f'1 s of its stamps takes {ratio:.3g} s'
+                advice = 'the stamps are not times: use stamp: arrival in the mapping'
+                found.append(_problem(what, text, advice))
+    elif len(offsets) == 2 and abs(offsets[0] - offsets[1]) > 0.5:
+        text = f'stamps are {offsets[0] - offsets[1]:.3g} s after those of the joints'
+        found.append(_problem('imu', text, 'both need one clock, to 1 ms'))
+    elif abs(ratios[0] - 1.0) > 0.02:
+        text = f'1 s of them takes {ratios[0]:.3g} s: right only in a simulation'
+        found.append(_warning('stamps', text, 'on a robot: use stamp: arrival in the mapping'))
+    elif abs(offsets[0]) > 1.0:
+        text = f'they differ from the time of arrival by {offsets[0]:.3g} s: another clock'
+        found.append(_warning('stamps', text, 'synchronise the clocks (chrony, ptp4l)'))
+    return found
+
+
+def gravity(recording: Recording) -> list[Finding]:
+    """Check size and axis of the specific force at rest."""
+    rests = recording.rests.any()
+    mean = recording.calm(recording.pull).mean(0)
+    size = float(np.linalg.norm(mean))
+    when = 'at rest' if rests else 'on average'
+    text = f'{size:.3g} m/s2 {when}, {WEIGHT:g} is gravity'
+    if size < 0.4:
+        advice = 'the driver has taken gravity off: use its raw data (imu/data_raw)'
+        return [_problem('accelerometer', f'shows no gravity: {text}', advice)]
+    if abs(size * WEIGHT - WEIGHT) < GRAVITY_ERROR:
+        return [_problem('accelerometer', f'is in g: {text}', 'scale: 9.80665 in the mapping')]
+    found = []
+    if abs(size - WEIGHT) > (1.0 if rests else 2.0) * GRAVITY_ERROR:
+        advice = f'scale: {WEIGHT / size:.4g} in the mapping, or calibrate it'
+        found.append(_problem('accelerometer', f'has a wrong scale: {text}', advice))
+    if mean[2] < 0.85 * size:
+        text = f'gravity is on {_axis(mean)} of the base, and should be on z'
+        advice = 'axes in the mapping, or the pose of the IMU in the robot file, are wrong'
+        found.append(_problem('accelerometer', text, advice))
+    return found
+
+
+def ranges(recording: Recording) -> list[Finding]:
+    """Check that joint positions are angles of legs, in rad, or lengths, in m."""
+    most = float(np.abs(recording.positions).max())
+    if most < LARGEST:
+        return []
+    advice = 'in degrees? scale: 0.01745329252 of the joints in the mapping'
+    return [_problem('joints', f'positions up to {most:.3g} rad (or m)', advice)]
+
+
+def velocities(recording: Recording) -> list[Finding]:
+    """Check that joint velocities are the derivatives of joint positions."""
+    if recording.velocities is None or np.median(np.diff(recording.joint_time)) > LONGEST_STEP:
+        return []  # too few to be integrated
+    found: dict[str, list[tuple[str, float]]] = {}
+    times, q, dq = recording.joint_time, recording.positions, recording.velocities
+    steps = np.diff(times)[:, None]
+    moved = np.vstack([np.zeros(q.shape[1]), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * steps, axis=0)])
+    span = max(1, round(0.1 / float(np.median(steps))))
+    if len(times) < span + FEWEST:
+        return []
+    changes, sums = (values[span:] - values[:-span] for values in (q, moved))
+    for name, change, total in zip(recording.robot.joint_names, changes.T, sums.T, strict=True):
+        if change.std() < 5e-3 and total.std() < 0.02:
+            continue  # it did not move
+        sizes = float(np.linalg.norm(change) * np.linalg.norm(total))
+        fits = float(change @ total) / max(sizes, 1e-12)
+        ratio = float(np.linalg.norm(total) / max(float(np.linalg.norm(change)), 1e-9))
+        if abs(fits) < 0.7:
+            text = 'velocity does not fit the change of position'
+        elif fits < 0.0:
+            text = 'velocity is reversed against position'
+        elif not 0.8 < ratio < 1.25:
+            text = 'velocity is {:.3g} times the change of position'
+        else:
+            continue
+        found.setdefault(text, []).append((name, ratio))
+    advice = 'mend the driver, or leave velocities out of the mapping: differences replace them'
+    all_ = len(recording.robot.joint_names)
+    return [
+        _problem(
+            'joints' if len(some) == all_ else f'joint {", ".join(name for name, _ in some)}',
+            text.format(np.median([ratio for _, ratio in some])),
+            advice,
+        )
+        for text, some in found.items()
+    ]
+
+
+class _Pairs(NamedTuple):
+    """Pairs of feet that stand over a window: what they show of the rotation of the body.
+
+    Two feet that do not slip have ``drift + rate x arm = 0``, on average over the window.
+    """
+
+    first: npt.NDArray[np.intp]  # sample at which the window begins
+    arm: Array  # (k, 3), m
+    drift: Array  # (k, 3), m/s
+
+
+def _pairs(recording: Recording, stands: Flags, span: int) -> _Pairs:
+    places, _, _, angular = recording.kinematics
+    speeds = recording.speeds.reshape(len(places), *recording.robot.home.shape)[..., None]
+    up = recording.robot.foot_radius * np.array((0.0, 0.0, 1.0))
+    rolling = _mean(cross((angular @ speeds)[..., 0], up), span)
+    middle = _mean(places, span) - up
+    time = (recording.joint_time[span:] - recording.joint_time[:-span])[:, None, None]
+    moving = (places[span:] - places[:-span]) / time - rolling
+    stay = _mean(stands.astype(float), span) > 1.0 - 0.5 / (span + 1)
+    chosen = np.arange(0, len(stay), max(1, span // 3))
+    first, arm, drift = [], [], []
+    for one in range(len(recording.robot.legs)):
+        for other in range(one):
+            both = chosen[stay[chosen, one] & stay[chosen, other]]
+            first.append(both)
+            arm.append(middle[both, one] - middle[both, other])
+            drift.append(moving[both, one] - moving[both, other])
+    return _Pairs(np.concatenate(first), np.concatenate(arm), np.concatenate(drift))
+
+
+def _mean(values: Array, span: int) -> Array:
+    """Return means of values over each window from a sample to the one ``span`` later."""
+    sums = np.cumsum(values, axis=0)
+    return (sums[span:] - sums[:-span] + 0.5 * (values[:-span] - values[span:])) / span
+
+
+def _without_bias(recording: Recording) -> Array:
+    """Return the angular velocity without the bias that the gyro shows at rest."""
+    rests = recording.rests
+    return recording.rate - (recording.rate[rests].mean(0) if rests.any() else 0.0)
+
+
+def _better(before: Array, after: Array) -> float:
+    """Return how sure it is that errors are smaller than before, in standard deviations."""
+    gain = before - after
+    # Windows overlap by two thirds.
+    deviation = float(gain.std()) * math.sqrt(3.0 / len(gain))
+    return float(gain.mean()) / max(deviation, 1e-12)
+
+
+class _Guess(NamedTuple):
+    """Something that may be wrong, and the recording without it."""
+
+    finding: Finding
+    simple: int  # number of things that it takes to be wrong
+    mended: Recording
+
+
+def mend(recording: Recording) -> tuple[list[Finding], Recording]:
+    """Check joints and gyro against each other: feet that stand do not move against each other.
+
+    Of all single faults (a joint reversed, a gyro turned, negated or in degrees), the one is
+    found with which feet stand still best; then another one, until no other helps.
+
+    Returns
+    -------
+    findings : list of Finding
+    mended : Recording
+        The recording without these faults.
+    """
+    found: list[Finding] = []
+    while len(found) < len(recording.robot.joint_names):
+        guess = _first_guess(recording)
+        if guess is None or guess.finding in found:
+            break
+        found.append(guess.finding)
+        recording = guess.mended
+    return found, recording
+
+
+def _first_guess(recording: Recording) -> _Guess | None:
+    """Return the simplest fault that explains motion of standing feet best, or None."""
+    before = _errors(recording)
+    guesses: list[tuple[_Guess, Array]] = []
+    if len(before) < FEWEST:
+        return None
+    for guess in [*_gyro_guesses(recording), *_joint_guesses(recording)]:
+        after = _errors(guess.mended)
+        sure = _better(before, after)
+        if sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean()):
+            guesses.append((guess, after))
+    if not guesses:
+        return None
+    _, best = min(guesses, key=lambda each: float(each[1].mean()))
+    alike = [each for each in guesses if _better(each[1], best) < 3.0]
+    return min(alike, key=lambda each: (each[0].simple, float(each[1].mean())))[0]
+
+
+def _errors(recording: Recording) -> Array:
+    """Return how fast pairs of standing feet move against each other in windows, m/s."""
+    span = recording.span
+    pairs = recording.pairs
+    rate = _mean(_without_bias(recording), span)[pairs.first]
+    return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
+
+
+def _gyro_guesses(recording: Recording) -> list[_Guess]:
+    found = []
+
+    def guess(text: str, advice: str, turn: Array, simple: int) -> None:
+        to_base = recording.robot.imu[:3, :3]
+        other = recording.with_gyro(recording.gyro @ (to_base.T @ turn @ to_base).T)
+        found.append(_Guess(_problem('gyro', text, advice), simple, other))
+
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            # Rows: the axis of the base, and the axis of the gyro that has its rate.
+            turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
+            wrong = [axis for axis in range(3) if turn[axis, axis] != 1.0]
+            if wrong:
+                rows = [f'{"xyz"[row]} is on {_axis(turn[row])}' for row in wrong]
+                guess(
+                    f'its axes do not fit the legs: rotation about {", about ".join(rows)}',
+                    _turn_back(recording, turn),
+                    turn,
+                    len(wrong),
+                )
+    scale = math.pi / 180.0
+    guess('is in degrees per second', f'scale: {scale:.10g} in the mapping', scale * np.eye(3), 1)
+    return found
+
+
+def _turn_back(recording: Recording, turn: Array) -> str:
+    """Return advice how to turn an IMU: rows have the sensor's axis of each axis of the base."""
+    axes = f'[{", ".join(map(_axis, turn))}]'
+    if np.array_equal(recording.robot.imu[:3, :3], np.eye(3)):
+        return f'axes: {axes} in the mapping, or turn the IMU in the robot file'
+    return f'turn the IMU in the robot file: what it calls x, y, z of the base is {axes}'
+
+
+def _joint_guesses(recording: Recording) -> list[_Guess]:
+    return [
+        _Guess(_reversed(name), 1, recording.reversed(joint))
+        for joint, name in enumerate(recording.robot.joint_names)
+    ]
+
+
+def _reversed(name: str) -> Finding:
+    advice = f'reversed: [{name}] in the mapping, or the axis in the robot file'
+    return _problem(f'joint {name}', 'is reversed: its foot moves as if it slipped', advice)
+
+
+def levels(recording: Recording) -> tuple[list[Finding], Recording]:
+    """Check at rest that the feet are in one plane below the body.
+
+    Returns
+    -------
+    findings : list of Finding
+    mended : Recording
+        The recording with the one joint reversed that brings the feet into a plane, if there is
+        such a joint.
+    """
+    if not recording.rests.any():
+        return [], recording
+    q = recording.positions[recording.rests].mean(0)
+    off = _off_plane(recording, q)
+    if off.max() < UNEVEN:
+        return [], recording
+    signs = 1.0 - 2.0 * np.eye(len(q))
+    left = [float(_off_plane(recording, q * each).max()) for each in signs]
+    best = int(np.argmin(left))
+    if left[best] < 0.5 * UNEVEN and sorted(left)[1] > 2.0 * left[best]:
+        return [_reversed(recording.robot.joint_names[best])], recording.reversed(best)
+    leg = recording.robot.legs[int(off.argmax())]
+    text = (
+        f'at rest foot {leg} is {off.max():.2g} m off the plane of the others, or the plane leans'
+    )
+    advice = (
+        'on a flat floor: look for a reversed joint, a wrong zero, a wrong foot link or length'
+    )
+    return [_problem('feet', text, advice)], recording
+
+
+def _off_plane(recording: Recording, q: Array) -> Array:
+    """Return how far each foot is off a plane through all feet, or above it if it leans, m."""
+    places = recording.robot.foot_positions(q)
+    up = recording.up
+    centred = places - places.mean(0)
+    slope = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)[0]
+    lean = up[:2] + slope * up[2]  # of the ground, which may be a slope, against gravity
+    heights = np.abs(centred[:, 2] - centred[:, :2] @ slope)
+    if np.linalg.norm(lean) > STEEPEST:
+        heights = np.maximum(heights, np.abs(centred @ up))
+    above = places[:, 2] > -0.2 * np.linalg.norm(places - recording.robot.hips, axis=1)
+    return np.where(above, np.maximum(heights, UNEVEN), heights)
+
+
+def delay(recording: Recording) -> list[Finding]:
+    """Check that IMU and joints have the same time: when the gyro fits the legs best."""
+    span, pairs = recording.span, recording.pairs
+    if len(pairs.first) < FEWEST:
+        return []
+    bias = recording.rate - _without_bias(recording)
+
+    def errors(late: float) -> Array:
+        rate = _mean(recording.at_joints(recording.gyro, late) - bias, span)[pairs.first]
+        return np.asarray(np.linalg.norm(pairs.drift + cross(rate, pairs.arm), axis=1))
+
+    tried = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 5e-4, 1e-3)
+    best = float(tried[int(np.argmin([errors(late).mean() for late in tried]))])
+    if abs(best) <= DELAY or _better(errors(0.0), errors(best)) < 0.5 * SURE:
+        return []
+    text = (
+        f'stamps are {1e3 * abs(best):.0f} ms {"later" if best > 0.0 else "earlier"} than the IMU'
+    )
+    advice = f'stamp both where they are measured, or delay: {best:.3f} in the mapping'
+    return [_warning('joints', f"{text}'s for the same motion", advice)]
+
+
+def forces(recording: Recording) -> list[Finding]:
+    """Check sign, axis and unit of the forces on the feet at rest."""
+    found = recording.ground_forces
+    if found is None:
+        advice = 'velocity, effort or foot forces: without one of the last two no foot stands'
+        return [_problem('force', 'neither foot forces nor efforts arrive', advice)]
+    measured = recording.forces is not None
+    what = 'foot forces' if measured else 'efforts'
+    if not np.any(recording.forces if measured else recording.efforts):
+        advice = 'does the driver measure them? Leave them out of the mapping if not'
+        return [_problem(what, 'are all zero', advice)]
+    sizes = np.linalg.norm(found, axis=2).max(0)
+    idle = [
+        leg
+        for leg, size in zip(recording.robot.legs, sizes, strict=True)
+        if size < 0.02 * sizes.max()
+    ]
+    if idle:
+        text = f'foot {", ".join(map(str, idle))} never carries load'
+        return [_problem(what, text, 'is its sensor connected, and the leg the right one?')]
+    if recording.force_kind == 'contact':
+        return []
+    mean, up = recording.calm(found).mean(0), recording.up
+    total = mean.sum(0)
+    size = float(np.linalg.norm(total))
+    if total @ up < -0.7 * size:
+        text = 'are reversed: the robot would hang from its feet'
+        advice = f'{"scale" if measured else "effort_scale"}: -1.0 in the mapping'
+        return [_problem(what, text, advice)]
+    if total @ up < 0.7 * size:
+        text = f'are along {_axis(total)} of the base at rest, and should be along z'
+        return [_problem(what, text, _axes_advice(recording))]
+    weight = recording.robot.mass * WEIGHT
+    lines = []
+    for leg, force in zip(recording.robot.legs, mean, strict=True):
+        if force @ up < -0.05 * size:
+            lines.append((f'that of foot {leg} is reversed', 'scale: -1.0 for this foot'))
+        elif np.linalg.norm(force) > 0.05 * size and force @ up < 0.5 * np.linalg.norm(force):
+            text = f'that of foot {leg} is along {_axis(force)} of the base at rest'
+            lines.append((text, 'its axes are turned: it should be along z'))
+    if not lines and not 0.75 < size / weight < 1.33:
+        text = f'add up to {size:.3g} at rest, and the robot weighs {weight:.3g} N'
+        whole = measured and np.array_equal(found, np.round(found))
+        advice = (
+            f'{"counts, not newtons: " if whole else ""}scale: {weight / size:.3g} in the mapping'
+        )
+        lines.append((text, advice if measured else advice.replace('scale', 'effort_scale')))
+    return [_problem(what, text, advice) for text, advice in lines]
+
+
+def _axes_advice(recording: Recording) -> str:
+    """Return how forces at rest that are not along z may come to be."""
+    other = 'foot' if recording.force_axes == 'base' else 'base'
+    found = replace(recording, force_axes=other).ground_forces
+    if recording.forces is not None and found is not None:
+        mean = recording.calm(found).mean(0).sum(0)
+        if mean @ recording.up > 0.9 * np.linalg.norm(mean):
+            return f'force_axes: {other} in the mapping'
+    return 'axes, or force_axes (base or foot), in the mapping'
+
+
+def horizontal(recording: Recording) -> list[Finding]:
+    """Check that foot forces accelerate the body as the accelerometer shows: axes about z."""
+    found = recording.ground_forces
+    if found is None or recording.force_kind != 'vector' or not np.any(found[..., :2]):
+        return []
+    turn = _turned(recording, found)
+    if turn is None:
+        return []
+    other = recording.forces_of_efforts
+    # Forces from joints that are right have the right axes.
+    which = 'foot forces'
+    if recording.forces is None or (other is not None and _turned(recording, other) is not None):
+        which = 'accelerometer'
+    elif other is None:
+        which = 'accelerometer or foot forces'
+    text = (
+        'horizontal axes are turned against the motion: x of the accelerometer is'
+        f' {_axis(turn[0])} of the forces, y is {_axis(turn[1])}'
+    )
+    advice = f'axes: [{_axis(turn[0])}, {_axis(turn[1])}, z] of the forces in the mapping'
+    if which == 'accelerometer':
+        advice = _turn_back(recording, turn.T)
+    elif which != 'foot forces':
+        advice = 'axes in the mapping, or the pose of the IMU in the robot file, are wrong'
+    return [_problem(which, text, advice)]
+
+
+def _turned(recording: Recording, forces: Array) -> Array | None:
+    """Return how the total force must be turned about z to fit the accelerometer, or None."""
+    eye = np.eye(2)
+    plain = _push_errors(recording, forces, eye)
+    if len(plain) < FEWEST:
+        return None
+    turns = [
+        row * np.array(signs)[:, None]
+        for row in (eye, eye[::-1])
+        for signs in itertools.product((1.0, -1.0), repeat=2)
+    ]
+    errors = [_push_errors(recording, forces, turn) for turn in turns]
+    best = min(range(len(turns)), key=lambda index: float(errors[index].mean()))
+    if errors[best].mean() > 0.7 * plain.mean() or _better(plain, errors[best]) < SURE:
+        return None
+    found = np.eye(3)
+    found[:2, :2] = turns[best]
+    return found
+
+
+def _push_errors(recording: Recording, found: Array, turn: Array) -> Array:
+    """Return how much the total force, turned, differs from mass times specific force, N."""
+    span = 3 * recording.span
+    moves = np.flatnonzero(~recording.rests[: len(recording.rests) - span])[:: max(1, span // 3)]
+    total = _mean(found.sum(1), span)[moves, :2] @ turn.T
+    wanted = recording.robot.mass * _mean(recording.pull, span)[moves, :2]
+    if not len(moves):
+        return np.zeros(0)
+    errors = total - total.mean(0) - wanted + wanted.mean(0)
+    return np.asarray(np.linalg.norm(errors, axis=1))
+
+
+def swings(recording: Recording) -> list[Finding]:
+    """Check that feet swing above the floor on which the others stand."""
+    heights = recording.kinematics[0] @ recording.up
+    stands = recording.stands
+    some = stands.sum(1) >= 2
+    if not some.any():
+        return []
+    floor = np.where(stands, heights, 0.0).sum(1) / np.maximum(stands.sum(1), 1)
+    found = []
+    for leg, name in enumerate(recording.robot.legs):
+        below = (floor - heights[:, leg])[some & ~recording.rests]
+        depth = float(np.quantile(below, 0.95)) if len(below) else 0.0
+        if depth > SUNK:
+            advice = 'look for a reversed joint, a wrong zero, a wrong foot link or length'
+            text = f'foot {name} goes {depth:.2g} m below the floor on which others stand'
+            found.append(_problem('feet', text, advice))
+    return found
+
+
+def unjudged(recording: Recording) -> list[str]:
+    """Return what moved too little to be judged: axes of the gyro, joints, the delay."""
+    if ranges(recording):
+        return ['all but the positions of joints']
+    before = _errors(recording)
+    if len(before) < FEWEST:
+        return ['gyro, joints and their delay: the robot did not move on its feet']
+
+    def unclear(after: Array) -> bool:
+        sure = _better(after, before)
+        return sure < 0.5 * SURE or (sure < SURE and before.mean() > 0.7 * after.mean())
+
+    flips = {
+        f'gyro about {axis}': recording.with_gyro(recording.gyro @ flip)
+        for axis, flip in zip('xyz', _flips(recording), strict=True)
+    }
+    others = {each.finding.what: each.mended for each in _joint_guesses(recording)}
+    found = [name for name, other in (flips | others).items() if unclear(_errors(other))]
+    late = replace(recording, imu_time=recording.imu_time + 0.01)
+    vars(late).update(pairs=recording.pairs, rests=recording.rests)
+    if unclear(_errors(late)):
+        found.append('delay between IMU and joints')
+    push = recording.ground_forces
+    if push is not None and recording.force_kind == 'vector':
+        before = _push_errors(recording, push, np.eye(2))
+        if unclear(_push_errors(recording, push, -np.eye(2))):
+            found.append('horizontal axes of accelerometer and forces')
+    return found
+
+
+def _flips(recording: Recording) -> list[Array]:
+    """Return the matrices that negate the gyro's rate about x, y or z of the base."""
+    to_base = recording.robot.imu[:3, :3]
+    return [to_base.T @ np.diag(1.0 - 2.0 * row) @ to_base for row in np.eye(3)]
+
+
+def examine(recording: Recording) -> list[Finding]:
+    """Run all checks; each fault that is found is mended before the next check.
+
+    Parameters
+    ----------
+    recording : Recording
+        Some seconds; better with the robot at rest first, and then walking.
+
+    Returns
+    -------
+    list of Finding
+        Empty if nothing is wrong.
+    """
+    found = [*stamps(recording), *ranges(recording)]
+    if any(each.status == 'problem' for each in found):
+        return found  # without times and angles, nothing else can be judged
+    found += [*rates(recording), *gravity(recording), *velocities(recording)]
+    uneven, level = levels(recording)
+    moved, fine = mend(level)
+    found += [*uneven, *moved]
+    if not (uneven or moved):
+        found += [*swings(fine), *delay(fine)]
+    loads = forces(fine)
+    return [*found, *loads, *([] if loads or gravity(recording) else horizontal(fine))]

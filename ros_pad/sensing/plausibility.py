@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Readings that contradict each other.
+
+Sensors that repeat, joints whose velocity is not theirs, legs that move against the others, joints
+later than the IMU.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import cross
+from ros_pad.sensing.body_filter import Flags
+
+EVERY = 4
+"""Samples of which one is looked at, where that is enough."""
+
+STUCK = 0.2
+"""Time for which a sensor may repeat its reading while the robot moves, s."""
+
+STANCES = 4.0
+"""Time constant of the share of its stances in which a foot slips, s of stance."""
+
+AGAINST, WITH = 0.9, 0.75
+"""Share above which a foot moves against the others, if half of all feet are below the second: on
+ice feet slip half of the time."""
+
+FASTER = 0.6
+"""Mean speed of its contact point over that of the foot against the body from which on it does."""
+
+MOVES = 0.02
+"""Speed of a foot against body or ground from which on it shows something, m/s."""
+
+AGREES = 0.5
+"""Share below which it moves with them again."""
+
+STRETCH = 0.5
+"""Time over which joint positions are compared with their velocities, s."""
+
+UNLIKE, UNLIKE_SHARE = 0.08, 0.3
+"""Largest difference of both, rad, and what is added to it, as a share of the largest motion."""
+
+LATE = 2e-3
+"""Delay between IMU and joints above which there is a doubt, s."""
+
+SURE = 2.0
+"""Standard deviations of the delay that it must be above that."""
+
+LATE_BIAS = 2.5e-4
+"""Error of the estimated delay that slips cause, s."""
+
+HALF = 0.008
+"""Half of the time over which the gyro is differentiated, s."""
+
+BLOCK, BLOCKS = 2.0, 12
+"""Length, s, and largest number of stretches of walking that give a delay and its deviation."""
+
+FEWEST = 4
+"""Stretches of walking without which no delay is known."""
+
+LARGEST = 0.1
+"""Difference of foot velocities above which one of them slips, m/s."""
+
+LEAST = 20.0
+"""Sum of squared differences of feet's accelerations, m²/s⁴, that a stretch of walking needs."""
+
+
+class Repeats:
+    """Sensors that repeat their last reading although the robot moves.
+
+    Parameters
+    ----------
+    gyro_noise, velocity_noise : float
+        Standard deviations of the gyro and of joint velocities, rad/s.
+    """
+
+    def __init__(self, gyro_noise: float, velocity_noise: float) -> None:
+        self._turns, self._steps = 0.1 + 5.0 * gyro_noise, 0.1 + 5.0 * velocity_noise
+        self._last: list[Array | None] = [None] * 4
+        self._since = [math.nan] * 4
+        self._turn, self._doubt = 0, ''
+
+    def update(
+        self, time: float, gyro: Array, force: Array, q: Array, dq: Array, loads: Array | None
+    ) -> str:
+        """Return what repeats at a time, s, or an empty text."""
+        self._turn += 1
+        if self._turn % EVERY:
+            return self._doubt
+        self._doubt = ''
+        turns = bool(np.abs(gyro).max() > self._turns)
+        steps = bool(np.abs(dq).max() > self._steps)
+        sensors = (
+            ('imu: the gyro', gyro, steps, 1.0),
+            # Readings without any noise, as of a calculated motion, are no fault.
+            ('imu: the accelerometer', force, (steps or turns) and gyro.any(), 1.0),
+            ('joints: all joint positions', q, turns, 2.0),
+            # Forces may come from contacts that are made or not.
+            ('force: all foot forces', loads, steps, 10.0),
+        )
+        for index, (name, values, moves, patience) in enumerate(sensors):
+            last = self._last[index]
+            if values is None or last is None or not (values == last).all():
+                self._last[index], self._since[index] = values, time
+            elif moves and time - self._since[index] > patience * STUCK and values.any():
+                self._doubt = f'{name} repeat{"s its reading" if index < 2 else ""}'
+        return self._doubt
+
+
+class Joints:
+    """Joints whose position does not follow their velocity.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the joints.
+    """
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._begin = math.nan
+        self._first: Array = np.zeros(0)
+        self._path: Array = np.zeros(0)
+        self._apart, self._most = self._path, self._path  # largest difference and motion
+        self._turn = 0
+        self._bad: Flags = np.zeros(len(names), dtype=bool)
+        self._doubt = ''
+
+    def update(self, time: float, dt: float, q: Array, dq: Array) -> str:
+        """Return which joint does not, after a step of dt, s, or an empty text."""
+        if not 0.0 < dt < 0.05 or math.isnan(self._begin):
+            self._restart(time, q)
+            return self._doubt
+        self._path += dt * dq
+        self._turn += 1
+        if self._turn % EVERY:
+            return self._doubt
+        moved = q - self._first
+        np.maximum(self._apart, np.abs(moved - self._path), out=self._apart)
+        np.maximum(self._most, np.maximum(np.abs(moved), np.abs(self._path)), out=self._most)
+        if time - self._begin >= STRETCH:
+            bad = (self._apart > UNLIKE + UNLIKE_SHARE * self._most).ravel()
+            both = np.flatnonzero(bad & self._bad)
+            self._bad, self._doubt = bad, ''
+            if both.size:
+                name = self._names[int(both[0])]
+                self._doubt = f'joints: the position of {name} does not follow its velocity'
+            self._restart(time, q)
+        return self._doubt
+
+    def _restart(self, time: float, q: Array) -> None:
+        self._begin, self._first = time, q
+        self._path, self._apart, self._most = np.zeros((3, *q.shape))
+
+
+class Shift:
+    """Readings of one sensor as they were some time ago.
+
+    Parameters
+    ----------
+    delay : float
+        That time, s.
+    """
+
+    def __init__(self, delay: float) -> None:
+        self._delay = delay
+        self._rows: deque[tuple[float, list[Array]]] = deque()
+
+    def update(self, time: float, readings: list[Array]) -> list[Array]:
+        """Add readings, and return those of that time ago, on a line between samples."""
+        rows = self._rows
+        if rows and time < rows[-1][0]:
+            rows.clear()
+        rows.append((time, readings))
+        wanted = time - self._delay
+        while len(rows) > 2 and rows[1][0] <= wanted:
+            rows.popleft()
+        (before, first), (after, second) = rows[0], rows[min(1, len(rows) - 1)]
+        share = min(max((wanted - before) / max(after - before, 1e-9), 0.0), 1.0)
+        return [a + share * (b - a) for a, b in zip(first, second, strict=True)]
+
+
+class Legs:
+    """Legs that move against the others.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Attributes
+    ----------
+    against : array of bool (legs,)
+        Which do.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._names = robot.legs
+        # Share of slips, and mean speeds of contact points and of feet against the body.
+        self._means = np.zeros((3, len(robot.legs)))
+        self.against: Flags = np.zeros(len(robot.legs), dtype=bool)
+        self._time = np.zeros(len(robot.legs))  # of stance in motion, s
+        self._turn, self._spent = 0, 0.0
+
+    @property
+    def agree(self) -> bool:
+        """Whether no foot slips in nearly all of its stances."""
+        return bool(self._means[0].max() < WITH)
+
+    @property
+    def sticks(self) -> bool:
+        """Whether every foot sticks for half of its stances or more."""
+        return bool(self._means[0].max() <= AGREES)
+
+    def update(
+        self, dt: float, standing: Flags, slipping: Flags, slips: Array, moves: Array
+    ) -> bool:
+        """Add a step; return whether other legs than before move against the others.
+
+        Parameters
+        ----------
+        dt : float
+            Length of the step, s.
+        standing, slipping : array of bool (legs,)
+            Feet that carry load, and those that slip.
+        slips, moves : array (legs,)
+            Speeds of the contact points, and of the feet against the body, m/s.
+        """
+        self._turn += 1
+        self._spent += dt
+        if self._turn % EVERY:
+            return False
+        dt, self._spent = self._spent, 0.0
+        means = self._means
+        # Feet that neither move nor slip show nothing.
+        counts = standing & ((moves > MOVES) | (slips > MOVES))
+        self._time += counts * dt
+        gain = counts * dt / np.clip(self._time, max(dt, 1e-9), STANCES)
+        means += gain * (np.stack([slipping, slips, moves]) - means)
+        shares = means[0]
+        if not (shares > AGREES).any():
+            self.against = self.against & False
+            return False
+        before = self.against
+        most = 2 * int((shares < WITH).sum()) >= len(shares)
+        wrong = (shares > AGAINST) & (means[1] > FASTER * means[2]) & most
+        wrong &= self._time > 0.5 * STANCES
+        self.against = wrong | (before & (shares > AGREES))
+        return bool((self.against & ~before).any())
+
+    def doubt(self) -> str:
+        """Return which legs do, or an empty text."""
+        if not self.against.any():
+            return ''
+        names = ', '.join(str(self._names[leg]) for leg in np.flatnonzero(self.against))
+        return (
+            f'kinematics: leg {names} moves against the other legs: joint reversed or wrong foot'
+            ' link?'
+        )
+
+
+class Delay:
+    """Delay of the joints behind the IMU, from the rates at which gyro and standing legs turn.
+
+    The difference of the velocities of two feet that stand is ω x (s1 - s2) less what joints show;
+    if joints are late by τ, it is τ dω/dt x (s1 - s2): a line whose slope is τ, by least squares,
+    less what the noise of dω/dt takes from it.
+
+    Parameters
+    ----------
+    gyro_noise : float
+        Standard deviation of a sample of the gyro, rad/s.
+
+    Attributes
+    ----------
+    value, deviation : float
+        The delay and its standard deviation, s; NaN before they are known.
+    """
+
+    def __init__(self, gyro_noise: float) -> None:
+        self._noise = 2.0 * gyro_noise**2 * 2.0  # of both ends; two of three axes count
+        self._rows: deque[tuple[float, Array, Array, Array, Flags]] = deque(maxlen=64)
+        self._blocks: deque[tuple[float, float]] = deque(maxlen=BLOCKS)
+        self._sums = [0.0, 0.0]
+        self._spent = 0.0
+        self._turn = 0
+        self.value = self.deviation = math.nan
+
+    def update(self, time: float, rate: Array, places: Array, slips: Array, stands: Flags) -> None:
+        """Add a sample.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        rate : array (3,)
+            Angular velocity, rad/s.
+        places, slips : array (legs, 3)
+            Feet from the body, m, and velocities of the contact points, m/s, up to a velocity that
+            all of them share.
+        stands : array of bool (legs,)
+            Feet that stand and do not slip.
+        """
+        rows = self._rows
+        rows.append((time, rate, places, slips, stands))
+        self._turn += 1
+        if self._turn % EVERY or time - rows[0][0] < 2.0 * HALF:
+            return
+        while time - rows[1][0] >= 2.0 * HALF:
+            rows.popleft()
+        middle = rows[len(rows) // 2]
+        feet = np.flatnonzero(rows[0][4] & middle[4] & stands)
+        span = time - rows[0][0]
+        if len(feet) < 2 or span > 4.0 * HALF:
+            return
+        speeds = middle[3][feet]
+        speeds = speeds - speeds.sum(0) / len(feet)
+        if np.abs(speeds).max() > LARGEST:
+            return
+        arms = middle[2][feet]
+        arms = arms - arms.sum(0) / len(feet)
+        lines = cross((rate - rows[0][1]) / span, arms)
+        self._sums[0] += float((speeds * lines).sum())
+        self._sums[1] += float((lines * lines).sum())
+        self._sums[1] -= self._noise / span**2 * float((arms * arms).sum())
+        self._spent += EVERY * span / len(rows)
+        if self._spent >= BLOCK:
+            self._close()
+
+    def _close(self) -> None:
+        """End a stretch of walking."""
+        if self._sums[1] > LEAST:
+            self._blocks.append((self._sums[0], self._sums[1]))
+        self._sums, self._spent = [0.0, 0.0], 0.0
+        if len(self._blocks) >= FEWEST:
+            line, square = np.array(self._blocks).T
+            self.value = float(line.sum() / square.sum())
+            rest = line - self.value * square
+            self.deviation = math.hypot(
+                float(np.sqrt((rest * rest).sum()) / square.sum()), LATE_BIAS
+            )
+
+    def doubt(self) -> str:
+        """Return a doubt, or an empty text."""
+        if math.isnan(self.value) or abs(self.value) < LATE + SURE * self.deviation:
+            return ''
+        word = 'later' if self.value > 0.0 else 'earlier'
+        return f'delay: joints are {1e3 * abs(self.value):.0f} ms {word} than the IMU'

@@ -1,0 +1,529 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensing stage of a robot: pair what IMU, joints and feet measure, and estimate its motion.
+
+The body estimator node, the loop without ROS and replay use the same class.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Mapping
+from collections.abc import Sequence
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad.configuration import Setting
+from ros_pad.configuration import choice
+from ros_pad.configuration import quantity
+from ros_pad.errors import InvalidInput
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import matrix
+from ros_pad.robots.rotation import skew
+from ros_pad.sensing.estimator import UNKNOWN_BIAS
+from ros_pad.sensing.estimator import WEIGHT
+from ros_pad.sensing.estimator import BodyEstimate
+from ros_pad.sensing.estimator import BodyEstimator
+
+SAME_NS = 1_000_000
+"""Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the
+IMU triple the error of the body's velocity."""
+
+APART_NS = 5_000_000
+"""Difference of the stamps of IMU and joints above which they cannot be paired, ns."""
+
+OLDEST_FORCE_NS = 20_000_000
+"""Age above which the force of a foot is not used any more, ns."""
+
+LONGEST_DIFFERENCE = 0.05
+"""Longest time over which positions of joints are differentiated, s."""
+
+SET_BACK_NS = 100_000_000
+"""Step back of a stamp from which on a clock has been set back, ns; less is a late message."""
+
+START = 0.2
+"""Longest time for which the first sample waits until the robot is calm, s: one reading in a jolt
+would begin odom with a wrong tilt."""
+
+CALM = 5
+"""Readings in a row that are calm before estimation begins."""
+
+_CALM_PULL, _CALM_RATE, _CALM_JOINTS = 0.5, 0.1, 0.3
+"""Largest difference of the specific force from gravity, m/s², and largest rates of body and
+joints, rad/s, of a calm robot."""
+
+SILENCE = 0.4
+"""Time without a sample after which there is a doubt, s."""
+
+FORCES = ('auto', 'feet', 'efforts')
+"""Sources of the forces: sensors of the feet, efforts of the joints, or the first that comes."""
+
+SETTINGS = (
+    Setting(
+        'gyro_noise', 0.005, 'Standard deviation of a sample of the gyro.', 'rad/s', 1e-6, 1.0
+    ),
+    Setting(
+        'accelerometer_noise', 0.05, 'Standard deviation of a sample of the accelerometer.',
+        'm/s2', 1e-6, 10.0,
+    ),
+    Setting(
+        'accelerometer_bias', 0.05, 'Standard deviation of the bias of the accelerometer.',
+        'm/s2', 0.0, 5.0,
+    ),
+    Setting(
+        'encoder_noise', 5e-4, 'Standard deviation of the position of a joint.', 'rad', 1e-6, 0.1
+    ),
+    Setting(
+        'velocity_noise', 0.03,
+        'Standard deviation of the velocity of a joint; where velocities are missing, 1.4 times'
+        ' the encoder noise over the period.',
+        'rad/s', 1e-6, 10.0,
+    ),
+    Setting(
+        'force_noise', 0.03, 'Standard deviation of a component of the force on a foot.',
+        'N', 0.0, 100.0,
+    ),
+    Setting(
+        'forces', 'auto',
+        'Source of the forces: sensors of the feet, efforts of the joints, or feet where their'
+        ' forces come, else efforts.',
+        choices=FORCES,
+    ),
+    Setting(
+        'force_axes', 'foot',
+        'Axes of the forces: of the link that carries the foot, or of the base.',
+        choices=('foot', 'base'),
+    ),
+    Setting(
+        'contact_share', 0.0,
+        'Share of the expected load above which a foot stands; 0: 0.1, and 0.25 for efforts.',
+        '', 0.0, 0.9,
+    ),
+    Setting('window', 0.02, 'Time over which slip velocities are averaged.', 's', 0.0, 1.0),
+    Setting('rate', 250.0, 'Samples a second that are expected.', 'Hz', 10.0, 1e4),
+)  # fmt: skip
+"""Settings of a body estimator and its stage, by the names of their arguments."""
+
+_NEVER = -(10**18)  # ns, before any stamp
+_LATEST_NS = 50_000_000  # readings of joints wait no longer than this for the IMU
+_WAITING = 50  # readings of joints that wait for the IMU, and readings of the IMU that are kept
+
+
+def estimator_of(robot: Robot, values: Mapping[str, Any]) -> BodyEstimator:
+    """Return the estimator of a robot with the values of all :data:`SETTINGS`, by name.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not allowed.
+    """
+    own = {each.name: each.accept(values[each.name]) for each in SETTINGS}
+    del own['forces']  # of the stage
+    return BodyEstimator(robot, **own | {'contact_share': own['contact_share'] or None})
+
+
+class FootReadings(NamedTuple):
+    """What a body estimate shows of one foot, in odom axes, as the stage of a foot receives it.
+
+    Attributes
+    ----------
+    force, position : tuple of float
+        Force of the ground, N, and position in odom, m.
+    velocity : tuple of float
+        Velocity of the contact point over the floor, x and y, m/s.
+    variance : float
+        Variance of each component, m²/s²; -1 if the body is in doubt.
+    """
+
+    force: tuple[float, float, float]
+    position: tuple[float, float, float]
+    velocity: tuple[float, float]
+    variance: float
+
+
+def foot_readings(estimate: BodyEstimate) -> list[FootReadings]:
+    """Return what a body estimate shows of each foot, as plain numbers."""
+    certain = not estimate.doubt
+    readings = []
+    for foot in estimate.feet:
+        fx, fy, fz = foot.force.tolist()
+        x, y, z = foot.position.tolist()
+        slip_x, slip_y = foot.slip_velocity.tolist()
+        variance = foot.slip_velocity_sd**2 if certain else -1.0
+        readings.append(FootReadings((fx, fy, fz), (x, y, z), (slip_x, slip_y), variance))
+    return readings
+
+
+def joint_order(robot: Robot, names: Sequence[str]) -> npt.NDArray[np.intp]:
+    """Return where each joint of a robot is among the names of a message.
+
+    Raises
+    ------
+    InvalidInput
+        When a joint of the robot is missing, or a name comes twice.
+    """
+    places = {name: place for place, name in enumerate(names)}
+    missing = [name for name in robot.joint_names if name not in places]
+    if missing or len(places) < len(names):
+        wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
+        raise InvalidInput(
+            f'joint names {wrong} are not allowed: those of {robot.name} are needed'
+        )
+    return np.array([places[name] for name in robot.joint_names])
+
+
+def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Array, Array]:
+    """Return the twist of the base in its own axes, and its covariance, as in an Odometry.
+
+    Parameters
+    ----------
+    estimate : BodyEstimate
+        Estimate of the base.
+    rate : array (3,)
+        Angular velocity as the gyro shows it, in axes of the base, rad/s: with its bias.
+    gyro_noise : float
+        Standard deviation of the gyro, rad/s.
+
+    Returns
+    -------
+    tuple of array
+        Linear and angular velocity, (6,), m/s and rad/s; covariance, (6, 6).
+    """
+    to_base = matrix(estimate.orientation).T
+    # An error φ of the rotation, in odom axes, turns the velocity by v x φ.
+    change = np.hstack([skew(estimate.velocity), np.eye(3)])
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = to_base @ change @ estimate.covariance[3:, 3:] @ change.T @ to_base.T
+    covariance[3:, 3:] = (gyro_noise**2 + UNKNOWN_BIAS**2) * np.eye(3)
+    return np.concatenate([to_base @ estimate.velocity, rate]), covariance
+
+
+class _Inertial(NamedTuple):
+    stamp_ns: int
+    gyro: Array
+    accelerometer: Array
+
+
+class _Joints(NamedTuple):
+    stamp_ns: int
+    positions: Array
+    velocities: Array
+    efforts: Array | None
+
+
+class SensingStage:
+    """Pair readings of IMU, joints and feet by their time stamps, and estimate the robot's motion.
+
+    Readings of the joints set the pace: each is paired with the reading of the IMU within 1 ms, or
+    with one interpolated between those before and after it, for which it waits. It also waits for
+    the forces of that moment, until the next reading of the joints arrives; then the last forces
+    are used, if they are not older than 20 ms. The first sample waits for a calm robot, up to
+    0.2 s.
+
+    Parameters
+    ----------
+    robot : Robot
+    estimator : BodyEstimator
+        Estimator of this robot.
+    emit : callable
+        Called with time stamp, ns, and :class:`BodyEstimate` after each sample.
+    emit_doubt : callable
+        Called with the doubt when its kind has changed, before the estimate of the same sample.
+    reject : callable
+        Called with the error when a reading is rejected; it is not used.
+    forces : str
+        ``feet``, ``efforts``, or ``auto``: feet where their forces come, else efforts.
+
+    Attributes
+    ----------
+    estimator : BodyEstimator
+    samples : int
+        Number of samples used so far.
+    last_ns : int
+        Time stamp of the last sample used, ns; 0 before the first one.
+    doubt : str or None
+        Doubt emitted last, with its present details; None before the first sample.
+    differentiates : bool
+        Whether joint velocities are missing, and come from the change of the positions: about
+        encoder noise times 1.4 over the period of noise, and half a period late.
+    force_source : str
+        Where the forces of the last sample came from, ``feet`` or ``efforts``; empty if nowhere.
+
+    Raises
+    ------
+    InvalidInput
+        When ``forces`` is none of these.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        estimator: BodyEstimator,
+        emit: Callable[[int, BodyEstimate], None],
+        emit_doubt: Callable[[str], None],
+        reject: Callable[[InvalidInput], None],
+        forces: str = 'auto',
+    ) -> None:
+        self.estimator = estimator
+        self._legs, self._size = len(robot.legs), len(robot.joint_names)
+        self._emit, self._emit_doubt, self._reject = emit, emit_doubt, reject
+        self._source = choice('forces', forces, FORCES)
+        self.samples = self.last_ns = 0
+        self.doubt: str | None = None
+        self.differentiates = False
+        self.force_source = ''
+        self._rejection = ''
+        self._silent_since_ns: int | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Discard all readings."""
+        self._inertial: deque[_Inertial] = deque(maxlen=_WAITING)
+        self._waiting: deque[_Joints] = deque(maxlen=_WAITING)
+        self._last_positions: tuple[int, Array] | None = None
+        self._forces = np.zeros((self._legs, 3))
+        self._force_ns = [_NEVER] * self._legs
+        self._calm = 0  # readings in a row
+        self._first_ns: float = math.inf  # stamp of the first sample that could be used
+        self._unpaired_ns: float = math.inf  # stamp of the first joints without partner since then
+        self._received: Counter[str] = Counter()  # readings since the last sample, by source
+        self._fresh: Counter[str] = Counter()  # of those, how many had a new stamp
+
+    def imu(self, stamp_ns: int, gyro: npt.ArrayLike, accelerometer: npt.ArrayLike) -> None:
+        """Process a reading of the IMU: time stamp, ns, rad/s, and specific force, m/s²."""
+        try:
+            reading = _Inertial(
+                stamp_ns,
+                _checked('gyro', gyro, 3, 'rad/s'),
+                _checked('accelerometer', accelerometer, 3, 'm/s2'),
+            )
+        except InvalidInput as error:
+            self.reject(error)
+            return
+        self._received['IMU'] += 1
+        last = self._inertial[-1].stamp_ns if self._inertial else -math.inf
+        if stamp_ns <= last:
+            if stamp_ns > last - SET_BACK_NS:
+                return  # it came twice, or late
+            self._inertial.clear()
+        self._fresh['IMU'] += 1
+        self._inertial.append(reading)
+        self._process()
+
+    def joints(
+        self,
+        stamp_ns: int,
+        positions: npt.ArrayLike,
+        velocities: npt.ArrayLike | None = None,
+        efforts: npt.ArrayLike | None = None,
+    ) -> None:
+        """Process a reading of all joints, in the order of ``robot.joint_names``.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Time stamp, ns.
+        positions : array (joints,)
+            Positions, rad.
+        velocities : array (joints,) or None
+            Velocities, rad/s; without them, positions are differentiated.
+        efforts : array (joints,) or None
+            Torques, N m.
+        """
+        try:
+            q = _checked('joint positions', positions, self._size, 'rad')
+            dq = None
+            if velocities is not None:
+                dq = _checked('joint velocities', velocities, self._size, 'rad/s')
+            torques = None
+            if efforts is not None:
+                torques = _checked('efforts', efforts, self._size, 'N m')
+        except InvalidInput as error:
+            self.reject(error)
+            return
+        self._received['joints'] += 1
+        last_ns, before = self._last_positions or (stamp_ns - 1, q)
+        if stamp_ns <= last_ns:
+            if stamp_ns > last_ns - SET_BACK_NS:
+                return
+            self._waiting.clear()
+            before = q
+        self._fresh['joints'] += 1
+        self.differentiates = dq is None
+        if dq is None:
+            dt = (stamp_ns - last_ns) * 1e-9
+            self._last_positions = stamp_ns, q
+            if before is q or not 0.0 < dt <= LONGEST_DIFFERENCE:
+                return  # the next reading has one before it
+            dq = (q - before) / dt
+        self._last_positions = stamp_ns, q
+        while self._waiting and self._waiting[0].stamp_ns < stamp_ns - _LATEST_NS:
+            self._waiting.popleft()
+        self._waiting.append(_Joints(stamp_ns, q, dq, torques))
+        self._process()
+
+    def force(self, leg_index: int, stamp_ns: int, force: Sequence[float]) -> None:
+        """Process the force of the ground on a foot, N, in the axes of its sensor."""
+        try:
+            self._forces[leg_index] = _checked('foot force', force, 3, 'N')
+        except InvalidInput as error:
+            self.reject(error)
+            return
+        self._force_ns[leg_index] = stamp_ns
+        self._process()
+
+    def reject(self, error: InvalidInput) -> None:
+        """Report a rejected reading; its error becomes the doubt if no sample follows for long."""
+        self._rejection = str(error)
+        self._reject(error)
+
+    def tick(self, now_ns: int) -> None:
+        """Check at a time, ns, whether readings are missing; call it every `TICK_PERIOD_NS`."""
+        if self._silent_since_ns is None:
+            self._silent_since_ns = now_ns
+            return
+        silence = (now_ns - self._silent_since_ns) * 1e-9
+        if silence > SILENCE:
+            self._update_doubt(self._missing(silence))
+
+    def _missing(self, silence: float) -> str:
+        missing = [f'no {each}' for each in ('IMU', 'joints') if each not in self._received]
+        if missing and not self._rejection:
+            return f'{" and ".join(missing)}: for {silence:.1f} s'
+        if self._rejection:
+            return f'reading refused: {self._rejection}'
+        for source in ('IMU', 'joints'):
+            if self._fresh[source] < 2 < self._received[source]:
+                return f'stamps: those of the {source} do not advance'
+        if not self._waiting and self.differentiates:
+            return f'no joints: no two readings in {LONGEST_DIFFERENCE:g} s, without velocities'
+        assert self._last_positions
+        return self._apart(self._last_positions[0])
+
+    def _apart(self, stamp_ns: int) -> str:
+        nearest = min((each.stamp_ns - stamp_ns for each in self._inertial), key=abs, default=0)
+        return f'stamps: IMU and joints are {abs(nearest) * 1e-6:.3g} ms apart'
+
+    def _process(self) -> None:
+        """Use the readings of joints that have all they need."""
+        while self._waiting:
+            joints = self._waiting[0]
+            found = self._inertial_at(joints.stamp_ns)
+            if found is None:
+                last_ns = self._inertial[-1].stamp_ns if self._inertial else -math.inf
+                if last_ns < joints.stamp_ns and len(self._waiting) < _WAITING:
+                    return  # the IMU may be late
+                self._waiting.popleft()
+                self._unpaired_ns = min(self._unpaired_ns, joints.stamp_ns)
+                # After a silence of the IMU a few readings of joints have no partner.
+                if joints.stamp_ns - self._unpaired_ns > 2 * _LATEST_NS:
+                    self._update_doubt(self._apart(joints.stamp_ns))
+                continue
+            if not self._has_forces(joints.stamp_ns) and len(self._waiting) == 1:
+                return
+            self._waiting.popleft()
+            if self.samples or self._starts(joints, found):
+                self._update(joints, found)
+
+    def _inertial_at(self, stamp_ns: int) -> _Inertial | None:
+        """Return the reading of the IMU at a time, or one interpolated between its neighbours."""
+        after: _Inertial | None = None
+        for reading in reversed(self._inertial):
+            if abs(reading.stamp_ns - stamp_ns) <= SAME_NS:
+                return reading
+            if reading.stamp_ns < stamp_ns:
+                return after and _between(reading, after, stamp_ns)
+            after = reading
+        return None
+
+    def _has_forces(self, stamp_ns: int) -> bool:
+        """Return whether the forces of a moment are there, or none are awaited."""
+        if self._source == 'efforts' or max(self._force_ns) < stamp_ns - OLDEST_FORCE_NS:
+            return True
+        return min(self._force_ns) >= stamp_ns - SAME_NS
+
+    def _starts(self, joints: _Joints, inertial: _Inertial) -> bool:
+        """Return whether estimation may begin: the robot is calm, or has not been for long."""
+        pull = abs(math.sqrt(inertial.accelerometer @ inertial.accelerometer) - WEIGHT)
+        calm = pull < _CALM_PULL and np.abs(inertial.gyro).max() < _CALM_RATE
+        calm = calm and np.abs(joints.velocities).max() < _CALM_JOINTS
+        self._calm = self._calm + 1 if calm else 0
+        self._first_ns = min(self._first_ns, joints.stamp_ns)
+        return self._calm >= CALM or joints.stamp_ns - self._first_ns >= START * 1e9
+
+    def _update(self, joints: _Joints, inertial: _Inertial) -> None:
+        """Process a sample."""
+        stamp_ns = joints.stamp_ns
+        forces, efforts, self.force_source = None, None, ''
+        if self._source != 'efforts' and min(self._force_ns) >= stamp_ns - OLDEST_FORCE_NS:
+            forces, self.force_source = self._forces.copy(), 'feet'
+        elif self._source != 'feet' and joints.efforts is not None:
+            efforts, self.force_source = joints.efforts, 'efforts'
+        try:
+            estimate = self.estimator.update(
+                stamp_ns * 1e-9,
+                inertial.gyro,
+                inertial.accelerometer,
+                joints.positions,
+                joints.velocities,
+                forces,
+                efforts,
+            )
+        except InvalidInput as error:
+            self.reject(error)
+            return
+        if not _finite(estimate):
+            self.reject(InvalidInput(f'sample at {stamp_ns * 1e-9:.3f} s: no finite estimate'))
+            return
+        self.samples += 1
+        self.last_ns = stamp_ns
+        self._silent_since_ns, self._rejection = None, ''
+        self._received.clear()
+        self._fresh.clear()
+        self._unpaired_ns = math.inf
+        self._update_doubt(estimate.doubt)
+        self._emit(stamp_ns, estimate)
+
+    def _update_doubt(self, doubt: str) -> None:
+        before, self.doubt = self.doubt, doubt
+        # Details, after the colon, may change with every sample.
+        if before is None or doubt.partition(':')[0] != before.partition(':')[0]:
+            self._emit_doubt(doubt)
+
+
+def _between(before: _Inertial, after: _Inertial, stamp_ns: int) -> _Inertial | None:
+    """Return the reading at a time between two others, or None if these are too far apart."""
+    length = after.stamp_ns - before.stamp_ns
+    if length > 2 * APART_NS:
+        return None
+    share = (stamp_ns - before.stamp_ns) / length
+    return _Inertial(
+        stamp_ns,
+        before.gyro + share * (after.gyro - before.gyro),
+        before.accelerometer + share * (after.accelerometer - before.accelerometer),
+    )
+
+
+def _checked(name: str, values: npt.ArrayLike, size: int, unit: str) -> Array:
+    """Return values as an array; raise `InvalidInput` for those that no sensor can have."""
+    given = quantity(name, values, unit, -1e6, 1e6)
+    if given.shape != (size,):
+        raise InvalidInput(
+            f'{name} of shape {given.shape} is not allowed: {size} numbers are needed'
+        )
+    return given
+
+
+def _finite(estimate: BodyEstimate) -> bool:
+    """Return whether all numbers of an estimate are finite; if one is not, the sum is not."""
+    total = estimate.covariance.sum() + estimate.position.sum() + estimate.orientation.sum()
+    for foot in estimate.feet:
+        total += foot.position.sum() + foot.force.sum() + foot.slip_velocity.sum()
+        total += foot.slip_velocity_sd
+    return math.isfinite(total + estimate.velocity.sum())
