@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimate slip, wetness, friction and friction margin of one foot from its force and motion."""
 
+from ros_pad.estimation.doubt import MOTION
 from ros_pad.estimation.doubt import OF_THE_GROUND
+from ros_pad.estimation.foot import ContactMotion
 from ros_pad.estimation.foot import Estimate
 from ros_pad.estimation.foot import FootEstimator
 from ros_pad.estimation.sensing import SENSOR_FAULTS
@@ -9,7 +11,15 @@ from ros_pad.estimation.sensing import sensor_fault
 from ros_pad.estimation.tuning import SETTINGS
 from ros_pad.estimation.tuning import Tuning
 
-DOUBTS = ('', *OF_THE_GROUND, *SENSOR_FAULTS)
+DOUBTS = ('', *OF_THE_GROUND, *SENSOR_FAULTS, MOTION)
 """Kinds of doubt, which are the texts before the colon; the first one, empty, is no doubt."""
 
-__all__ = ['DOUBTS', 'SETTINGS', 'Estimate', 'FootEstimator', 'Tuning', 'sensor_fault']
+__all__ = [
+    'DOUBTS',
+    'SETTINGS',
+    'ContactMotion',
+    'Estimate',
+    'FootEstimator',
+    'Tuning',
+    'sensor_fault',
+]

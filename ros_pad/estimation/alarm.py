@@ -68,6 +68,10 @@ class SlipAlarm:
         self._highest = 1.25 * self._threshold  # so that the alarm ends soon after the slip
         self.statistic = 0.0
 
+    def set_noise(self, noise: float) -> None:
+        """Change the standard deviation of the speed, m/s, above 0, for the next samples."""
+        self._variance = noise * noise
+
     def reset(self) -> None:
         """Discard all evidence; call it at touch-down."""
         self.statistic = 0.0
@@ -120,6 +124,11 @@ class SlipAlarms:
         """Discard all evidence; call it at touch-down."""
         for alarm in self._alarms:
             alarm.reset()
+
+    def set_noise(self, noise: float) -> None:
+        """Change the standard deviation of the speed, m/s, above 0, for the next samples."""
+        for alarm in self._alarms:
+            alarm.set_noise(noise)
 
     def update(self, speed: float, dt: float) -> bool:
         """Process a slip speed, m/s, measured dt seconds after the previous one.

@@ -27,6 +27,9 @@ the true friction of wet ground may be 1.5 times the expected one."""
 LIGHT = 0.3
 """Share of the expected load below which sensor noise hides the friction."""
 
+MOTION = 'motion unknown'
+"""Kind of doubt of a foot whose body estimate is in doubt; the doubt of the body follows."""
+
 OF_THE_GROUND = (
     'not yet', 'domed', 'half inflated', 'light', 'turning', 'not pulled', 'undecided',
 )  # fmt: skip

@@ -50,6 +50,28 @@ HINDSIGHT = DEAD + LONGEST_GAP
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
 
+BODY_CORRELATION = 0.15
+"""Time over which errors of a measured velocity of the contact are the same, s: that of the body,
+which is common to all feet, lasts for about a stance."""
+
+
+class ContactMotion(NamedTuple):
+    """Motion of the contact point of a foot, as a body estimator has it from joints and IMU.
+
+    Attributes
+    ----------
+    velocity : tuple of float
+        Velocity over the floor, x and y, m/s.
+    sd : float
+        Standard deviation of each component, m/s, from 0.
+    doubt : str
+        Why the velocity must not be used; empty if it may be.
+    """
+
+    velocity: tuple[float, float]
+    sd: float
+    doubt: str = ''
+
 
 class Estimate(NamedTuple):
     """Estimate of one foot after a sample.
@@ -109,7 +131,18 @@ _estimate: Callable[[tuple[object, ...]], Estimate] = partial(tuple.__new__, Est
 
 
 class FootEstimator:
-    """Estimate slip, wetness and friction of one foot from its force, marker and pressure.
+    """Estimate slip, wetness and friction of one foot from its force, motion and pressure.
+
+    The motion is the position of a marker, from whose change slip follows, or, with the setting
+    ``source: joints``, the velocity of the contact point with its standard deviation, beside a
+    position in odom that is used for places only. Then the deviation of each sample sets the noise
+    of the alarm and of the filter, so that both become less sensitive as the estimate of the body
+    becomes less certain; while the body is in doubt, nothing is learnt, and there is no alarm.
+
+    Markers and joints follow the link above the soft pads. The contact is ahead of it by force
+    over shear stiffness, and its velocity by the rate of that, which is added unless the setting
+    ``pads_shear`` is false. Simulated robots stand on rigid feet: their joints follow the contact
+    itself, and only their markers are displaced.
 
     The reading of the force sensor in the air is its offset, and is subtracted. No sample is used
     while sensors are faulty (see :mod:`ros_pad.estimation.sensing`): the posterior is set back to
@@ -149,8 +182,15 @@ class FootEstimator:
         self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
         self._lever = foot.turning_radius
         self._gate = LoadGate(expected_load, tuning.load_gate)
+        self._joints = tuning.source == 'joints'
+        self._softness = 1.0 / foot.shear_stiffness if tuning.pads_shear else 0.0
+        self._shear_noise = math.hypot(
+            tuning.force_noise * self._softness / tuning.smoothing, tuning.speed_noise
+        )
         self._alarm = SlipAlarms(
-            self._speed_noise, tuning.smoothing, threshold=tuning.alarm_threshold
+            self._speed_noise,
+            BODY_CORRELATION if self._joints else tuning.smoothing,
+            threshold=tuning.alarm_threshold,
         )
         self._ground = GroundFilter(
             FrictionPrior.of(foot, expected_load),
@@ -159,11 +199,12 @@ class FootEstimator:
             rim_speed=tuning.rim_speed(foot),
             model_error=tuning.ratio_noise,
         )
-        self._sensing = Sensing(
-            tuning.force_noise, tuning.position_noise, tuning.force_range or math.inf
-        )
+        # An estimated position never stops, and its noise is not that of a marker.
+        marker_noise = 0.0 if self._joints else tuning.position_noise
+        self._sensing = Sensing(tuning.force_noise, marker_noise, tuning.force_range or math.inf)
         self._offset = Offset(expected_load)
-        self._motion = Motion(tuning.smoothing)
+        self._motion = Motion(tuning.smoothing)  # of the contact; of the pads' shear with joints
+        self._place = (0.0, 0.0)  # of the contact, m
         self._window = Window()
         self._stance = Stance()
         self._path = Path()
@@ -185,6 +226,7 @@ class FootEstimator:
         pressure: float,
         moment: float | None = None,
         position_time: float | None = None,
+        motion: ContactMotion | None = None,
     ) -> Estimate:
         """Process one sample.
 
@@ -196,7 +238,7 @@ class FootEstimator:
         force : sequence of 3 floats
             Force of the ground on the foot, N; z is the normal force.
         position : sequence of 3 floats
-            Position of the foot's marker, m.
+            Position of the foot's marker, or of the foot in odom, m.
         pressure : float
             Gauge pressure in the pads, Pa.
         moment : float or None
@@ -204,6 +246,8 @@ class FootEstimator:
             friction that turning uses follows from it, and is otherwise assumed.
         position_time : float or None
             Time at which the position was measured, s; None if it is `time`.
+        motion : ContactMotion or None
+            Motion of the contact point; needed with the setting ``source: joints``, else not used.
 
         Returns
         -------
@@ -213,9 +257,16 @@ class FootEstimator:
         Raises
         ------
         InvalidInput
-            When a value is not a finite number, force or position are not three numbers, or time
-            does not advance.
+            When a value is not a finite number, force or position are not three numbers, time
+            does not advance, or the motion is missing or has a deviation below 0.
         """
+        if not self._joints:
+            motion = None
+        elif motion is None:
+            raise InvalidInput(
+                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
+                ' velocity of the contact is needed'
+            )
         age = 0.0 if position_time is None else abs(time - position_time)
         if not self._measures_moment:
             moment = None
@@ -228,6 +279,8 @@ class FootEstimator:
             raise _not_numbers(time, force, position, pressure, moment) from error
         if not finite:
             raise _not_finite(time, force, position, pressure, moment, position_time)
+        if motion:
+            self._speed_noise = math.hypot(_checked(time, motion).sd, self._shear_noise)
         dt = time - self._time
         if dt <= 0.0:
             dt = self._set_back(time)
@@ -235,7 +288,9 @@ class FootEstimator:
         gate, offset = self._gate, self._offset
         stood = gate.standing
         air = self._height + AIRBORNE
-        fault = self._sensing.update(time, force, position, age, stood, not z <= air < math.inf)
+        # With the body in doubt odom may begin anew: no leap of a foot.
+        leaps = stood and not (motion and motion.doubt)
+        fault = self._sensing.update(time, force, position, age, leaps, not z <= air < math.inf)
         if fault:
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z
@@ -254,8 +309,19 @@ class FootEstimator:
         contact_x, contact_y = x + fx / self._stiffness, y + fy / self._stiffness
         if not stood or dt > LONGEST_GAP:
             self._touch_down(time, contact_x, contact_y, z, pressure)
+            if motion:
+                self._motion.begin(fx * self._softness, fy * self._softness)
             dt = self.tuning.smoothing / 10.0 if math.isinf(dt) else dt
-        velocity = self._motion.update(contact_x, contact_y, dt)
+        if motion:
+            shear_x, shear_y = self._motion.update(fx * self._softness, fy * self._softness, dt)
+            velocity = motion.velocity[0] + shear_x, motion.velocity[1] + shear_y
+            self._place = contact_x, contact_y
+            self._alarm.set_noise(self._speed_noise)
+            if motion.doubt:
+                return self._in_doubt(time, (fx, fy, fz), motion.doubt)
+        else:
+            velocity = self._motion.update(contact_x, contact_y, dt)
+            self._place = self._motion.x, self._motion.y
         # On the ellipsoidal limit surface, friction used by turning is not available to the pull.
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
@@ -302,7 +368,7 @@ class FootEstimator:
         slip = (along * fx / pull, along * fy / pull) if along else (0.0, 0.0)
         slipping = self._alarm.update(-along, dt)
         stance, window, last = self._stance, self._window, self.estimate
-        window.add(fz, pull, turning, -along)
+        window.add(fz, pull, turning, -along, self._speed_noise)
         if fz > stance.peak_load:
             stance.peak_load = fz
         fresh = time - window.start >= self._filter_period
@@ -324,6 +390,20 @@ class FootEstimator:
             fresh, reason, True,
         ))  # fmt: skip
         return estimate
+
+    def _in_doubt(self, time: float, force: tuple[float, float, float], why: str) -> Estimate:
+        """Return the estimate of a standing foot while the motion of the body is in doubt."""
+        last = self.estimate
+        self._alarm.reset()
+        self._window.begin(time, first=True)
+        margin = self._quantile - math.hypot(force[0], force[1]) / force[2]
+        reason = f'{doubt.MOTION}: {why}'
+        fresh = not last.standing or last.doubt.partition(':')[0] != doubt.MOTION
+        self.estimate = Estimate(
+            time, True, False, (0.0, 0.0), 0.0, math.inf, last.wet_probability,
+            last.friction_mean, last.friction_sd, margin, fresh, reason, True,
+        )  # fmt: skip
+        return self.estimate
 
     def _swing(self, time: float, stood: bool) -> Estimate:
         """Return the estimate of a foot in the air."""
@@ -397,9 +477,11 @@ class FootEstimator:
         speed_noise = math.hypot(
             tuning.speed_noise, self._contact_noise * math.sqrt(spread) / duration
         )
+        if self._joints:  # the error of the body's velocity is the same in the whole window
+            speed_noise = window.noise / window.count
         self._ground.update(
             ratio, noise, window.speed / window.count, speed_noise, duration,
-            stance.weight(ratio, noise, self._motion.x, self._motion.y), turning_known,
+            stance.weight(ratio, noise, *self._place), turning_known,
             self._scales(load),
         )  # fmt: skip
 
@@ -414,6 +496,17 @@ class FootEstimator:
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
         return dry / prior.flat_dry, wet / prior.flat_wet
+
+
+def _checked(time: float, motion: ContactMotion) -> ContactMotion:
+    """Return a motion of the contact; raise `InvalidInput` if it is not made of numbers."""
+    (x, y), sd, _ = motion
+    if not math.isfinite(x + y + sd) or sd < 0.0:
+        raise InvalidInput(
+            f'sample at {time!r} s: velocity = ({x!r}, {y!r}) m/s with a deviation of {sd!r} m/s'
+            ' is not allowed: finite numbers are needed, and a deviation from 0'
+        )
+    return motion
 
 
 def _not_numbers(

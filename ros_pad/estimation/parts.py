@@ -99,7 +99,7 @@ class Motion:
 class Window:
     """Sums of the samples since the last update of the filter."""
 
-    __slots__ = ('count', 'first', 'load', 'pull', 'speed', 'start', 'turning')
+    __slots__ = ('count', 'first', 'load', 'noise', 'pull', 'speed', 'start', 'turning')
 
     def __init__(self) -> None:
         self.start = 0.0
@@ -109,20 +109,26 @@ class Window:
     def clear(self) -> None:
         """Discard all samples."""
         self.count = 0
-        self.load = self.pull = self.speed = self.turning = 0.0
+        self.load = self.pull = self.speed = self.turning = self.noise = 0.0
 
     def begin(self, time: float, first: bool) -> None:
         """Begin a window at a time, s; ``first`` says whether it is the first of its stance."""
         self.start, self.first = time, first
         self.clear()
 
-    def add(self, load: float, pull: float, turning: float, speed: float) -> None:
-        """Add normal force, tangential force, friction used by turning, N, and slip speed, m/s."""
+    def add(
+        self, load: float, pull: float, turning: float, speed: float, noise: float = 0.0
+    ) -> None:
+        """Add normal force, tangential force, friction used by turning, N, and slip speed, m/s.
+
+        ``noise`` is the standard deviation of a measured slip speed, m/s.
+        """
         self.count += 1
         self.load += load
         self.pull += pull
         self.turning += turning
         self.speed += speed
+        self.noise += noise
 
 
 class Stance:

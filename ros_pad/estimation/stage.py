@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation.foot import ContactMotion
 from ros_pad.estimation.foot import Estimate
 from ros_pad.estimation.foot import FootEstimator
 from ros_pad.pace import CONTROL_PERIOD_NS
@@ -59,7 +60,9 @@ class EstimationStage:
     """Pair the wrenches of a foot with its positions, and emit the estimates.
 
     A wrench is paired with the position of the same time stamp, whichever arrives first. If the
-    next wrench arrives before such a position, the last position is used instead.
+    next wrench arrives before such a position, the last position is used instead. With the setting
+    ``source: joints`` wrench, position and velocity of the contact come from one body estimator:
+    all three must have the same time stamp, and a sample that lacks one is left out.
 
     Parameters
     ----------
@@ -100,6 +103,9 @@ class EstimationStage:
         self.estimator = estimator
         self._pace = Pace(period_ns)
         self._moments = estimator.tuning.moment_noise > 0.0
+        self._joints = estimator.tuning.source == 'joints'
+        self._motion: tuple[int, ContactMotion] | None = None
+        self._body_doubt = ''
         self._emit, self._emit_doubt, self._reject = emit, emit_doubt, reject
         self._pressure = 0.0
         self._wrench: tuple[int, Vector, float | None] | None = None
@@ -121,13 +127,12 @@ class EstimationStage:
 
     def wrench(self, stamp_ns: int, force: Vector, moment: float | None) -> None:
         """Process a wrench: time stamp, ns, force, N, and torque z, N m, None if not measured."""
-        if self._wrench is not None and self._position is not None:
+        if self._wrench is not None and self._position is not None and not self._joints:
             # No position came for the last wrench: the marker is hidden or sampled more slowly.
             self._update(self._wrench, self._position)
         self._hold(force[2])
         self._wrench = stamp_ns, force, moment if self._moments else None
-        if self._position is not None and self._position[0] == stamp_ns:
-            self._update(self._wrench, self._position)
+        self._match(stamp_ns)
 
     def position(self, stamp_ns: int, point: Vector) -> None:
         """Process a position of the marker: its time stamp, ns, and coordinates, m."""
@@ -136,12 +141,51 @@ class EstimationStage:
         if math.isfinite(point[0] + point[1] + point[2]):
             self._position = stamp_ns, point
         wrench, position = self._wrench, self._position
-        if wrench is not None and position is not None and wrench[0] == stamp_ns:
+        if self._joints:
+            self._match(stamp_ns)
+        elif wrench is not None and position is not None and wrench[0] == stamp_ns:
+            self._update(wrench, position)
+
+    def body_doubt(self, doubt: str) -> None:
+        """Store why the body estimator is in doubt; empty if it is not."""
+        self._body_doubt = doubt
+
+    def contact_velocity(
+        self, stamp_ns: int, x: float, y: float, variance_x: float, variance_y: float
+    ) -> None:
+        """Process a velocity of the contact point; used with the setting ``source: joints`` only.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Time stamp, ns.
+        x, y : float
+            Velocity over the floor, m/s.
+        variance_x, variance_y : float
+            Variances of the components, m²/s², of which the larger one counts; one below 0 means
+            that the velocity must not be used.
+        """
+        doubt, variance = '', max(variance_x, variance_y)
+        if variance_x < 0.0 or variance_y < 0.0:
+            doubt, x, y, variance = self._body_doubt or 'no reason was received', 0.0, 0.0, 0.0
+        self._motion = stamp_ns, ContactMotion((x, y), math.sqrt(variance), doubt)
+        self._match(stamp_ns)
+
+    def _match(self, stamp_ns: int) -> None:
+        """Use the sample of a time stamp, ns, if all of it is there."""
+        wrench, position, motion = self._wrench, self._position, self._motion
+        if wrench is None or position is None or not wrench[0] == position[0] == stamp_ns:
+            return
+        if not self._joints or (motion and motion[0] == stamp_ns):
             self._update(wrench, position)
 
     def sample(self, stamp_ns: int, force: Vector, moment: float | None, point: Vector) -> None:
         """Process a wrench and a position of the same time stamp, see :meth:`wrench`."""
-        if self._wrench is None and math.isfinite(point[0] + point[1] + point[2]):
+        if (
+            self._wrench is None
+            and not self._joints
+            and math.isfinite(point[0] + point[1] + point[2])
+        ):
             self._hold(force[2])
             self._place = point[0], point[1]
             self._position = position = stamp_ns, point
@@ -175,6 +219,7 @@ class EstimationStage:
                 self._pressure,
                 moment,
                 self._used_ns * 1e-9,
+                *([self._motion[1]] if self._joints and self._motion else []),
             )
         except InvalidInput as error:
             self.reject(error)
@@ -216,6 +261,8 @@ class EstimationStage:
             return f'sample refused: {self._rejection}'
         if self._position is None and self._wrench is not None:
             return f'no position: for {silence:.1f} s'
+        if self._joints and self._wrench is not None:
+            return f'no contact velocity: for {silence:.1f} s'
         return f'no wrench: for {silence:.1f} s'
 
 

@@ -15,6 +15,9 @@ EXPECTED_LOAD = Setting(
     'N', 0.01, 1000.0,
 )  # fmt: skip
 
+SOURCES = ('markers', 'joints')
+"""Where slip comes from."""
+
 SETTINGS = (
     Setting(
         'position_noise', 1.5e-4,
@@ -68,6 +71,17 @@ SETTINGS = (
         ' alarms.',
         'nats', 0.1, 100.0,
     ),
+    Setting(
+        'source', 'markers',
+        'Where slip comes from: positions of markers, or velocities of contact points with their'
+        ' variances, which a body estimator has from joints and IMU.',
+        choices=SOURCES,
+    ),
+    Setting(
+        'pads_shear', True,
+        'With source joints: whether pads that shear move the link above them, as on a robot; the'
+        ' joints of simulated robots are those of rigid feet.',
+    ),
 )  # fmt: skip
 """Settings of an estimator; an attribute of :class:`Tuning` has ``_`` in place of a dot."""
 
@@ -104,6 +118,8 @@ class Tuning:
     speed_noise: float = _DEFAULTS['speed_noise']
     turning_rate: float = _DEFAULTS['turning_rate']
     alarm_threshold: float = _DEFAULTS['alarm.threshold']
+    source: str = _DEFAULTS['source']
+    pads_shear: bool = _DEFAULTS['pads_shear']
 
     def __post_init__(self) -> None:
         for setting in SETTINGS:

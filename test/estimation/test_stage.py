@@ -85,6 +85,16 @@ def test_without_a_position_of_its_own_the_last_one_counts():
     assert watched.samples[1][5] == 0.004
 
 
+def test_a_hidden_marker_takes_the_last_position_at_once():
+    watched = Watched()
+    watched.sample(4)
+    watched.wrench(8)
+    watched.position(8, x=math.nan)
+    assert [(each[0], each[2][0], each[5]) for each in watched.samples] == [
+        (0.004, 0.0, 0.004), (0.008, 0.0, 0.004),
+    ]  # fmt: skip
+
+
 def test_pressures_that_are_no_number_leave_the_last_one():
     watched = Watched()
     for ms, gauge in ((4, 60e3), (8, math.nan), (12, 70e3)):

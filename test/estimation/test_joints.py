@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A foot whose slip comes from joints: a velocity of the contact with its deviation."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import ContactMotion
+from ros_pad.estimation import FootEstimator
+from ros_pad.estimation import Tuning
+from ros_pad.estimation import sensor_fault
+from ros_pad.estimation.stage import EstimationStage
+
+FOOT = Foot.load('large37')
+LOAD = 6.8  # N
+PERIOD = 0.004  # s
+MS = 1_000_000
+JOINTS = Tuning(source='joints', pads_shear=False)
+
+
+class Stance:
+    """A foot that is pulled along x, with the velocity that joints would show."""
+
+    def __init__(self, sd, tuning=JOINTS, foot=FOOT, seed=0):
+        self.estimator = FootEstimator(foot, LOAD, tuning)
+        self.sd, self.time = sd, 0.0
+        self._random = np.random.default_rng(seed)
+        self.estimates = []
+
+    def sample(self, ratio, velocity=0.0, doubt='', load=LOAD, place=0.0):
+        self.time += PERIOD
+        force = np.array((-ratio * load, 0.0, load)) + 0.03 * self._random.standard_normal(3)
+        motion = ContactMotion((velocity, 0.0), self.sd, doubt)
+        estimate = self.estimator.update(
+            self.time, force.tolist(), (place, 0.0, 0.0), 0.0, motion=motion
+        )
+        self.estimates.append(estimate)
+        return estimate
+
+    def slide(self, speed, samples, ratio=0.12):
+        """Slide for some samples; return after how many the alarm rises, or None."""
+        for count in range(1, samples + 1):
+            if self.sample(ratio, speed).slipping:
+                return count
+        return None
+
+
+def test_the_alarm_waits_longer_where_the_velocity_is_less_certain():
+    # A CUSUM test for v1 gains v1/s² (v - v1/2) a sample, s² = sd² times correlation time over
+    # period (0.15 s, 4 ms); the test for 30 mm/s reaches 4 nats first.
+    for sd in (0.005, 0.01, 0.02):
+        gain = 0.03 / ((sd**2 + 0.002**2) * 0.15 / 0.004) * (0.06 - 0.015)
+        count = Stance(sd).slide(0.06, 300)
+        assert count == pytest.approx(4.0 / gain, abs=1.5)
+
+
+def test_the_stated_deviation_is_that_of_the_velocity():
+    for sd in (0.004, 0.03):
+        estimate = Stance(sd).sample(0.3, 0.01)
+        assert estimate.slip_speed_sd == pytest.approx(math.hypot(sd, 0.002), rel=1e-12)
+        assert estimate.slip_speed == pytest.approx(0.01, abs=1e-4)
+
+
+def test_an_uncertain_velocity_teaches_less():
+    def wetness(sd):
+        stance = Stance(sd)
+        for _ in range(100):
+            stance.sample(0.12, 0.05)
+        return stance.estimates[-1].wet_probability
+
+    # A foot that slips at T/N = 0.12 is on wet ground: μ is 0.80 dry and 0.12 wet.
+    assert wetness(0.005) > 0.95
+    assert 0.5 < wetness(0.05) < wetness(0.005)
+
+
+def test_places_do_not_count_as_slip():
+    """Odom is corrected by millimetres: that must look like nothing."""
+    stance = Stance(0.008)
+    for step in range(200):
+        estimate = stance.sample(0.3, place=0.004 * (step % 2))
+        assert not estimate.slipping
+    assert estimate.slip_speed == 0.0
+
+
+def test_a_body_in_doubt_stops_alarm_and_learning():
+    stance = Stance(0.005)
+    for _ in range(100):
+        stance.sample(0.3)
+    before = stance.estimates[-1]
+    assert before.wet_probability < 0.5  # it sticks at more than wet ground holds
+    for _ in range(100):
+        estimate = stance.sample(0.12, 0.2, 'slipping: all feet that stand may slip')
+        assert estimate.doubt == 'motion unknown: slipping: all feet that stand may slip'
+        assert not estimate.slipping
+        assert estimate.standing
+        assert estimate.sound
+        assert estimate.slip_speed_sd == math.inf
+        assert estimate.wet_probability == before.wet_probability
+    assert 'motion unknown' in DOUBTS
+    assert not sensor_fault(estimate.doubt)  # force and pads are fine
+    for _ in range(12):  # the window after the doubt has no sample of the doubt
+        estimate = stance.sample(0.3)
+    assert not estimate.slipping
+    assert estimate.doubt.partition(':')[0] != 'motion unknown'
+    assert estimate.wet_probability <= before.wet_probability
+
+
+def test_a_leap_of_odom_in_doubt_is_no_fault_of_the_foot():
+    stance = Stance(0.005)
+    for _ in range(50):
+        stance.sample(0.3)
+    estimate = stance.sample(0.3, doubt='clock: time went back, odom begins anew', place=3.0)
+    assert estimate.sound
+    assert stance.sample(0.3, place=3.0).sound
+
+
+@pytest.mark.parametrize(('shears', 'slips'), [(True, False), (False, True)])
+def test_the_link_above_soft_pads_moves_while_the_contact_sticks(shears, slips):
+    soft = dataclasses.replace(FOOT, shear_stiffness=300.0)
+    stance = Stance(0.003, Tuning(source='joints', pads_shear=shears), soft)
+    alarms = 0
+    for step in range(1, 1250):
+        angle = math.pi * step / 125
+        ratio = 0.5 * math.sin(angle) ** 2
+        # The pull is -ratio times load: the link is ahead of the contact by ratio load / k.
+        rate = 0.5 * math.sin(2.0 * angle) * math.pi / 125 / PERIOD * LOAD / 300.0
+        alarms += stance.sample(ratio, rate).slipping
+    assert (alarms > 0) == slips
+
+
+@pytest.mark.parametrize(
+    ('motion', 'named'),
+    [
+        (None, 'motion = None'),
+        (ContactMotion((math.nan, 0.0), 0.01), 'velocity = \\(nan, 0.0\\) m/s'),
+        (ContactMotion((0.0, 0.0), math.inf), 'deviation of inf m/s'),
+        (ContactMotion((0.0, 0.0), -0.01), 'deviation of -0.01 m/s'),
+    ],
+)
+def test_a_bad_motion_is_refused(motion, named):
+    estimator = FootEstimator(FOOT, LOAD, JOINTS)
+    with pytest.raises(InvalidInput, match=named):
+        estimator.update(0.004, (0.0, 0.0, LOAD), (0.0, 0.0, 0.0), 0.0, motion=motion)
+    assert estimator.estimate.time == -math.inf  # as before
+
+
+def test_the_source_is_one_of_two():
+    with pytest.raises(InvalidInput, match=r'source = .camera.*markers, joints'):
+        Tuning(source='camera')
+
+
+class Watched:
+    """A stage whose samples are recorded."""
+
+    def __init__(self, tuning=JOINTS):
+        self.samples, self.rejected, self.doubts = [], [], []
+        estimator = FootEstimator(FOOT, LOAD, tuning)
+        update = estimator.update
+        estimator.update = lambda *sample: self.samples.append(sample) or update(*sample)
+        self.stage = EstimationStage(
+            estimator, 20 * MS, lambda _: None, self.doubts.append, self.rejected.append
+        )
+
+    def send(self, ms, *kinds):
+        for kind in kinds:
+            if kind == 'wrench':
+                self.stage.wrench(ms * MS, (0.5, 0.0, 6.0), None)
+            elif kind == 'position':
+                self.stage.position(ms * MS, (0.001 * ms, 0.0, 0.0))
+            else:
+                self.stage.contact_velocity(ms * MS, 0.001 * ms, 0.0, 1e-4, 9e-5)
+
+
+@pytest.mark.parametrize(
+    'order',
+    [('wrench', 'position', 'velocity'), ('velocity', 'wrench', 'position'),
+     ('position', 'velocity', 'wrench')],
+)  # fmt: skip
+def test_a_sample_needs_all_three_of_one_stamp(order):
+    watched = Watched()
+    watched.send(4, *order)
+    watched.send(8, *order[:2])
+    watched.send(12, *order)
+    assert [each[0] for each in watched.samples] == [0.004, 0.012]
+    assert [each[6].velocity[0] for each in watched.samples] == [0.004, 0.012]
+    assert {each[6].sd for each in watched.samples} == {0.01}
+    assert not watched.rejected
+
+
+def test_with_markers_a_velocity_is_not_used():
+    watched = Watched(Tuning())
+    watched.send(4, 'velocity', 'wrench', 'position')
+    assert [len(each) for each in watched.samples] == [6]
+
+
+def test_a_negative_variance_is_a_doubt_with_the_reason_of_the_body():
+    watched = Watched()
+    watched.stage.body_doubt('gap: no readings for 0.3 s')
+    watched.send(4, 'wrench', 'position')
+    watched.stage.contact_velocity(4 * MS, math.nan, 0.0, -1.0, -1.0)
+    assert watched.samples[0][6] == ContactMotion((0.0, 0.0), 0.0, 'gap: no readings for 0.3 s')
+    assert watched.doubts == ['motion unknown: gap: no readings for 0.3 s']
+    watched.stage.body_doubt('')
+    watched.send(8, 'wrench', 'position')
+    watched.stage.contact_velocity(8 * MS, 0.0, 0.0, 1e-4, -1.0)
+    assert watched.stage.doubt == 'motion unknown: no reason was received'
+
+
+def test_a_variance_that_is_no_number_is_refused():
+    watched = Watched()
+    watched.send(4, 'wrench', 'position')
+    watched.stage.contact_velocity(4 * MS, 0.0, 0.0, math.nan, 1e-4)
+    assert len(watched.rejected) == 1
+
+
+def test_a_missing_velocity_becomes_a_fault():
+    watched = Watched()
+    for ms in range(4, 600, 4):
+        watched.send(ms, 'wrench', 'position')
+        watched.stage.tick(ms * MS)
+    assert watched.stage.doubt.startswith('no contact velocity: for 0.')
+    assert sensor_fault(watched.stage.doubt) == 'no contact velocity'
+    assert not watched.stage.sound
