@@ -15,6 +15,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from ros_pad.configuration import shared_folder
+from ros_pad.simulation.scene import Scene
 
 ARGUMENTS = {
     'namespace': ('', 'Namespace of every node and topic, such as robot_1; empty: none. [text]'),
@@ -26,8 +27,14 @@ ARGUMENTS = {
     'simulate': ('true', 'Start a simulator; false for a real robot. [true, false]'),
     'scene': (
         '',
-        'Scene of the simulator, whose hose and faults simulated regulators have too; empty: the'
-        ' scenes in params_file. [name or path]',
+        'Scene of the simulator, whose hose and faults simulated regulators have too; its legs,'
+        ' foot and load are those of the other nodes; empty: the scenes in params_file.'
+        ' [name or path]',
+    ),
+    'sensing': (
+        'markers',
+        'What slip is estimated from: markers, or joints, IMU and forces in the axes of the feet,'
+        ' for which a body estimator is started. [markers, joints]',
     ),
     'record': ('true', 'Record every topic into a bag. [true, false]'),
     'folder': (
@@ -71,7 +78,10 @@ def nodes(context: LaunchContext) -> list[Node]:
             parameters=[
                 text('params_file') or str(shared_folder() / 'params.yaml'),
                 {
-                    name: ParameterValue(value, value_type=type(value))  # '1' stays text
+                    # '1' stays text
+                    name: value
+                    if isinstance(value, list)
+                    else ParameterValue(value, value_type=type(value))
                     for name, value in parameters.items()
                     if value != ''
                 },
@@ -80,14 +90,29 @@ def nodes(context: LaunchContext) -> list[Node]:
         )
 
     use_sim_time, simulate = flag('use_sim_time'), flag('simulate')
-    scene = text('scene')
+    scene, sensing = text('scene'), text('sensing')
+    joints = sensing == 'joints'
+    # The parameters of the file stay in force where sensing is markers, the default.
+    estimator = {'source': sensing} if joints else {}
+    simulator = {'sensing': sensing} if joints else {}
+    if joints and simulate:
+        estimator['pads_shear'] = False  # joints of simulated robots are those of rigid feet
+    # The other nodes take the robot of a scene that is named here.
+    walked = Scene.load(scene) if simulate and scene else None
+    legs = {'legs': list(walked.legs)} if walked else {}
+    foot = {'foot': walked.foot.source, 'expected_load': walked.expected_load} if walked else {}
+    robot = {'robot': walked.body.robot.source, 'foot_radius': 0.0} if walked and joints else {}
     # The recorder first and the simulator last: a walk is recorded from its first step on.
     chosen = []
     if flag('record'):
-        chosen.append(node('recorder_node', use_sim_time=use_sim_time, folder=text('folder')))
-    chosen.append(node('regulator_node', use_sim_time=use_sim_time, scene=scene))
-    chosen.append(node('estimator_node', use_sim_time=use_sim_time))
-    chosen.append(node('controller_node', use_sim_time=use_sim_time))
+        folder = text('folder')
+        chosen.append(node('recorder_node', use_sim_time=use_sim_time, folder=folder, **legs))
+    chosen.append(node('regulator_node', use_sim_time=use_sim_time, scene=scene, **legs))
+    if joints:
+        chosen.append(node('body_estimator_node', use_sim_time=use_sim_time, **legs, **robot))
+    shared = {'use_sim_time': use_sim_time, **legs, **foot}
+    chosen.append(node('estimator_node', **shared, **estimator))
+    chosen.append(node('controller_node', **shared))
     if simulate:
-        chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=scene))
+        chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=scene, **simulator))
     return chosen

@@ -81,9 +81,9 @@ class MessageType:
         """Return the fields of this type or of one inside it: pairs of name and description."""
         return self._store.fielddefs[name][1]
 
-    def blank(self) -> Any:
-        """Return a message of zeros, empty texts and empty lists."""
-        return self._blank(self.name)
+    def blank(self, name: str = '') -> Any:
+        """Return a message, or one of a type inside it, of zeros, empty texts and empty lists."""
+        return self._blank(name or self.name)
 
     def _blank(self, name: str) -> Any:
         _, fields = self._store.fielddefs[name]

@@ -66,10 +66,10 @@ class FieldReader:
     def __init__(self, message_type: MessageType, paths: Sequence[str]) -> None:
         self.paths = tuple(paths)
         self._fields = list(_fields(message_type, message_type.blank()))
-        self._wanted = _chosen(self._fields, paths)
         texts = [place for place, (_, form) in enumerate(self._fields) if form.endswith('s')]
         if len(texts) > 1 or any(path.endswith(_COUNT) for path, _ in self._fields):
             raise UnknownEncoding(f'{message_type.name} has a list, or more than one text')
+        self._wanted = _chosen(self._fields, paths)
         self._text = texts[0] if texts else None
         self._size_at = _places(self._fields)[self._text - 1] if self._text is not None else 0
         self._text_at = self._wanted.index(self._text) if self._text in self._wanted else None

@@ -87,6 +87,44 @@ BODY_POSE = Topic(
         *(f'pose.orientation.{name}' for name in 'xyzw'),
     ),
 )
+ODOM = Topic(
+    'odom',
+    'nav_msgs/msg/Odometry',
+    'm, m/s',
+    'odom',
+    (
+        *(f'pose.pose.position.{axis}' for axis in 'xyz'),
+        *(f'pose.pose.orientation.{name}' for name in 'xyzw'),
+    ),
+)
+BODY_DOUBT = Topic('body/doubt', 'std_msgs/msg/String', values=('data',), text=True)
+IMU = Topic(
+    'imu/data',
+    'sensor_msgs/msg/Imu',
+    'rad/s, m/s²',
+    'imu_link',
+    (
+        *(f'angular_velocity.{axis}' for axis in 'xyz'),
+        *(f'linear_acceleration.{axis}' for axis in 'xyz'),
+    ),
+)
+FOOT_WRENCH = Topic(
+    'leg_{leg}/foot_wrench',
+    'geometry_msgs/msg/WrenchStamped',
+    'N',
+    'leg_{leg}_foot',
+    ('wrench.force.x', 'wrench.force.y', 'wrench.force.z'),
+)
+CONTACT_VELOCITY = Topic(
+    'leg_{leg}/contact_velocity',
+    'geometry_msgs/msg/TwistWithCovarianceStamped',
+    'm/s',
+    'odom',
+    (
+        *('twist.twist.linear.x', 'twist.twist.linear.y'),
+        *('twist.covariance[0]', 'twist.covariance[7]'),
+    ),
+)
 SLIP = Topic(
     'leg_{leg}/slip',
     'geometry_msgs/msg/TwistWithCovarianceStamped',
@@ -122,8 +160,12 @@ TRIAL = {
     for topic in (
         *(WRENCH, POSITION, BODY_POSE, PRESSURE, PRESSURE_SETPOINT, SLIP, SLIPPING),
         *(WETNESS, FRICTION, FRICTION_MARGIN, DOUBT, MORPHOLOGY),
+        *(ODOM, BODY_DOUBT, CONTACT_VELOCITY),
     )
 }
 """The topics that a trial is read from, by kind."""
 
-__all__ = ['TRIAL', 'Topic']
+OF_BODY = tuple(topic.kind for topic in (BODY_POSE, ODOM, BODY_DOUBT))
+"""Kinds of these topics that a robot has only once."""
+
+__all__ = ['OF_BODY', 'TRIAL', 'Topic']

@@ -32,6 +32,7 @@ from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation.tuning import attribute
+from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.messages import Hooks
@@ -47,11 +48,13 @@ from ros_pad.pace import Pace
 from ros_pad.pace import Progress
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.label import label
 from ros_pad.trials.metrics import summarise
+from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.trial import Trial
 
@@ -62,7 +65,7 @@ _VENTING = 5.0  # longest simulated time for the pads to vent, s
 
 
 class ComposedTrial:
-    """Run the five nodes of one trial in lock-step.
+    """Run the nodes of one trial in lock-step: five, and a body estimator without markers.
 
     Parameters
     ----------
@@ -78,6 +81,8 @@ class ComposedTrial:
         Initialised context of the nodes.
     fidelity : str
         ``auto`` or a fidelity level.
+    sensing : str
+        ``markers`` or ``joints``.
 
     Attributes
     ----------
@@ -87,8 +92,8 @@ class ComposedTrial:
         Set it to True to end the walk early.
     executor : EventsExecutor
         Runs the nodes.
-    recorder, regulator, estimator, controller, simulator : rclpy.node.Node
-        The nodes.
+    recorder, regulator, body_estimator, estimator, controller, simulator : rclpy.node.Node
+        The nodes; the body estimator is None with markers.
     walked : MorphologyController
         Copy of the controller at the end of the walk; not set before.
 
@@ -106,6 +111,7 @@ class ComposedTrial:
         bag: str | os.PathLike[str],
         context: rclpy.Context,
         fidelity: str = 'auto',
+        sensing: str = 'markers',
     ) -> None:
         self.scene = scene
         self.stopped = False
@@ -115,7 +121,7 @@ class ComposedTrial:
         self._nodes: list[Node] = []
         self._pace = Pace(CONTROL_PERIOD_NS)
         try:
-            self._add_nodes(policy, seed, bag, fidelity)
+            self._add_nodes(policy, seed, bag, fidelity, sensing)
             parameters = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
             self.recorder.describe({PARAMETERS: json.dumps(parameters)})
             # The executor adds nodes only while it spins; messages that were published before
@@ -145,17 +151,19 @@ class ComposedTrial:
         seed: int,
         bag: str | os.PathLike[str],
         fidelity: str,
+        sensing: str,
     ) -> None:
-        """Make the five nodes: the recorder first; last the simulator, which starts the trial."""
+        """Make the nodes: the recorder first; last the simulator, which starts the trial."""
         scene = self.scene
         legs, foot = list(scene.legs), scene.foot.source
         shared = {'use_sim_time': True, 'legs': legs, 'foot': foot}
         loaded = shared | {'expected_load': scene.expected_load}
         ground = {'scene': scene.source, 'seed': seed}
-        tuning = tuning_for(scene)
+        tuning = tuning_for(scene, sensing)
 
+        about = label(scene, policy, seed, fidelity, sensing=sensing)
         self.recorder = self._add(
-            partial(RecorderNode, label(scene, policy, seed, fidelity), False),
+            partial(RecorderNode, about, False),
             use_sim_time=True,
             legs=legs,
             folder=os.fspath(bag),
@@ -172,6 +180,17 @@ class ComposedTrial:
             **shared,
             **options,
         )
+        self.body_estimator = None
+        if sensing == 'joints':
+            assert isinstance(scene.body, LeggedBody)
+            self.body_estimator = self._add(
+                BodyEstimatorNode,
+                use_sim_time=True,
+                legs=legs,
+                robot=scene.body.robot.source,
+                foot_radius=0.0,  # a sole on an ankle
+                **body_settings_for(scene),
+            )
         self.estimator = self._add(
             EstimatorNode,
             **{each.name: getattr(tuning, attribute(each)) for each in SETTINGS},
@@ -188,6 +207,7 @@ class ComposedTrial:
             SimulatorNode,
             foot=foot,
             fidelity=fidelity,
+            sensing=sensing,
             publish_clock=True,
             free_running=False,
             **ground,
@@ -224,20 +244,24 @@ class ComposedTrial:
         PadError
             When that takes more than ``PATIENCE``.
         """
-        answered = self.regulator.answered
+        answered, emissions = self.regulator.answered, self.estimator.emissions
         self.simulator.step()
         now_ns = self.simulator.time_ns
         legs = len(self.scene.legs)
         samples = now_ns // self.simulator.period_ns * legs
         control = self._pace.due(now_ns)
-        estimator = self.estimator
+        estimator, body = self.estimator, self.body_estimator
 
         def settled() -> bool:
             # The cheapest condition comes first, because it is evaluated after every message.
-            if estimator.samples < samples:
-                return False
-            return not control or (
-                self.regulator.answered == answered + legs and self._reported(now_ns)
+            if body is None:
+                if estimator.samples < samples:
+                    return False
+            elif body.forces < samples or estimator.samples < body.stage.samples * legs:
+                return False  # where IMU or joints are silent, there are no samples
+            due = estimator.emissions - emissions
+            return self.regulator.answered == answered + due and (
+                not control or self._reported(now_ns)
             )
 
         self._spin(settled, f'all nodes to process the sample of {now_ns * 1e-9:.3f} s')
@@ -342,10 +366,11 @@ def _walked(
     context: rclpy.Context,
     level: str,
     progress: Progress | None,
+    sensing: str,
 ) -> tuple[ComposedTrial, float]:
     """Walk a scene and close its nodes; return them, and the wall time of the walk, s."""
     with STOP.during():  # no signal leaves half a trial
-        trial = ComposedTrial(scene, policy, seed, bag, context, level)
+        trial = ComposedTrial(scene, policy, seed, bag, context, level, sensing)
         started = time.perf_counter()
         with _interruptible(trial):
             try:
@@ -355,7 +380,7 @@ def _walked(
                     trial.close()
                 raise
             wall = time.perf_counter() - started
-            about = label(scene, policy, seed, level, interrupted=trial.stopped)
+            about = label(scene, policy, seed, level, interrupted=trial.stopped, sensing=sensing)
             trial.recorder.describe(about)
             trial.close()
     return trial, wall
@@ -369,12 +394,13 @@ def run(
     *,
     bag: str | os.PathLike[str],
     progress: Progress | None = None,
+    sensing: str = 'markers',
 ) -> Trial:
     """Run a trial on ROS 2 nodes and record it.
 
     Parameters
     ----------
-    scene, policy, seed, fidelity, progress
+    scene, policy, seed, fidelity, progress, sensing
         As for :func:`ros_pad.trials.run`.
     bag : path
         Folder of the bag; must not exist.
@@ -396,7 +422,7 @@ def run(
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = policy or scene.policy
-    level = levels.level(scene, fidelity, policy)
+    level = levels.level(scene, fidelity, policy, sensing == 'joints')
     context = rclpy.Context()
     # rclpy's own signal handlers would stop the nodes before the pads are vented.
     try:
@@ -404,7 +430,7 @@ def run(
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}') from error
     try:
-        trial, wall = _walked(scene, policy, seed, bag, context, level, progress)
+        trial, wall = _walked(scene, policy, seed, bag, context, level, progress, sensing)
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
@@ -412,7 +438,7 @@ def run(
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
-    describe = partial(label, scene, policy, seed, level, interrupted=stopped)
+    describe = partial(label, scene, policy, seed, level, interrupted=stopped, sensing=sensing)
     result = recorded.load(bag)
     result.floor = floor
     result.metrics = summarise(scene, result, robot, controller)

@@ -41,9 +41,9 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
+from ros_pad.nodes.refusals import rate_status
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
-from ros_pad.pace import LATE
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 
@@ -102,6 +102,9 @@ class _LegTopics:
             (topics.POSITION, self._on_position, (*STAMP, *_POINT)),
         ):
             node.messages.receive(topic, callback, (FRAME, *paths), leg)
+        if estimator.tuning.source == 'joints':
+            velocity = (FRAME, *STAMP, *topics.CONTACT_VELOCITY.schema.values)
+            node.messages.receive(topics.CONTACT_VELOCITY, self._on_velocity, velocity, leg)
 
     def _is_ours(self, frame: str) -> bool:
         """Return whether a frame is allowed for this leg; otherwise reject the sample."""
@@ -127,6 +130,12 @@ class _LegTopics:
     ) -> None:
         if self._is_ours(frame):
             self.stage.position(sec * 1_000_000_000 + nanosec, (x, y, z))
+
+    def _on_velocity(
+        self, frame: str, sec: int, nanosec: int, x: float, y: float, *variances: float
+    ) -> None:
+        if self._is_ours(frame):
+            self.stage.contact_velocity(sec * 1_000_000_000 + nanosec, x, y, *variances)
 
     def _warn(self, error: InvalidInput) -> None:
         self._node.get_logger().warning(
@@ -154,6 +163,7 @@ class _LegTopics:
         )
 
     def _publish(self, emission: Emission) -> None:
+        self._node.emissions += 1
         estimate, stamp = emission.estimate, split(emission.stamp_ns)
         variance = estimate.slip_speed_sd**2
         values = (
@@ -173,6 +183,8 @@ class EstimatorNode(Node):
     ----------
     legs : dict
         For each leg, its topics and its estimation stage.
+    emissions : int
+        Number of estimates published so far, of all legs.
     messages : Messages
         Publishers and subscriptions.
     """
@@ -184,6 +196,7 @@ class EstimatorNode(Node):
         values = declare(self, PARAMETERS)
         foot: Foot = values['foot']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
+        self.emissions = 0
         self.messages = Messages(self)
         self.legs = {
             leg: _LegTopics(
@@ -195,6 +208,8 @@ class EstimatorNode(Node):
             )
             for leg in values['legs']
         }
+        if tuning.source == 'joints':
+            self.messages.receive(topics.BODY_DOUBT, self._on_body_doubt, ('data',))
         self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported = [True] * len(self.legs)
@@ -204,6 +219,10 @@ class EstimatorNode(Node):
         if not self._simulated:
             self._hold(round(1e9 / values['publish_rate']))
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+
+    def _on_body_doubt(self, doubt: str) -> None:
+        for leg in self.legs.values():
+            leg.stage.body_doubt(doubt)
 
     def _hold(self, period_ns: int) -> None:
         """Process the samples of a period together, when the estimate of the period is due.
@@ -246,17 +265,7 @@ class EstimatorNode(Node):
         rate = (self.samples - self._counted) / elapsed / len(self.legs)
         self._since_ns, self._counted = now_ns, self.samples
         age = (now_ns - max(leg.stage.last_ns for leg in self.legs.values())) * 1e-9
-        late = rate > 0.0 and not -OLDEST < age < OLDEST
-        text = f'samples are {age:.3g} s old' if late else f'{rate:.0f} samples a second'
-        return DiagnosticStatus(
-            name=f'{self.get_name()}: rate',
-            level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
-            message=f'{LATE}, or clocks differ: {text}' if late else text,
-            values=[
-                KeyValue(key='samples a second of a foot (Hz)', value=f'{rate:.1f}'),
-                KeyValue(key='age of the last sample (s)', value=f'{age:.3f}'),
-            ],
-        )
+        return rate_status(self.get_name(), ' of a foot', rate, age, OLDEST)
 
     @property
     def samples(self) -> int:

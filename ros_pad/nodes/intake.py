@@ -13,6 +13,7 @@ import operator
 import time
 from collections import Counter
 from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -29,7 +30,7 @@ class _Source:
 
     subscription: Subscription
     last: int | None = None
-    batches: str = ''  # topic on which the same messages come in batches
+    batches: Sequence[str] = ()  # topics on which the same messages come in batches
 
 
 class Intake:
@@ -61,7 +62,7 @@ class Intake:
         name: str,
         message: type,
         profile: Callable[[list[QoSProfile]], QoSProfile],
-        batches: str = '',
+        batches: Sequence[str] = (),
     ) -> None:
         """Subscribe to a topic.
 
@@ -74,9 +75,9 @@ class Intake:
         profile : callable
             Returns the QoS to request from the QoS that publishers are known to offer. It is
             called again when a publisher offers less.
-        batches : str
-            Full name of the topic on which the same messages may come in batches. While it has a
-            publisher, no loss is counted here.
+        batches : sequence of str
+            Full names of the topics on which the same messages may come in batches. While one has
+            a publisher, no loss is counted here.
         """
         self._subscribe(name, message, profile([]), profile)
         self._sources[name].batches = batches
@@ -101,7 +102,7 @@ class Intake:
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=adapt),
         )  # fmt: skip
         before = self._sources.get(name)
-        self._sources[name] = _Source(subscription, batches=before.batches if before else '')
+        self._sources[name] = _Source(subscription, batches=before.batches if before else ())
 
     def take(self, write: Callable[[str, bytes, int], None]) -> None:
         """Hand over topic, bytes and time of receipt, ns, of all messages, in order of receipt."""
@@ -130,7 +131,7 @@ class Intake:
         last, source.last = source.last, number
         if number is None or last is None or number <= last + 1:
             return
-        if source.batches and self._node.count_publishers(source.batches):
+        if any(map(self._node.count_publishers, source.batches)):
             return
         # Each publisher has numbers of its own.
         if self._node.count_publishers(name) == 1:

@@ -17,8 +17,8 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Robot
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.robot import SimulatedRobot
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
@@ -65,18 +65,21 @@ class WalkMarkers:
         self._path: list[Point] = []
         self._slow_ns: int | None = None
         outline: Sequence[tuple[float, float]] = ()
-        if isinstance(scene.body, HexapodBody):
-            outline = (*scene.body.homes, scene.body.homes[0])
+        if isinstance(scene.body, LeggedBody):
+            around = sorted(scene.body.homes, key=lambda home: math.atan2(home[1], -home[0]))
+            outline = (*around, around[0])
         # The outline of the body is drawn halfway to the home positions of the feet.
         self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
         list(self._ground(0.0, 0.0))  # in advance, because it would delay the walk
 
-    def message(self, robot: Robot, pressures: Sequence[float], time_ns: int) -> MarkerArray:
+    def message(
+        self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int
+    ) -> MarkerArray:
         """Return the markers of this moment.
 
         Parameters
         ----------
-        robot : Robot
+        robot : SimulatedRobot
             The robot in its present state.
         pressures : sequence of float
             Pressures of the pads, gauge Pa, in the order of the robot's legs.
@@ -131,7 +134,7 @@ class WalkMarkers:
             Point(
                 x=x + cosine * fore - sine * left,
                 y=y + sine * fore + cosine * left,
-                z=self._scene.body.height if isinstance(self._scene.body, HexapodBody) else 0.05,
+                z=self._scene.body.height if isinstance(self._scene.body, LeggedBody) else 0.05,
             )
             for fore, left in self._outline or ((-0.05, 0.0), (0.05, 0.0))
         ]

@@ -118,6 +118,18 @@ class Once:
         return True
 
 
+def _whole(topic: Topic) -> Callable[[bytes], tuple[Any, ...]]:
+    """Return a function that reads whole messages, for those of which the parts have no place."""
+
+    def read(data: bytes) -> tuple[Any, ...]:
+        try:
+            return (deserialize_message(data, topic.message),)
+        except Exception as error:  # rclpy raises various ones
+            raise BadMessage(str(error)) from None
+
+    return read
+
+
 class _Output:
     """A topic whose messages go out in batches, and alone where others subscribe to it."""
 
@@ -191,6 +203,13 @@ class _Part:
 class Messages:
     """Publishers and subscriptions of a node.
 
+    Parameters
+    ----------
+    node : Node
+    source : str
+        Key in :data:`ros_pad.nodes.topics.BATCHES` of the batches that it sends; empty: the first
+        source of what it sends.
+
     Attributes
     ----------
     refusals : Refusals
@@ -199,8 +218,9 @@ class Messages:
         Returns the node's time, ns.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, source: str = '') -> None:
         self.refusals = Refusals(node)
+        self._source = source
         self.now_ns = clock_of(node)
         self._node = node
         self._hooks = _HOOKS.get(node.context)
@@ -241,7 +261,7 @@ class Messages:
         :meth:`flush`, which is called after each received message and each tick.
         """
         outgoing = Outgoing(topic, paths, leg, constants)
-        if topic.source:
+        if topic.sources:
             return self.joint_sender([outgoing])
         write, publish = outgoing.writer(), self.output(topic, leg)
         return lambda *values: publish(write(*values))
@@ -249,7 +269,8 @@ class Messages:
     def joint_sender(self, outgoing: Sequence[Outgoing]) -> Callable[..., None]:
         """Return a function that sends several messages with the numbers of all, in their order.
 
-        All of them go out in batches. This is faster than a sender for each.
+        All of them go out in batches. This is faster than a sender for each. All topics of a node
+        have one source in common, whose batches these are.
         """
         writers = [each.writer() for each in outgoing]
         write = FieldWriter.joined(writers)
@@ -270,7 +291,7 @@ class Messages:
 
     def _batched(self, topic: Topic, leg: int | None) -> _Output:
         if self._batches is None:
-            self._batches = topics.BATCHES[topic.source].publisher(self._node)
+            self._batches = topics.BATCHES[self._source or topic.sources[0]].publisher(self._node)
         name = topic.name(leg)
         if name not in self._outputs:
             publisher = topic.publisher(self._node, leg)
@@ -312,10 +333,13 @@ class Messages:
         leg: int | None = None,
         on_mismatch: Callable[[str], None] | None = None,
     ) -> None:
-        """Call a function with some fields of each message, see :meth:`Topic.subscription`."""
+        """Call a function with some fields of each message, see :meth:`Topic.subscription`.
+
+        Without paths it is called with the whole message.
+        """
         name = self._node.resolve_topic_name(topic.name(leg))
         take = self._taker(topic, name, callback, paths)
-        if not topic.source:
+        if not topic.sources:
 
             def take_only(data: bytes) -> None:
                 take(data)
@@ -323,18 +347,22 @@ class Messages:
 
             topic.subscription(self._node, take_only, leg, raw=True, on_mismatch=on_mismatch)
             return
-        if topic.source not in self._takers:
-            self._receive_batches(topic.source)
-        takers, once = self._takers[topic.source], self._once[topic.source]
-        if name in takers:  # topics of two legs may be remapped to one
-            takers[name].append(take)
+        for source in topic.sources:
+            if source not in self._takers:
+                self._receive_batches(source)
+        takers = [self._takers[source] for source in topic.sources]
+        if name in takers[0]:  # topics of two legs may be remapped to one
+            takers[0][name].append(take)
             return
-        takers[name] = [take]
+        takes = [take]  # the same list for all sources
+        for each in takers:
+            each[name] = takes
+        onces = [self._once[source] for source in topic.sources]
 
         def take_alone(data: bytes) -> None:
-            if once.is_new(name, data):
+            if all(once.is_new(name, data) for once in onces):
                 self._take_held()
-                for each in takers[name]:
+                for each in takes:
                     each(data)
                 self._finish()
 
@@ -344,7 +372,8 @@ class Messages:
         self, topic: Topic, name: str, callback: Callable[..., None], paths: Sequence[str]
     ) -> _Take:
         """Return a function that reads a message and calls another one with its fields."""
-        read, refuse = FieldReader(topic.message_type, paths), self.refusals
+        refuse = self.refusals
+        read = FieldReader(topic.message_type, paths) if paths else _whole(topic)
 
         def take(data: bytes) -> bool:
             try:

@@ -78,7 +78,9 @@ class Parameter(Setting):
         return descriptor
 
 
-LEGS = Parameter('legs', list(topics.LEGS), 'Numbers of the legs of this node.', '', 1, 6)
+LEGS = Parameter(
+    'legs', list(topics.LEGS), 'Numbers of the legs of this node.', '', 1, topics.MOST_LEGS
+)
 FOOT = Parameter(
     'foot', 'large37', 'Name of a foot in config/feet, or path of a YAML file.', read=Foot.load
 )

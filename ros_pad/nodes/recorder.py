@@ -150,21 +150,22 @@ class RecorderNode(Node):
         self._diagnostics, self._refusals = messages.output(topics.DIAGNOSTICS), messages.refusals
         self._failed = False  # whether writing has failed
         self._writers: dict[str, Callable[[bytes], None]] = {}
-        self._once: dict[str, Once] = {}  # by full name of a topic whose messages batches have
+        self._once: dict[str, list[Once]] = {}  # by full name of a topic that batches have
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
             writer = self._clock_writer if topic is topics.CLOCK else self._writer
             self._writers[full_name] = writer(full_name)
             if subscribes:
-                batches = ''
-                if topic.source:
-                    batches = self.resolve_topic_name(topics.BATCHES[topic.source].name())
+                batches = [
+                    self.resolve_topic_name(topics.BATCHES[source].name())
+                    for source in topic.sources
+                ]
                 profile = partial(self._profile, topic)
                 self._intake.add(full_name, topic.message, profile, batches)
         if subscribes:
             for source, topic in topics.BATCHES.items():
-                names = [n for n, each in recorded.items() if each.source == source]
+                names = [n for n, each in recorded.items() if source in each.sources]
                 self._receive_batches(topic, list(map(self.resolve_topic_name, names)))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
@@ -203,7 +204,7 @@ class RecorderNode(Node):
 
     def _write_received(self, name: str, data: bytes, received_ns: int) -> None:
         self._received_ns = received_ns
-        if name not in self._once or self._once[name].is_new(name, data):
+        if all(once.is_new(name, data) for once in self._once.get(name, ())):
             self._writers[name](data)
 
     def record(self, name: str, data: bytes) -> None:
@@ -373,7 +374,8 @@ class RecorderNode(Node):
     def _receive_batches(self, topic: topics.Topic, names: Collection[str]) -> None:
         """Write the messages of these topics in the batches of a topic."""
         name, read, once = self.resolve_topic_name(topic.name()), BatchReader(), Once()
-        self._once |= dict.fromkeys(names, once)
+        for each in names:
+            self._once.setdefault(each, []).append(once)
         writers = {each: self._writers[each] for each in names}
 
         def write(batch: bytes) -> None:

@@ -9,6 +9,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
@@ -19,6 +20,8 @@ from rclpy.node import Node
 from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
@@ -36,7 +39,9 @@ from ros_pad.pace import Pace
 from ros_pad.pace import Rate
 from ros_pad.pace import RealTime
 from ros_pad.simulation import fidelity
+from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Sensors
 
 PARAMETERS = (
@@ -50,6 +55,12 @@ PARAMETERS = (
     SEED,
     Parameter(
         'fidelity', 'auto', 'Fidelity level of the simulation.', choices=fidelity.FIDELITIES
+    ),
+    Parameter(
+        'sensing',
+        'markers',
+        'Sensors: markers, or joints with IMU and forces in the axes of the feet (L2).',
+        choices=SOURCES,
     ),
     Parameter(
         'rate', 0.0, 'Samples a second, at least 50; 0: the rate of the scene.', 'Hz', 0.0, 1000.0
@@ -78,9 +89,11 @@ class SimulatorNode(Node):
     """Simulate a robot from the pressures of its pads, and publish the readings of its sensors.
 
     These are the wrench and position of each foot, the pose of the body, and joint positions if
-    the robot has joints. Parameters are in :data:`PARAMETERS`. Pads are flat until their pressure
-    is received. In real time, ``/diagnostics`` has once a second the wanted and the reached
-    rate: where the computer is too slow, samples are left out, and at last time itself.
+    the robot has joints. With the parameter ``sensing: joints`` they are the force on each foot in
+    the axes of its link, IMU, positions, velocities and efforts of the joints, and, to compare
+    with, the true pose of the body. Parameters are in :data:`PARAMETERS`. Pads are flat until
+    their pressure is received. In real time, ``/diagnostics`` has once a second the wanted and the
+    reached rate: where the computer is too slow, samples are left out, and at last time itself.
 
     Attributes
     ----------
@@ -120,10 +133,17 @@ class SimulatorNode(Node):
             self.scene = replace(self.scene, foot=values['foot'])
         self.period_ns = round(1e9 / (values['rate'] or self.scene.sensors.rate))
         self.floor = self.scene.floor.build(values['seed'])
-        self.robot = fidelity.build(
-            self.scene, self.floor, self.period_ns * 1e-9, values['fidelity']
-        )
+        joints = values['sensing'] == 'joints'
+        try:
+            level = fidelity.level(self.scene, values['fidelity'], joints=joints)
+        except InvalidInput as error:
+            raise ConfigError(f'node {self.get_name()}: {error}') from error
+        self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9, level)
         self._sensors = Sensors.of(self.scene, values['seed'])
+        self._body_sensors: BodySensors | None = None
+        if joints:
+            count = len(self.robot.joint_names)
+            self._body_sensors = BodySensors(self.scene, values['seed'], count)
         self._ambient = values['ambient_pressure']
         self.time_ns = 0
         self.pressures = [0.0] * len(self.scene.legs)
@@ -141,7 +161,7 @@ class SimulatorNode(Node):
         # Without a timer, the caller of step() reports fidelity level and verdict.
         self._ended = False
         if values['free_running']:
-            choice = fidelity.choose(self.scene, values['fidelity'])
+            choice = fidelity.choose(self.scene, level)
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
             self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
             self._real_time: RealTime | None = None
@@ -158,19 +178,58 @@ class SimulatorNode(Node):
         if self._simulated:
             values = topics.CLOCK.schema.values
             self._clock_output = self.messages.sender(topics.CLOCK, values)
+        pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
+        body = Outgoing(topics.BODY_POSE, (*STAMP, *pose))
+        if self._body_sensors:
+            self._advertise_body()
+            self._pose = self.messages.joint_sender([body])
+            return
         forces = (*(f'wrench.force.{axis}' for axis in 'xyz'), 'wrench.torque.z')
         point = (*STAMP, *topics.POSITION.schema.values)
         readings: list[Outgoing] = []
         for leg in legs:
             readings.append(Outgoing(topics.WRENCH, (*STAMP, *forces), leg))
             readings.append(Outgoing(topics.POSITION, point, leg))
-        pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
-        readings.append(Outgoing(topics.BODY_POSE, (*STAMP, *pose)))
+        readings.append(body)
         if joints:
             angles = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
             still = {'name': joints, 'position': [0.0] * len(joints)}
             readings.append(Outgoing(topics.JOINT_STATES, angles, constants=still))
         self._readings = self.messages.joint_sender(readings)
+
+    def _advertise_body(self) -> None:
+        """Create the publishers of IMU, joints, and forces in the axes of the feet."""
+        noise, joints = self.scene.sensors, self.robot.joint_names
+        sender, schema = self.messages.joint_sender, topics.FOOT_WRENCH.schema
+        paths = (*STAMP, *schema.values)
+        feet = [Outgoing(topics.FOOT_WRENCH, paths, leg) for leg in self.scene.legs]
+        self._send_forces = sender(feet)
+        still = {
+            'orientation_covariance': [-1.0] + [0.0] * 8,  # it measures no orientation
+            'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
+            'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
+        }
+        imu = (*STAMP, *topics.IMU.schema.values)
+        self._send_imu = sender([Outgoing(topics.IMU, imu, constants=still)])
+        parts = ('position', 'velocity', 'effort')
+        angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
+        zeros = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
+        self._send_joints = sender(
+            [Outgoing(topics.JOINT_STATES, (*STAMP, *angles), constants=zeros)]
+        )
+
+    def _send_body(self, stamp: tuple[int, int]) -> None:
+        """Publish readings of the forces, then IMU and joints where they are not silent."""
+        assert self._body_sensors
+        assert isinstance(self.robot, FullRobot)
+        reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
+        self._send_forces(*(value for force in reading.forces for value in (*stamp, *force)))
+        if reading.imu:
+            gyro, accelerometer = reading.imu
+            self._send_imu(*stamp, *gyro, *accelerometer)
+        if reading.joints:
+            positions, velocities, efforts = reading.joints
+            self._send_joints(*stamp, *positions, *velocities, *efforts)
 
     def _pressure_callback(self, index: int) -> Any:
         def callback(sec: int, nanosec: int, pressure: float) -> None:
@@ -239,20 +298,29 @@ class SimulatorNode(Node):
         self.tick(samples)
         stamp_ns = self._stamp_ns()
         stamp = split(stamp_ns)
+        x, y, heading = self.robot.body
+        pose = (*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+        if self._body_sensors:
+            self._send_body(stamp)
+            self._pose(*pose)
+        else:
+            self._send_feet(stamp, pose)
+        if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
+            assert self._marker_output
+            self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))
+        self.messages.flush()
+
+    def _send_feet(self, stamp: tuple[int, int], pose: tuple[float, ...]) -> None:
+        """Publish wrenches and markers, body, and joint positions."""
         readings: list[float] = []
         for (force, point), moment in zip(
             self._sensors.read(self.robot), self._sensors.read_moments(self.robot), strict=True
         ):
             readings += (*stamp, *force, moment or 0.0, *stamp, *point)
-        x, y, heading = self.robot.body
-        readings += (*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+        readings += pose
         if self.robot.joint_names:
             readings += (*stamp, *self.robot.joint_positions)
         self._readings(*readings)
-        if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
-            assert self._marker_output
-            self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))
-        self.messages.flush()
 
     def tick(self, samples: int = 1) -> None:
         """Advance simulated time, but not the robot; :meth:`step` calls this."""

@@ -14,6 +14,7 @@ def _start(name: str) -> int:
     return int(importlib.import_module(f'ros_pad.nodes.{name}').main())
 
 
+body_estimator = partial(_start, 'body_estimator')
 controller = partial(_start, 'controller')
 estimator = partial(_start, 'estimator')
 recorder = partial(_start, 'recorder')

@@ -18,6 +18,7 @@ from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -27,6 +28,7 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
+from sensor_msgs.msg import Imu
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
@@ -42,7 +44,10 @@ from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos
 
 LEGS = (1, 2, 3, 4, 5, 6)
-"""Leg numbers of the thesis: 1, 3, 5 and 2, 4, 6 are the tripods."""
+"""Numbers of the legs where a node is not given others."""
+
+MOST_LEGS = 8
+"""Largest number of a leg."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,15 +62,15 @@ class Topic:
         Message class.
     publish, subscribe : QoSProfile
         QoS that publishers offer, and QoS that subscriptions request.
-    source : str
-        The node of ros_pad that sends it in batches too; empty where none does.
+    sources : tuple of str
+        The nodes of ros_pad that may send it in batches too; empty where none does.
     """
 
     schema: schemas.Topic
     message: type
     publish: QoSProfile
     subscribe: QoSProfile
-    source: str = ''
+    sources: tuple[str, ...] = ()
 
     @property
     def pattern(self) -> str:
@@ -155,16 +160,20 @@ def _owner(peer: TopicEndpointInfo, topic: str) -> str:
     return f'node {peer.node_namespace.rstrip("/")}/{peer.node_name}'
 
 
-def _measured(topic: schemas.Topic, message: type, source: str = '') -> Topic:
-    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR, source)
+def _measured(topic: schemas.Topic, message: type, *sources: str) -> Topic:
+    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR, sources)
 
 
 PRESSURE = _measured(schemas.PRESSURE, FluidPressure, 'regulator')
 PRESSURE_SETPOINT = Topic(
-    schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND, 'controller'
+    schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND, ('controller',)
 )
-WRENCH = _measured(schemas.WRENCH, WrenchStamped, 'simulator')
-POSITION = _measured(schemas.POSITION, PointStamped, 'simulator')
+WRENCH = _measured(schemas.WRENCH, WrenchStamped, 'simulator', 'body_estimator')
+POSITION = _measured(schemas.POSITION, PointStamped, 'simulator', 'body_estimator')
+FOOT_WRENCH = _measured(schemas.FOOT_WRENCH, WrenchStamped, 'simulator')
+CONTACT_VELOCITY = _measured(
+    schemas.CONTACT_VELOCITY, TwistWithCovarianceStamped, 'body_estimator'
+)
 SLIP = _measured(schemas.SLIP, TwistWithCovarianceStamped, 'estimator')
 WETNESS = _measured(schemas.WETNESS, Float64, 'estimator')
 FRICTION = _measured(schemas.FRICTION, Float64, 'estimator')
@@ -175,6 +184,9 @@ SLIPPING = _measured(schemas.SLIPPING, Bool, 'estimator')
 DOUBT = Topic(schemas.DOUBT, String, qos.STATE, qos.STATE)
 MORPHOLOGY = Topic(schemas.MORPHOLOGY, String, qos.STATE, qos.STATE)
 BODY_POSE = _measured(schemas.BODY_POSE, PoseStamped, 'simulator')
+IMU = _measured(schemas.IMU, Imu, 'simulator')
+ODOM = _measured(schemas.ODOM, Odometry, 'body_estimator')
+BODY_DOUBT = Topic(schemas.BODY_DOUBT, String, qos.STATE, qos.STATE)
 JOINT_STATES = _measured(schemas.JOINT_STATES, JointState, 'simulator')
 MARKERS = Topic(schemas.MARKERS, MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
 CLOCK = Topic(schemas.CLOCK, Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
@@ -184,7 +196,7 @@ _BATCHES = 'std_msgs/msg/UInt8MultiArray'
 BATCHES = {
     **{
         source: _measured(schemas.Topic(f'_batches/{source}', _BATCHES), UInt8MultiArray)
-        for source in ('simulator', 'regulator', 'estimator')
+        for source in ('simulator', 'regulator', 'body_estimator', 'estimator')
     },
     'controller': Topic(
         schemas.Topic('_batches/controller', _BATCHES), UInt8MultiArray, qos.COMMANDS, qos.COMMANDS
@@ -197,6 +209,8 @@ LEG_TOPICS = (
     PRESSURE_SETPOINT,
     WRENCH,
     POSITION,
+    FOOT_WRENCH,
+    CONTACT_VELOCITY,
     SLIP,
     WETNESS,
     FRICTION,
@@ -209,7 +223,10 @@ LEG_TOPICS = (
 )
 """The topics that every leg has."""
 
-COMMON_TOPICS = (CLOCK, BODY_POSE, JOINT_STATES, MARKERS, DIAGNOSTICS)
+COMMON_TOPICS = (
+    *(CLOCK, BODY_POSE, IMU, JOINT_STATES),
+    *(ODOM, BODY_DOUBT, MARKERS, DIAGNOSTICS),
+)
 """The topics that a robot has only once."""
 
 
@@ -219,11 +236,11 @@ def names(legs: Sequence[int]) -> dict[str, Topic]:
     Raises
     ------
     ConfigError
-        When `legs` is empty, repeats a leg, or has a number outside 1 to 6.
+        When `legs` is empty, repeats a leg, or has a number outside 1 to 8.
     """
-    if not legs or len(set(legs)) < len(legs) or not set(legs) <= set(LEGS):
+    if not legs or len(set(legs)) < len(legs) or not set(legs) <= set(range(1, MOST_LEGS + 1)):
         raise ConfigError(
-            f'legs = {list(legs)} is not allowed: a list of different whole numbers from 1 to 6 is'
+            f'legs = {list(legs)} is not allowed: a list of different whole numbers from 1 to 8 is'
             ' needed'
         )
     common = {topic.name(): topic for topic in COMMON_TOPICS}

@@ -11,10 +11,12 @@ from rosbags.typesys import get_typestore
 from ros_pad.bags import topics
 from ros_pad.bags.codec import MessageType
 from ros_pad.bags.fields import FieldReader
+from ros_pad.bags.fields import field_of
 from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
+from ros_pad.errors import UnknownEncoding
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]
@@ -45,7 +47,11 @@ def test_each_type_has_the_values_of_its_topic(topic):
     definition, _ = store.generate_msgdef(topic.type_name, ros_version=2)
     message_type = MessageType(topic.type_name, definition)
     paths = (*topic.values, *((*STAMP, FRAME) if topic.frame else ()))
-    values = FieldReader(message_type, paths)(message_type.encode(message_type.blank()))
+    blank = message_type.blank()
+    try:
+        values = FieldReader(message_type, paths)(message_type.encode(blank))
+    except UnknownEncoding:  # more than one text: bags are decoded
+        values = [field_of(blank, path) for path in paths]
     assert [isinstance(each, str) for each in values] == [
         path == FRAME or topic.text for path in paths
     ]

@@ -29,7 +29,7 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.regulators import SimulatedRegulator
 
-NODES = ['simulator', 'estimator', 'controller', 'regulator', 'recorder']
+NODES = ['simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'recorder']
 FILE = shared_folder() / 'params.yaml'
 PAGE = pathlib.Path(__file__).resolve().parents[2] / 'docs' / 'parameters.md'
 RATE = Parameter('rate', 50.0, 'Samples a second.', 'Hz', 1.0, 1000.0)
@@ -214,7 +214,7 @@ LIVE = {
         'policy.probe_every': 15,
     },
 }
-CLASSES = {name: f'{name.capitalize()}Node' for name in NODES}
+CLASSES = {name: f'{name.title().replace("_", "")}Node' for name in NODES}
 
 
 @pytest.mark.parametrize('name', NODES)
@@ -260,14 +260,14 @@ def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_pa
         (SHAPE, 'cone', 'one of flat, dome'),
         (SHAPE, 1, 'one of flat, dome'),
         (SWITCH, 1, 'true or false'),
-        (LEGS, [0, 1], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, [7], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, [2, 2], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, [], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, [1.0], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, ['a'], 'a list of different whole numbers from 1 to 6'),
-        (LEGS, 'all', 'a list of different whole numbers from 1 to 6'),
-        (LEGS, 1, 'a list of different whole numbers from 1 to 6'),
+        (LEGS, [0, 1], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, [9], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, [2, 2], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, [], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, [1.0], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, ['a'], 'a list of different whole numbers from 1 to 8'),
+        (LEGS, 'all', 'a list of different whole numbers from 1 to 8'),
+        (LEGS, 1, 'a list of different whole numbers from 1 to 8'),
         (FOOT, 3, 'text'),
     ],
 )
@@ -373,7 +373,10 @@ def test_a_params_file_that_is_not_there():
 
 def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp_path):
     """The file has the defaults, so some values are changed to see that each part is read."""
-    text = FILE.read_text().replace('legs: [1, 2, 3, 4, 5, 6]', 'legs: [4]')
+    head, body, text = re.split(r'(/\*\*/body_estimator:\n(?:.*\n)+?\n)', FILE.read_text())
+    text = head + text.replace('legs: [1, 2, 3, 4, 5, 6]', 'legs: [4]')
+    # The body estimator has all legs of its robot, here in another namespace.
+    text += body.replace('/**/body_estimator', '/**/body/body_estimator')
     text = text.replace('scene: hexapod_patches', 'scene: leg_dry_flat')
     text = text.replace('folder: ""', f'folder: {tmp_path / "bag"}')
     text += '\n/**/regulator:\n  ros__parameters:\n    colour: red\n'
@@ -382,12 +385,15 @@ def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp
     executor.add_node(observer)
     served = {
         'simulator': '/lab/leg_1/position',
+        'body_estimator': '/lab/body/odom',
         'estimator': '/lab/leg_4/wetness',
         'controller': '/lab/leg_4/morphology',
         'regulator': '/lab/leg_4/pressure',
     }
     arguments = ('--params-file', str(tmp_path / 'params.yaml'), '-r', '__ns:=/lab')
-    processes = {name: run_node(name, *arguments) for name in NODES}
+    processes = {name: run_node(name, *arguments) for name in NODES if name != 'body_estimator'}
+    arguments = (*arguments[:-1], '__ns:=/lab/body')
+    processes['body_estimator'] = run_node('body_estimator', *arguments)
     try:
         for topic in served.values():
             until(lambda t=topic: observer.count_publishers(t), 30.0, f'a publisher of {topic}')

@@ -113,7 +113,7 @@ def test_everything_that_is_published_is_recorded(robot, record, until, tmp_path
             for topic in topics.LEG_TOPICS
         ]
     } | {topic.name().lstrip('/'): topic.publisher(robot) for topic in topics.COMMON_TOPICS}
-    assert len(publishers) == 2 * 13 + 5
+    assert len(publishers) == 2 * 15 + 8
     recorder = record(legs=[1, 4])
     until(lambda: all(p.get_subscription_count() for p in publishers.values()))
     for round_number in range(1, 21):
@@ -467,12 +467,12 @@ def test_a_namespace_moves_the_robot_but_not_the_clock(context, tmp_path):
     node.close()
     node.destroy_node()
     recorded = BagReader(tmp_path / 'trial').topics
-    assert len(recorded) == 6 * 13 + 5
+    assert len(recorded) == 6 * 15 + 8
     assert {'/lab/robot_7/leg_6/wrench', '/lab/robot_7/body/pose', '/clock'} <= set(recorded)
     assert recorded['/diagnostics'] == 'diagnostic_msgs/msg/DiagnosticArray'
 
 
-@pytest.mark.parametrize('legs', [[0], [7], [1, 1]])
+@pytest.mark.parametrize('legs', [[0], [9], [1, 1]])
 def test_legs_that_are_none_are_refused(context, tmp_path, legs):
     overrides = [
         Parameter('legs', value=legs),

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ros_pad.nodes import topics
+from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.recorder import RecorderNode
@@ -23,6 +24,7 @@ from ros_pad.nodes.simulator import SimulatorNode
 POLICY = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'security' / 'policy.xml'
 NODES = {
     'regulator': RegulatorNode,
+    'body_estimator': BodyEstimatorNode,
     'estimator': EstimatorNode,
     'controller': ControllerNode,
     'simulator': SimulatorNode,
@@ -41,6 +43,13 @@ SETPOINT = topics.PRESSURE_SETPOINT.name('?')
 # Allowed, but not always used: joints exist at L2 only, the clock in simulated time only.
 AT_TIMES = {
     ('simulator', 'publish', '/joint_states'),
+    # Without markers:
+    ('simulator', 'publish', '/leg_?/foot_wrench'),
+    ('simulator', 'publish', '/imu/data'),
+    ('body_estimator', 'publish', '/tf'),
+    ('estimator', 'subscribe', '/leg_?/contact_velocity'),
+    ('estimator', 'subscribe', '/body/doubt'),
+    ('body_estimator', 'subscribe', '/clock'),
     ('regulator', 'subscribe', '/clock'),
     ('estimator', 'subscribe', '/clock'),
     ('controller', 'subscribe', '/clock'),
@@ -48,7 +57,7 @@ AT_TIMES = {
     # The recorder requests parameters of the nodes that run.
     *(
         ('recorder', 'request', f'/{node}/{verb}_parameters')
-        for node in ('regulator', 'estimator', 'controller', 'simulator')
+        for node in ('regulator', 'body_estimator', 'estimator', 'controller', 'simulator')
         for verb in ('list', 'get')
     ),
 }
@@ -79,7 +88,7 @@ def test_sros2_can_read_the_file():
     root = xml.etree.ElementTree.parse(POLICY, parser).getroot()
     assert (root.tag, root.attrib) == ('policy', {'version': '0.2.0'})
     (enclaves,) = root
-    assert [each.tag for each in enclaves] == ['enclave'] * 6
+    assert [each.tag for each in enclaves] == ['enclave'] * 7
 
 
 @pytest.mark.parametrize('name', NODES)

@@ -251,7 +251,7 @@ def test_it_reports_the_fidelity_level_and_the_end_of_the_walk(start, until, tmp
     """The log reports a robot that has fallen, which topics alone do not show."""
     text = (configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml').read_text()
     top_heavy = tmp_path / 'top_heavy.yaml'
-    top_heavy.write_text(text.replace('height: 0.12 ', 'height: 0.9 '))
+    top_heavy.write_text(f'{text}\nbody: {{height: 0.9}}\n')
     node = start(scene=str(top_heavy), fidelity='L1')
     until(lambda: node.robot.verdict)
     until(lambda end=node.robot.time + 0.1: node.robot.time > end)

@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The body estimator node: motion of body and feet from IMU, joints and forces, without markers.
+
+It publishes what an estimator with ``source: joints`` needs of each foot, and ``odom``. The reason
+why the motion must not be relied on is published on ``body/doubt`` and on ``/diagnostics``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
+from geometry_msgs.msg import TransformStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from ros_pad.bags.topics import FRAME
+from ros_pad.bags.topics import STAMP
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.nodes import qos
+from ros_pad.nodes import topics
+from ros_pad.nodes.frames import check_frame
+from ros_pad.nodes.listening import message_class
+from ros_pad.nodes.messages import Messages
+from ros_pad.nodes.messages import Outgoing
+from ros_pad.nodes.parameters import LEGS
+from ros_pad.nodes.parameters import Parameter
+from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.process import run
+from ros_pad.nodes.refusals import rate_status
+from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.stamps import split
+from ros_pad.pace import TICK_PERIOD_NS
+from ros_pad.pace import Pace
+from ros_pad.robots import Robot
+from ros_pad.sensing import BodyEstimate
+from ros_pad.sensing import SensingStage
+from ros_pad.sensing.mapping import Mapping
+from ros_pad.sensing.stage import SETTINGS
+from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import foot_readings
+from ros_pad.sensing.stage import joint_order
+from ros_pad.sensing.stage import twist_of
+
+PARAMETERS = (
+    LEGS,
+    Parameter(
+        'robot', 'ch3r', 'Name of a robot in config/robots, or path of a YAML or URDF file.'
+    ),
+    Parameter(
+        'feet',
+        '',
+        'For URDF: links at the ends of the legs, in the order of legs, with commas between them.',
+    ),
+    Parameter('imu_link', '', 'For URDF: link of the IMU; empty: the base.'),
+    Parameter(
+        'foot_radius',
+        -1.0,
+        'Radius with which the feet roll; below 0: that of the YAML file, 0 for URDF.',
+        'm',
+        -1.0,
+        1.0,
+    ),
+    Parameter(
+        'mapping',
+        '',
+        'Name of a mapping in config/mappings, or path of a YAML file: what the topics of another'
+        ' robot mean; empty: imu/data, joint_states and leg_i/foot_wrench.',
+    ),
+    *(Parameter(**vars(setting)) for setting in SETTINGS),
+    Parameter(
+        'publish_tf',
+        False,
+        'Publish the transform odom -> base_link on /tf; only one node may.',
+    ),
+    Parameter('base_frame', 'base_link', 'Frame of the base, the child of odom.'),
+)
+
+OLDEST = 0.1
+"""Age of the last sample, s, from which the body estimator counts as late."""
+
+_RATE = tuple(f'angular_velocity.{axis}' for axis in 'xyz')
+_PULL = tuple(f'linear_acceleration.{axis}' for axis in 'xyz')
+_ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
+_FORCE = tuple(f'wrench.force.{axis}' for axis in 'xyz')
+_MATRIX = [f'covariance[{place}]' for place in range(36)]
+_TWIST = [f'twist.{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz']
+
+
+class BodyEstimatorNode(Node):
+    """Estimate the motion of body and feet; parameters are in :data:`PARAMETERS`.
+
+    Attributes
+    ----------
+    stage : SensingStage
+    forces : int
+        Number of messages with the force of a foot so far.
+    messages : Messages
+        Publishers and subscriptions.
+
+    Raises
+    ------
+    ConfigError
+        When a parameter is not allowed, or the robot has another number of legs.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(
+            'body_estimator', automatically_declare_parameters_from_overrides=True, **kwargs
+        )
+        values = declare(self, PARAMETERS)
+        self._robot = robot = self._load(values)
+        self._mapping = self._mapped(values)
+        if self._mapping:
+            values['force_axes'] = self._mapping.force_axes
+        self._base: str = values['base_frame']
+        self.forces = 0
+        self._rate = np.zeros(3)  # last angular velocity, IMU axes, rad/s
+        self.messages = Messages(self, 'body_estimator')
+        self.stage = SensingStage(
+            robot,
+            estimator_of(robot, values),
+            self._publish,
+            self._publish_doubt,
+            self._warn,
+            values['forces'],
+        )
+        self._gyro_noise: float = values['gyro_noise']
+        self._orders: dict[tuple[str, ...], Any] = {}  # by names of joints
+        self._send = self.messages.joint_sender(self._outgoing(values['legs']))
+        self._doubts = self.messages.output(topics.BODY_DOUBT)
+        self._send_tf = self._transforms() if values['publish_tf'] else None
+        if self._mapping:
+            self._follow(self._mapping)
+        else:
+            self._subscribe(values['legs'])
+        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
+        self._diagnostics_pace = Pace(1_000_000_000)
+        self._reported: str | None = None
+        self._simulated: bool = self.get_parameter('use_sim_time').value
+        self._since_ns, self._counted = self.messages.now_ns(), 0
+        self._health_pace = Pace(TICK_PERIOD_NS)
+        self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+
+    def _load(self, values: dict[str, Any]) -> Robot:
+        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
+        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
+        try:
+            robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
+        except (ConfigError, InvalidInput) as error:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter robot = {values["robot"]!r} is not allowed:'
+                f' {error}'
+            ) from error
+        if len(robot.legs) != len(values['legs']):
+            raise ConfigError(
+                f'node {self.get_name()}: parameter legs = {list(values["legs"])} is not allowed:'
+                f' robot {values["robot"]!r} has {len(robot.legs)} legs'
+            )
+        return robot
+
+    def _mapped(self, values: dict[str, Any]) -> Mapping | None:
+        """Return the mapping of another robot's topics; set what is always in doubt with it."""
+        self._lasting = ''
+        if not values['mapping']:
+            return None
+        try:
+            mapping = Mapping.load(values['mapping'], self._robot)
+        except ConfigError as error:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter mapping = {values["mapping"]!r} is not'
+                f' allowed: {error}'
+            ) from error
+        for text in mapping.missing:
+            self.get_logger().warning(f'mapping {mapping.name}: {text}')
+        # Without tangential forces nothing can be learnt about the ground, whatever slips.
+        self._lasting = next((text for text in mapping.missing if text.startswith('friction')), '')
+        return mapping
+
+    def _follow(self, mapping: Mapping) -> None:
+        """Subscribe to the topics of a mapping."""
+        for source in mapping.sources:
+            self.create_subscription(
+                message_class(source.type_name),
+                source.topic,
+                self._source_callback(mapping, source.topic),
+                qos.SENSOR,
+            )
+
+    def _source_callback(self, mapping: Mapping, topic: str) -> Callable[[Any], None]:
+        def callback(message: Any) -> None:
+            try:
+                readings = mapping.read(topic, message, self.messages.now_ns())
+            except InvalidInput as error:
+                self.stage.reject(error)
+                return
+            if readings.gyro is not None:
+                self._rate = readings.gyro
+            self.forces += len(readings.forces)
+            readings.pass_to(self.stage)
+
+        return callback
+
+    def _outgoing(self, legs: list[int]) -> list[Outgoing]:
+        """Return the messages of one estimate: those of each foot, then odom."""
+        velocity = (*STAMP, *topics.CONTACT_VELOCITY.schema.values)
+        odom = {FRAME: topics.ODOM.schema.frame}
+        outgoing: list[Outgoing] = []
+        for leg in legs:
+            outgoing += (
+                Outgoing(topics.WRENCH, (*STAMP, *_FORCE), leg),
+                Outgoing(topics.POSITION, (*STAMP, *topics.POSITION.schema.values), leg, odom),
+                Outgoing(topics.CONTACT_VELOCITY, velocity, leg),
+            )
+        pose, twist = ([f'{part}.{place}' for place in _MATRIX] for part in ('pose', 'twist'))
+        paths = [*STAMP, *topics.ODOM.schema.values, *pose]
+        paths += [*(f'twist.{each}' for each in _TWIST), *twist]
+        child = {'child_frame_id': self._base}
+        return [*outgoing, Outgoing(topics.ODOM, paths, constants=child)]
+
+    def _transforms(self) -> Callable[[int, BodyEstimate], None]:
+        """Return a function that publishes the transform from odom to the base."""
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError as error:
+            raise ConfigError(
+                f'node {self.get_name()}: parameter publish_tf = True is not allowed: the package'
+                f' tf2_msgs of ROS is not found ({error})'
+            ) from error
+        publisher = self.create_publisher(TFMessage, '/tf', topics.ODOM.publish)
+
+        def send(stamp_ns: int, estimate: BodyEstimate) -> None:
+            transform = TransformStamped(child_frame_id=self._base)
+            transform.header.frame_id = topics.ODOM.schema.frame
+            set_stamp(transform.header.stamp, stamp_ns)
+            place, turn = transform.transform.translation, transform.transform.rotation
+            place.x, place.y, place.z = estimate.position.tolist()
+            turn.x, turn.y, turn.z, turn.w = estimate.orientation.tolist()
+            publisher.publish(TFMessage(transforms=[transform]))
+
+        return send
+
+    def _subscribe(self, legs: list[int]) -> None:
+        receive = self.messages.receive
+        for index, leg in enumerate(legs):
+            receive(
+                topics.FOOT_WRENCH, self._force_callback(index, leg), (FRAME, *STAMP, *_FORCE), leg
+            )
+        receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *_RATE, *_PULL))
+        receive(topics.JOINT_STATES, self._on_joints, ())
+
+    def _force_callback(self, index: int, leg: int) -> Callable[..., None]:
+        def callback(frame: str, sec: int, nanosec: int, *force: float) -> None:
+            self.forces += 1
+            try:
+                check_frame(frame, leg)
+            except InvalidInput as error:
+                self.stage.reject(error)
+                return
+            self.stage.force(index, sec * 1_000_000_000 + nanosec, force)
+
+        return callback
+
+    def _on_imu(
+        self, sec: int, nanosec: int, no_gyro: float, no_accelerometer: float, *values: float
+    ) -> None:
+        for name, absent in (
+            ('angular_velocity', no_gyro),
+            ('linear_acceleration', no_accelerometer),
+        ):
+            if absent == -1.0:  # as the message defines it
+                error = f'{name}_covariance[0] = -1: the IMU does not measure {name}, but it must'
+                self.stage.reject(InvalidInput(error))
+                return
+        self._rate = np.array(values[:3])
+        self.stage.imu(sec * 1_000_000_000 + nanosec, values[:3], values[3:])
+
+    def _on_joints(self, message: JointState) -> None:
+        names = tuple(message.name)
+        try:
+            if names not in self._orders:
+                self._orders = {names: joint_order(self._robot, names)}
+            order = self._orders[names]
+            for part in ('position', 'velocity', 'effort'):
+                given = getattr(message, part)
+                if len(given) != len(names) and (len(given) or part == 'position'):
+                    raise InvalidInput(
+                        f'joint_states: {len(given)} values in {part} are not allowed:'
+                        f' {len(names)} are needed, one for each name'
+                    )
+        except InvalidInput as error:
+            self.stage.reject(error)
+            return
+        stamp = message.header.stamp
+        self.stage.joints(
+            stamp.sec * 1_000_000_000 + stamp.nanosec,
+            np.array(message.position)[order],
+            np.array(message.velocity)[order] if message.velocity else None,
+            np.array(message.effort)[order] if message.effort else None,
+        )
+
+    def _publish(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        stamp = split(stamp_ns)
+        estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
+        values: list[float] = []
+        for foot in foot_readings(estimate):
+            values += (*stamp, *foot.force, *stamp, *foot.position)
+            values += (*stamp, *foot.velocity, foot.variance, foot.variance)
+        values += (*stamp, *estimate.position.tolist(), *estimate.orientation.tolist())
+        values += estimate.covariance[:6, :6].ravel().tolist()
+        rate = self._robot.imu[:3, :3] @ self._rate
+        velocity, covariance = twist_of(estimate, rate, self._gyro_noise)
+        values += (*velocity.tolist(), *covariance.ravel().tolist())
+        self._send(*values)
+        if self._send_tf:
+            self._send_tf(stamp_ns, estimate)
+
+    def _publish_doubt(self, doubt: str) -> None:
+        self._doubts(String(data=doubt or self._lasting))
+
+    def _warn(self, error: InvalidInput) -> None:
+        self.get_logger().warning(f'reading ignored: {error}', throttle_duration_sec=1.0)
+
+    def _tick(self, now_ns: int) -> None:
+        if not self._health_pace.due(now_ns):
+            return
+        self.stage.tick(now_ns)
+        kind = (self.stage.doubt or '').partition(':')[0]
+        if self._diagnostics_pace.due(now_ns) or kind != self._reported:
+            self._reported = kind
+            array = DiagnosticArray(status=[self._status(), *self.messages.refusals.statuses()])
+            if not self._simulated:
+                array.status.append(self._rate_status(now_ns))
+            set_stamp(array.header.stamp, now_ns)
+            self._diagnostics(array)
+
+    def _status(self) -> DiagnosticStatus:
+        """Return the doubt and the sources of the estimate, for ``/diagnostics``."""
+        stage = self.stage
+        waits = stage.doubt is None
+        doubt = stage.doubt or self._lasting
+        text = 'no sample yet' if waits else doubt or 'the motion is known'
+        return DiagnosticStatus(
+            name=f'{self.get_name()}: sensing',
+            hardware_id=self._robot.name,
+            level=DiagnosticStatus.WARN if waits or doubt else DiagnosticStatus.OK,
+            message=text,
+            values=[
+                KeyValue(key='samples', value=str(stage.samples)),
+                KeyValue(key='forces', value=stage.force_source or 'none'),
+                KeyValue(
+                    key='joint velocities',
+                    value='from positions' if stage.differentiates else 'measured',
+                ),
+            ],
+        )
+
+    def _rate_status(self, now_ns: int) -> DiagnosticStatus:
+        """Return rate and age of the samples, for ``/diagnostics``."""
+        elapsed = max(1, now_ns - self._since_ns) * 1e-9
+        rate = (self.stage.samples - self._counted) / elapsed
+        self._since_ns, self._counted = now_ns, self.stage.samples
+        age = (now_ns - self.stage.last_ns) * 1e-9
+        return rate_status(self.get_name(), '', rate, age, OLDEST)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until it is interrupted; return the exit status."""
+    return run(BodyEstimatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
