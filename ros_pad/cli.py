@@ -33,7 +33,7 @@ COMMANDS = {
     'wet': 'compute rise, pressure and force of the liquid round a meshed pad',
     'chart': 'measure time and error of every method on this machine',
     'emulate': 'emulate a pressure regulator on a pseudo-terminal',
-    'doctor': 'check Python, ROS 2, serial ports and folders, and advise',
+    'doctor': 'check this machine, or the sensors of a robot, and advise',
 }
 """Summary of each command, by the name of its module in ``ros_pad.commands``, in the order of
 ``pad --help``."""

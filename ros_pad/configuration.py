@@ -352,6 +352,7 @@ class Table:
             raise ConfigError(f'{origin}: expected a table of keys, found {shown(values)}')
         self._values = dict(values)
         self._taken: set[str] = set()
+        self._known: set[str] = set()
         self.origin = origin
 
     @classmethod
@@ -380,10 +381,12 @@ class Table:
         return cls(values, origin)
 
     def __contains__(self, key: str) -> bool:
+        self._known.add(key)
         return key in self._values
 
     def _take(self, key: str, default: Any) -> Any:
         self._taken.add(key)
+        self._known.add(key)
         if key in self._values:
             return self._values[key]
         if default is _REQUIRED:
@@ -440,6 +443,13 @@ class Table:
         """Read a string."""
         return self.value(Setting(key, str, ''), default)
 
+    def texts(self, key: str) -> list[str]:
+        """Read a list of strings."""
+        value = self._take(key, _REQUIRED)
+        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+            raise ConfigError(f'{self.origin}: {_not_allowed(key, value, "a list of texts")}')
+        return value
+
     def vector(
         self,
         key: str,
@@ -461,6 +471,17 @@ class Table:
             )
         return numbers
 
+    def sequence(self, key: str, default: Any = _REQUIRED) -> tuple[Any, ...]:
+        """Read a list of different numbers or texts, which may not be empty."""
+        value = self._take(key, default)
+        if isinstance(value, tuple):
+            return value
+        plain = isinstance(value, list) and all(isinstance(e, (str, int, float)) for e in value)
+        if not plain or not len(set(value)) == len(value) > 0:
+            wanted = 'a list of different numbers or texts'
+            raise ConfigError(f'{self.origin}: {_not_allowed(key, value, wanted)}')
+        return tuple(value)
+
     @property
     def keys(self) -> tuple[Any, ...]:
         """The keys of the mapping, in the order of the file."""
@@ -477,9 +498,9 @@ class Table:
         """Raise `ConfigError` for keys that were not read."""
         unknown = [key for key in self._values if key not in self._taken]
         if unknown:
-            near = difflib.get_close_matches(str(unknown[0]), sorted(self._taken), n=1)
+            near = difflib.get_close_matches(str(unknown[0]), sorted(self._known), n=1)
             hint = f' Did you mean {near[0]!r}?' if near else ''
             raise ConfigError(
                 f'{self.origin}: unknown key {unknown[0]!r}.{hint}'
-                f' Allowed: {", ".join(sorted(self._taken))}'
+                f' Allowed: {", ".join(sorted(self._known))}'
             )

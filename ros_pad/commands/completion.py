@@ -64,13 +64,13 @@ def _paths(prefix: str, ending: str) -> list[str]:
     ]
 
 
-def _shipped(kind: str) -> Callable[..., list[str]]:
-    """Return a completer for shipped names (scenes or feet) or, if none fits, for YAML files."""
+def _shipped(kind: str, *endings: str) -> Callable[..., list[str]]:
+    """Return a completer for shipped names (such as scenes) or, if none fits, for files."""
 
     def complete(prefix: str, **_: Any) -> list[str]:
-        return [name for name in configuration.names(kind) if name.startswith(prefix)] or _paths(
-            prefix, '.yaml'
-        )
+        found = [name for name in configuration.names(kind) if name.startswith(prefix)]
+        files = {path for ending in endings or ('.yaml',) for path in _paths(prefix, ending)}
+        return found or sorted(files)
 
     return complete
 
@@ -84,7 +84,7 @@ def _policies(prefix: str, **_: Any) -> list[str]:
 
 
 def _nothing(**_: Any) -> list[str]:
-    """Offer no file names for a number."""
+    """Offer no file names for a number or a name of ROS."""
     return []
 
 
@@ -92,6 +92,11 @@ _COMPLETERS: dict[str, Callable[..., list[str]]] = {
     'scene': _shipped('scenes'),
     'scenes': _shipped('scenes'),
     'foot': _shipped('feet'),
+    'robot': _shipped('robots', '.yaml', '.urdf'),
+    'mapping': _shipped('mappings'),
+    'feet': _nothing,
+    'imu': _nothing,
+    'namespace': _nothing,
     'policy': _policies,
     'bag': bags,
     'path': bags,

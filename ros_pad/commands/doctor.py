@@ -34,6 +34,7 @@ from importlib import metadata
 from ros_pad.commands.command import WIDEST
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.command import complain
 from ros_pad.pace import Progress
 
 OLDEST, NEWEST = (3, 11), (3, 13)  # versions of Python with which ros_pad is tested
@@ -41,7 +42,7 @@ DISTRIBUTION = 'jazzy'  # distribution of ROS 2 with which ros_pad is tested
 NEEDED = ('numpy', 'scipy', 'yaml', 'matplotlib', 'tqdm', 'mcap', 'rosbags', 'serial')
 # Optional modules, each with the extra of ros_pad that installs it, and its purpose.
 EXTRAS = {
-    'mujoco': ('mujoco', 'the hexapod with joints, L2; without it, L1 is used'),
+    'mujoco': ('mujoco', 'robots with joints, L2; without it, L1 is used'),
     'numba': ('fast', 'compiled L1; without it, L1 is ten times slower, with the same results'),
     'distributed': ('sweep', 'sweeps on a Dask cluster'),
     'pyarrow': ('sweep', 'Parquet tables of sweeps'),
@@ -64,7 +65,16 @@ message must arrive within {LOOPBACK:g} s.
 
   ok       as it should be
   warning  something does not work that not everybody needs
-  problem  fix this; the exit status is then 1"""
+  problem  fix this; the exit status is then 1
+
+With --robot, look at the sensors of a robot instead, live or in a bag: what is
+missing, rates, stamps, units, axes and signs of IMU, joints and foot forces.
+Let the robot stand for two seconds, then walk some steps."""
+_EXAMPLES = """\
+pad doctor
+pad doctor --json
+pad doctor --robot go2 --mapping go2
+pad doctor --robot my_robot.urdf --feet lf_foot rf_foot lh_foot rh_foot --bag my_bag"""
 _ONE_ROS = (
     'one ROS 2 at a time: open a new shell and either source /opt/ros/jazzy/setup.bash or'
     ' activate .venv, not both'
@@ -95,19 +105,58 @@ class Finding:
 
 def add(commands: Commands) -> None:
     """Add the command and its arguments."""
-    part = add_command(commands, 'doctor', run, _DESCRIPTION, 'pad doctor\npad doctor --json')
+    part = add_command(commands, 'doctor', run, _DESCRIPTION, _EXAMPLES)
     part.add_argument('--json', action='store_true', help='print one JSON object')
+    _add_robot(part)
+
+
+def _add_robot(part: argparse.ArgumentParser) -> None:
+    """Add the arguments for the sensors of a robot."""
+    group = part.add_argument_group('sensors of a robot')
+    group.add_argument(
+        '--robot',
+        metavar='FILE',
+        help='check IMU, joints and foot forces of this robot instead of the machine: a shipped'
+        ' name, or a .yaml or .urdf file',
+    )
+    group.add_argument(
+        '--feet',
+        nargs='+',
+        default=[],
+        metavar='LINK',
+        help='the links of the feet in a URDF file',
+    )
+    group.add_argument('--imu', default='', metavar='LINK', help='the link of the IMU in it')
+    group.add_argument(
+        '--foot-radius', type=float, metavar='M', help='radius with which the feet roll, m, 0 to 1'
+    )
+    group.add_argument(
+        '--mapping',
+        default='default',
+        metavar='NAME',
+        help='what the messages mean: a shipped name, or a .yaml file (default: default)',
+    )
+    group.add_argument(
+        '--bag',
+        type=pathlib.Path,
+        metavar='PATH',
+        help='folder of a bag, or one MCAP file, instead of live topics',
+    )
+    group.add_argument('--namespace', default='', help='namespace of the topics, such as /robot_1')
+    group.add_argument(
+        '--seconds',
+        type=float,
+        default=10.0,
+        metavar='S',
+        help='how long to look, s, 1 to 60 (default: 10)',
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Run all checks and print their findings; return the exit status."""
-    try:
-        from ros_pad.commands.progress import bar
-    except ImportError:  # the missing package is among the findings
-        found = list(examine())
-    else:
-        with bar('checking', 1.0, 'machine') as progress:
-            found = list(examine(progress))
+    if options.bag and not options.robot:
+        return complain('--bag needs --robot: the robot whose sensors are in it', 2)
+    found = _robot(options) if options.robot else _machine()
     counts = {
         f'{status}s': sum(each.status == status for each in found)
         for status in ('problem', 'warning')
@@ -119,6 +168,23 @@ def run(options: argparse.Namespace) -> int:
             _show(each)
         print('\n' + ', '.join(f'{status}: {count}' for status, count in counts.items()))
     return 1 if counts['problems'] else 0
+
+
+def _machine() -> list[Finding]:
+    """Check the machine."""
+    try:
+        from ros_pad.commands.progress import bar
+    except ImportError:  # the missing package is among the findings
+        return list(examine())
+    with bar('checking', 1.0, 'machine') as progress:
+        return list(examine(progress))
+
+
+def _robot(options: argparse.Namespace) -> list[Finding]:
+    """Check the sensors of a robot."""
+    from ros_pad.commands.robot_check import findings
+
+    return [Finding(*each) for each in findings(options)]
 
 
 def _show(finding: Finding) -> None:

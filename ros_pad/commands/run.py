@@ -24,6 +24,7 @@ from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.estimation.tuning import SOURCES
 from ros_pad.reports import report
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
@@ -42,6 +43,7 @@ _ONLY_WALKS = {
     'cycles': (None, 'in which nothing walks'),
     'seed': (0, 'in which nothing is random'),
     'fidelity': ('auto', 'which is calculated, not simulated'),
+    'sensing': ('markers', 'in which nothing is estimated'),
     'no_compare': (False, 'which has no policies to compare'),
     'live': (False, 'which has no nodes'),
 }
@@ -72,8 +74,15 @@ def add(commands: Commands) -> None:
         '--fidelity',
         choices=levels.FIDELITIES,
         default='auto',
-        help='L0 is the leg on its rail, L1 the hexapod in the plane, L2 the hexapod with joints '
+        help='L0 is the leg on its rail, L1 a robot in the plane, L2 a robot with joints '
         '(MuJoCo); auto (default) takes the cheapest that is accurate enough for the scene',
+    )
+    part.add_argument(
+        '--sensing',
+        choices=SOURCES,
+        default='markers',
+        help='what slip is estimated from: markers on the feet (default), or joints, IMU and '
+        'forces in the axes of the feet, as robots have them; joints needs L2',
     )
     part.add_argument(
         '--no-ros', action='store_true', help='walk without nodes and bag; much faster'
@@ -116,8 +125,10 @@ def run(options: argparse.Namespace) -> int:
             f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
         )
     policy = options.policy or scene.policy
-    level = levels.level(scene, options.fidelity, policy)
-    folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}')
+    joints = options.sensing == 'joints'
+    level = levels.level(scene, options.fidelity, policy, joints)
+    suffix = '_joints' if joints else ''
+    folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}{suffix}')
     try:
         return _run_in(folder, options, scene, policy, level)
     except KeyboardInterrupt:
@@ -158,7 +169,7 @@ def _run_in(
 ) -> int:
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
-    others = Others(scene, compared, options.seed, level)
+    others = Others(scene, compared, options.seed, level, options.sensing)
     # Real regulators may wait for set-points: nothing else takes their time.
     with contextlib.nullcontext() if options.live else others.beside():
         return _run_beside(others, folder, options, scene, policy, level)
@@ -173,10 +184,12 @@ def _run_beside(
     level: str,
 ) -> int:
     bag = None if options.no_ros else folder / 'bag'
+    given = scene, policy, options.seed, level
     if bag is None:
-        trial = _walk(scene, policy, options.seed, level, f'{policy}, without ROS')
+        with bar(f'{policy}, without ROS', scene.duration) as progress:
+            trial = loop.run(*given, progress, sensing=options.sensing)
     else:
-        trial = _walk_on_nodes(scene, policy, options.seed, level, bag, options.live)
+        trial = _walk_on_nodes(given, bag, options)
     assert trial.metrics is not None
     if bag is not None and trial.settings['interrupted']:
         return complain(
@@ -196,6 +209,7 @@ def _run_beside(
             metrics=trial.metrics,
             real_time_factor=trial.real_time_factor,
             comparison=trial.settings['comparison'],
+            sensing=options.sensing,
         )
         annotate(bag, about)
     page = folder / 'report.html'
@@ -212,14 +226,10 @@ def _run_beside(
     return 0
 
 
-def _walk(scene: Scene, policy: str, seed: int, level: str, text: str) -> Trial:
-    with bar(text, scene.duration) as progress:
-        return loop.run(scene, policy, seed, level, progress)
-
-
 def _walk_on_nodes(
-    scene: Scene, policy: str, seed: int, level: str, bag: pathlib.Path, live: bool
+    given: tuple[Scene, str, int, str], bag: pathlib.Path, options: argparse.Namespace
 ) -> Trial:
+    scene, policy, _, _ = given
     try:
         with STOP.deferred():  # an exception in the midst of imports may be dropped
             from ros_pad.nodes import composed
@@ -229,10 +239,10 @@ def _walk_on_nodes(
             ' pip install "ros_pad[ros]", or run without ROS: --no-ros'
         ) from error
     with (
-        contextlib.nullcontext() if live else alone(),
+        contextlib.nullcontext() if options.live else alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
-        return composed.run(scene, policy, seed, level, bag=bag, progress=progress)
+        return composed.run(*given, bag=bag, progress=progress, sensing=options.sensing)
 
 
 @contextlib.contextmanager
@@ -257,6 +267,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         'policy': trial.policy,
         'seed': trial.seed,
         'fidelity': trial.fidelity,
+        'sensing': trial.settings['sensing'],
         'fidelity_bound': None if own.verdict else trial.settings['fidelity_bound'],
         'fidelity_note': labels.promise(trial),
         'foot': trial.settings['foot'],
@@ -277,7 +288,8 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         f'\n{trial.scene}, seed {trial.seed}, {trial.fidelity}: {own.distance_m:.2f} m in'
         f' {own.cycles:.3g} cycles, {trial.real_time_factor:.1f} times real time'
     )
-    print(f'fidelity: {labels.promise(trial)}\n')
+    print(f'fidelity: {labels.promise(trial)}')
+    print(f'sensing:  {trial.settings["sensing"]}\n')
     rows = [{'policy': trial.policy, **own.as_dict()}, *trial.settings['comparison']]
     for row in rows:
         if row.get('goal_m') is not None:

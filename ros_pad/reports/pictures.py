@@ -237,7 +237,7 @@ def _overview(view: View, window: tuple[float, float]) -> Drawn:
         'For each leg over the whole trial: P(wet), true ground, times as a dome, and slip alarms',
         'Wet and dry ground give the same forces on a dome: P(wet) of a domed foot only fades to '
         'its prior, and its morphology follows from the estimates of all feet nearby.'
-        + (' Legs are in the order of the tripods.' if len(view.order) > 1 else ''),
+        + (' Legs that stand together are side by side.' if len(view.order) > 1 else ''),
     )
 
 

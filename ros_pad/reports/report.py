@@ -202,6 +202,7 @@ def _facts(trial: Trial) -> list[str]:
         f'policy {POLICY_NAMES.get(trial.policy, trial.policy)}' if trial.policy else '',
         f'seed {trial.seed}' if trial.scene else '',
         f'simulation {trial.fidelity}' if trial.fidelity else '',
+        f'sensing {sensing}' if (sensing := trial.settings.get('sensing')) else '',
         f'recorded {trial.settings["recorded"]}' if 'recorded' in trial.settings else '',
         f'{trial.real_time_factor:.1f} times real time' if trial.real_time_factor else '',
         f'ros_pad {trial.settings["version"]}' if 'version' in trial.settings else '',

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +41,7 @@ class View:
     Attributes
     ----------
     order : list of int
-        Columns of the legs: first odd legs, then even legs, as they stand together in tripods.
+        Columns of the legs, so that those are side by side that stand together.
     load_gate : float
         Normal force above which a foot stands, N.
     wet : ndarray of bool (m, legs) or None
@@ -63,6 +65,14 @@ class View:
     foot: Foot | None
 
 
+def _order(legs: Sequence[int], settings: Mapping[str, Any]) -> list[int]:
+    """Return the columns of the legs by the times of their stances, else odd legs, then even."""
+    gait = (settings.get('conditions') or {}).get('gait') or {}
+    middles = gait.get('middles') or ()
+    times = middles if len(middles) == len(legs) else [leg % 2 == 0 for leg in legs]
+    return sorted(range(len(legs)), key=lambda k: (times[k], legs[k]))
+
+
 def view_of(trial: Trial, others: Iterable[Trial] = ()) -> View:
     """Return a trial with the data for its pictures, and the metrics of other trials."""
     settings = dict(trial.settings)
@@ -76,9 +86,7 @@ def view_of(trial: Trial, others: Iterable[Trial] = ()) -> View:
     known = [policy for policy in POLICIES if policy in rows]
     return View(
         trial=trial,
-        order=sorted(
-            range(len(trial.legs)), key=lambda k: (trial.legs[k] % 2 == 0, trial.legs[k])
-        ),
+        order=_order(trial.legs, settings),
         load_gate=gate,
         wet=trial.wet() if trial.floor is not None else None,
         stances=_stances(trial, gate),

@@ -16,8 +16,8 @@ from ros_pad.trials.trial import Trial
 
 # Units of the values of a scene and a foot, by name; a value that is not listed has no unit.
 _UNITS = {
-    'mass': 'kg', 'inertia': 'kg m²', 'height': 'm', 'homes': 'm', 'coxa': 'm', 'femur': 'm',
-    'tibia': 'm', 'leg_stiffness': 'N/m', 'rolling_drag': 'N', 'load': 'N', 'goal': 'm',
+    'mass': 'kg', 'inertia': 'kg m²', 'height': 'm', 'homes': 'm', 'leg_stiffness': 'N/m',
+    'rolling_drag': 'N', 'load': 'N', 'goal': 'm',
     'cycle': 's', 'stride': 'm', 'lift': 'm', 'stroke': 'm', 'stance': 's', 'swing': 's',
     'heading_gain': '1/s', 'film_thickness': 'm', 'viscosity': 'Pa s', 'patch_length': 'm',
     'cell': 'm', 'slope': 'rad', 'roughness': 'm', 'unevenness': 'm', 'weight': 'N',
@@ -149,7 +149,7 @@ def _listed(values: Mapping[str, Any]) -> str:
 def _items(values: Mapping[str, Any], of: str = '') -> Iterator[str]:
     for name, each in values.items():
         words = f'{of}{name.replace("_", " ")}'
-        if each is None or each == () or each == [] or name == 'homes':
+        if each is None or each == () or each == [] or name in ('homes', 'middles'):
             continue
         if name in ('cell', 'wet_fraction', 'patch_length') and not each:  # not used by this floor
             continue

@@ -58,6 +58,7 @@ def label(
     metrics: Metrics | None = None,
     real_time_factor: float | None = None,
     comparison: Sequence[dict[str, Any]] = (),
+    sensing: str = 'markers',
 ) -> dict[str, str]:
     """Return the custom data of a trial's bag: JSON texts by key.
 
@@ -71,6 +72,8 @@ def label(
         Results of the trial; None before its end.
     comparison : sequence of dict
         Metrics of other policies on the same ground, each with its ``policy``.
+    sensing : str
+        ``markers`` or ``joints``.
     """
     return {
         KEY: json.dumps(
@@ -83,7 +86,7 @@ def label(
                 'ambient_pressure': AMBIENT_PRESSURE.default,
                 'metrics': metrics.as_dict() if metrics else None,
                 'real_time_factor': real_time_factor,
-                'settings': settings(scene, policy, fidelity)
+                'settings': settings(scene, policy, fidelity, sensing)
                 | {
                     'interrupted': interrupted,
                     'comparison': list(comparison),
@@ -133,7 +136,7 @@ def promise(trial: Trial) -> str:
     return str(trial.settings['fidelity_note'])
 
 
-def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
+def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers') -> dict[str, Any]:
     """Return what pages and replays show of a trial's settings: scene, level and versions."""
     choice = levels.choose(scene, fidelity, policy)
     return {
@@ -142,6 +145,7 @@ def settings(scene: Scene, policy: str, fidelity: str) -> dict[str, Any]:
         'stride_m': scene.stride,
         'cycle_s': scene.gait.cycle,
         'settle_s': scene.settle,
+        'sensing': sensing,
         'faults': [str(fault) for fault in scene.faults],
         # JSON has no infinity.
         'fidelity_bound': choice.bound if choice.bound < math.inf else None,
@@ -161,5 +165,6 @@ def described(scene: Scene) -> dict[str, Any]:
     values['foot'] = {
         name: each for name, each in values['foot'].items() if not name.startswith('_')
     }
+    values['body'].pop('robot', None)  # its file is named
     values['faults'] = [str(fault) for fault in scene.faults]
     return values

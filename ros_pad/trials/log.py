@@ -13,7 +13,7 @@ import numpy as np
 from ros_pad.control import MorphologyController
 from ros_pad.estimation import DOUBTS
 from ros_pad.estimation import Estimate
-from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.robot import SimulatedRobot
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -32,19 +32,36 @@ class TrialLog:
     seed : int
     fidelity : str
         Fidelity level of the trial.
+    sensing : str
+        ``markers`` or ``joints``.
     """
 
-    def __init__(self, scene: Scene, policy: str, seed: int, fidelity: str) -> None:
+    def __init__(
+        self, scene: Scene, policy: str, seed: int, fidelity: str, sensing: str = 'markers'
+    ) -> None:
         self._scene = scene
         self._policy = policy
         self._seed = seed
         self._fidelity = fidelity
+        self._sensing = sensing
+        self._odom = array('d')
         # Arrays, because many small tuples would occupy memory and the garbage collector.
         self._time, self._body, self._readings = array('d'), array('d'), array('d')
         self._slow_time, self._rows = array('d'), array('d')
 
-    def sample(self, time: float, body: Vector, readings: Sequence[tuple[Vector, Vector]]) -> None:
-        """Add a sensor sample: time, s, body, and force, N, and position, m, of each foot."""
+    def sample(
+        self,
+        time: float,
+        body: Vector,
+        readings: Sequence[tuple[Vector, Vector]],
+        odom: Vector | None = None,
+    ) -> None:
+        """Add a sensor sample: time, s, body, and force, N, and position, m, of each foot.
+
+        ``odom`` is the estimated body, in whose frame the feet are then.
+        """
+        if odom:
+            self._odom.extend(odom)
         self._time.append(time)
         self._body.extend(body)
         self._readings.extend(chain.from_iterable(chain.from_iterable(readings)))
@@ -73,14 +90,15 @@ class TrialLog:
 
     def finish(
         self,
-        robot: Robot,
+        robot: SimulatedRobot,
         controller: MorphologyController,
         floor: Floor,
         real_time_factor: float | None,
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
-        readings = np.array(self._readings).reshape(len(self._time), -1, 2, 3)
-        slow = np.array(self._rows).reshape(len(self._slow_time), -1, 9)
+        legs = len(self._scene.legs)
+        readings = np.array(self._readings).reshape(len(self._time), legs, 2, 3)
+        slow = np.array(self._rows).reshape(len(self._slow_time), legs, 9)
         trial = Trial(
             scene=self._scene.name,
             policy=self._policy,
@@ -102,8 +120,11 @@ class TrialLog:
             dome=slow[:, :, 7].astype(bool),
             doubt=slow[:, :, 8].astype(int),
             floor=floor,
-            settings=settings(self._scene, self._policy, self._fidelity),
+            settings=settings(self._scene, self._policy, self._fidelity, self._sensing),
             real_time_factor=real_time_factor,
+            odom=np.array(self._odom).reshape(-1, 3),
         )
+        if len(trial.odom):
+            trial.move_to_world()
         trial.metrics = summarise(self._scene, trial, robot, controller)
         return trial

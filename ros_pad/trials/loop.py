@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 
+from ros_pad.configuration import choice
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
@@ -24,6 +25,7 @@ from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.tuning import SOURCES
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
@@ -32,14 +34,25 @@ from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
 from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
 from ros_pad.regulators.supervisor import SupervisedChannel
+from ros_pad.sensing import BodyEstimate
+from ros_pad.sensing import SensingStage
+from ros_pad.sensing.stage import FootReadings
+from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import foot_readings
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.faults import faults_of
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
 from ros_pad.trials.log import TrialLog
+from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import heading
 
 
 def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:
@@ -98,6 +111,13 @@ class LegStages:
         force, position = reading
         self.estimation.sample(stamp_ns, force, moment, position)
 
+    def motion(self, stamp_ns: int, reading: FootReadings) -> None:
+        """Pass what a body estimator shows of the foot to the stages, in the order of its node."""
+        self.estimation.wrench(stamp_ns, reading.force, None)
+        self.estimation.position(stamp_ns, reading.position)
+        variance = reading.variance
+        self.estimation.contact_velocity(stamp_ns, *reading.velocity, variance, variance)
+
     def report(self, now_ns: int) -> None:
         """Read the pressure from the regulator, and pass it to estimation and decision."""
         pressure = self.channel.read(now_ns)
@@ -106,18 +126,74 @@ class LegStages:
             self.estimation.pressure(pressure)
             self.decision.pressure(pressure)
 
-    def decide(self, now_ns: int) -> None:
-        """Pass a new estimate to the decision, and its set-point to the regulator."""
+    def decide(self, now_ns: int) -> bool:
+        """Pass an estimate to the decision, and its set-point to the regulator, if it is new."""
         if self._emission is None:
-            return
+            return False
         setpoint = self.decision.take(now_ns * 1e-9, self._emission).setpoint
         self._emission = None
         if setpoint is not None:
             self.channel.command(setpoint, 0.0, now_ns)
+        return True
 
 
 def _ignore(error: InvalidInput) -> None:
     """Ignore a rejected sample: the stage reports repeated rejections as a doubt."""
+
+
+class BodySensing:
+    """Simulated IMU, joints and forces of the feet, and the sensing stage that they feed.
+
+    Parameters
+    ----------
+    scene : Scene
+    seed : int
+        Seed of the noise.
+    robot : FullRobot
+        The simulated robot.
+    emit_doubt : callable
+        Called with the doubt of the body when its kind has changed.
+
+    Attributes
+    ----------
+    stage : SensingStage
+    estimate : BodyEstimate or None
+        Estimate of the present sample; None if it has none.
+    """
+
+    def __init__(
+        self, scene: Scene, seed: int, robot: FullRobot, emit_doubt: Callable[[str], None]
+    ) -> None:
+        self._robot = robot
+        self._sensors = BodySensors(scene, seed, len(robot.joint_names))
+        assert isinstance(scene.body, LeggedBody)
+        model, values = scene.body.robot, body_settings_for(scene)
+        self.stage = SensingStage(
+            model, estimator_of(model, values), self._take, emit_doubt, _ignore, values['forces']
+        )
+        self.estimate: BodyEstimate | None = None
+
+    def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        self.estimate = estimate
+
+    def sample(self, stamp_ns: int) -> list[FootReadings]:
+        """Measure and estimate; return what the estimate shows of each foot, or nothing."""
+        self.estimate = None
+        reading = self._sensors.read(self._robot.proprioception(), self._robot.time)
+        for index, force in enumerate(reading.forces):
+            self.stage.force(index, stamp_ns, force)
+        if reading.imu:
+            self.stage.imu(stamp_ns, *reading.imu)
+        if reading.joints:
+            self.stage.joints(stamp_ns, *reading.joints)
+        return foot_readings(self.estimate) if self.estimate else []
+
+    @property
+    def odom(self) -> Vector:
+        """Estimated position x and y, m, and heading, rad, of the body."""
+        assert self.estimate
+        x, y, _ = self.estimate.position.tolist()
+        return x, y, heading(*self.estimate.orientation.tolist())
 
 
 class ClosedLoop:
@@ -138,9 +214,13 @@ class ClosedLoop:
         :func:`ros_pad.trials.node_settings.tuning_for`.
     policy_parameters : mapping or None
         See :func:`ros_pad.control.policy_named`.
+    sensing : str
+        ``markers``, or ``joints``: IMU, joints and forces in the axes of the feet (L2 only).
 
     Attributes
     ----------
+    body : BodySensing or None
+        None with markers.
     estimators : list of FootEstimator
         One for each leg; see :meth:`connect`.
     controller : MorphologyController
@@ -164,15 +244,21 @@ class ClosedLoop:
         fidelity: str = 'auto',
         tuning: Tuning | None = None,
         policy_parameters: Mapping[str, Any] | None = None,
+        sensing: str = 'markers',
     ) -> None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
         self.period_ns = round(1e9 / scene.sensors.rate)
         self.floor = scene.floor.build(seed)
+        fidelity = levels.level(scene, fidelity, joints=sensing == 'joints')
         self.robot = levels.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
         self.sensors = Sensors.of(scene, seed)
         self._stamp_ns = 0
-        tuning = tuning or tuning_for(scene)
+        tuning = tuning or tuning_for(scene, sensing)
+        self.body: BodySensing | None = None
+        if sensing == 'joints':
+            assert isinstance(self.robot, FullRobot)
+            self.body = BodySensing(scene, seed, self.robot, self._doubt_body)
         estimators = [FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs]
         controller = MorphologyController(
             scene.foot,
@@ -230,6 +316,10 @@ class ClosedLoop:
     def _clock(self) -> float:
         return self._stamp_ns * 1e-9
 
+    def _doubt_body(self, doubt: str) -> None:
+        for leg in self.legs:
+            leg.estimation.body_doubt(doubt)
+
     @property
     def pressures(self) -> list[float]:
         """Gauge pressures that the regulators reported last, Pa."""
@@ -239,30 +329,45 @@ class ClosedLoop:
         """Advance by one sample, and log it.
 
         First the robot moves, and each foot is estimated with the last reported pressure. At
-        control steps the regulators then report, the controller decides, and the regulators
-        receive its set-points.
+        control steps the regulators then report. Where there are new estimates, the controller
+        decides, and the regulators receive its set-points.
         """
         self._stamp_ns += self.period_ns
         now_ns, legs = self._stamp_ns, self.legs
         for channel in self._channels:
             channel.tick(now_ns)
         if self._tick_pace.due(now_ns):
+            if self.body:
+                self.body.stage.tick(now_ns)
             for leg in legs:
                 leg.tick(now_ns)
         self.robot.step(self.pads)
-        readings = self.sensors.read(self.robot)
-        moments = self.sensors.read_moments(self.robot)
-        for leg, reading, moment in zip(legs, readings, moments, strict=True):
-            leg.sample(now_ns, reading, moment)
-        log.sample(now_ns * 1e-9, self.robot.body, readings)
+        self._measure(now_ns, log)
         if self._pace.due(now_ns):
             for leg in legs:
                 leg.report(now_ns)
             self.pads = [regulator.pad_pressure for regulator in self._regulators]
-            for leg in legs:
-                leg.decide(now_ns)
+        # Without markers the first estimate after a silence may come between control steps.
+        decided = [leg.decide(now_ns) for leg in legs]
+        if any(decided):
             estimates = [each.estimate for each in self.estimators]
             log.control(now_ns * 1e-9, self.pressures, estimates, self.controller)
+
+    def _measure(self, now_ns: int, log: TrialLog) -> None:
+        """Read the sensors, pass what they measure to the legs, and log it."""
+        if self.body:
+            feet = self.body.sample(now_ns)
+            if feet:
+                for leg, foot in zip(self.legs, feet, strict=True):
+                    leg.motion(now_ns, foot)
+                felt = [(foot.force, foot.position) for foot in feet]
+                log.sample(now_ns * 1e-9, self.robot.body, felt, self.body.odom)
+            return
+        readings = self.sensors.read(self.robot)
+        moments = self.sensors.read_moments(self.robot)
+        for leg, reading, moment in zip(self.legs, readings, moments, strict=True):
+            leg.sample(now_ns, reading, moment)
+        log.sample(now_ns * 1e-9, self.robot.body, readings)
 
     def close(self) -> None:
         """Vent and close the regulators."""
@@ -278,6 +383,7 @@ def run(
     progress: Progress | None = None,
     tuning: Tuning | None = None,
     policy_parameters: Mapping[str, Any] | None = None,
+    sensing: str = 'markers',
 ) -> Trial:
     """Run a trial without ROS.
 
@@ -297,6 +403,8 @@ def run(
         Tuning of the estimators; None takes that for the scene's sensors.
     policy_parameters : mapping or None
         Parameters of :func:`ros_pad.control.adaptive`, by name.
+    sensing : str
+        ``markers``, or ``joints``: without markers, from IMU, joints and forces of the feet (L2).
 
     Returns
     -------
@@ -313,9 +421,10 @@ def run(
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
-    level = levels.level(scene, fidelity, policy)
-    loop = ClosedLoop(scene, policy, seed, level, tuning, policy_parameters)
-    log = TrialLog(scene, policy, seed, level)
+    choice('sensing', sensing, SOURCES)
+    level = levels.level(scene, fidelity, policy, sensing == 'joints')
+    loop = ClosedLoop(scene, policy, seed, level, tuning, policy_parameters, sensing)
+    log = TrialLog(scene, policy, seed, level, sensing)
     started = time.perf_counter()
     samples = round(scene.duration * 1e9) // loop.period_ns
     try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.control import MorphologyController
-from ros_pad.simulation.robot import Robot
+from ros_pad.simulation.robot import SimulatedRobot
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.trial import Metrics
@@ -19,7 +19,7 @@ LOAD_GATE = 0.3  # share of the expected load above which a foot stands
 
 
 def summarise(
-    scene: Scene, trial: Trial, robot: Robot, controller: MorphologyController
+    scene: Scene, trial: Trial, robot: SimulatedRobot, controller: MorphologyController
 ) -> Metrics:
     """Return the metrics of a trial from its series and from the robot that walked it."""
     x, y, heading = robot.body

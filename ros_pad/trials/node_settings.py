@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import os
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from typing import Any
 from typing import TypeAlias
 
 from ros_pad.configuration import Setting
+from ros_pad.configuration import choice
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.control import MorphologyController
@@ -34,8 +36,11 @@ from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.tuning import EXPECTED_LOAD
+from ros_pad.estimation.tuning import SOURCES
 from ros_pad.estimation.tuning import attribute
+from ros_pad.sensing.stage import SETTINGS as BODY_SETTINGS
 from ros_pad.simulation.scene import FloorPlan
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.label import AMBIENT_PRESSURE
@@ -61,12 +66,41 @@ OWN = (
 
 _ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 
+SHAKING = 0.3
+"""Error of an acceleration as the mean of a sample while the robot walks, m/s²: its steps are
+shorter. Where all feet slip, the body estimator must not rely on the IMU more than that."""
+
 Value: TypeAlias = 'float | int | bool | str'
 
 
-def tuning_for(scene: Scene) -> Tuning:
-    """Return the tuning of the estimators for the sensors of a scene, whatever its ground is."""
+def body_settings_for(scene: Scene) -> dict[str, Any]:
+    """Return the settings of the body estimator for the sensors of a scene, by name."""
     sensors = scene.sensors
+    share = 0.0
+    if isinstance(scene.body, LeggedBody) and scene.body.mass != scene.body.robot.mass:
+        # The estimator has the mass of the robot's file; the scene's robot has another one.
+        share = min(max(0.1 * scene.body.mass / scene.body.robot.mass, 0.01), 0.9)
+    return {each.name: each.default for each in BODY_SETTINGS} | {
+        'contact_share': share,
+        'gyro_noise': sensors.gyro,
+        'accelerometer_noise': math.hypot(sensors.accelerometer, SHAKING),
+        'accelerometer_bias': sensors.accelerometer_bias,
+        'encoder_noise': sensors.encoder,
+        'velocity_noise': sensors.joint_velocity,
+        'force_noise': sensors.force,
+        'rate': sensors.rate,
+    }
+
+
+def tuning_for(scene: Scene, sensing: str = 'markers') -> Tuning:
+    """Return the tuning of the estimators for the sensors of a scene, whatever its ground is.
+
+    ``sensing`` is where slip comes from, ``markers`` or ``joints``.
+    """
+    sensors = scene.sensors
+    if choice('sensing', sensing, SOURCES) == 'joints':
+        # A body estimator has no moments; the joints of simulated robots are those of rigid feet.
+        return Tuning(force_noise=sensors.force, source='joints', pads_shear=False)
     return Tuning(
         position_noise=sensors.position, force_noise=sensors.force, moment_noise=sensors.moment
     )

@@ -43,18 +43,27 @@ def _share(reached: MutableSequence[float]) -> None:
     os.nice(NICENESS)
 
 
-def _walk(scene: Scene, policy: str, seed: int, level: str, place: int) -> Metrics | None:
+def _walk(
+    scene: Scene, policy: str, seed: int, level: str, sensing: str, place: int
+) -> Metrics | None:
     def progress(seconds: float) -> None:
         _reached[place] = seconds
 
-    return loop.run(scene, policy, seed, level, progress).metrics
+    return loop.run(scene, policy, seed, level, progress, sensing=sensing).metrics
 
 
 class Others:
     """Walks that may be under way in other processes."""
 
-    def __init__(self, scene: Scene, policies: Sequence[str], seed: int, level: str) -> None:
-        self._given = scene, seed, level
+    def __init__(
+        self,
+        scene: Scene,
+        policies: Sequence[str],
+        seed: int,
+        level: str,
+        sensing: str = 'markers',
+    ) -> None:
+        self._given = scene, seed, level, sensing
         self._policies = policies
         self._left: deque[str] = deque()  # not begun
         self._reached: MutableSequence[float] = []
@@ -82,10 +91,10 @@ class Others:
             policy = self._left.popleft()
         except IndexError:
             return
-        scene, seed, level = self._given
+        scene, seed, level, sensing = self._given
         place = self._policies.index(policy)
         with suppress(RuntimeError):  # the executor has ended, or its processes were killed
-            walk = executor.submit(_walk, scene, policy, seed, level, place)
+            walk = executor.submit(_walk, scene, policy, seed, level, sensing, place)
             self._walks[policy] = walk
             walk.add_done_callback(lambda _: self._begin(executor))
 
@@ -113,9 +122,9 @@ class Others:
         return {policy: each for policy in self._policies if (each := found[policy]) is not None}
 
     def _here(self, policy: str, bar: Bar) -> Metrics | None:
-        scene, seed, level = self._given
+        scene, seed, level, sensing = self._given
         with bar(_text(policy), scene.duration) as progress:
-            return loop.run(scene, policy, seed, level, progress).metrics
+            return loop.run(scene, policy, seed, level, progress, sensing=sensing).metrics
 
     def _awaited(self, policy: str, place: int, bar: Bar) -> Metrics | None:
         walk = self._walks[policy]

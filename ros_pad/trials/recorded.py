@@ -30,6 +30,7 @@ import numpy as np
 from ros_pad.bags import BagReader
 from ros_pad.bags.recovery import KEY as REPAIR
 from ros_pad.bags.topics import DIAGNOSTICS
+from ros_pad.bags.topics import OF_BODY
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
@@ -45,8 +46,9 @@ from ros_pad.trials.label import LOST
 from ros_pad.trials.label import RECORDED_AT
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import heading
 
-_TOPIC = re.compile(r'(?P<namespace>.*?/)(?:leg_(?P<leg>\d+)/)?(?P<kind>\w+(?:/pose)?)')
+_TOPIC = re.compile(r'(?P<namespace>.*?/)(?:leg_(?P<leg>\d+)/)?(?P<kind>\w+(?:/pose|/doubt)?)')
 # A log time after 2001 is a date, an earlier one is simulated time.
 _FIRST_DATE_NS = 10**18
 
@@ -63,15 +65,8 @@ def _is_dome(text: str) -> float:
 _CODES: dict[str, Callable[[str], float]] = {'doubt': _doubt_code, 'morphology': _is_dome}
 """Functions that turn the text of a message into a number, by kind of topic."""
 
-_BODY = -1  # in place of a leg's number, for the body's pose
-
-
-def _heading(x: float, y: float, z: float, w: float) -> float:
-    """Return the heading, rad, of a unit quaternion."""
-    if x == 0.0 and y == 0.0:
-        # For a rotation about the vertical alone, this is more exact than the formula below.
-        return 2.0 * math.atan2(z, w)
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+OF_ROBOT = -1
+"""In place of the number of a leg, for what a robot has only once."""
 
 
 def _each(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
@@ -149,7 +144,7 @@ def load(
     bag = BagReader(folder)
     wanted = wanted_topics(bag, namespace, remaps)
     series = _read(bag, wanted, progress)
-    legs = tuple(sorted({leg for leg, _ in series if leg != _BODY}))
+    legs = tuple(sorted({leg for leg, _ in series if leg != OF_ROBOT}))
 
     def columns(kind: str, times: np.ndarray) -> np.ndarray:
         return np.stack([_column(series, kind, leg, times) for leg in legs], axis=1)
@@ -157,9 +152,15 @@ def load(
     def slow(kind: str) -> np.ndarray:
         return columns(kind, slow_ns)[:, :, 0]
 
-    fast_ns = _grid(series, 'wrench', 'position', 'body/pose')
+    fast_ns = _grid(series, 'wrench', 'position', 'body/pose', 'odom')
     slow_ns = _grid(series, 'wetness', 'pressure', *TRIAL)
-    pose, slip = _column(series, 'body/pose', _BODY, fast_ns), columns('slip', slow_ns)
+    slip = columns('slip', slow_ns)
+    odom = np.zeros((0, 3))
+    body = _pose_of(_column(series, 'body/pose', OF_ROBOT, fast_ns))
+    if (OF_ROBOT, 'odom') in series:
+        odom = _pose_of(np.delete(_column(series, 'odom', OF_ROBOT, fast_ns), 2, axis=1))
+        if (OF_ROBOT, 'body/pose') not in series:
+            body = odom
     trial = _described(bag)
     zero_ns = 0
     if bag.start > _FIRST_DATE_NS:
@@ -172,11 +173,11 @@ def load(
     with contextlib.suppress(BagError):  # a trial can be read without it
         trial['settings']['late'] = late(bag)
     ambient = trial['settings']['ambient_pressure']
-    return Trial(
+    found = Trial(
         **trial,
         legs=legs,
         time=(fast_ns - zero_ns) * 1e-9,
-        body=np.column_stack([pose[:, :2], _each(_heading, pose[:, 2:])]),
+        body=body,
         force=columns('wrench', fast_ns),
         position=columns('position', fast_ns),
         slow_time=(slow_ns - zero_ns) * 1e-9,
@@ -189,7 +190,16 @@ def load(
         slipping=slow('slipping') == 1.0,
         dome=slow('morphology') == 1.0,
         doubt=np.nan_to_num(slow('doubt'), nan=-1.0).astype(int),
+        odom=odom,
     )
+    if len(odom):
+        found.move_to_world()
+    return found
+
+
+def _pose_of(values: np.ndarray) -> np.ndarray:
+    """Return x and y, m, and heading, rad, of positions x, y and quaternions: shape (n, 3)."""
+    return np.column_stack([values[:, :2], _each(heading, values[:, 2:])])
 
 
 def late(bag: BagReader) -> list[str]:
@@ -262,7 +272,7 @@ def _described(bag: BagReader) -> dict[str, Any]:
 def wanted_topics(
     bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
 ) -> dict[str, tuple[int, str]]:
-    """Return leg (-1 for the body's pose) and kind of each topic that a trial is read from.
+    """Return leg (-1 for those of the body) and kind of each topic that a trial is read from.
 
     Parameters
     ----------
@@ -289,17 +299,17 @@ def wanted_topics(
         match = _TOPIC.fullmatch(own_name)
         if not match or match['kind'] not in TRIAL or not bag.counts[name]:
             continue
-        if (match['kind'] == 'body/pose') != (match['leg'] is None):
+        if (match['kind'] in OF_BODY) != (match['leg'] is None):
             continue
         expected = TRIAL[match['kind']].type_name
         if bag.topics[name] != expected:
             raise BagError(f'{bag.path}: {name} is a {bag.topics[name]}: {expected} is needed')
-        leg = int(match['leg'] or _BODY)
+        leg = int(match['leg'] or OF_ROBOT)
         found.setdefault(match['namespace'], {})[name] = leg, match['kind']
     robots = {
         prefix: topics
         for prefix, topics in found.items()
-        if any(leg != _BODY for leg, _ in topics.values())
+        if any(leg != OF_ROBOT for leg, _ in topics.values())
     }
     if namespace is not None:
         prefix = _prefix(namespace)
@@ -327,13 +337,13 @@ def _names(
         given = f'--remap {own}:={other}'
         kind = own.removeprefix('/').partition('/')[2]
         leg = own.removeprefix('/').partition('/')[0].removeprefix('leg_')
-        if not (own == 'body/pose' or (kind in TRIAL and (leg.isdecimal() or leg == '{leg}'))):
+        if not (own in OF_BODY or (kind in TRIAL and (leg.isdecimal() or leg == '{leg}'))):
             near = difflib.get_close_matches(kind or own, TRIAL, n=1)
             hint = f' Did you mean leg_{{leg}}/{near[0]}?' if near else ''
             raise InvalidInput(
-                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: body/pose, and'
+                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: {", ".join(OF_BODY)}, and'
                 f' leg_{{leg}}/ or leg_1/ before one of'
-                f' {", ".join(each for each in TRIAL if "/" not in each)}'
+                f' {", ".join(each for each in TRIAL if each not in OF_BODY)}'
             )
         if (leg == '{leg}') != ('{leg}' in other):
             raise InvalidInput(f'{given}: {{leg}} is needed on both sides of := or on neither')

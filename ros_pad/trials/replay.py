@@ -3,8 +3,9 @@
 
 The stages of the nodes receive the wrenches, positions and pressures of a bag in the order of
 recording, and their output is compared with the recorded one. For a trial in simulated time, the
-two are equal to the bit. With other parameters, a replay shows how estimates and decisions would
-have changed; the motion of the robot stays as recorded.
+two are equal to the bit. The body estimator of a trial without markers is replayed beside them,
+from IMU, joints and forces. With other parameters, a replay shows how estimates and decisions
+would have changed; the motion of the robot stays as recorded.
 """
 
 from __future__ import annotations
@@ -28,14 +29,16 @@ from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
+from ros_pad.trials.replay_body import compare_body
 from ros_pad.trials.replay_comparison import compare_topics
 from ros_pad.trials.replay_notes import notes_on
 from ros_pad.trials.replay_player import DECISIONS
 from ros_pad.trials.replay_player import ESTIMATES
-from ros_pad.trials.replay_player import INPUTS
+from ros_pad.trials.replay_player import OF_MOTION
 from ros_pad.trials.replay_player import Player
 from ros_pad.trials.replay_player import Progress
 from ros_pad.trials.replay_player import Tracks
+from ros_pad.trials.replay_player import inputs_of
 from ros_pad.trials.replay_player import play
 from ros_pad.trials.trial import BOUNCE
 
@@ -196,10 +199,13 @@ def replay(
         When a remap is not allowed, see :func:`ros_pad.trials.recorded.wanted_topics`.
     """
     settings = settings or NodeSettings.of(bag)
+    kinds = (*inputs_of(settings), *ESTIMATES, *DECISIONS)
+    if settings.tuning.source == 'joints':
+        kinds += OF_MOTION
     wanted = {
         topic: key
         for topic, key in wanted_topics(bag, namespace, remaps).items()
-        if key[1] in INPUTS + ESTIMATES + DECISIONS
+        if key[1] in kinds
     }
     there = {key: topic for topic, key in wanted.items()}
     legs = tuple(sorted(leg for leg, kind in there if kind == 'wrench'))
@@ -223,7 +229,11 @@ def replay(
                 f'leg {", ".join(map(str, late))}: the estimator started later than the recorder,'
                 ' so the replay leaves out the samples before its first recorded estimate'
             )
-            return other
+            found = other
+    # The body estimator is replayed beside the feet, which take what it published.
+    comparisons, note = compare_body(bag, wanted)
+    found.comparisons += comparisons
+    found.notes += [note] if note else []
     return found
 
 

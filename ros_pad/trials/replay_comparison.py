@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.topics import OF_BODY
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
@@ -77,7 +78,8 @@ def absent(
     player: Player, there: Mapping[tuple[int, str], str], settings: NodeSettings
 ) -> list[int]:
     """Return the legs of the robot that cannot be replayed."""
-    return sorted(({*settings.legs} | {leg for leg, _ in there}) - set(player.legs))
+    recorded = {leg for leg, kind in there if kind not in OF_BODY}
+    return sorted(({*settings.legs} | recorded) - set(player.legs))
 
 
 def first_gap(leg: ReplayedLeg) -> tuple[int, str] | None:

@@ -13,9 +13,9 @@ from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay_comparison import absent
 from ros_pad.trials.replay_comparison import first_gap
-from ros_pad.trials.replay_player import INPUTS
 from ros_pad.trials.replay_player import TEXTS
 from ros_pad.trials.replay_player import Player
+from ros_pad.trials.replay_player import inputs_of
 
 
 def notes_on(
@@ -79,12 +79,18 @@ def _missing_inputs(
             ' other legs lack its footprints'
         )
     without = {
-        kind: [str(leg) for leg in player.legs if (leg, kind) not in there] for kind in INPUTS
+        kind: [str(leg) for leg in player.legs if (leg, kind) not in there]
+        for kind in inputs_of(settings)
     }
     if without['position']:
         notes.append(
             f'leg {", ".join(without["position"])}: no position was recorded, so there are no'
             ' estimates'
+        )
+    if without.get('contact_velocity'):
+        notes.append(
+            f'leg {", ".join(without["contact_velocity"])}: no velocity of the contact was'
+            ' recorded, which source joints needs, so there are no estimates'
         )
     if without['pressure']:
         notes.append(

@@ -17,6 +17,7 @@ from typing import Any
 from typing import TypeAlias
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.topics import BODY_DOUBT
 from ros_pad.bags.topics import CLOCK
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
@@ -33,7 +34,8 @@ from ros_pad.pace import Progress
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.node_settings import NodeSettings
 
-INPUTS = ('wrench', 'position', 'pressure')
+OF_MOTION = ('contact_velocity', BODY_DOUBT.kind)
+"""Further inputs of estimators with ``source: joints``."""
 TEXTS = tuple(kind for kind, topic in TRIAL.items() if topic.text)
 ESTIMATES = ('slip', 'slipping', 'friction', 'friction_margin', 'wetness', 'doubt')
 DECISIONS = ('morphology', 'pressure_setpoint')
@@ -43,6 +45,13 @@ LONGEST_SILENCE_NS = 10_000_000_000
 """Without /clock, the stages tick only in the last part of a pause; this is its length, ns."""
 
 _REPORT_EVERY = 5_000  # messages
+
+
+def inputs_of(settings: NodeSettings) -> tuple[str, ...]:
+    """Return the kinds of input of each leg."""
+    joints = settings.tuning.source == 'joints'
+    return ('wrench', 'position', 'pressure', *(OF_MOTION[:1] if joints else ()))
+
 
 Take: TypeAlias = Callable[[Any, int], None]
 """Function of the values of a message and its log time, ns."""
@@ -93,7 +102,7 @@ class ReplayedLeg:
         self.first_stamp_ns = -1
         self.rejected, self.rejection = 0, ''
         self.inputs: dict[str, tuple[array[int], array[int]]] = {
-            kind: (array('q'), array('q')) for kind in INPUTS
+            kind: (array('q'), array('q')) for kind in inputs_of(settings)
         }
         self._standing = False
         self.landings, self.lift_offs = array('q'), array('q')
@@ -120,6 +129,13 @@ class ReplayedLeg:
         stamp_ns = self._note('position', values[:2], log_ns)
         if stamp_ns >= self.first_stamp_ns:
             self.estimation.position(stamp_ns, values[2:])
+        self._follow_stance(log_ns)
+
+    def contact_velocity(self, values: tuple[Any, ...], log_ns: int) -> None:
+        """Process a message of the velocity of the contact."""
+        stamp_ns = self._note('contact_velocity', values[:2], log_ns)
+        if stamp_ns >= self.first_stamp_ns:
+            self.estimation.contact_velocity(stamp_ns, *values[2:])
         self._follow_stance(log_ns)
 
     def pressure(self, values: tuple[Any, ...], log_ns: int) -> None:
@@ -254,6 +270,11 @@ class Player:
             for leg in self.legs.values():
                 leg.tick(self.now_ns)
 
+    def body_doubt(self, values: tuple[Any, ...], log_ns: int) -> None:
+        """Process a doubt of the body estimator."""
+        for leg in self.legs.values():
+            leg.estimation.body_doubt(*values)
+
     def flush(self) -> None:
         """Pass the stored outputs of estimation to decision."""
         for call in self.later:
@@ -325,15 +346,19 @@ def play(
         player.legs[leg].first_stamp_ns = beginning_ns
     takers: dict[str, Take] = {}
     paths: dict[str, tuple[str, ...]] = {}
+    inputs = inputs_of(settings)
     for topic, (leg, kind) in wanted.items():
+        if kind == BODY_DOUBT.kind:
+            takers[topic] = partial(player.play, player.body_doubt)
+            paths[topic] = BODY_DOUBT.values
         if leg not in player.legs:
             continue
         paths[topic] = TRIAL[kind].values
-        if kind in INPUTS:
+        if kind in inputs:
             takers[topic] = partial(player.play, getattr(player.legs[leg], kind))
         else:
             takers[topic] = _keeper(player.recorded[leg, kind], kind)
-        if kind in (*INPUTS, 'slip'):
+        if kind in (*inputs, 'slip'):
             paths[topic] = STAMP + paths[topic]
         if kind == 'wrench':
             paths[topic] += ('wrench.torque.z',)

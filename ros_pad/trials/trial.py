@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from dataclasses import dataclass
@@ -111,6 +112,14 @@ def _end(fault: dict[str, Any]) -> str:
     return 'the end' if fault['end'] is None else f'{fault["end"]:.1f} s'
 
 
+def heading(x: float, y: float, z: float, w: float) -> float:
+    """Return the heading, rad, of a unit quaternion."""
+    if x == 0.0 and y == 0.0:
+        # For a rotation about the vertical alone, this is more exact than the formula below.
+        return 2.0 * math.atan2(z, w)
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
 class _OnDemand:
     """A field that may be set to a function, which makes its value when it is first read."""
 
@@ -159,6 +168,9 @@ class Trial:
     doubt : ndarray of int (m, legs)
         Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
         was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
+    odom : ndarray (n, 3)
+        Estimated position x and y of the body, m, and heading, rad, in odom; shape (0, 3) with
+        markers. Feet are in the world all the same.
     floor : Floor or None
         The true floor; None where it is unknown. It may be given as a function that builds it.
     metrics : Metrics or None
@@ -192,6 +204,25 @@ class Trial:
     settings: dict[str, Any] = field(default_factory=dict)
     real_time_factor: float | None = None
     doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=int))
+    odom: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def move_to_world(self) -> None:
+        """Move the feet of a trial with odom from there to the world of the body's true pose.
+
+        Odom is where the body estimator takes the robot to be; it drifts. Feet are placed by the
+        true pose of the body, as they stand to its estimated one.
+        """
+        turn = (self.body[:, 2] - self.odom[:, 2])[:, None]
+        cosine, sine = np.cos(turn), np.sin(turn)
+
+        def turned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=2)
+
+        arms = self.position[:, :, :2] - self.odom[:, None, :2]
+        self.position = self.position.copy()
+        self.position[:, :, :2] = self.body[:, None, :2] + turned(arms[..., 0], arms[..., 1])
+        self.force = self.force.copy()
+        self.force[:, :, :2] = turned(self.force[:, :, 0], self.force[:, :, 1])
 
     def standing(self, load_gate: float) -> np.ndarray:
         """Return whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).

@@ -63,7 +63,7 @@ def offered(
 
 @pytest.fixture
 def here(tmp_path: pathlib.Path) -> pathlib.Path:
-    """Return a folder with two bags, a lone MCAP file, a file of a foot and an empty folder."""
+    """Return a folder with two bags, an MCAP file, a foot, a robot, and an empty folder."""
     for name in ('runs/walk/bag', 'runs/walk_2/bag'):
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / 'metadata.yaml').touch()
@@ -71,6 +71,7 @@ def here(tmp_path: pathlib.Path) -> pathlib.Path:
     (tmp_path / 'runs' / 'lone.mcap').touch()
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'my_foot.yaml').touch()
+    (tmp_path / 'my_robot.urdf').touch()
     return tmp_path
 
 
@@ -114,6 +115,11 @@ def test_arguments(line: str, expected: list[str], here: pathlib.Path):
         ('sweep', 'policy', '', list(POLICIES)),
         ('sweep', 'policy', 'flat,', [f'flat,{each}' for each in POLICIES if each != 'flat']),
         ('run', 'seed', '', []),
+        ('doctor', 'robot', '', configuration.names('robots')),
+        ('doctor', 'robot', 'my', ['my_foot.yaml', 'my_robot.urdf']),
+        ('doctor', 'mapping', 'go2', ['go2', 'go2_sport']),
+        ('doctor', 'bag', 'runs/walk_', ['runs/walk_2/bag']),
+        ('doctor', 'imu', '', []),
     ],
 )
 def test_what_the_parser_does_not_know(

@@ -461,7 +461,7 @@ def test_conditions_of_a_shipped_scene(walk):
     rows = dict(conditions.rows(of_an_old_bag(walk)))
     assert 'shipped scene' in rows['conditions']
     assert rows['scene'].startswith('hexapod_patches; ') and '30 gait cycles' in rows['scene']
-    assert rows['robot'].startswith('hexapod') and 'mass 2.09 kg' in rows['robot']
+    assert rows['robot'].startswith('ch3r') and 'mass 2.09 kg' in rows['robot']
     assert rows['foot'].startswith('large37') and 'pad stiffness 40 N/m' in rows['foot']
     assert 'wet fraction 0.45' in rows['floor'] and 'viscosity 0.001 Pa s' in rows['floor']
     assert 'weight 9 N' in rows['towed load']

@@ -113,7 +113,7 @@ def test_what_is_unknown_is_refused_by_name():
         run(short(1), '')
     with pytest.raises(InvalidInput, match="fidelity = 'L9'"):
         run(short(1), fidelity='L9')
-    with pytest.raises(InvalidInput, match=r"fidelity = 'L0'.* hexapod"):
+    with pytest.raises(InvalidInput, match=r"fidelity = 'L0'.* ch3r"):
         run(short(1), fidelity='L0')
 
 

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad doctor --robot``: find what is wrong with the sensors of a robot."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from typing import Any
+
+from ros_pad.bags import BagReader
+from ros_pad.commands.progress import bar
+from ros_pad.configuration import number
+from ros_pad.errors import ConfigError
+from ros_pad.robots import Robot
+from ros_pad.sensing import Mapping
+from ros_pad.sensing.checks import Finding
+from ros_pad.sensing.collector import Collector
+
+
+def findings(options: argparse.Namespace) -> Iterator[Finding]:
+    """Check the sensors of a robot, and yield what is found; ``ok`` for each topic that is read.
+
+    Raises
+    ------
+    PadError
+        When robot, mapping or bag cannot be read.
+    """
+    seconds = number('--seconds', options.seconds, 's', 1.0, 60.0)
+    robot = Robot.load(options.robot, options.feet, options.imu, options.foot_radius)
+    mapping = Mapping.load(options.mapping, robot)
+    joints = len(robot.joint_names)
+    about = f'{robot.name}: {len(robot.legs)} legs, {joints} joints, {robot.mass:.3g} kg'
+    yield Finding('robot', 'ok', about, '')
+    messages, topics = (_recorded if options.bag else _live)(options, mapping, seconds)
+    collector = Collector(mapping, robot)
+    for message in messages:
+        collector.add(*message)
+    for topic, count in collector.counts.items():
+        yield Finding(topic, 'ok', f'{count} messages', '')
+    yield from collector.findings(topics)
+
+
+_Messages = tuple[list[tuple[str, Any, int]], dict[str, str]]
+
+
+def _live(options: argparse.Namespace, mapping: Mapping, seconds: float) -> _Messages:
+    """Receive messages; also return the types of all topics."""
+    try:
+        from ros_pad.nodes.listening import receive
+    except ImportError as error:
+        raise ConfigError(
+            f'live topics need ROS 2 ({error}): install it, or give a recording with --bag'
+        ) from error
+    with bar('listening', seconds) as progress:
+        return receive(mapping.sources, seconds, options.namespace, progress)
+
+
+def _recorded(options: argparse.Namespace, mapping: Mapping, seconds: float) -> _Messages:
+    """Read the first seconds of a bag; also return the types of all of its topics."""
+    reader = BagReader(options.bag)
+    prefix = f'/{options.namespace.strip("/")}/' if options.namespace else '/'
+    names = {
+        name: source.topic
+        for source in mapping.sources
+        for name in (prefix + source.topic.lstrip('/'), source.topic)
+    }
+    end = min(reader.start + round(seconds * 1e9), reader.end)
+    found = []
+    with bar('reading', (end - reader.start) * 1e-9) as progress:
+        for topic, message, at in reader.messages(names):
+            if at > end:
+                break
+            found.append((names[topic], message, at))
+            progress((at - reader.start) * 1e-9)
+    return found, reader.topics

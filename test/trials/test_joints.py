@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walks without markers in the loop without ROS: settings, refusals, and where feet are."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+from ros_pad import cli
+from ros_pad import trials
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation import fidelity
+from ros_pad.simulation.faults import Fault
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.log import TrialLog
+from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import body_settings_for
+from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.trial import Trial
+
+PATCHES = Scene.load('hexapod_patches')
+SHORT = dataclasses.replace(PATCHES, cycles=2)
+
+
+def test_the_same_seed_gives_the_same_walk_and_another_one_other_noise():
+    one, same, other = (trials.run(SHORT, 'flat', seed, sensing='joints') for seed in (3, 3, 4))
+    for series in ('odom', 'position', 'force', 'wet_probability', 'slip_speed'):
+        assert np.array_equal(getattr(one, series), getattr(same, series)), series
+    assert not np.array_equal(one.odom, other.odom)
+    assert one.settings['sensing'] == 'joints'
+
+
+def test_the_true_distance_counts():
+    """Flat feet decide nothing, so that both walks are the same but for what is estimated."""
+    markers = trials.run(SHORT, 'flat', 3, 'L2')
+    joints = trials.run(SHORT, 'flat', 3, sensing='joints')
+    assert joints.metrics.distance_m == markers.metrics.distance_m
+    assert joints.metrics.slip_path_m == markers.metrics.slip_path_m
+    assert joints.odom[-1, 0] != joints.body[-1, 0]
+    assert markers.odom.shape == (0, 3)
+    assert markers.settings['sensing'] == 'markers'
+
+
+def test_settings_of_a_scene():
+    loud = dataclasses.replace(
+        PATCHES, sensors=dataclasses.replace(PATCHES.sensors, gyro=0.02, encoder=1e-3, moment=5e-4)
+    )
+    values = body_settings_for(loud)
+    assert (values['gyro_noise'], values['encoder_noise']) == (0.02, 1e-3)
+    assert values['accelerometer_noise'] == pytest.approx(math.hypot(0.05, 0.3))
+    tuning = tuning_for(loud, 'joints')
+    assert (tuning.source, tuning.pads_shear, tuning.moment_noise) == ('joints', False, 0.0)
+    assert tuning_for(loud).moment_noise == 5e-4
+    assert tuning_for(loud).source == 'markers'
+    with pytest.raises(InvalidInput, match=r"sensing = 'eyes'.*markers, joints"):
+        trials.run(SHORT, sensing='eyes')
+
+
+def test_levels():
+    assert fidelity.level(PATCHES, 'auto', joints=True) == 'L2'
+    for level in ('L0', 'L1'):
+        with pytest.raises(InvalidInput, match=level):
+            fidelity.level(PATCHES, level, joints=True)
+    with pytest.raises(InvalidInput, match='leg_dry_flat'):
+        fidelity.level(Scene.load('leg_dry_flat'), joints=True)
+
+
+def test_feet_of_a_lighter_robot_than_its_file_stand():
+    assert body_settings_for(PATCHES)['contact_share'] == 0.0
+    body = dataclasses.replace(PATCHES.body, mass=0.5 * PATCHES.body.mass)
+    light = body_settings_for(dataclasses.replace(PATCHES, body=body))
+    assert light['contact_share'] == pytest.approx(0.05)
+
+
+def test_a_quadruped_is_sensed_by_its_joints():
+    scene = dataclasses.replace(Scene.load('quadruped_patches'), cycles=6)
+    trial = trials.run(scene, 'dome', seed=1, sensing='joints')
+    assert trial.metrics.verdict is None
+    # The estimated path is the true one, less what starts before the estimate.
+    way = trial.body[-1, 0] - trial.body[0, 0]
+    assert trial.odom[-1, 0] - trial.odom[0, 0] == pytest.approx(way, abs=0.05)
+    assert way > 0.2
+
+
+@pytest.mark.parametrize('kind', ['imu_silent', 'joints_silent'])
+def test_a_walk_without_any_sample_has_its_true_distance(kind):
+    scene = dataclasses.replace(SHORT, faults=(Fault(kind, 0.0, 100.0),))
+    trial = trials.run(scene, 'flat', 1, sensing='joints')
+    assert trial.force.shape == (0, 6, 3)
+    assert trial.metrics.distance_m > 0.0
+
+
+def test_drop_outs_are_survived():
+    faults = (Fault('imu_silent', 1.2, 1.9), Fault('joints_silent', 2.2, 2.25))
+    scene = dataclasses.replace(SHORT, faults=faults)
+    loop = ClosedLoop(scene, 'adaptive', 1, sensing='joints')
+    log = TrialLog(scene, 'adaptive', 1, 'L2', 'joints')
+    doubts = set()
+    for _ in range(750):
+        loop.tick(log)
+        doubts.add(loop.body.stage.doubt)
+        for leg in loop.legs:
+            estimate = leg.estimation.estimator.estimate
+            assert math.isfinite(estimate.wet_probability)
+            assert math.isfinite(sum(estimate.slip_velocity))
+    loop.close()
+    kinds = {each.partition(':')[0] for each in doubts if each}
+    assert {'no IMU', 'gap'} <= kinds
+    assert loop.body.stage.doubt == ''
+    assert all(leg.estimation.sound for leg in loop.legs)
+
+
+def test_feet_in_odom_move_to_the_world():
+    """Odom is turned by 90 degrees, and begins at (2, 3) m."""
+    trial = Trial(
+        *('scene', 'flat', 'L2', 0, (1,)),
+        time=np.array([0.0]),
+        body=np.array([[2.0, 4.0, 0.5 * math.pi]]),  # 1 m ahead of where odom begins
+        force=np.array([[[1.0, 0.0, 5.0]]]),
+        position=np.array([[[1.2, 0.1, -0.14]]]),
+        **dict.fromkeys(
+            ('slow_time', 'pressure', 'setpoint', 'wet_probability', 'friction', 'margin',
+             'slip_speed', 'slipping', 'dome'),
+            np.zeros(0),
+        ),
+        odom=np.array([[1.0, 0.0, 0.0]]),
+    )  # fmt: skip
+    trial.move_to_world()
+    # 0.2 m ahead of the body and 0.1 m to its left, where ahead is y.
+    assert trial.position[0, 0] == pytest.approx([1.9, 4.2, -0.14])
+    assert trial.force[0, 0] == pytest.approx([0.0, 1.0, 5.0])
+
+
+def test_the_command_line(tmp_path, capsys):
+    out = tmp_path / 'walk'
+    words = ['run', 'hexapod_patches', '--sensing', 'joints', '--cycles', '1', '--no-ros']
+    assert cli.main([*words, '--policy', 'flat', '--json', '--out', str(out)]) == 0
+    assert json.loads(capsys.readouterr().out)['sensing'] == 'joints'
+    assert 'sensing joints' in (out / 'report.html').read_text()
+    assert cli.main([*words, '--fidelity', 'L1', '--out', str(tmp_path / 'other')]) == 2
+    assert "'joints' is not allowed with fidelity = 'L1'" in capsys.readouterr().err
+    assert not (tmp_path / 'other').exists()
