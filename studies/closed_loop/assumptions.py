@@ -40,7 +40,7 @@ from ros_pad.estimation.friction import GroundFilter
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
 from ros_pad.simulation import Scene
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops
@@ -121,6 +121,7 @@ class Assumption:
 
 
 FOOT = 'feet/large37.yaml: '
+ROBOT = 'robots/ch3r.yaml: '
 PATCHES = 'scenes/hexapod_patches.yaml: '
 MODEL = 'regulators/simulated.py: SimulatedRegulator.'
 TUNING = 'estimation/tuning.py: Tuning.'
@@ -143,8 +144,8 @@ ASSUMPTIONS = (
     Assumption(FOOT + 'film_exponent', 'world.foot.film_exponent', 'film exponent', ''),
     Assumption(FOOT + 'shear_stiffness', 'world.foot.shear_stiffness', 'shear stiffness', 'N/m'),
     Assumption(FOOT + 'chamber_volume', 'world.foot.chamber_volume', 'chamber volume', 'm3'),
-    Assumption(PATCHES + 'body.mass', 'both.body.mass', 'robot mass', 'kg', 'mass'),
-    Assumption(PATCHES + 'body.height', 'both.body.height', 'height of the mass', 'm'),
+    Assumption(ROBOT + 'mass', 'both.body.mass', 'robot mass', 'kg', 'mass'),
+    Assumption(ROBOT + 'height', 'both.body.height', 'height of the mass', 'm'),
     Assumption(PATCHES + 'gait.cycle', 'both.gait.cycle', 'gait cycle', 's'),
     Assumption(PATCHES + 'gait.heading_gain', 'both.heading_gain', 'heading gain', '1/s'),
     Assumption(PATCHES + 'floor.wet_fraction',
@@ -262,7 +263,7 @@ def wrong_by(setup: Setup, assumption: Assumption, factor: float) -> Setup:
         rest, part = 'foot', replace(foot, pads=round(value), sole_radius=radius)
     if assumption.rule == 'mass':  # the inertia of a body with the same dimensions
         body = setup.world.body
-        assert isinstance(body, HexapodBody)
+        assert isinstance(body, LeggedBody)
         inertia = body.inertia * value / body.mass
         rest, part = 'body', replace(body, mass=value, inertia=inertia)
     if place == 'both':

@@ -18,11 +18,11 @@ import yaml
 
 from ros_pad.reports.files import save
 from ros_pad.simulation import fidelity
-from ros_pad.simulation.full_hexapod import FullHexapod
-from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.full_robot import FullRobot
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
@@ -38,7 +38,7 @@ RESERVES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 MARGIN = 1.5
 # Ranges of the random scenes, in SI units; the bounds do not hold outside them.
 RANGES = {
-    'hexapod': {
+    'ch3r': {
         'body.mass': (1.0, 3.2),
         'gait.cycle': (0.8, 2.0),
         'gait.stride': (0.06, 0.15),
@@ -59,18 +59,18 @@ RANGES = {
     },
 }
 CYCLES = 8
-TOP_STEP = {'hexapod': 5e-4, 'rail_leg': 1e-4}
+TOP_STEP = {'ch3r': 5e-4, 'rail_leg': 1e-4}
 # Errors are relative to the distance, or to this share of the distance without slip if that is
 # larger: a robot that slips all the time hardly advances.
 LEAST_DISTANCE = 0.5
 
 
-def hexapod(seed: int) -> tuple[Scene, str]:
+def ch3r(seed: int) -> tuple[Scene, str]:
     """Return a random hexapod scene with a policy."""
     draw = np.random.default_rng([seed, 0])
 
     def uniform(name: str) -> float:
-        return draw.uniform(*RANGES['hexapod'][name])
+        return draw.uniform(*RANGES['ch3r'][name])
 
     scene = Scene.load('hexapod_patches')
     share = draw.uniform(0.2, 0.85)
@@ -81,8 +81,8 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         wet_fraction=share,
         patch_length=draw.uniform(max(0.3, shortest), min(2.0, longest)),
         slope=float(draw.choice([0.0, uniform('floor.slope')])),
-        roughness=float(draw.choice(RANGES['hexapod']['floor.roughness'])),
-        unevenness=float(draw.choice(RANGES['hexapod']['floor.unevenness'])),
+        roughness=float(draw.choice(RANGES['ch3r']['floor.roughness'])),
+        unevenness=float(draw.choice(RANGES['ch3r']['floor.unevenness'])),
     )
     tow = replace(
         scene.tow,
@@ -92,7 +92,7 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         distance=draw.uniform(0.2, 0.6),
         height=draw.uniform(0.01, 0.1),
     )
-    assert isinstance(scene.gait, TripodGait)
+    assert isinstance(scene.gait, WalkingGait)
     gait = replace(
         scene.gait,
         cycle=uniform('gait.cycle'),
@@ -101,7 +101,7 @@ def hexapod(seed: int) -> tuple[Scene, str]:
         lift=uniform('gait.lift'),
     )
     mass = uniform('body.mass')
-    assert isinstance(scene.body, HexapodBody)
+    assert isinstance(scene.body, LeggedBody)
     inertia = scene.body.inertia * mass / scene.body.mass
     scene = replace(
         scene,
@@ -134,9 +134,9 @@ def distance(scene: Scene, policy: str, seed: int, level: str, top: bool = False
     """Return the distance that a robot walks, m; NaN if the walk ends with a verdict."""
     loop = ClosedLoop(scene, policy, seed, level)
     period = loop.period_ns * 1e-9
-    if top and scene.robot == 'hexapod':
-        settings = SolverSettings(timestep=TOP_STEP['hexapod'])
-        loop.robot = FullHexapod(scene, loop.floor, period, settings)
+    if top and scene.robot == 'ch3r':
+        settings = SolverSettings(timestep=TOP_STEP['ch3r'])
+        loop.robot = FullRobot(scene, loop.floor, period, settings)
     elif top:
         loop.robot = _FineLeg(scene, loop.floor, period, round(period / TOP_STEP['rail_leg']))
     loops.walk(loop, scene)
@@ -168,8 +168,8 @@ def apart(scene: Scene, here: float, top: float) -> float:
 
 def errors(robot: str, seed: int) -> tuple[float, dict[str, float]]:
     """Return the reserve of a random scene, and each level's error on it."""
-    scene, policy = hexapod(seed) if robot == 'hexapod' else rail_leg(seed)
-    levels = ('L1', 'L2') if robot == 'hexapod' else ('L0',)
+    scene, policy = ch3r(seed) if robot == 'ch3r' else rail_leg(seed)
+    levels = ('L1', 'L2') if robot == 'ch3r' else ('L0',)
     top = distance(scene, policy, seed, levels[-1], top=True)
     found = {level: apart(scene, distance(scene, policy, seed, level), top) for level in levels}
     return fidelity.reserve(scene, policy), found

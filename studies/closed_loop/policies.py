@@ -27,7 +27,7 @@ from ros_pad.control import MorphologyController
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.simulation import Scene
-from ros_pad.simulation.gait import TripodGait
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops
@@ -134,7 +134,7 @@ def jobs(floors: int) -> list[Job]:
 def walk(ground: Ground, job: Job) -> tuple[float, int, str | None]:
     """Return distance a cycle, m, number of switches, and the verdict, None for a valid walk."""
     gait = ground.scene.gait
-    assert isinstance(gait, TripodGait)
+    assert isinstance(gait, WalkingGait)
     scene = replace(ground.scene, gait=replace(gait, cycle=gait.cycle * job.slower))
     policy, parameters = POLICIES[job.policy]
     loop = ClosedLoop(scene, policy, job.seed, LEVEL, policy_parameters=parameters)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import field
 from dataclasses import fields
 from typing import Any
 from typing import NamedTuple
@@ -13,15 +14,19 @@ import numpy as np
 from ros_pad.robots import Gait
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
+from ros_pad.robots.rotation import from_rpy
+from ros_pad.robots.rotation import matrix
 from ros_pad.robots.rotation import quaternion
+from ros_pad.simulation.mujoco_model import at_frame
+from ros_pad.simulation.mujoco_model import words
 
-RATE = 250.0  # samples a second
+RATE = 250.0  # samples a second, where a course has no other
 SUBSTEPS = 4  # steps of MuJoCo in each of them
 REST = 2.0  # s at rest before the walk
+GRAVITY = np.array((0.0, 0.0, -9.81))  # m/s²
 SETTLE = 1.0  # s before the log, in which the robot comes to rest on its feet
 RAMP = 1.0  # s until the full stride
 FLOORS = ('dry', 'patches', 'ice')
-PUSH = 0.1  # s, length of a push
 PATCH = 0.4  # m, edge of the squares of a floor
 START_FRICTION = 0.7  # of the ground at rest
 POINT = 1e-4  # m, radius of the ball that stands for a foot that does not roll
@@ -50,16 +55,77 @@ class Drive(NamedTuple):
     armature: float
 
 
+HEAVY = Noise(gyro=0.02, accelerometer=0.3, accelerometer_bias=0.2)
+"""Noise of a cheap IMU."""
+
 DRIVES = {'go2': Drive(0.3, 80.0, 3.0, 40.0, 0.01), 'ch3r': Drive(0.13, 18.8, 0.18, 0.94, 2e-3)}
+
+
+@dataclass(frozen=True)
+class Course:
+    """What is walked, where, and how it is measured.
+
+    Attributes
+    ----------
+    robot : str
+        ``go2`` or ``ch3r``.
+    floor : str
+        ``dry``, ``patches`` or ``ice``.
+    push : float
+        Length of a push of the trunk, s.
+    gait : str
+        Name of a gait; the robot's own where it is empty.
+    period, duty : float
+        Of that gait, s and share; those of the robot's own where they are 0.
+    slope : float
+        Slope of the floor, uphill, rad.
+    turn : float
+        Rate with which the robot turns, rad/s.
+    lean : float
+        Shift of the body away from a foot that swings, over the distance of that foot.
+    pace : float
+        Factor on the robot's usual speed.
+    rate : float
+        Samples a second, Hz.
+    soft : float
+        Time constant of the contacts, s: soft feet sink in, and creep.
+    noise : Noise
+    delay : float
+        Time by which joints and forces are later than the IMU, s; less than 20 ms.
+    """
+
+    robot: str = 'go2'
+    floor: str = 'dry'
+    push: float = 0.1
+    gait: str = ''
+    period: float = 0.0
+    duty: float = 0.0
+    slope: float = 0.0
+    turn: float = 0.0
+    lean: float = 0.0
+    pace: float = 1.0
+    rate: float = RATE
+    soft: float = 0.02
+    noise: Noise = field(default_factory=Noise)
+    delay: float = 0.0
+
+    def gait_of(self, robot: Robot) -> Gait:
+        """Return the gait in which a robot walks it."""
+        own = robot.gait
+        assert own is not None
+        period, duty = self.period or own.cycle, self.duty or own.duty
+        if not self.gait:
+            return Gait(period, duty, own.phases, own.lift)
+        return Gait.named(self.gait, robot.hips, period, duty, own.lift)
 
 
 @dataclass
 class Log:
     """Samples of a walk, one row each. Base axes but for ``gyro`` and ``accelerometer`` (IMU).
 
-    The truth is in the axes of the world: ``position``, ``orientation`` (x y z w), ``velocity`` of
-    the base, ``feet`` (centres of the spheres), ``slip`` (velocity of the contact points, x
-    and y), ``load`` (normal forces).
+    The truth is in axes with z up and x along the first heading: ``position``, ``orientation``
+    (x y z w), ``velocity`` of the base, ``feet`` (centres of the spheres), ``slip`` (velocity of
+    the contact points, x and y), ``load`` (normal forces).
     """
 
     time: Array
@@ -77,8 +143,9 @@ class Log:
     load: Array
 
 
-def model_of(robot: Robot, drive: Drive) -> str:
+def model_of(robot: Robot, course: Course) -> str:
     """Return a robot on a floor, one plane for each foot, in MuJoCo's XML."""
+    drive = DRIVES[course.robot]
     trees, pairs, servos = [], [], []
     carried = 0.0
     for index, joints in enumerate(robot.chains.legs):
@@ -88,9 +155,9 @@ def model_of(robot: Robot, drive: Drive) -> str:
             # Links are taken for rods of 0.2 m in every direction: enough for test data.
             inertia = max(joint.mass * 0.2**2 / 12.0, 1e-6)
             tree += (
-                f'<body {_at(joint.at)}><joint name="{joint.name}" axis="{_words(joint.axis)}"'
+                f'<body {at_frame(joint.at)}><joint name="{joint.name}" axis="{words(joint.axis)}"'
                 f' damping="{0.1 * drive.damping}" armature="{drive.armature}"/>'
-                f'<inertial mass="{max(joint.mass, 1e-6)!r}" pos="{_words(joint.centre)}"'
+                f'<inertial mass="{max(joint.mass, 1e-6)!r}" pos="{words(joint.centre)}"'
                 f' diaginertia="{inertia} {inertia} {inertia}"/>'
             )
             ends += '</body>'
@@ -98,7 +165,7 @@ def model_of(robot: Robot, drive: Drive) -> str:
                 f'<position joint="{joint.name}" kp="{drive.stiffness}" kv="{drive.damping}"'
                 f' forcerange="{-drive.torque} {drive.torque}"/>'
             )
-        place = _words(robot.chains.feet[index, :3, 3])
+        place = words(robot.chains.feet[index, :3, 3])
         size = robot.foot_radius or POINT
         trees.append(f'{tree}<geom name="foot_{index}" size="{size}" pos="{place}"/>{ends}')
         pairs.append(
@@ -113,13 +180,13 @@ def model_of(robot: Robot, drive: Drive) -> str:
     )
     return f"""
 <mujoco>
-  <option timestep="{1.0 / RATE / SUBSTEPS}" integrator="implicitfast" cone="elliptic"
-          impratio="100"/>
-  <default><geom contype="0" conaffinity="0" solref="0.005 1"/></default>
+  <option timestep="{1.0 / course.rate / SUBSTEPS}" integrator="implicitfast" cone="elliptic"
+          impratio="100" gravity="{words(GRAVITY @ _level(course))}"/>
+  <default><geom contype="0" conaffinity="0"/><pair solref="{course.soft} 1"/></default>
   <worldbody>{planes}
     <body name="base"><freejoint/>
       <inertial mass="{trunk!r}" pos="0 0 0" diaginertia="{roll} {pitch} {yaw}"/>
-      <site name="imu" {_at(robot.imu)}/>{''.join(trees)}
+      <site name="imu" {at_frame(robot.imu)}/>{''.join(trees)}
     </body>
   </worldbody>
   <contact>{''.join(pairs)}</contact>
@@ -129,13 +196,9 @@ def model_of(robot: Robot, drive: Drive) -> str:
 """
 
 
-def _words(numbers: Array) -> str:
-    return ' '.join(repr(float(each)) for each in numbers)
-
-
-def _at(frame: Array) -> str:
-    turn = quaternion(frame[:3, :3])[[3, 0, 1, 2]]
-    return f'pos="{_words(frame[:3, 3])}" quat="{_words(turn)}"'
+def _level(course: Course) -> Array:
+    """Return the rotation from the axes of the floor to those with z up."""
+    return from_rpy((0.0, -course.slope, 0.0))
 
 
 class Floor:
@@ -158,85 +221,91 @@ class Floor:
 
 
 def foot_targets(
-    robot: Robot, gait: Gait, home: Array, stride: float, time: float, size: float
+    gait: Gait, home: Array, velocity: Array, lean: float, time: float, size: float
 ) -> Array:
     """Return places of the feet in the base, (legs, 3), m, at a time of the gait, s.
 
-    ``stride`` is the distance of the body in a stance, m, ``size`` a factor on stride and lift.
+    ``velocity`` is that of the body over each foot, (legs, 2), m/s, ``lean`` as in
+    :class:`Course`, ``size`` a factor on all motion.
     """
     phase = gait.phase(time)
     rest = np.maximum(phase - gait.duty, 0.0) / (1.0 - gait.duty)
     ahead = np.where(phase < gait.duty, 0.5 - phase / gait.duty, -0.5 * np.cos(np.pi * rest))
+    # The body leans away from feet that are about to swing, if they are on one side.
+    apart = np.abs((phase - 0.5 * gait.duty) % 1.0 - 0.5) / (1.0 - gait.duty)
+    aside = lean * np.cos(0.5 * np.pi * np.minimum(apart, 1.0)) ** 2
     feet = home.copy()
-    feet[:, 0] += size * stride * ahead
+    feet[:, :2] += size * aside @ home[:, :2]
+    feet[:, :2] += (size * gait.duty * gait.cycle * ahead)[:, None] * velocity
     feet[:, 2] += size * gait.lift * np.sin(np.pi * rest) ** 2
     return feet
 
 
-def walk(
-    name: str,
-    floor: str,
-    seed: int,
-    duration: float,
-    push: float = PUSH,
-    noise: Noise | None = None,
-) -> Log:
-    """Simulate a walk of a shipped robot in its usual gait, with pushes of the trunk.
+class _Pushes:
+    """Pushes of the trunk in any direction, with pauses between them."""
+
+    def __init__(self, length: float, weight: float, generator: np.random.Generator) -> None:
+        self._length, self._weight, self._generator = length, weight, generator
+        self._next, self._end, self._force = 0.0, 0.0, np.zeros(2)
+
+    def force(self, time: float) -> Array:
+        """Return the force at a time, (2,), N."""
+        draw = self._generator.uniform
+        if time > self._next:
+            self._next = time + max(draw(0.4, 1.0), 1.5 * self._length)
+            size, angle = draw(0.06, 0.12) * self._weight, draw(0.0, 2.0 * np.pi)
+            self._force = size * np.array((np.cos(angle), np.sin(angle)))
+            self._end = time + self._length
+        return self._force if time < self._end else np.zeros(2)
+
+
+def walk(course: Course, seed: int, duration: float) -> Log:
+    """Simulate a walk of a shipped robot with pushes of the trunk.
 
     Parameters
     ----------
-    name : str
-        ``go2`` or ``ch3r``.
-    floor : str
-        ``dry``, ``patches`` or ``ice``.
+    course : Course
+        What is walked, where, and how it is measured.
     seed : int
         Of floor, pushes and noise.
     duration : float
         Length of the log, s, with :data:`REST` s at rest first.
-    push : float
-        Length of a push, s.
-    noise : Noise, optional
-        Noise of the sensors.
     """
     import mujoco
 
-    robot, drive = Robot.load(name), DRIVES[name]
-    gait = robot.gait
-    assert gait is not None
+    robot, drive = Robot.load(course.robot), DRIVES[course.robot]
+    gait = course.gait_of(robot)
     generator = np.random.default_rng(seed)
-    ground = Floor(floor, generator)
-    model: Any = mujoco.MjModel.from_xml_string(model_of(robot, drive))
+    ground = Floor(course.floor, generator)
+    model: Any = mujoco.MjModel.from_xml_string(model_of(robot, course))
     data: Any = mujoco.MjData(model)
     home = robot.foot_positions(robot.home)
-    q = robot.home
+    home[:, 0] += home[:, 2] * np.tan(course.slope)  # the centre of mass is over their middle
+    q = robot.joint_positions(home)
+    # Feet that stand on the ground go backwards under the body, and round it.
+    velocity = course.turn * np.stack([-home[:, 1], home[:, 0]], axis=1)
+    velocity[:, 0] += course.pace * drive.speed
     aim = q.ravel()
     data.qpos[2] = -home[:, 2].mean() + (robot.foot_radius or POINT)
     data.qpos[7:] = data.ctrl[:] = aim
     feet = [model.geom(f'foot_{index}').id for index in range(len(robot.legs))]
-    rows: dict[str, list[Any]] = {field.name: [] for field in fields(Log)}
-    force, until, ends = np.zeros(2), 0.0, 0.0
-    for _ in range(round(SETTLE * RATE * SUBSTEPS)):
+    rows: dict[str, list[Any]] = {each.name: [] for each in fields(Log)}
+    pushes = _Pushes(course.push, robot.mass * 9.81, generator)
+    for _ in range(round(SETTLE * course.rate * SUBSTEPS)):
         mujoco.mj_step(model, data)
-    for tick in range(round(duration * RATE)):
-        time = tick / RATE
+    for tick in range(round(duration * course.rate)):
+        time = tick / course.rate
         if time > REST:
             size = min(1.0, (time - REST) / RAMP)
-            stride = drive.speed * gait.duty * gait.period
-            goal = foot_targets(robot, gait, home, stride, time - REST, size)
+            goal = foot_targets(gait, home, velocity, course.lean, time - REST, size)
             before, q = q, robot.joint_positions(goal, near=q)
             # Set-points lead by what servos need for their damping and for the robot's weight.
             stands = gait.stands(time - REST)
             share = np.where(stands, robot.mass * 9.81 / max(stands.sum(), 1), 0.0)
             torque = -share[:, None] * robot.foot_jacobians(q)[:, 2]
-            torque += 1.1 * drive.damping * (q - before) * RATE
+            torque += 1.1 * drive.damping * (q - before) * course.rate
             aim = (q + torque / drive.stiffness).ravel()
-            if time > until:  # the next push, after a pause
-                until = time + generator.uniform(0.4, 1.0)
-                size = generator.uniform(0.06, 0.12) * robot.mass * 9.81
-                angle = generator.uniform(0.0, 2.0 * np.pi)
-                force = size * np.array((np.cos(angle), np.sin(angle)))
-                ends = time + push
-            data.xfrc_applied[1, :2] = force if time < ends else 0.0
+            data.xfrc_applied[1, :2] = pushes.force(time)
         # Servos follow a line between set-points: steps in time with the samples would alias.
         change = (aim - data.ctrl) / SUBSTEPS
         speeds = []
@@ -252,34 +321,51 @@ def walk(
                 mujoco.mj_forward(model, data)  # all readings are of this moment
                 _read(mujoco, model, data, feet, rows)
         # MuJoCo's accelerometer is of an explicit step, the motion that of an implicit one.
-        rows['accelerometer'].append(_specific_force(robot, rows, speeds[-1] - speeds[-3]))
+        acceleration = (speeds[-1] - speeds[-3]) * course.rate * SUBSTEPS / 2.0
+        rows['accelerometer'].append(_specific_force(robot, model, rows, acceleration))
         rows['time'].append(time)
-    return _noisy(Log(**{key: np.array(value) for key, value in rows.items()}), generator, noise)
+    log = Log(**{key: np.array(value) for key, value in rows.items()})
+    return _noisy(delayed(_levelled(log, course), course.delay), generator, course.noise)
+
+
+def _levelled(log: Log, course: Course) -> Log:
+    """Return a log whose truth is in axes with z up, x along the first heading."""
+    x, y, z, w = log.orientation[0]
+    first = _level(course) @ matrix((x, y, z, w))
+    level = from_rpy((0.0, 0.0, -np.arctan2(first[1, 0], first[0, 0]))) @ _level(course)
+    for name in ('position', 'velocity', 'feet'):
+        setattr(log, name, getattr(log, name) @ level.T)
+    log.slip = log.slip @ level[:2, :2].T
+    log.orientation = np.array(
+        [quaternion(level @ matrix((x, y, z, w))) for x, y, z, w in log.orientation]
+    )
+    return log
+
+
+def delayed(log: Log, delay: float) -> Log:
+    """Return a log whose joints and forces come so much later, s, than they were measured."""
+    if delay:
+        for name in ('joint_positions', 'joint_velocities', 'foot_forces', 'efforts'):
+            values = getattr(log, name)
+            rows = values.reshape(len(values), -1).T
+            late = [np.interp(log.time - delay, log.time, row) for row in rows]
+            setattr(log, name, np.array(late).T.reshape(values.shape))
+    return log
 
 
 def _imu_velocity(robot: Robot, data: Any) -> Array:
     """Return the velocity of the IMU in the world, m/s."""
-    turn = _matrix(data.qpos[3:7])
+    turn = matrix(data.qpos[[4, 5, 6, 3]])
     return data.qvel[:3] + turn @ np.cross(data.qvel[3:6], robot.imu[:3, 3])
 
 
-def _specific_force(robot: Robot, rows: dict[str, list[Any]], change: Array) -> Array:
-    """Return what an accelerometer shows for a change of velocity over two steps, m/s²."""
+def _specific_force(
+    robot: Robot, model: Any, rows: dict[str, list[Any]], acceleration: Array
+) -> Array:
+    """Return what an accelerometer shows for an acceleration, m/s²."""
     x, y, z, w = rows['orientation'][-1]
-    acceleration = change * RATE * SUBSTEPS / 2.0 + np.array((0.0, 0.0, 9.81))
-    return acceleration @ _matrix((w, x, y, z)) @ robot.imu[:3, :3]
-
-
-def _matrix(turn: Any) -> Array:
-    """Return the rotation matrix of a quaternion w x y z."""
-    w, x, y, z = turn
-    return np.array(
-        (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-        )
-    )
+    felt = acceleration - model.opt.gravity
+    return np.asarray(felt @ matrix((x, y, z, w)) @ robot.imu[:3, :3])
 
 
 def _read(mujoco: Any, model: Any, data: Any, feet: list[int], rows: dict[str, list[Any]]) -> None:
@@ -312,9 +398,8 @@ def _read(mujoco: Any, model: Any, data: Any, feet: list[int], rows: dict[str, l
     rows['load'].append(forces[:, 2])
 
 
-def _noisy(log: Log, generator: np.random.Generator, noise: Noise | None) -> Log:
+def _noisy(log: Log, generator: np.random.Generator, noise: Noise) -> Log:
     """Return a log with noise and bias on what sensors measure."""
-    noise = noise or Noise()
 
     def white(values: Array, deviation: float) -> Array:
         return values + deviation * generator.standard_normal(values.shape)
@@ -330,3 +415,27 @@ def _noisy(log: Log, generator: np.random.Generator, noise: Noise | None) -> Log
     log.foot_forces = white(log.foot_forces, noise.force)
     log.efforts = white(log.efforts, noise.effort)
     return log
+
+
+COURSES = {
+    'dry': Course(),
+    'patches': Course(floor='patches'),
+    'ice': Course(floor='ice'),
+    'hexapod': Course('ch3r', 'patches'),
+    'long pushes': Course(floor='patches', push=0.3),
+    'long pushes, ice': Course(floor='ice', push=0.6),
+    'slope': Course(slope=0.1),
+    'turning': Course(floor='patches', turn=0.3),
+    'crawl': Course(floor='patches', gait='crawl', period=2.0, duty=0.85, lean=0.2, pace=0.3),
+    'flight': Course(duty=0.45),
+    'fast, 500 Hz': Course(floor='patches', pace=2.0, rate=500.0),
+    '200 Hz': Course(floor='patches', rate=200.0),
+    'soft feet': Course(floor='patches', soft=0.03),
+    'hard feet': Course(floor='patches', soft=0.005),
+    'cheap IMU': Course(floor='patches', noise=HEAVY),
+    'hexapod, ripple': Course('ch3r', 'ice', push=0.3, gait='ripple', duty=0.7),
+    'hexapod, wave': Course(
+        'ch3r', 'patches', push=0.6, gait='wave', period=2.0, duty=0.85, pace=0.5
+    ),
+}
+"""The walks of the study; constants of the estimator were chosen on seeds below 101."""

@@ -24,10 +24,9 @@ from scipy.optimize import brentq
 
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
-from ros_pad.simulation.gait import TRIPODS
-from ros_pad.simulation.gait import TripodGait
-from ros_pad.simulation.planar_hexapod import GRAVITY
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.planar_robot import GRAVITY
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.pneumatics import REFERENCE_DENSITY
 from ros_pad.simulation.pneumatics import REFERENCE_PRESSURE
@@ -36,7 +35,7 @@ from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
 from ros_pad.simulation.pneumatics import conductance
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import Tow
@@ -49,12 +48,13 @@ from studies.work_precision.friction import exact_stick
 Step = Callable[[Twist, float, float, Sequence[Contact], float, Twist], Twist]
 
 STILL: Twist = (0.0, 0.0, 0.0)
+LEGS = (1, 3, 5)  # one tripod
 # The hexapod of the shipped scenes, standing on one of its tripods.
 _SCENE = Scene.load('hexapod_smooth_dry_flat')
-assert isinstance(_SCENE.body, HexapodBody)
-BODY: HexapodBody = _SCENE.body
+assert isinstance(_SCENE.body, LeggedBody)
+BODY: LeggedBody = _SCENE.body
 MASS, INERTIA, WEIGHT = BODY.mass, BODY.inertia, BODY.mass * GRAVITY
-TRIPOD = tuple(BODY.homes[leg - 1] for leg in TRIPODS[0])
+TRIPOD = tuple(BODY.homes[leg - 1] for leg in LEGS)
 STIFFNESS = _SCENE.foot.shear_stiffness
 
 
@@ -483,7 +483,7 @@ def sticking_feet() -> list[Outcome]:
             fails = bool(np.abs(force - mean).max() > 0.01 * SPLIT_PUSH)
             outcomes += [
                 SPLIT.of(name, leg, float(-along), law, fails)
-                for leg, along, law in zip(TRIPODS[0], force[:, 0], laws, strict=True)
+                for leg, along, law in zip(LEGS, force[:, 0], laws, strict=True)
             ]
     return outcomes
 
@@ -629,7 +629,7 @@ PULLING = Case(
     'weight, or moment over its arm, that is made up, shares of the weight',
 )
 FALLING = Case('top-heavy walk', 'height of the centre of mass, m', 'time of the verdict, s')
-VERDICT = 'verdict of PlanarHexapod'
+VERDICT = 'verdict of PlanarRobot'
 OFFSETS = tuple(float(x) for x in np.linspace(-0.06, 0.06, 25))  # m beyond the edge
 HEIGHTS = (0.12, 0.6, 0.85, 0.9, 0.95, 1.0)  # height of the centre of mass, m
 
@@ -679,9 +679,9 @@ def walk_top_heavy(height: float) -> tuple[float | None, str | None]:
     body = dataclasses.replace(BODY, height=height)
     foot = dataclasses.replace(_SCENE.foot, shear_stiffness=1e6)
     scene = dataclasses.replace(_SCENE, body=body, foot=foot, tow=Tow(), settle=0.0)
-    robot = PlanarHexapod(scene, scene.floor.build(0), 1e-3)
+    robot = PlanarRobot(scene, scene.floor.build(0), 1e-3)
     while robot.time < scene.gait.cycle:
-        robot.step([0.0] * 6)
+        robot.step([0.0] * len(robot.legs))
         if robot.verdict:
             return robot.time, robot.verdict
     return None, None
@@ -694,17 +694,17 @@ def tip_over_law(height: float) -> float | None:
     which just one tripod stands are used.
     """
     gait = _SCENE.gait
-    assert isinstance(gait, TripodGait)
+    assert isinstance(gait, WalkingGait)
     for count in range(1, 1001):
         time = count * gait.cycle / 1000
-        standing = [leg for leg in range(1, 7) if gait.phase(leg, time) < gait.duty]
+        standing = [leg for leg in range(6) if gait.phase(leg, time) < gait.duty]
         if len(standing) > 3:
             continue
         places = []
         for leg in standing:
             since = gait.phase(leg, time) * gait.cycle
             moved = gait.body_advance(time) - gait.body_advance(time - since)
-            x, y = BODY.homes[leg - 1]
+            x, y = BODY.homes[leg]
             places.append((x + gait.reach() - moved, y))
         speed = gait.peak_acceleration * math.sin(4.0 * math.pi * time / gait.cycle)
         if least_norm(places, -height * speed / GRAVITY, 0.0).min() < 0.0:

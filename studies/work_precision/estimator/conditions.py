@@ -14,7 +14,7 @@ import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.pace import Progress
-from ros_pad.simulation.scene import HexapodBody
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.estimator.tally import Row
 from studies.work_precision.estimator.tally import Tally
@@ -155,7 +155,7 @@ def with_mass(factor: float) -> World:
 
     def change(scene: Scene) -> Scene:
         body = scene.body
-        assert isinstance(body, HexapodBody)
+        assert isinstance(body, LeggedBody)
         body = replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
         tow = replace(scene.tow, weight=factor * scene.tow.weight)
         return replace(scene, body=body, tow=tow)

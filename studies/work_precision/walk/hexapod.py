@@ -11,10 +11,10 @@ from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
 from ros_pad.control.policies import FLAT
 from ros_pad.control.policies import policy_named
-from ros_pad.simulation.full_hexapod import FullHexapod
+from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import RECOMMENDED
 from ros_pad.simulation.mujoco_model import SolverSettings
-from ros_pad.simulation.planar_hexapod import PlanarHexapod
+from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.walk.walkers import CYCLES
 from studies.work_precision.walk.walkers import HEXAPOD
@@ -98,8 +98,8 @@ TOP, STIFF = 'L2, top', 'L2, noslip'
 def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bool) -> Walker:
     def walk(case: Walk) -> Walked:
         floor = case.scene.floor.build(case.seed)
-        robot = PlanarHexapod(case.scene, floor, step, compiled, turning)
-        pressures, count = [case.pressure] * 6, round(case.scene.duration / step)
+        robot = PlanarRobot(case.scene, floor, step, compiled, turning)
+        pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
         start = time.perf_counter()
         if at_once:
             count = robot.walk(pressures, count)
@@ -113,8 +113,8 @@ def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bo
 
 def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
     def walk(case: Walk) -> Walked:
-        robot = FullHexapod(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
-        pressures, count = [case.pressure] * 6, round(case.scene.duration / SAMPLE)
+        robot = FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
+        pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / SAMPLE)
         start = time.perf_counter()
         for _ in range(count):
             robot.step(pressures)

@@ -23,7 +23,9 @@ from studies.closed_loop import assumptions
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PAGE = ROOT / 'docs' / 'assumptions.md'
 DOCUMENT = ROOT / 'docs' / 'charts' / 'assumptions.json'
-FILES = sorted([*ROOT.glob('config/feet/*.yaml'), *ROOT.glob('config/scenes/*.yaml')])
+FILES = sorted(
+    path for kind in ('feet', 'robots', 'scenes') for path in ROOT.glob(f'config/{kind}/*.yaml')
+)
 STATUSES = ('thesis', 'measured', 'data', 'derived', 'assumed', 'chosen')
 
 # Classes and functions, by module, with numeric defaults that the thesis does not give.
@@ -80,8 +82,10 @@ ROWS = rows()
 
 
 def numbers(table: dict[str, Any], path: str = '') -> Iterator[tuple[str, float]]:
-    """Yield the dotted key and the value of every number in a YAML file."""
+    """Yield the dotted key and the value of every number in a YAML file, but for geometry."""
     for key, value in table.items():
+        if key in ('legs', 'imu') or isinstance(value, (bool, list)):
+            continue
         if isinstance(value, dict):
             yield from numbers(value, f'{path}{key}.')
         else:

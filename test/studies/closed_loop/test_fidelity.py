@@ -14,7 +14,7 @@ def test_table_has_the_ranges_of_the_study():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('robot', ['hexapod', 'rail_leg'])
+@pytest.mark.parametrize('robot', ['ch3r', 'rail_leg'])
 def test_bounds_hold_on_scenes_that_were_not_measured(robot):
     """The error of each level is within its bound on ten scenes.
 
@@ -26,7 +26,7 @@ def test_bounds_hold_on_scenes_that_were_not_measured(robot):
         scene, policy = getattr(study, robot)(seed)
         scene = dataclasses.replace(scene, cycles=4, accuracy=0.15)
         taken.add(fidelity.choose(scene, policy=policy).level)
-        levels = ('L1', 'L2') if robot == 'hexapod' else ('L0',)
+        levels = ('L1', 'L2') if robot == 'ch3r' else ('L0',)
         top = study.distance(scene, policy, seed, levels[-1], top=True)
         for level in levels:
             choice = fidelity.choose(scene, level, policy)

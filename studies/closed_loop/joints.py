@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walk without markers, beside the same walks with them: distance, slip, wetness, deviations.
+
+Walks ``hexapod_patches`` on full dynamics (L2, needs mujoco) with each policy and each sensing,
+prints a table, and writes it to joints.json. Seeds are not those with which anything was tuned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ros_pad.contact.pad import DOME_PRESSURE
+from ros_pad.control import POLICIES
+from ros_pad.estimation.tuning import SOURCES
+from ros_pad.sensing import BodyEstimate
+from ros_pad.simulation import Scene
+from ros_pad.simulation.robot import SimulatedRobot
+from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.trial import heading
+from studies import command
+from studies.closed_loop import loops
+from studies.work_precision.estimator.tally import MOVING
+from studies.work_precision.estimator.tally import Tally
+from studies.work_precision.estimator.tally import count_alarms
+
+SCENE = 'hexapod_patches'
+FIRST_SEED = 201  # earlier ones were used while the code was written
+GATE = 0.3
+"""Share of the expected load above which a foot stands."""
+
+BEGINS = 2.0  # s: from then on the robot walks
+WINDOW = 5  # samples over which a contact velocity is the mean
+LANDED = 12  # samples after which a stance counts for the velocity: feet skid when they land
+STICKS = 0.9
+"""Share of a stance in which at least one foot must stick for its verdict to count."""
+
+
+@dataclass(frozen=True)
+class Walk:
+    """What happened in a walk, and what was estimated; arrays have the shape (samples, legs).
+
+    Attributes
+    ----------
+    period, expected_load : float
+        Sampling period, s; load of a foot in stance, N.
+    stamps : ndarray, shape (samples,)
+        Time of each sample, s.
+    load, speed : ndarray
+        True normal force, N, and slip speed, m/s.
+    alarm, wet, flat : ndarray of bool
+        Slip alarm, true ground, and whether the pad is flat.
+    probability : ndarray
+        Estimated P(wet).
+    body, feet : ndarray, shape (n, 2)
+        Errors of velocities of body and contacts, x and y, m/s, and their stated deviations:
+        one row for each component.
+    doubt : float
+        Share of samples in which the body was in doubt.
+    distance : float
+        True distance, m.
+    verdict : str or None
+        Why the walk ended early.
+    sticks_only : bool
+        As for the recordings of ``work_precision.estimator``; always False here.
+    """
+
+    period: float
+    expected_load: float
+    stamps: np.ndarray
+    load: np.ndarray
+    speed: np.ndarray
+    alarm: np.ndarray
+    wet: np.ndarray
+    flat: np.ndarray
+    probability: np.ndarray
+    body: np.ndarray
+    feet: np.ndarray
+    doubt: float
+    distance: float
+    verdict: str | None
+    sticks_only: bool = False
+
+
+class _Truth:
+    """Compare each estimate of the body with the true motion of body and contacts."""
+
+    def __init__(self, robot: Any) -> None:
+        self._robot = robot
+        self._places: list[np.ndarray] = []
+        self._ages = np.zeros(len(robot.legs), dtype=int)
+        self.body: list[tuple[float, float]] = []
+        self.feet: list[tuple[float, float]] = []
+        self.doubts: list[bool] = []
+
+    def compare(self, estimate: BodyEstimate | None, gate: float) -> None:
+        """Add the errors of a sample; call it for each."""
+        robot = self._robot
+        # The contact is ahead of the marker by the shear of the pads.
+        self._places = [*self._places[-WINDOW:], robot._places[:, :2].copy()]
+        loaded = np.array([foot.force[2] > gate for foot in robot.feet])
+        self._ages = np.where(loaded, self._ages + 1, 0)
+        if estimate is None or robot.time < BEGINS:
+            return
+        self.doubts.append(bool(estimate.doubt))
+        if estimate.doubt:
+            return
+        # Heading cannot be observed: its drift is not an error of velocity.
+        turn = heading(*estimate.orientation.tolist()) - robot.body[2]
+        to_odom = np.array(((math.cos(turn), -math.sin(turn)), (math.sin(turn), math.cos(turn))))
+        miss = estimate.velocity[:2] - to_odom @ robot.data.qvel[:2]
+        deviations = np.sqrt(np.diag(estimate.covariance)[6:8])
+        self.body += zip(miss.tolist(), deviations.tolist(), strict=True)
+        moved = (self._places[-1] - self._places[0]) / (WINDOW * robot.period) @ to_odom.T
+        for index in np.flatnonzero(self._ages > LANDED):
+            foot = estimate.feet[index]
+            miss = foot.slip_velocity - moved[index]
+            self.feet += [(each, foot.slip_velocity_sd) for each in miss.tolist()]
+
+
+def walked(cycles: int, seed: int, policy: str, sensing: str) -> Walk:
+    """Walk the shipped hexapod_patches on full dynamics for a number of gait cycles."""
+    scene = replace(Scene.load(SCENE), cycles=cycles)
+    loop = ClosedLoop(scene, policy, seed, 'L2', sensing=sensing)
+    robot: SimulatedRobot = loop.robot
+    truth, gate = _Truth(robot), GATE * scene.expected_load
+    rows = []
+    for _ in loops.samples(loop, scene):
+        rows.append([
+            (foot.force[2], foot.slip_speed, foot.wet, each.estimate.slipping,
+             each.estimate.wet_probability, pressure < DOME_PRESSURE)
+            for foot, each, pressure in zip(
+                robot.feet, loop.estimators, loop.pressures, strict=True
+            )
+        ])  # fmt: skip
+        if loop.body:
+            truth.compare(loop.body.estimate, gate)
+    load, speed, wet, alarm, probability, flat = np.moveaxis(np.array(rows, dtype=float), 2, 0)
+    period = loop.period_ns * 1e-9
+    return Walk(
+        period,
+        scene.expected_load,
+        period * np.arange(1, len(rows) + 1),
+        load,
+        speed,
+        alarm > 0.5,
+        wet > 0.5,
+        flat > 0.5,
+        probability,
+        np.array(truth.body).reshape(-1, 2),
+        np.array(truth.feet).reshape(-1, 2),
+        float(np.mean(truth.doubts)) if truth.doubts else 0.0,
+        robot.body[0],
+        robot.verdict,
+    )
+
+
+def verdicts(walk: Walk) -> tuple[int, int]:
+    """Return the number of right verdicts, wet or dry, at ends of flat stances, and of all.
+
+    Stances count in which at least one foot sticks for nearly all of the time.
+    """
+    loaded = walk.load > GATE * walk.expected_load
+    anchored: np.ndarray = np.any(loaded & (walk.speed < MOVING), axis=1)
+    right = total = 0
+    for leg in range(loaded.shape[1]):
+        change = np.diff(loaded[:, leg].astype(int))
+        starts, ends = np.flatnonzero(change > 0) + 1, np.flatnonzero(change < 0)
+        for end in ends[walk.stamps[ends] > BEGINS]:
+            before = starts[starts <= end]
+            if not len(before) or not walk.flat[end, leg]:
+                continue
+            stance = slice(int(before[-1]), int(end) + 1)
+            # Shorter ones are bounces.
+            if (end - before[-1]) * walk.period < 0.1 or anchored[stance].mean() < STICKS:
+                continue
+            total += 1
+            right += bool((walk.probability[end, leg] > 0.5) == walk.wet[end, leg])
+    return right, total
+
+
+def summary(walks: Sequence[Walk]) -> dict[str, Any]:
+    """Return the figures of the walks of one policy and one sensing."""
+    tally = Tally()
+    right = total = 0
+    for walk in walks:
+        count_alarms(tally, walk, walk.alarm)  # type: ignore[arg-type]
+        found = verdicts(walk)
+        right, total = right + found[0], total + found[1]
+    delays = [each for each in tally.delays if math.isfinite(each)]
+    errors = {
+        name: np.concatenate([getattr(walk, name) for walk in walks]) for name in ('body', 'feet')
+    }
+    figures: dict[str, Any] = {
+        'distance_m': [walk.distance for walk in walks],
+        'ended_early': [walk.verdict for walk in walks if walk.verdict],
+        'stances': total,
+        'verdict_right': right / total if total else None,
+        'slips': tally.slips,
+        'missed': tally.missed,
+        'delay_s': float(np.median(delays)) if delays else None,
+        'stick_s': tally.stick_time,
+        'false_alarms': tally.false_alarms,
+        'doubt': float(np.mean([walk.doubt for walk in walks])),
+    }
+    for name, rows in errors.items():
+        if len(rows):
+            figures[f'{name}_rmse_m_s'] = float(np.sqrt(np.mean(rows[:, 0] ** 2)))
+            figures[f'{name}_coverage'] = float(np.mean(np.abs(rows[:, 0]) < 2.0 * rows[:, 1]))
+    return figures
+
+
+def table(document: dict[str, Any]) -> str:
+    """Return the figures as text."""
+    lines = []
+    for policy, of_policy in document['policies'].items():
+        for sensing, row in of_policy.items():
+            walks = ' '.join(f'{each:.2f}' for each in row['distance_m'])
+            ratio = sum(row['distance_m']) / sum(of_policy['markers']['distance_m'])
+            verdict = row['verdict_right']
+            text = (
+                f'{policy:9}{sensing:8} {walks} m ({100.0 * ratio:.1f} %), verdict right'
+                f' {"-" if verdict is None else f"{100.0 * verdict:.1f} %"} of {row["stances"]},'
+                f' slips missed {row["missed"]} of {row["slips"]},'
+                f' {row["false_alarms"]} false alarms in {row["stick_s"]:.0f} s'
+            )
+            if row['delay_s'] is not None:
+                text += f', delay {1e3 * row["delay_s"]:.0f} ms'
+            for name in ('body', 'feet'):
+                if f'{name}_rmse_m_s' in row:
+                    text += (
+                        f'; {name} {1e3 * row[f"{name}_rmse_m_s"]:.1f} mm/s a component,'
+                        f' {100.0 * row[f"{name}_coverage"]:.1f} % within 2 sd'
+                    )
+            lines.append(text + (f'; in doubt {100.0 * row["doubt"]:.1f} %' * bool(row['doubt'])))
+    return '\n'.join(lines)
+
+
+def main(words: Sequence[str]) -> int:
+    """Walk, print and save."""
+    parser = command.parser('joints', __doc__)
+    command.add_count(parser, '--walks', 3, f'number of walks, with seeds from {FIRST_SEED}')
+    command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
+    command.add_processes(parser)
+    command.add_out(parser)
+    options = parser.parse_args(words)
+    seeds = range(FIRST_SEED, FIRST_SEED + options.walks)
+    kinds = [(policy, sensing) for policy in POLICIES for sensing in SOURCES]
+    cases = [(options.cycles, seed, *kind) for kind in kinds for seed in seeds]
+    walks = command.in_processes(walked, cases, options.processes, 'joints')
+    policies: dict[str, dict[str, Any]] = {}
+    for place, (policy, sensing) in enumerate(kinds):
+        mine = walks[place * len(seeds) : (place + 1) * len(seeds)]
+        policies.setdefault(policy, {})[sensing] = summary(mine)
+    document = {'cycles': options.cycles, 'seeds': [*seeds], 'policies': policies}
+    kept = command.write(options.out, 'joints', document)
+    command.show(options, kept, table(document))
+    return 0
