@@ -8,7 +8,7 @@ from setuptools import find_packages
 from setuptools import setup
 
 NAME = 'ros_pad'
-NODES = ['controller', 'estimator', 'recorder', 'regulator', 'simulator']
+NODES = ['body_estimator', 'controller', 'estimator', 'recorder', 'regulator', 'simulator']
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
@@ -32,6 +32,7 @@ def ros(distribution: str) -> list[str]:
         'diagnostic-msgs',
         'geometry-msgs',
         'lifecycle-msgs',
+        'nav-msgs',
         'rcl-interfaces',
         'rosgraph-msgs',
         'sensor-msgs',
@@ -81,6 +82,7 @@ setup(
         'test': [
             'colcon-common-extensions',
             'distributed>=2024.1',
+            'h5py',
             'hypothesis',
             'mcap-ros2-support',
             'meshio>=5.3',

@@ -13,7 +13,10 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FILE = ROOT / 'launch' / 'ros_pad.launch.py'
-NODES = ('recorder_node', 'regulator_node', 'estimator_node', 'controller_node', 'simulator_node')
+NODES = (
+    *('recorder_node', 'regulator_node', 'body_estimator_node', 'estimator_node'),
+    *('controller_node', 'simulator_node'),
+)
 
 
 def assigned(tree: ast.Module, name: str) -> object:

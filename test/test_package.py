@@ -18,15 +18,27 @@ pytestmark = pytest.mark.slow
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
-    f'{node}_node' for node in ('controller', 'estimator', 'recorder', 'regulator', 'simulator')
+    f'{node}_node'
+    for node in (
+        *('body_estimator', 'controller', 'estimator'),
+        *('recorder', 'regulator', 'simulator'),
+    )
 }
 EXECUTABLES = NODES | {'pad'}
 
 # From ros/rosdistro: packages of jazzy/distribution.yaml and keys of rosdep/python.yaml.
 ROSDEP_KEYS = {
     *('ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs'),
-    *('launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs'),
-    *('sensor_msgs', 'std_msgs', 'std_srvs', 'visualization_msgs'),
+    *(
+        'launch',
+        'launch_ros',
+        'lifecycle_msgs',
+        'rcl_interfaces',
+        'nav_msgs',
+        'rclpy',
+        'rosgraph_msgs',
+    ),
+    *('sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs', 'visualization_msgs'),
     *('mcap-ros2-support', 'python3-argcomplete', 'python3-hypothesis', 'python3-matplotlib'),
     'python3-numpy',
     *('python3-pytest', 'python3-pytest-xdist', 'python3-rosbags-pip', 'python3-scipy'),

@@ -13,7 +13,10 @@ import pytest
 import yaml
 
 from ros_pad import cli
+from ros_pad import configuration
 from ros_pad.regulators import emulate
+from ros_pad.robots import Robot
+from ros_pad.sensing import Mapping
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TUTORIALS = ROOT / 'docs' / 'tutorials'
@@ -72,6 +75,50 @@ def test_own_foot(
         shown(capsys.readouterr().out, page, first)
     written = {path.name for path in tmp_path.iterdir()}
     assert written == {'my_pads.csv', 'my_foot.yaml', 'my_foot.png', 'design.png'}
+
+
+def test_own_robot(
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    page = TUTORIALS / 'own_robot.md'
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('COLUMNS', '98')
+    (tmp_path / 'bags').symlink_to(ROOT / 'bags')
+    loading, estimating = blocks(page, 'python')
+    (mapping,) = blocks(page, 'yaml')
+    (tmp_path / 'my_mapping.yaml').write_text(mapping, encoding='utf-8')
+    exec(compile(loading, str(page), 'exec'), {})
+    shown(capsys.readouterr().out, page, "('FL_hip_joint'")
+    with_faults, mended = (words[1:] for words in commands(page) if words[1] == 'doctor')
+    expected = [each for each in blocks(page) if each.startswith('ok       robot')]
+    for words, status, block in zip((with_faults, mended), (1, 0), expected, strict=True):
+        assert cli.main(words) == status
+        lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+        for line in block.splitlines():
+            beginning = line.removesuffix('...').rstrip()
+            assert any(each.startswith(beginning) for each in lines), line
+    exec(compile(estimating, str(page), 'exec'), {})
+    distance, doubts = capsys.readouterr().out.strip().split(' m ')
+    # The simulation's true distance, from the log of which the bag was made.
+    assert float(distance) == pytest.approx(1.564, rel=0.03)
+    assert doubts == "['']"
+
+
+def test_the_example_of_a_mapping(tmp_path: pathlib.Path):
+    page = ROOT / 'docs' / 'mappings.md'
+    (text,) = blocks(page, 'yaml')
+    (tmp_path / 'my.yaml').write_text(text, encoding='utf-8')
+    robot = Robot.load('go2')
+    mapping = Mapping.load(tmp_path / 'my.yaml', robot)
+    assert [source.topic for source in mapping.sources][2:] == [
+        f'leg_{leg}/foot_wrench' for leg in (1, 2, 3, 4)
+    ]
+    assert (mapping.force_axes, mapping.missing[0][:15]) == ('foot', 'force: sensors ')
+    table = page.read_text(encoding='utf-8')
+    for name in configuration.names('mappings'):
+        assert f'| `{name}` |' in table
 
 
 def test_own_regulator(tmp_path: pathlib.Path):
