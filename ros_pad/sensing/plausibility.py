@@ -66,7 +66,7 @@ FEWEST = 4
 LARGEST = 0.1
 """Difference of foot velocities above which one of them slips, m/s."""
 
-LEAST = 20.0
+LEAST = 10.0
 """Sum of squared differences of feet's accelerations, m²/s⁴, that a stretch of walking needs."""
 
 
@@ -268,7 +268,8 @@ class Delay:
 
     The difference of the velocities of two feet that stand is ω x (s1 - s2) less what joints show;
     if joints are late by τ, it is τ dω/dt x (s1 - s2): a line whose slope is τ, by least squares,
-    less what the noise of dω/dt takes from it.
+    less what the noise of dω/dt takes from it. Feet that slip bend this line in x and y, feet that
+    sink in bend it in z, and both repeat with the gait: a delay shows in both.
 
     Parameters
     ----------
@@ -278,17 +279,19 @@ class Delay:
     Attributes
     ----------
     value, deviation : float
-        The delay and its standard deviation, s; NaN before they are known.
+        The delay (mean of both lines) and its standard deviation, s; NaN before they are known.
     """
 
     def __init__(self, gyro_noise: float) -> None:
-        self._noise = 2.0 * gyro_noise**2 * 2.0  # of both ends; two of three axes count
+        self._noise = 2.0 * gyro_noise**2  # of both ends
         self._rows: deque[tuple[float, Array, Array, Array, Flags]] = deque(maxlen=64)
-        self._blocks: deque[tuple[float, float]] = deque(maxlen=BLOCKS)
-        self._sums = [0.0, 0.0]
+        # Products of the line with velocities and with itself, in x and y, and in z.
+        self._blocks: deque[Array] = deque(maxlen=BLOCKS)
+        self._sums = np.zeros((2, 2))
         self._spent = 0.0
         self._turn = 0
         self.value = self.deviation = math.nan
+        self._least, self._spread = 0.0, 0.0
 
     def update(self, time: float, rate: Array, places: Array, slips: Array, stands: Flags) -> None:
         """Add a sample.
@@ -324,29 +327,33 @@ class Delay:
         arms = middle[2][feet]
         arms = arms - arms.sum(0) / len(feet)
         lines = cross((rate - rows[0][1]) / span, arms)
-        self._sums[0] += float((speeds * lines).sum())
-        self._sums[1] += float((lines * lines).sum())
-        self._sums[1] -= self._noise / span**2 * float((arms * arms).sum())
+        squares = (arms * arms).sum(0)
+        noise = self._noise / span**2 * (squares.sum() - squares)
+        both = np.stack([(speeds * lines).sum(0), (lines * lines).sum(0) - noise])
+        self._sums[0] += both[:, 0] + both[:, 1]
+        self._sums[1] += both[:, 2]
         self._spent += EVERY * span / len(rows)
         if self._spent >= BLOCK:
             self._close()
 
     def _close(self) -> None:
         """End a stretch of walking."""
-        if self._sums[1] > LEAST:
-            self._blocks.append((self._sums[0], self._sums[1]))
-        self._sums, self._spent = [0.0, 0.0], 0.0
+        if self._sums[:, 1].min() > LEAST:
+            self._blocks.append(self._sums)
+        self._sums, self._spent = np.zeros((2, 2)), 0.0
         if len(self._blocks) >= FEWEST:
-            line, square = np.array(self._blocks).T
-            self.value = float(line.sum() / square.sum())
-            rest = line - self.value * square
-            self.deviation = math.hypot(
-                float(np.sqrt((rest * rest).sum()) / square.sum()), LATE_BIAS
-            )
+            blocks = np.array(self._blocks)
+            total = blocks.sum(0)
+            level, upright = slopes = total[:, 0] / total[:, 1]
+            rest = (blocks[..., 0] - slopes * blocks[..., 1]) / total[:, 1]
+            self._spread = max(float(np.sqrt((rest * rest).sum(0).max())), LATE_BIAS)
+            self._least = min(abs(level), abs(upright)) if level * upright > 0.0 else 0.0
+            self.value = float(level + upright) / 2.0
+            self.deviation = math.hypot(self._spread, (level - upright) / 2.0)
 
     def doubt(self) -> str:
         """Return a doubt, or an empty text."""
-        if math.isnan(self.value) or abs(self.value) < LATE + SURE * self.deviation:
+        if self._least < LATE + SURE * self._spread:
             return ''
         word = 'later' if self.value > 0.0 else 'earlier'
         return f'delay: joints are {1e3 * abs(self.value):.0f} ms {word} than the IMU'

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Walk without markers, beside the same walks with them: distance, slip, wetness, deviations.
 
-Walks ``hexapod_patches`` on full dynamics (L2, needs mujoco) with each policy and each sensing,
-prints a table, and writes it to joints.json. Seeds are not those with which anything was tuned.
+Walks ``hexapod_patches`` and ``quadruped_patches`` on full dynamics (L2, needs mujoco) with each
+policy and each sensing, prints a table, and writes it to joints.json. Seeds are not those with
+which anything was tuned.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,7 @@ from studies.work_precision.estimator.tally import MOVING
 from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.tally import count_alarms
 
-SCENE = 'hexapod_patches'
+SCENES = ('hexapod_patches', 'quadruped_patches')
 FIRST_SEED = 201  # earlier ones were used while the code was written
 GATE = 0.3
 """Share of the expected load above which a foot stands."""
@@ -123,9 +125,9 @@ class _Truth:
             self.feet += [(each, foot.slip_velocity_sd) for each in miss.tolist()]
 
 
-def walked(cycles: int, seed: int, policy: str, sensing: str) -> Walk:
-    """Walk the shipped hexapod_patches on full dynamics for a number of gait cycles."""
-    scene = replace(Scene.load(SCENE), cycles=cycles)
+def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk:
+    """Walk a shipped scene on full dynamics for a number of gait cycles."""
+    scene = replace(Scene.load(name), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2', sensing=sensing)
     robot: SimulatedRobot = loop.robot
     truth, gate = _Truth(robot), GATE * scene.expected_load
@@ -218,8 +220,10 @@ def summary(walks: Sequence[Walk]) -> dict[str, Any]:
 def table(document: dict[str, Any]) -> str:
     """Return the figures as text."""
     lines = []
-    for policy, of_policy in document['policies'].items():
-        for sensing, row in of_policy.items():
+    for scene, policies in document['scenes'].items():
+        lines.append(scene)
+        for (policy, of_policy), sensing in product(policies.items(), SOURCES):
+            row = of_policy[sensing]
             walks = ' '.join(f'{each:.2f}' for each in row['distance_m'])
             ratio = sum(row['distance_m']) / sum(of_policy['markers']['distance_m'])
             verdict = row['verdict_right']
@@ -244,20 +248,31 @@ def table(document: dict[str, Any]) -> str:
 def main(words: Sequence[str]) -> int:
     """Walk, print and save."""
     parser = command.parser('joints', __doc__)
+    parser.add_argument(
+        '--scenes', nargs='+', choices=SCENES, default=[*SCENES], metavar='SCENE', help='scenes'
+    )
+    parser.add_argument(
+        '--policies', nargs='+', choices=POLICIES, default=[*POLICIES], metavar='POLICY',
+        help='policies',
+    )  # fmt: skip
     command.add_count(parser, '--walks', 3, f'number of walks, with seeds from {FIRST_SEED}')
     command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
     command.add_processes(parser)
     command.add_out(parser)
     options = parser.parse_args(words)
     seeds = range(FIRST_SEED, FIRST_SEED + options.walks)
-    kinds = [(policy, sensing) for policy in POLICIES for sensing in SOURCES]
-    cases = [(options.cycles, seed, *kind) for kind in kinds for seed in seeds]
+    kinds = list(product(options.scenes, options.policies, SOURCES))
+    cases = [
+        (scene, options.cycles, seed, policy, sensing)
+        for scene, policy, sensing in kinds
+        for seed in seeds
+    ]
     walks = command.in_processes(walked, cases, options.processes, 'joints')
-    policies: dict[str, dict[str, Any]] = {}
-    for place, (policy, sensing) in enumerate(kinds):
+    scenes: dict[str, dict[str, dict[str, Any]]] = {}
+    for place, (scene, policy, sensing) in enumerate(kinds):
         mine = walks[place * len(seeds) : (place + 1) * len(seeds)]
-        policies.setdefault(policy, {})[sensing] = summary(mine)
-    document = {'cycles': options.cycles, 'seeds': [*seeds], 'policies': policies}
+        scenes.setdefault(scene, {}).setdefault(policy, {})[sensing] = summary(mine)
+    document = {'cycles': options.cycles, 'seeds': [*seeds], 'scenes': scenes}
     kept = command.write(options.out, 'joints', document)
     command.show(options, kept, table(document))
     return 0

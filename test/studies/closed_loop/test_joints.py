@@ -71,15 +71,16 @@ def test_slips_alarms_and_deviations_are_counted():
 
 
 def test_a_walk_without_markers_is_measured_against_the_truth():
-    walk = joints.walked(4, 12, 'flat', 'joints')
+    walk = joints.walked('hexapod_patches', 4, 12, 'flat', 'joints')
     assert walk.verdict is None
     assert walk.distance > 0.3
     row = joints.summary([walk])
     # The robot moves at up to 0.3 m/s: an estimate of nothing would be off by 0.1 m/s.
     assert row['body_rmse_m_s'] < 0.03
     assert row['feet_rmse_m_s'] < 0.03
-    markers = joints.walked(4, 12, 'flat', 'markers')
+    markers = joints.walked('hexapod_patches', 4, 12, 'flat', 'markers')
     assert not len(markers.body)
     assert markers.distance == pytest.approx(walk.distance, abs=1e-9)  # flat feet decide nothing
-    document = {'policies': {'flat': {'markers': joints.summary([markers]), 'joints': row}}}
+    figures = {'flat': {'markers': joints.summary([markers]), 'joints': row}}
+    document = {'scenes': {'hexapod_patches': figures}}
     assert '(100.0 %)' in joints.table(document).splitlines()[1]
