@@ -222,7 +222,7 @@ class BodyEstimator:
         window: float = 0.02,
         rate: float = 1000.0,
         force_axes: str = 'base',
-        radius_error: float = 0.2,
+        radius_error: float = 0.05,
         length_error: float = 0.003,
         joint_delay: float = 0.0,
         rejection: bool = True,
