@@ -83,6 +83,8 @@ class BodyFilter:
         With which feet roll, m; relative error of the length of the legs.
     covariance : array (17 + 3 legs, 17 + 3 legs)
         Of the errors above.
+    creep : float
+        Random motion of feet that stand, beyond that on firm ground, m after 1 s.
     rejected : array of bool (legs,)
         Feet whose last measurement was not consistent with standing still.
     lifted : array of bool (legs,)
@@ -101,7 +103,7 @@ class BodyFilter:
         self.velocity, self.position = np.zeros(3), np.zeros(3)
         self.gyro_bias, self.force_bias = np.zeros(3), np.zeros(3)
         self.footholds = np.zeros((legs, 3))
-        self.radius = self.scale = 0.0
+        self.radius = self.scale = self.creep = 0.0
         self.covariance = np.zeros((size, size))
         self.rejected, self.lifted = np.zeros((2, legs), dtype=bool)
         self._legs = legs
@@ -200,7 +202,7 @@ class BodyFilter:
         self._diagonal[_GYRO] += GYRO_DRIFT**2 * dt
         self._diagonal[_FORCE] += FORCE_DRIFT**2 * dt
         unsure = ROLLING_ERROR * self.radius
-        stray = (STRAY**2 + ROLLING_TIME * unsure**2 * (spin * spin).sum(1)) * dt
+        stray = (STRAY**2 + self.creep**2 + ROLLING_TIME * unsure**2 * (spin * spin).sum(1)) * dt
         self._diagonal[FEET:].reshape(-1, 3)[:] += stray[:, None]
         self._diagonal[FEET + 2 :: 3] += SINKING**2 * dt
 

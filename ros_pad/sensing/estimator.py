@@ -81,6 +81,10 @@ are far apart."""
 CALM = 0.05
 """Slip speed up to which feet show a delay, m/s."""
 
+SLIPPERY, CREEP = 0.35, 0.03
+"""Share of their stances in which all feet slip, above which they creep while they seem to stick;
+random motion of such a foot over the rest of the share, m after 1 s."""
+
 LOOK = 0.25
 """Time between two looks at the length of the legs, s."""
 
@@ -610,7 +614,9 @@ class BodyEstimator:
             # What such legs have shown about the others is wrong.
             self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._length_error)
             return True
-        if not time < self._look:
+        self._filter.creep = CREEP * max(0.0, self._agreement.share - SLIPPERY)
+        # Joints that are late look like legs of another length, too.
+        if not time < self._look and not self._delay.doubt():
             self._look = time + LOOK
             scale, deviation = self._filter.scale, self._filter.deviations[1]
             learnt = self._length_error**2 - deviation**2

@@ -26,9 +26,11 @@ STUCK = 0.2
 STANCES = 4.0
 """Time constant of the share of its stances in which a foot slips, s of stance."""
 
-AGAINST, WITH = 0.9, 0.75
-"""Share above which a foot moves against the others, if half of all feet are below the second: on
-ice feet slip half of the time."""
+AGAINST = 0.9
+"""Share above which a foot moves against the others, if half of all feet are below AGREES."""
+
+WITH = 0.75
+"""Share of each foot up to which radius and length of the legs are learnt."""
 
 FASTER = 0.6
 """Mean speed of its contact point over that of the foot against the body from which on it does."""
@@ -37,7 +39,7 @@ MOVES = 0.02
 """Speed of a foot against body or ground from which on it shows something, m/s."""
 
 AGREES = 0.5
-"""Share below which it moves with them again."""
+"""Share below which a foot moves with the others."""
 
 STRETCH = 0.5
 """Time over which joint positions are compared with their velocities, s."""
@@ -207,6 +209,11 @@ class Legs:
         self._turn, self._spent = 0, 0.0
 
     @property
+    def share(self) -> float:
+        """Share of its last stances in which a foot slips, mean of all feet."""
+        return float(self._means[0].sum()) / len(self._names)
+
+    @property
     def agree(self) -> bool:
         """Whether no foot slips in nearly all of its stances."""
         return bool(self._means[0].max() < WITH)
@@ -246,7 +253,8 @@ class Legs:
             self.against = self.against & False
             return False
         before = self.against
-        most = 2 * int((shares < WITH).sum()) >= len(shares)
+        # Where all feet slip for half of their stances, some do so nearly always.
+        most = 2 * int((shares < AGREES).sum()) >= len(shares)
         wrong = (shares > AGAINST) & (means[1] > FASTER * means[2]) & most
         wrong &= self._time > 0.5 * STANCES
         self.against = wrong | (before & (shares > AGREES))
