@@ -25,6 +25,7 @@ from ros_pad.sensing.body_filter import GATE
 from ros_pad.sensing.body_filter import GRAVITY
 from ros_pad.sensing.body_filter import BodyFilter
 from ros_pad.sensing.body_filter import Flags
+from ros_pad.sensing.plausibility import SLIPPERY
 from ros_pad.sensing.plausibility import Delay
 from ros_pad.sensing.plausibility import Joints
 from ros_pad.sensing.plausibility import Legs
@@ -81,9 +82,8 @@ are far apart."""
 CALM = 0.05
 """Slip speed up to which feet show a delay, m/s."""
 
-SLIPPERY, CREEP = 0.35, 0.03
-"""Share of their stances in which all feet slip, above which they creep while they seem to stick;
-random motion of such a foot over the rest of the share, m after 1 s."""
+CREEP = 0.03
+"""Random motion of feet that stand, m after 1 s, over the share of slips beyond SLIPPERY."""
 
 LOOK = 0.25
 """Time between two looks at the length of the legs, s."""

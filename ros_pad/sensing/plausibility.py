@@ -29,8 +29,9 @@ STANCES = 4.0
 AGAINST = 0.9
 """Share above which a foot moves against the others, if half of all feet are below AGREES."""
 
-WITH = 0.75
-"""Share of each foot up to which radius and length of the legs are learnt."""
+SLIPPERY, SLIPS = 0.35, 0.45
+"""Shares of their stances in which all feet slip, above which they creep while they seem to stick,
+and above which they show nothing about their radius and the length of their legs."""
 
 FASTER = 0.6
 """Mean speed of its contact point over that of the foot against the body from which on it does."""
@@ -215,8 +216,8 @@ class Legs:
 
     @property
     def agree(self) -> bool:
-        """Whether no foot slips in nearly all of its stances."""
-        return bool(self._means[0].max() < WITH)
+        """Whether feet stick for most of their stances, so that they show something."""
+        return self.share < SLIPS
 
     @property
     def sticks(self) -> bool:
