@@ -113,9 +113,7 @@ class Urdf:
                 )
             mass, centre = self._carried(joint.child)
             slides = joint.kind == 'prismatic'
-            joints.append(
-                Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits)
-            )
+            joints.append(Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits))
             at = np.eye(4)
         if not joints:
             raise self._error(f'no moving joint between {self.root!r} and foot {foot!r}')
