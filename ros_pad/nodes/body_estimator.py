@@ -86,6 +86,12 @@ PARAMETERS = (
 OLDEST = 0.1
 """Age of the last sample, s, from which the body estimator counts as late."""
 
+_SOURCES = {
+    'feet': 'measured at the feet',
+    'efforts': 'from the efforts of the joints',
+    '': 'neither measured at the feet nor from efforts of the joints',
+}
+
 _RATE = tuple(f'angular_velocity.{axis}' for axis in 'xyz')
 _PULL = tuple(f'linear_acceleration.{axis}' for axis in 'xyz')
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
@@ -122,6 +128,7 @@ class BodyEstimatorNode(Node):
             values['force_axes'] = self._mapping.force_axes
         self._base: str = values['base_frame']
         self.forces = 0
+        self._force_source = ''  # as reported last
         self._rate = np.zeros(3)  # last angular velocity, IMU axes, rad/s
         self.messages = Messages(self, 'body_estimator')
         self.stage = SensingStage(
@@ -307,6 +314,10 @@ class BodyEstimatorNode(Node):
         )
 
     def _publish(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        if self.stage.force_source != self._force_source:
+            self._force_source = self.stage.force_source
+            text = _SOURCES[self._force_source]
+            self.get_logger().info(f'forces of the feet: {text}', throttle_duration_sec=1.0)
         stamp = split(stamp_ns)
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
         values: list[float] = []
