@@ -44,9 +44,9 @@ from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
 from ros_pad.sensing.mapping import Mapping
 from ros_pad.sensing.stage import SETTINGS
+from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
 from ros_pad.sensing.stage import foot_readings
-from ros_pad.sensing.stage import joint_order
 from ros_pad.sensing.stage import twist_of
 
 PARAMETERS = (
@@ -140,7 +140,7 @@ class BodyEstimatorNode(Node):
             values['forces'],
         )
         self._gyro_noise: float = values['gyro_noise']
-        self._orders: dict[tuple[str, ...], Any] = {}  # by names of joints
+        self._order = JointOrder(robot)
         self._send = self.messages.joint_sender(self._outgoing(values['legs']))
         self._doubts = self.messages.output(topics.BODY_DOUBT)
         self._send_tf = self._transforms() if values['publish_tf'] else None
@@ -290,28 +290,13 @@ class BodyEstimatorNode(Node):
         self.stage.imu(sec * 1_000_000_000 + nanosec, values[:3], values[3:])
 
     def _on_joints(self, message: JointState) -> None:
-        names = tuple(message.name)
         try:
-            if names not in self._orders:
-                self._orders = {names: joint_order(self._robot, names)}
-            order = self._orders[names]
-            for part in ('position', 'velocity', 'effort'):
-                given = getattr(message, part)
-                if len(given) != len(names) and (len(given) or part == 'position'):
-                    raise InvalidInput(
-                        f'joint_states: {len(given)} values in {part} are not allowed:'
-                        f' {len(names)} are needed, one for each name'
-                    )
+            values = self._order(message.name, message.position, message.velocity, message.effort)
         except InvalidInput as error:
             self.stage.reject(error)
             return
         stamp = message.header.stamp
-        self.stage.joints(
-            stamp.sec * 1_000_000_000 + stamp.nanosec,
-            np.array(message.position)[order],
-            np.array(message.velocity)[order] if message.velocity else None,
-            np.array(message.effort)[order] if message.effort else None,
-        )
+        self.stage.joints(stamp.sec * 1_000_000_000 + stamp.nanosec, *values)
 
     def _publish(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         if self.stage.force_source != self._force_source:

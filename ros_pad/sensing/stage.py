@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -110,6 +111,8 @@ SETTINGS = (
 )  # fmt: skip
 """Settings of a body estimator and its stage, by the names of their arguments."""
 
+_Values: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
+
 _NEVER = -(10**18)  # ns, before any stamp
 _LATEST_NS = 50_000_000  # readings of joints wait no longer than this for the IMU
 _WAITING = 50  # readings of joints that wait for the IMU, and readings of the IMU that are kept
@@ -160,22 +163,55 @@ def foot_readings(estimate: BodyEstimate) -> list[FootReadings]:
     return readings
 
 
-def joint_order(robot: Robot, names: Sequence[str]) -> npt.NDArray[np.intp]:
-    """Return where each joint of a robot is among the names of a message.
+class JointOrder:
+    """Bring the joints of messages into the order of a robot's: each message has its own names.
 
-    Raises
-    ------
-    InvalidInput
-        When a joint of the robot is missing, or a name comes twice.
+    Parameters
+    ----------
+    robot : Robot
     """
-    places = {name: place for place, name in enumerate(names)}
-    missing = [name for name in robot.joint_names if name not in places]
-    if missing or len(places) < len(names):
-        wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
-        raise InvalidInput(
-            f'joint names {wrong} are not allowed: those of {robot.name} are needed'
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._places: dict[tuple[str, ...], npt.NDArray[np.intp]] = {}  # by the last names
+
+    def __call__(
+        self, names: Sequence[str], position: _Values, velocity: _Values, effort: _Values
+    ) -> tuple[Array, Array | None, Array | None]:
+        """Return position, velocity and effort of the robot's joints, None where there are none.
+
+        Raises
+        ------
+        InvalidInput
+            When a joint of the robot is missing, a name comes twice, or there is not one value for
+            each name; velocity and effort may be empty.
+        """
+        key = tuple(names)
+        if key not in self._places:
+            self._places = {key: self._found(key)}
+        for part, given in (('position', position), ('velocity', velocity), ('effort', effort)):
+            if len(given) != len(key) and (len(given) or part == 'position'):
+                raise InvalidInput(
+                    f'joint_states: {len(given)} values in {part} are not allowed: {len(key)} are'
+                    ' needed, one for each name'
+                )
+        places = self._places[key]
+        return (
+            np.array(position)[places],
+            np.array(velocity)[places] if len(velocity) else None,
+            np.array(effort)[places] if len(effort) else None,
         )
-    return np.array([places[name] for name in robot.joint_names])
+
+    def _found(self, names: tuple[str, ...]) -> npt.NDArray[np.intp]:
+        """Return where each joint of the robot is among names."""
+        places = {name: place for place, name in enumerate(names)}
+        missing = [name for name in self._robot.joint_names if name not in places]
+        if missing or len(places) < len(names):
+            wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
+            raise InvalidInput(
+                f'joint names {wrong} are not allowed: those of {self._robot.name} are needed'
+            )
+        return np.array([places[name] for name in self._robot.joint_names])
 
 
 def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Array, Array]:
