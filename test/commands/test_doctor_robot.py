@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``pad doctor --robot`` on bags, and on live topics over DDS."""
 
+import contextlib
 import dataclasses
 import functools
 import heapq
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from ros_pad import cli
+from ros_pad.commands import robot_check
 from ros_pad.robots import Robot
 from studies.sensing import layouts
 
@@ -53,6 +55,24 @@ def test_a_bag_without_faults(tmp_path, capsys):
     assert (status, found['sensors']['status']) == (0, 'ok')
     assert found['leg_4/foot_wrench']['found'] == '1500 messages'
     assert {each['status'] for each in found.values()} <= {'ok', 'warning'}
+
+
+def test_progress_is_shown_while_sensors_are_checked(tmp_path, capsys, monkeypatch):
+    shares = []
+
+    @contextlib.contextmanager
+    def bar(text, total, unit='s'):
+        yield lambda share: shares.append(share) if text == 'checking' else None
+
+    monkeypatch.setattr(robot_check, 'bar', bar)
+    wrong = dataclasses.replace(log(), gyro=log().gyro * (1.0, 1.0, -1.0))
+    path = bag(tmp_path, *plain(wrong))
+    doctor(capsys, '--robot', 'go2', '--bag', path)
+    assert shares == sorted(shares)
+    # 47 turns and one scale of the gyro and 12 reversed joints, twice as one of them helps.
+    assert len(shares) == 2 * 60 + 2
+    assert shares[59] == pytest.approx(0.25)
+    assert shares[-1] == 1.0
 
 
 def test_a_bag_with_a_fault_in_its_gyro(tmp_path, capsys):
