@@ -29,7 +29,11 @@ def findings(options: argparse.Namespace) -> Iterator[Finding]:
     mapping = Mapping.load(options.mapping, robot)
     joints = len(robot.joint_names)
     about = f'{robot.name}: {len(robot.legs)} legs, {joints} joints, {robot.mass:.3g} kg'
-    yield Finding('robot', 'ok', about, '')
+    if robot.mass > 0.0:
+        yield Finding('robot', 'ok', about, '')
+    else:
+        advice = 'give the links an <inertial> with <mass>: the body estimator needs the weight'
+        yield Finding('robot', 'problem', f'{about}: its links have no mass', advice)
     collector = Collector(mapping, robot)
     topics = (_recorded if options.bag else _live)(options, mapping, seconds, collector)
     for topic, count in collector.counts.items():

@@ -260,7 +260,8 @@ class Robot:
             step = lines.transpose(0, 2, 1) @ np.linalg.solve(square, miss[..., None])
             q += np.clip(step[..., 0], -0.5, 0.5)
         leg = self.legs[int(np.abs(miss).max(1).argmax())]
-        raise InvalidInput(f'leg {leg} does not reach {goal[self.legs.index(leg)].tolist()} m')
+        place = goal[self.legs.index(leg)].round(4).tolist()
+        raise InvalidInput(f'leg {leg} does not reach {place} m')
 
     def _shaped(self, q: npt.ArrayLike) -> Array:
         checked = quantity('q', q, 'rad', -1e4, 1e4)
@@ -278,8 +279,8 @@ def _check_sizes(robot: Robot) -> None:
     places = robot.kinematics(robot.home)
     starts = places.frames[..., :3, 3]
     ends = np.concatenate([starts[1:], places.positions[None]])
-    lengths = np.linalg.norm(ends - starts, axis=2).sum(0).tolist()
-    away = np.linalg.norm(robot.hips, axis=1).tolist()
+    lengths = np.linalg.norm(ends - starts, axis=2).sum(0).round(6).tolist()
+    away = np.linalg.norm(robot.hips, axis=1).round(6).tolist()
     for name, joints, length, hip in zip(
         robot.legs, robot.chains.legs, lengths, away, strict=True
     ):

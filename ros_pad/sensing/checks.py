@@ -638,7 +638,7 @@ def forces(recording: Recording) -> list[Finding]:
         elif np.linalg.norm(force) > 0.05 * size and force @ up < 0.5 * np.linalg.norm(force):
             text = f'that of foot {leg} is along {_axis(force)} of the base at rest'
             lines.append((text, 'its axes are turned: it should be along z'))
-    if not lines and not 0.75 < size / weight < 1.33:
+    if not lines and weight and not 0.75 < size / weight < 1.33:
         text = f'add up to {size:.3g} at rest, and the robot weighs {weight:.3g} N'
         whole = measured and np.array_equal(found, np.round(found))
         advice = (

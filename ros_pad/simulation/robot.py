@@ -162,7 +162,11 @@ def check_reach(scene: Scene) -> FeetSolver:
     if not _miss(scene, lift, stride, scene.heading_gain):
         return FeetSolver(robot)
     if why := _miss(scene, 0.0, 0.0, 0.0):
-        raise ConfigError(f'{scene.source}: robot {robot.source} cannot stand at home: {why}')
+        heights = robot.foot_positions(robot.home)[:, 2]
+        raise ConfigError(
+            f'{scene.source}: robot {robot.source} cannot stand at home, where its feet are'
+            f' {heights.min():.3g} to {heights.max():.3g} m high in the base: {why}'
+        )
     motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
         ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
         ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),

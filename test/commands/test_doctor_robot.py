@@ -7,6 +7,7 @@ import functools
 import heapq
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -55,6 +56,17 @@ def test_a_bag_without_faults(tmp_path, capsys):
     assert (status, found['sensors']['status']) == (0, 'ok')
     assert found['leg_4/foot_wrench']['found'] == '1500 messages'
     assert {each['status'] for each in found.values()} <= {'ok', 'warning'}
+
+
+def test_a_robot_without_masses_is_a_problem(tmp_path, capsys):
+    path = bag(tmp_path, *plain(standing()), layouts.wrenches(standing(), GO2))
+    description = tmp_path / 'light.urdf'
+    description.write_text(re.sub('<mass[^>]*/>', '', layouts.urdf(GO2)))
+    feet = [f'{leg}_foot' for leg in GO2.legs]
+    words = ['--robot', str(description), '--feet', *feet, '--imu', 'imu', '--bag', path]
+    status, found = doctor(capsys, *words)
+    assert (status, found['robot']['status']) == (1, 'problem')
+    assert 'no mass' in found['robot']['found'] and '<inertial>' in found['robot']['advice']
 
 
 def test_progress_is_shown_while_sensors_are_checked(tmp_path, capsys, monkeypatch):

@@ -191,6 +191,14 @@ def test_links_without_mass_are_refused(tmp_path):
         Scene.load(path)
 
 
+def test_a_base_without_mass_is_refused(tmp_path):
+    path = urdf_scene(tmp_path)
+    text = (tmp_path / 'q.urdf').read_text()
+    (tmp_path / 'q.urdf').write_text(text.replace('<mass value="3.0"/>', ''))
+    with pytest.raises(ConfigError, match=r'have 1 of its 1 kg: at most 99% is .* has its base'):
+        Scene.load(path)
+
+
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
@@ -244,7 +252,7 @@ def test_a_robot_that_stands_beyond_its_limits_may_be_estimated_but_not_walk(tmp
         re.sub('(_shank_joint" type="revolute">)', rf'\1{limit}', text)
     )
     scene = Scene.load(path)
-    with pytest.raises(ConfigError, match=r'robot\.yaml cannot stand at home: .*shank_joint'):
+    with pytest.raises(ConfigError, match=r'robot\.yaml cannot stand at home, .*shank_joint'):
         walk(scene, 'L1')
 
 
