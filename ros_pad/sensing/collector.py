@@ -80,6 +80,9 @@ class Collector:
         """
         found = [self._refusal(topic, text) for topic, text in self.refused.items()]
         found += self._silent(topics)
+        if not self._forces and any(each.efforts is not None for each, _ in self._joints):
+            text = 'no foot force arrives: they are taken from the efforts of the joints'
+            found.append(Finding('forces', 'ok', text, ''))
         for each in self._mapping.missing:
             what, _, text = each.partition(': ')
             found.append(Finding(what, 'warning', text, ''))

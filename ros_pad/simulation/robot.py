@@ -182,7 +182,7 @@ def check_reach(scene: Scene) -> FeetSolver:
         low, high = (low, middle) if miss(middle) else (middle, high)
     raise ConfigError(
         f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g} {unit} is'
-        f' within reach of the legs of {robot.source}: {miss(value)}'
+        f' within reach of the legs of {robot.source} from its home: {miss(value)}'
     )
 
 
@@ -202,6 +202,8 @@ def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
         up = lift * (1.0 - (step / 8.0) ** 2)
         for height, angle in {(h, a) for h in (0.0, up) for a in (turned, -turned)}:
             c, s = math.cos(angle), math.sin(angle)
+            where = f'feet {ahead:+.3g} m ahead of home, {height:.3g} m up'
+            where += f', body turned by {angle:.3g} rad' if angle else ''
             feet = [
                 (c * (x + ahead) + s * y, c * y - s * (x + ahead), body.ground + height)
                 for x, y in body.homes
@@ -209,12 +211,11 @@ def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
             try:
                 joints = np.array(solver.angles(feet))
             except InvalidInput as error:
-                return f'feet {ahead:+.3g} m ahead of home, {height:.3g} m up: {error}'
+                return f'{where}: {error}'
             if ((joints < lows - 1e-6) | (joints > highs + 1e-6)).any():
                 worst = int(np.maximum(lows - joints, joints - highs).argmax())
                 return (
-                    f'feet {ahead:+.3g} m ahead of home, {height:.3g} m up:'
-                    f' {robot.joint_names[worst]} would be at {joints[worst]:.3g}, from'
+                    f'{where}: {robot.joint_names[worst]} would be at {joints[worst]:.3g}, from'
                     f' {lows[worst]:.3g} to {highs[worst]:.3g} is allowed'
                 )
     return ''

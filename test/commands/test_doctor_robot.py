@@ -55,6 +55,7 @@ def test_a_bag_without_faults(tmp_path, capsys):
     status, found = doctor(capsys, '--robot', 'go2', '--bag', path)
     assert (status, found['sensors']['status']) == (0, 'ok')
     assert found['leg_4/foot_wrench']['found'] == '1500 messages'
+    assert 'forces' not in found
     assert {each['status'] for each in found.values()} <= {'ok', 'warning'}
 
 
@@ -93,6 +94,7 @@ def test_a_bag_with_a_fault_in_its_gyro(tmp_path, capsys):
     assert (status, found['gyro']['status']) == (1, 'problem')
     assert 'about z is on -z' in found['gyro']['found']
     assert 'foot' not in ' '.join(found)  # efforts give the forces
+    assert found['forces']['found'].endswith('taken from the efforts of the joints')
 
 
 def test_messages_of_a_go2_need_no_package(tmp_path, capsys):
