@@ -79,4 +79,4 @@ def _recorded(
                 break
             collector.add(names[topic], message, at)
             progress((at - reader.start) * 1e-9)
-    return reader.topics
+    return {topic: of_type for topic, of_type in reader.topics.items() if reader.counts[topic]}

@@ -140,8 +140,14 @@ class Collector:
         for group in groups:
             type_name = group[0].type_name
             same = [name for name, each in topics.items() if each == type_name]
-            if same:
-                advice = f'{type_name} is on {", ".join(same)}: write that into a mapping'
+            own = {'/' + each.topic.lstrip('/') for each in group}
+            if own & set(same):
+                advice = 'it has a publisher, from which nothing was received: look at the driver'
+            elif same:
+                advice = (
+                    f'{type_name} is on {", ".join(same)}: write that into a mapping, or give the'
+                    ' namespace'
+                )
             else:
                 advice = f'no topic has {type_name}: does the driver run, in this namespace?'
             names = ', '.join(source.topic for source in group)

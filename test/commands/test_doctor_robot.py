@@ -229,6 +229,15 @@ def robot(tmp_path, monkeypatch):
     child.wait(10.0)
 
 
+def test_topics_that_nobody_publishes(monkeypatch, capsys):
+    pytest.importorskip('rclpy')
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    status, found = doctor(capsys, '--robot', 'go2', '--seconds', '1')
+    assert status == 1
+    assert found['imu/data']['advice'].startswith('no topic has sensor_msgs/msg/Imu: does the')
+
+
 def test_live_topics(robot, capsys):
     # A slow machine has gaps, which are found too, and takes long to start a publisher.
     for _ in range(10):
