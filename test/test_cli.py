@@ -55,6 +55,20 @@ def test_a_bad_value_names_file_key_value_and_range(
         assert part in said
 
 
+@pytest.mark.parametrize('level', ['L1', 'L2'])
+def test_a_gait_that_no_leg_reaches_leaves_no_folder(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str], level: str
+):
+    """So that the same command runs once the scene is mended."""
+    pytest.importorskip('rclpy')
+    scene, out = tmp_path / 'far.yaml', tmp_path / 'walk'
+    scene.write_text(SCENE.read_text().replace('stride: 0.14', 'stride: 1.4'))
+    assert cli.main(['run', str(scene), '--fidelity', level, '--out', str(out)]) == 2
+    said = capsys.readouterr().err
+    assert f'{scene}: gait.stride = 1.4 m is not allowed: at most 0.3' in said
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ('arguments', 'part'),
     [

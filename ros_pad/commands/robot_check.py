@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from typing import Any
 
 from ros_pad.bags import BagReader
 from ros_pad.commands.progress import bar
@@ -30,21 +29,25 @@ def findings(options: argparse.Namespace) -> Iterator[Finding]:
     mapping = Mapping.load(options.mapping, robot)
     joints = len(robot.joint_names)
     about = f'{robot.name}: {len(robot.legs)} legs, {joints} joints, {robot.mass:.3g} kg'
-    yield Finding('robot', 'ok', about, '')
-    messages, topics = (_recorded if options.bag else _live)(options, mapping, seconds)
+    if robot.mass > 0.0:
+        yield Finding('robot', 'ok', about, '')
+    else:
+        advice = 'give the links an <inertial> with <mass>: the body estimator needs the weight'
+        yield Finding('robot', 'problem', f'{about}: its links have no mass', advice)
     collector = Collector(mapping, robot)
-    for message in messages:
-        collector.add(*message)
+    topics = (_recorded if options.bag else _live)(options, mapping, seconds, collector)
     for topic, count in collector.counts.items():
         yield Finding(topic, 'ok', f'{count} messages', '')
-    yield from collector.findings(topics)
+    with bar('checking', 1.0, 'robot') as progress:
+        found = collector.findings(topics, progress)
+        progress(1.0)
+    yield from found
 
 
-_Messages = tuple[list[tuple[str, Any, int]], dict[str, str]]
-
-
-def _live(options: argparse.Namespace, mapping: Mapping, seconds: float) -> _Messages:
-    """Receive messages; also return the types of all topics."""
+def _live(
+    options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
+) -> dict[str, str]:
+    """Collect messages that arrive; return the types of all topics."""
     try:
         from ros_pad.nodes.listening import receive
     except ImportError as error:
@@ -52,11 +55,16 @@ def _live(options: argparse.Namespace, mapping: Mapping, seconds: float) -> _Mes
             f'live topics need ROS 2 ({error}): install it, or give a recording with --bag'
         ) from error
     with bar('listening', seconds) as progress:
-        return receive(mapping.sources, seconds, options.namespace, progress)
+        messages, topics = receive(mapping.sources, seconds, options.namespace, progress)
+    for message in messages:
+        collector.add(*message)
+    return topics
 
 
-def _recorded(options: argparse.Namespace, mapping: Mapping, seconds: float) -> _Messages:
-    """Read the first seconds of a bag; also return the types of all of its topics."""
+def _recorded(
+    options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
+) -> dict[str, str]:
+    """Collect the messages of the first seconds of a bag; return the types of all its topics."""
     reader = BagReader(options.bag)
     prefix = f'/{options.namespace.strip("/")}/' if options.namespace else '/'
     names = {
@@ -65,11 +73,10 @@ def _recorded(options: argparse.Namespace, mapping: Mapping, seconds: float) -> 
         for name in (prefix + source.topic.lstrip('/'), source.topic)
     }
     end = min(reader.start + round(seconds * 1e9), reader.end)
-    found = []
     with bar('reading', (end - reader.start) * 1e-9) as progress:
         for topic, message, at in reader.messages(names):
             if at > end:
                 break
-            found.append((names[topic], message, at))
+            collector.add(names[topic], message, at)
             progress((at - reader.start) * 1e-9)
-    return found, reader.topics
+    return {topic: of_type for topic, of_type in reader.topics.items() if reader.counts[topic]}

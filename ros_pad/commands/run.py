@@ -28,6 +28,7 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.reports import report
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
+from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import is_bench
 from ros_pad.trials import Trial
@@ -127,6 +128,8 @@ def run(options: argparse.Namespace) -> int:
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
     level = levels.level(scene, options.fidelity, policy, joints)
+    if level != 'L0':
+        check_reach(scene)  # before there is a folder
     suffix = '_joints' if joints else ''
     folder = new_folder(options.out, f'{scene.name}_{policy}_seed{options.seed}{suffix}')
     try:

@@ -260,27 +260,14 @@ class FootEstimator:
             When a value is not a finite number, force or position are not three numbers, time
             does not advance, or the motion is missing or has a deviation below 0.
         """
-        if not self._joints:
-            motion = None
-        elif motion is None:
-            raise InvalidInput(
-                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
-                ' velocity of the contact is needed'
-            )
+        motion = motion if self._joints else None
+        moment = moment if self._measures_moment else None
+        self._check(time, force, position, pressure, moment, position_time, motion)
+        (fx, fy, fz), (x, y, z) = force, position
         age = 0.0 if position_time is None else abs(time - position_time)
-        if not self._measures_moment:
-            moment = None
         yaw = 0.0 if moment is None else moment
-        try:
-            fx, fy, fz = force
-            x, y, z = position
-            finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure + yaw + age)
-        except (TypeError, ValueError) as error:
-            raise _not_numbers(time, force, position, pressure, moment) from error
-        if not finite:
-            raise _not_finite(time, force, position, pressure, moment, position_time)
         if motion:
-            self._speed_noise = math.hypot(_checked(time, motion).sd, self._shear_noise)
+            self._speed_noise = math.hypot(motion.sd, self._shear_noise)
         dt = time - self._time
         if dt <= 0.0:
             dt = self._set_back(time)
@@ -325,6 +312,34 @@ class FootEstimator:
         # On the ellipsoidal limit surface, friction used by turning is not available to the pull.
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
+
+    def _check(
+        self,
+        time: float,
+        force: Sequence[float],
+        position: Sequence[float],
+        pressure: float,
+        moment: float | None,
+        position_time: float | None,
+        motion: ContactMotion | None,
+    ) -> None:
+        """Raise `InvalidInput` unless a sample has all its numbers, and all are finite."""
+        if self._joints and motion is None:
+            raise InvalidInput(
+                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
+                ' velocity of the contact is needed'
+            )
+        try:
+            (fx, fy, fz), (x, y, z) = force, position
+            age = 0.0 if position_time is None else abs(time - position_time)
+            yaw = 0.0 if moment is None else moment
+            finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure + yaw + age)
+        except (TypeError, ValueError) as error:
+            raise _not_numbers(time, force, position, pressure, moment) from error
+        if not finite:
+            raise _not_finite(time, force, position, pressure, moment, position_time)
+        if motion:
+            _check_motion(time, motion)
 
     def _set_back(self, time: float) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
@@ -498,15 +513,14 @@ class FootEstimator:
         return dry / prior.flat_dry, wet / prior.flat_wet
 
 
-def _checked(time: float, motion: ContactMotion) -> ContactMotion:
-    """Return a motion of the contact; raise `InvalidInput` if it is not made of numbers."""
+def _check_motion(time: float, motion: ContactMotion) -> None:
+    """Raise `InvalidInput` unless a motion of the contact is made of finite numbers."""
     (x, y), sd, _ = motion
     if not math.isfinite(x + y + sd) or sd < 0.0:
         raise InvalidInput(
             f'sample at {time!r} s: velocity = ({x!r}, {y!r}) m/s with a deviation of {sd!r} m/s'
             ' is not allowed: finite numbers are needed, and a deviation from 0'
         )
-    return motion
 
 
 def _not_numbers(

@@ -44,9 +44,9 @@ from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
 from ros_pad.sensing.mapping import Mapping
 from ros_pad.sensing.stage import SETTINGS
+from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
 from ros_pad.sensing.stage import foot_readings
-from ros_pad.sensing.stage import joint_order
 from ros_pad.sensing.stage import twist_of
 
 PARAMETERS = (
@@ -86,6 +86,12 @@ PARAMETERS = (
 OLDEST = 0.1
 """Age of the last sample, s, from which the body estimator counts as late."""
 
+_SOURCES = {
+    'feet': 'measured at the feet',
+    'efforts': 'from the efforts of the joints',
+    '': 'neither measured at the feet nor from efforts of the joints',
+}
+
 _RATE = tuple(f'angular_velocity.{axis}' for axis in 'xyz')
 _PULL = tuple(f'linear_acceleration.{axis}' for axis in 'xyz')
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
@@ -122,6 +128,7 @@ class BodyEstimatorNode(Node):
             values['force_axes'] = self._mapping.force_axes
         self._base: str = values['base_frame']
         self.forces = 0
+        self._force_source = ''  # as reported last
         self._rate = np.zeros(3)  # last angular velocity, IMU axes, rad/s
         self.messages = Messages(self, 'body_estimator')
         self.stage = SensingStage(
@@ -133,7 +140,7 @@ class BodyEstimatorNode(Node):
             values['forces'],
         )
         self._gyro_noise: float = values['gyro_noise']
-        self._orders: dict[tuple[str, ...], Any] = {}  # by names of joints
+        self._order = JointOrder(robot)
         self._send = self.messages.joint_sender(self._outgoing(values['legs']))
         self._doubts = self.messages.output(topics.BODY_DOUBT)
         self._send_tf = self._transforms() if values['publish_tf'] else None
@@ -283,30 +290,19 @@ class BodyEstimatorNode(Node):
         self.stage.imu(sec * 1_000_000_000 + nanosec, values[:3], values[3:])
 
     def _on_joints(self, message: JointState) -> None:
-        names = tuple(message.name)
         try:
-            if names not in self._orders:
-                self._orders = {names: joint_order(self._robot, names)}
-            order = self._orders[names]
-            for part in ('position', 'velocity', 'effort'):
-                given = getattr(message, part)
-                if len(given) != len(names) and (len(given) or part == 'position'):
-                    raise InvalidInput(
-                        f'joint_states: {len(given)} values in {part} are not allowed:'
-                        f' {len(names)} are needed, one for each name'
-                    )
+            values = self._order(message.name, message.position, message.velocity, message.effort)
         except InvalidInput as error:
             self.stage.reject(error)
             return
         stamp = message.header.stamp
-        self.stage.joints(
-            stamp.sec * 1_000_000_000 + stamp.nanosec,
-            np.array(message.position)[order],
-            np.array(message.velocity)[order] if message.velocity else None,
-            np.array(message.effort)[order] if message.effort else None,
-        )
+        self.stage.joints(stamp.sec * 1_000_000_000 + stamp.nanosec, *values)
 
     def _publish(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        if self.stage.force_source != self._force_source:
+            self._force_source = self.stage.force_source
+            text = _SOURCES[self._force_source]
+            self.get_logger().info(f'forces of the feet: {text}', throttle_duration_sec=1.0)
         stamp = split(stamp_ns)
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
         values: list[float] = []

@@ -95,7 +95,11 @@ def receive(
             intake.take(lambda *message: found.append(message))
             if progress:
                 progress(min(passed, seconds))
-        topics = {name: types[0] for name, types in node.get_topic_names_and_types()}
+        topics = {
+            name: types[0]
+            for name, types in node.get_topic_names_and_types()
+            if node.count_publishers(name)
+        }
         node.destroy_node()
     finally:
         context.try_shutdown()

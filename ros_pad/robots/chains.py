@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -31,6 +32,8 @@ class Joint:
         Mass of the link and of what is fixed to it, kg.
     centre : array (3,)
         Centre of that mass in the frame of the joint, m.
+    limits : tuple of float
+        Lowest and highest position, rad or m; infinite without limits.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Joint:
     slides: bool
     mass: float
     centre: Array
+    limits: tuple[float, float] = (-math.inf, math.inf)
 
 
 class Kinematics(NamedTuple):

@@ -40,6 +40,8 @@ class LegSolver:
 
     def __init__(self, joints: Sequence[Joint], foot: Array, home: Sequence[float]) -> None:
         hip, thigh, knee = joints
+        self._home = home
+        self._far = max(map(abs, home)) > 0.5 * math.pi
         turn = thigh.at[:3, :3] @ knee.at[:3, :3]
         across = thigh.at[:3, :3] @ thigh.axis  # axis of the thigh, in the link of the hip
         ahead = _normal_to(across)
@@ -139,11 +141,20 @@ class LegSolver:
         end_x = upper + lower * math.cos(fold)
         end_y = lower * math.sin(fold)
         thigh = math.atan2(v, u) - math.atan2(end_y, end_x) - start
-        return (
+        found = (
             hip,
             math.remainder(thigh, math.tau),
             math.remainder(self._sense * turned, math.tau),
         )
+        return self._within_half_a_turn(found) if self._far else found
+
+    def _within_half_a_turn(self, angles: Place) -> Place:
+        """Return the same angles, rad, at most half a turn from home."""
+        hip, thigh, knee = (
+            angle + math.tau * round((home - angle) / math.tau)
+            for angle, home in zip(angles, self._home, strict=True)
+        )
+        return hip, thigh, knee
 
 
 class FeetSolver:

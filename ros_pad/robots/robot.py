@@ -40,7 +40,18 @@ SAG = 7e-3
 """Depth by which a robot would sink if one leg carried all of it, m, where a file does not give
 the stiffness of its legs."""
 
+LONGEST = 5.0
+"""Longest leg, and largest distance of a place on a link from its joint, m."""
+
+SHORTEST = 5e-3
+"""Shortest leg, m."""
+
+HEAVIEST = 2000.0
+"""Largest mass of a robot, kg."""
+
+_METRES, _KILOGRAMS = 'm (not mm)', 'kg (not g)'  # of a file in other units, values are refused
 _DOWN = np.array((0.0, 0.0, -9.81))
+_ORIGIN = (0.0, 0.0, 0.0)
 _MIRROR = np.array((1.0, -1.0, 1.0))
 
 
@@ -186,7 +197,12 @@ class Robot:
     def _loaded(self, path: str, foot_radius: float | None) -> Robot:
         source = os.path.abspath(path) if os.path.exists(path) else path
         radius = self.foot_radius if foot_radius is None else foot_radius
-        return replace(self, source=source, foot_radius=radius)
+        robot = replace(self, source=source, foot_radius=radius)
+        try:
+            _check_sizes(robot)
+        except InvalidInput as error:
+            raise ConfigError(f'{path}: {error}') from error
+        return robot
 
     def kinematics(self, q: npt.ArrayLike) -> Kinematics:
         """Return positions, rotations and Jacobians of all feet in the axes of the base.
@@ -244,7 +260,8 @@ class Robot:
             step = lines.transpose(0, 2, 1) @ np.linalg.solve(square, miss[..., None])
             q += np.clip(step[..., 0], -0.5, 0.5)
         leg = self.legs[int(np.abs(miss).max(1).argmax())]
-        raise InvalidInput(f'leg {leg} does not reach {goal[self.legs.index(leg)].tolist()} m')
+        place = goal[self.legs.index(leg)].round(4).tolist()
+        raise InvalidInput(f'leg {leg} does not reach {place} m')
 
     def _shaped(self, q: npt.ArrayLike) -> Array:
         checked = quantity('q', q, 'rad', -1e4, 1e4)
@@ -254,6 +271,25 @@ class Robot:
                 ' needed'
             )
         return checked.reshape(self.home.shape)
+
+
+def _check_sizes(robot: Robot) -> None:
+    """Raise `InvalidInput` for a mass or lengths that no legged robot has."""
+    number('mass', robot.mass, _KILOGRAMS, 0.0, HEAVIEST)
+    places = robot.kinematics(robot.home)
+    starts = places.frames[..., :3, 3]
+    ends = np.concatenate([starts[1:], places.positions[None]])
+    lengths = np.linalg.norm(ends - starts, axis=2).sum(0).round(6).tolist()
+    away = np.linalg.norm(robot.hips, axis=1).round(6).tolist()
+    for name, joints, length, hip in zip(
+        robot.legs, robot.chains.legs, lengths, away, strict=True
+    ):
+        number(f'leg {name}: distance of the hip from the base', hip, _METRES, 0.0, LONGEST)
+        if any(joint.slides for joint in joints):
+            number(f'leg {name}: length', length, _METRES, 0.0, LONGEST)
+        else:
+            number(f'leg {name}: length', length, _METRES, SHORTEST, LONGEST)
+            number('foot_radius', robot.foot_radius, _METRES, 0.0, length)
 
 
 class _Trunk(NamedTuple):
@@ -342,7 +378,9 @@ def _posture(joints: Sequence[Sequence[Joint]], wanted: Mapping[Any, Any], origi
             # The longest name that fits: that of one joint goes before that of its kind.
             for key in sorted((k for k in wanted if joint.name.endswith(str(k))), key=len)[-1:]:
                 unused.pop(key, None)
-                row[place] = number(f'{origin}: home: {key}', wanted[key], 'rad', -10.0, 10.0)
+                limits = max(-10.0, joint.limits[0]), min(10.0, joint.limits[1])
+                unit = 'm' if joint.slides else 'rad'
+                row[place] = number(f'home: {key} ({joint.name})', wanted[key], unit, *limits)
     if unused:
         names = ', '.join(joint.name for leg in joints for joint in leg)
         wrong = next(iter(unused))
@@ -355,7 +393,7 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
     table.text('description', default='')
     others: dict[str, Any] = {'foot_radius': table.number('foot_radius', 'm', 0.0, 1.0, 0.0)}
     for key, unit, low, high in (
-        ('height', 'm', 0.0, 5.0),
+        ('height', _METRES, 0.0, LONGEST),
         ('inertia', 'kg m2', 1e-6, 1e4),
         ('leg_stiffness', 'N/m', 1.0, 1e8),
     ):
@@ -365,6 +403,12 @@ def _from_table(table: Table, path: pathlib.Path) -> Robot:
         with table.table('servo') as part:
             others['servo'] = Servo.read(part)
     robot = _of_file(table, path, others) if 'urdf' in table else _of_links(table, path, others)
+    sliding = [joint.name for leg in robot.chains.legs for joint in leg if joint.slides]
+    if robot.servo and sliding:
+        raise ConfigError(
+            f'{table.origin}: servo is not allowed: its units are those of joints that turn, and'
+            f' {sliding[0]} slides: take servo out; L2 does not simulate such a robot'
+        )
     if 'gait' in table:
         robot = replace(robot, gait=_gait(table, robot))
     table.finish()
@@ -375,7 +419,7 @@ def _of_file(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot:
     """Return the robot of the URDF file that a YAML file names."""
     feet = table.texts('feet')
     with table.table('home', default={}) as part:
-        others['home'] = {key: part.number(key, 'rad', -10.0, 10.0) for key in part.keys}
+        others['home'] = {key: part.number(key, 'rad or m') for key in part.keys}
     file = path.parent / table.text('urdf')
     try:
         robot = _from_urdf(os.fspath(file), feet, table.text('imu', default=''), **others)
@@ -388,13 +432,13 @@ def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot
     """Return the robot whose links a YAML file has."""
     with table.table('imu', default={}) as part:
         others['imu'] = transform(
-            part.vector('at', 'm', default=(0.0, 0.0, 0.0)),
+            _place(part, 'at', _ORIGIN),
             from_rpy(part.vector('rpy', 'rad', default=(0.0, 0.0, 0.0))),
         )
-    mass = table.number('mass', 'kg', 1e-3, 1e5)
+    mass = table.number('mass', _KILOGRAMS, 1e-3, HEAVIEST)
     prefix = table.text('prefix', default='')
     links = _links(table)
-    foot = table.vector('foot', 'm')
+    foot = _place(table, 'foot')
     legs, joints, feet = [], [], []
     with table.table('legs') as part:
         if not LEGS[0] <= len(part.keys) <= LEGS[1]:
@@ -426,9 +470,15 @@ def _trunk(table: Table, mass: float, joints: Sequence[Sequence[Joint]]) -> _Tru
     with table.table('trunk', default={}) as part:
         return _Trunk(
             mass,
-            part.vector('centre', 'm', default=(0.0, 0.0, 0.0)),
+            _place(part, 'centre', _ORIGIN),
             part.number('inertia', 'kg m2', 0.0, 1e4, default=_plate(mass, joints)),
         )
+
+
+def _place(table: Table, key: str, default: tuple[float, ...] | None = None) -> Array:
+    """Read a place, (3,), m, no farther off than any on a legged robot."""
+    given = {} if default is None else {'default': default}
+    return table.vector(key, _METRES, 3, -LONGEST, LONGEST, **given)
 
 
 @dataclass(frozen=True)
@@ -451,15 +501,16 @@ def _links(table: Table) -> list[_Link]:
                 joint = Joint(
                     str(name),
                     transform(
-                        row.vector('at', 'm', default=(0.0, 0.0, 0.0)),
+                        _place(row, 'at', _ORIGIN),
                         from_rpy(row.vector('rpy', 'rad', default=(0.0, 0.0, 0.0))),
                     ),
                     axis / length,
                     row.choice('kind', ('revolute', 'prismatic'), 'revolute') == 'prismatic',
-                    row.number('mass', 'kg', 0.0, 1e4, default=0.0),
-                    row.vector('centre', 'm', default=(0.0, 0.0, 0.0)),
+                    row.number('mass', _KILOGRAMS, 0.0, HEAVIEST, default=0.0),
+                    _place(row, 'centre', _ORIGIN),
                 )
-                links.append(_Link(joint, row.number('home', 'rad', -10.0, 10.0, default=0.0)))
+                unit, most = (_METRES, LONGEST) if joint.slides else ('rad', 10.0)
+                links.append(_Link(joint, row.number('home', unit, -most, most, default=0.0)))
     if not links:
         raise ConfigError(f'{table.origin}: joints: at least one is needed')
     return links
@@ -472,7 +523,7 @@ def _hip(table: Table, leg: str | int) -> tuple[Array, bool]:
         raise ConfigError(f'{table.origin}: {leg!r} is not allowed: a name or number is needed')
     with table.table(key) as row:
         bearing = row.number('bearing', 'rad', -7.0, 7.0, default=0.0)
-        hip = transform(row.vector('at', 'm'), from_rpy((0.0, 0.0, bearing)))
+        hip = transform(_place(row, 'at'), from_rpy((0.0, 0.0, bearing)))
         return hip, row.choice('side', ('left', 'right'), default='left') == 'right'
 
 

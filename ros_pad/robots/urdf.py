@@ -20,6 +20,7 @@ from ros_pad.robots.rotation import from_rpy
 from ros_pad.robots.rotation import transform
 
 MOVING = ('revolute', 'continuous', 'prismatic')
+LIMITED = ('revolute', 'prismatic')
 
 
 class _Joint(NamedTuple):
@@ -29,6 +30,8 @@ class _Joint(NamedTuple):
     child: str
     at: Array
     axis: Array
+    limits: tuple[float, float]
+    mimics: str
 
 
 class Urdf:
@@ -88,7 +91,8 @@ class Urdf:
         Raises
         ------
         ConfigError
-            When there is no such link, no moving joint before it, or a joint of another type.
+            When there is no such link, no moving joint before it, or a joint that mimics another
+            or is of another type.
         """
         joints: list[Joint] = []
         at = np.eye(4)
@@ -101,9 +105,15 @@ class Urdf:
                     f'joint {joint.name!r}: type = {joint.kind!r} is not allowed:'
                     f' one of fixed, {", ".join(MOVING)} is needed'
                 )
+            if joint.mimics:
+                raise self._error(
+                    f'joint {joint.name!r} of the leg to {foot!r}: <mimic joint={joint.mimics!r}>'
+                    ' is not supported: joints of legs must move by themselves; where'
+                    f' joint_states has {joint.name!r} too, take <mimic> out of a copy of the file'
+                )
             mass, centre = self._carried(joint.child)
             slides = joint.kind == 'prismatic'
-            joints.append(Joint(joint.name, at, joint.axis, slides, mass, centre))
+            joints.append(Joint(joint.name, at, joint.axis, slides, mass, centre, joint.limits))
             at = np.eye(4)
         if not joints:
             raise self._error(f'no moving joint between {self.root!r} and foot {foot!r}')
@@ -184,11 +194,26 @@ class Urdf:
             self._text(child, 'link'),
             self._placed(element, name),
             line / (length or 1.0),
+            self._limits(element, name) if kind in LIMITED else (-math.inf, math.inf),
+            '' if (mimic := element.find('mimic')) is None else self._text(mimic, 'joint'),
         )
         for link in (made.parent, made.child):
             if link not in self._links:
                 raise self._error(f'joint {name!r} names a link {link!r} that is not there')
         return made
+
+    def _limits(self, element: xml.Element, name: str) -> tuple[float, float]:
+        """Return the limits of a joint, rad or m; exporters write 0 and 0 where they know none."""
+        limit = element.find('limit')
+        if limit is None:
+            return -math.inf, math.inf
+        low, high = (float(self._numbers(limit, key, name, 1)[0]) for key in ('lower', 'upper'))
+        if low > high:
+            raise self._error(
+                f'joint {name!r}: lower = {low:g} is not allowed: at most upper = {high:g} is'
+                ' needed'
+            )
+        return (low, high) if low < high else (-math.inf, math.inf)
 
     def _tensor(self, link: xml.Element) -> Array:
         """Return the inertia of a link about its centre of mass, kg m², in axes of the link."""

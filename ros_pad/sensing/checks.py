@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +42,13 @@ WINDOW = 0.06  # s, over which feet are taken to stand still
 FEWEST = 30  # windows in which pairs of feet stand while the robot moves
 SUNK = 0.05  # m, below the floor
 SURE = 6.0  # standard deviations
+
+
+Progress: TypeAlias = Callable[[float], None]
+
+
+def _unseen(share: float) -> None:
+    """Show nothing."""
 
 
 class Finding(NamedTuple):
@@ -424,7 +433,7 @@ class _Guess(NamedTuple):
     mended: Recording
 
 
-def mend(recording: Recording) -> tuple[list[Finding], Recording]:
+def mend(recording: Recording, progress: Progress = _unseen) -> tuple[list[Finding], Recording]:
     """Check joints and gyro against each other: feet that stand do not move against each other.
 
     Of all single faults (a joint reversed, a gyro turned, negated or in degrees), the one is
@@ -438,25 +447,29 @@ def mend(recording: Recording) -> tuple[list[Finding], Recording]:
     """
     found: list[Finding] = []
     while len(found) < len(recording.robot.joint_names):
-        guess = _first_guess(recording)
+        # How many faults there are is not known before: each takes half of the share that is left.
+        guess = _first_guess(recording, progress, 0.5 ** len(found))
         if guess is None or guess.finding in found:
             break
         found.append(guess.finding)
         recording = guess.mended
+    progress(1.0)
     return found, recording
 
 
-def _first_guess(recording: Recording) -> _Guess | None:
+def _first_guess(recording: Recording, progress: Progress, left: float) -> _Guess | None:
     """Return the simplest fault that explains motion of standing feet best, or None."""
     before = _errors(recording)
     guesses: list[tuple[_Guess, Array]] = []
     if len(before) < FEWEST:
         return None
-    for guess in [*_gyro_guesses(recording), *_joint_guesses(recording)]:
+    tried = [*_gyro_guesses(recording), *_joint_guesses(recording)]
+    for number, guess in enumerate(tried, 1):
         after = _errors(guess.mended)
         sure = _better(before, after)
         if sure > SURE or (sure > 0.5 * SURE and after.mean() < 0.7 * before.mean()):
             guesses.append((guess, after))
+        progress(1.0 - left * (1.0 - 0.5 * number / len(tried)))
     if not guesses:
         return None
     _, best = min(guesses, key=lambda each: float(each[1].mean()))
@@ -625,7 +638,7 @@ def forces(recording: Recording) -> list[Finding]:
         elif np.linalg.norm(force) > 0.05 * size and force @ up < 0.5 * np.linalg.norm(force):
             text = f'that of foot {leg} is along {_axis(force)} of the base at rest'
             lines.append((text, 'its axes are turned: it should be along z'))
-    if not lines and not 0.75 < size / weight < 1.33:
+    if not lines and weight and not 0.75 < size / weight < 1.33:
         text = f'add up to {size:.3g} at rest, and the robot weighs {weight:.3g} N'
         whole = measured and np.array_equal(found, np.round(found))
         advice = (
@@ -724,7 +737,7 @@ def swings(recording: Recording) -> list[Finding]:
     return found
 
 
-def unjudged(recording: Recording) -> list[str]:
+def unjudged(recording: Recording, progress: Progress = _unseen) -> list[str]:
     """Return what moved too little to be judged: axes of the gyro, joints, the delay."""
     if ranges(recording):
         return ['all but the positions of joints']
@@ -741,7 +754,11 @@ def unjudged(recording: Recording) -> list[str]:
         for axis, flip in zip('xyz', _flips(recording), strict=True)
     }
     others = {each.finding.what: each.mended for each in _joint_guesses(recording)}
-    found = [name for name, other in (flips | others).items() if unclear(_errors(other))]
+    found = []
+    for number, (name, other) in enumerate((flips | others).items(), 1):
+        if unclear(_errors(other)):
+            found.append(name)
+        progress(number / (len(flips) + len(others)))
     late = replace(recording, imu_time=recording.imu_time + 0.01)
     vars(late).update(pairs=recording.pairs, rests=recording.rests)
     if unclear(_errors(late)):
@@ -760,13 +777,15 @@ def _flips(recording: Recording) -> list[Array]:
     return [to_base.T @ np.diag(1.0 - 2.0 * row) @ to_base for row in np.eye(3)]
 
 
-def examine(recording: Recording) -> list[Finding]:
+def examine(recording: Recording, progress: Progress = _unseen) -> list[Finding]:
     """Run all checks; each fault that is found is mended before the next check.
 
     Parameters
     ----------
     recording : Recording
         Some seconds; better with the robot at rest first, and then walking.
+    progress : callable
+        Called now and then with the share that is done, 0 to 1.
 
     Returns
     -------
@@ -778,7 +797,7 @@ def examine(recording: Recording) -> list[Finding]:
         return found  # without times and angles, nothing else can be judged
     found += [*rates(recording), *gravity(recording), *velocities(recording)]
     uneven, level = levels(recording)
-    moved, fine = mend(level)
+    moved, fine = mend(level, progress)
     found += [*uneven, *moved]
     if not (uneven or moved):
         found += [*swings(fine), *delay(fine)]

@@ -13,6 +13,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.checks import Finding
+from ros_pad.sensing.checks import Progress
 from ros_pad.sensing.checks import Recording
 from ros_pad.sensing.checks import examine
 from ros_pad.sensing.checks import unjudged
@@ -67,16 +68,21 @@ class Collector:
         for leg, force in found.forces.items():
             self._forces[leg].append((found.stamp, force))
 
-    def findings(self, topics: dict[str, str]) -> list[Finding]:
+    def findings(self, topics: dict[str, str], progress: Progress) -> list[Finding]:
         """Check everything.
 
         Parameters
         ----------
         topics : dict of str to str
             Type of each topic that there is, for advice.
+        progress : callable
+            Called now and then with the share that is done, 0 to 1.
         """
         found = [self._refusal(topic, text) for topic, text in self.refused.items()]
         found += self._silent(topics)
+        if not self._forces and any(each.efforts is not None for each, _ in self._joints):
+            text = 'no foot force arrives: they are taken from the efforts of the joints'
+            found.append(Finding('forces', 'ok', text, ''))
         for each in self._mapping.missing:
             what, _, text = each.partition(': ')
             found.append(Finding(what, 'warning', text, ''))
@@ -98,14 +104,16 @@ class Collector:
                 ]
             return found
         recording = self.recording()
-        faults = examine(recording)
+        faults = examine(recording, lambda share: progress(0.5 * share))
         if not faults:
             text = 'no fault in rates, stamps, units, axes and signs'
             faults = [Finding('sensors', 'ok', text, '')]
         found += faults
-        if not any(each.status == 'problem' for each in found) and (left := unjudged(recording)):
-            advice = 'walk some steps, and rock the robot about all axes on standing feet'
-            found.append(Finding('not judged', 'warning', ', '.join(left), advice))
+        if not any(each.status == 'problem' for each in found):
+            left = unjudged(recording, lambda share: progress(0.5 + 0.5 * share))
+            if left:
+                advice = 'walk some steps, and rock the robot about all axes on standing feet'
+                found.append(Finding('not judged', 'warning', ', '.join(left), advice))
         return found
 
     @staticmethod
@@ -132,8 +140,14 @@ class Collector:
         for group in groups:
             type_name = group[0].type_name
             same = [name for name, each in topics.items() if each == type_name]
-            if same:
-                advice = f'{type_name} is on {", ".join(same)}: write that into a mapping'
+            own = {'/' + each.topic.lstrip('/') for each in group}
+            if own & set(same):
+                advice = 'it has a publisher, from which nothing was received: look at the driver'
+            elif same:
+                advice = (
+                    f'{type_name} is on {", ".join(same)}: write that into a mapping, or give the'
+                    ' namespace'
+                )
             else:
                 advice = f'no topic has {type_name}: does the driver run, in this namespace?'
             names = ', '.join(source.topic for source in group)

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -110,6 +111,8 @@ SETTINGS = (
 )  # fmt: skip
 """Settings of a body estimator and its stage, by the names of their arguments."""
 
+_Values: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
+
 _NEVER = -(10**18)  # ns, before any stamp
 _LATEST_NS = 50_000_000  # readings of joints wait no longer than this for the IMU
 _WAITING = 50  # readings of joints that wait for the IMU, and readings of the IMU that are kept
@@ -160,22 +163,55 @@ def foot_readings(estimate: BodyEstimate) -> list[FootReadings]:
     return readings
 
 
-def joint_order(robot: Robot, names: Sequence[str]) -> npt.NDArray[np.intp]:
-    """Return where each joint of a robot is among the names of a message.
+class JointOrder:
+    """Bring the joints of messages into the order of a robot's: each message has its own names.
 
-    Raises
-    ------
-    InvalidInput
-        When a joint of the robot is missing, or a name comes twice.
+    Parameters
+    ----------
+    robot : Robot
     """
-    places = {name: place for place, name in enumerate(names)}
-    missing = [name for name in robot.joint_names if name not in places]
-    if missing or len(places) < len(names):
-        wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
-        raise InvalidInput(
-            f'joint names {wrong} are not allowed: those of {robot.name} are needed'
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._places: dict[tuple[str, ...], npt.NDArray[np.intp]] = {}  # by the last names
+
+    def __call__(
+        self, names: Sequence[str], position: _Values, velocity: _Values, effort: _Values
+    ) -> tuple[Array, Array | None, Array | None]:
+        """Return position, velocity and effort of the robot's joints, None where there are none.
+
+        Raises
+        ------
+        InvalidInput
+            When a joint of the robot is missing, a name comes twice, or there is not one value for
+            each name; velocity and effort may be empty.
+        """
+        key = tuple(names)
+        if key not in self._places:
+            self._places = {key: self._found(key)}
+        for part, given in (('position', position), ('velocity', velocity), ('effort', effort)):
+            if len(given) != len(key) and (len(given) or part == 'position'):
+                raise InvalidInput(
+                    f'joint_states: {len(given)} values in {part} are not allowed: {len(key)} are'
+                    ' needed, one for each name'
+                )
+        places = self._places[key]
+        return (
+            np.array(position)[places],
+            np.array(velocity)[places] if len(velocity) else None,
+            np.array(effort)[places] if len(effort) else None,
         )
-    return np.array([places[name] for name in robot.joint_names])
+
+    def _found(self, names: tuple[str, ...]) -> npt.NDArray[np.intp]:
+        """Return where each joint of the robot is among names."""
+        places = {name: place for place, name in enumerate(names)}
+        missing = [name for name in self._robot.joint_names if name not in places]
+        if missing or len(places) < len(names):
+            wrong = f'without {", ".join(missing)}' if missing else 'with a name twice'
+            raise InvalidInput(
+                f'joint names {wrong} are not allowed: those of {self._robot.name} are needed'
+            )
+        return np.array([places[name] for name in self._robot.joint_names])
 
 
 def twist_of(estimate: BodyEstimate, rate: Array, gyro_noise: float) -> tuple[Array, Array]:
@@ -217,13 +253,19 @@ class _Joints(NamedTuple):
     efforts: Array | None
 
 
+class _Force(NamedTuple):
+    stamp_ns: int
+    force: Array
+
+
 class SensingStage:
     """Pair readings of IMU, joints and feet by their time stamps, and estimate the robot's motion.
 
     Readings of the joints set the pace: each is paired with the reading of the IMU within 1 ms, or
     with one interpolated between those before and after it, for which it waits. It also waits for
     the forces of that moment, until the next reading of the joints arrives; then the last forces
-    are used, if they are not older than 20 ms. The first sample waits for a calm robot, up to
+    are used, if they are not older than 20 ms. Forces whose stamps are more than 1 ms later wait
+    for the joints. The first sample waits for a calm robot, up to
     0.2 s.
 
     Parameters
@@ -287,8 +329,7 @@ class SensingStage:
         self._inertial: deque[_Inertial] = deque(maxlen=_WAITING)
         self._waiting: deque[_Joints] = deque(maxlen=_WAITING)
         self._last_positions: tuple[int, Array] | None = None
-        self._forces = np.zeros((self._legs, 3))
-        self._force_ns = [_NEVER] * self._legs
+        self._forces: list[deque[_Force]] = [deque(maxlen=_WAITING) for _ in range(self._legs)]
         self._calm = 0  # readings in a row
         self._first_ns: float = math.inf  # stamp of the first sample that could be used
         self._unpaired_ns: float = math.inf  # stamp of the first joints without partner since then
@@ -371,11 +412,14 @@ class SensingStage:
     def force(self, leg_index: int, stamp_ns: int, force: Sequence[float]) -> None:
         """Process the force of the ground on a foot, N, in the axes of its sensor."""
         try:
-            self._forces[leg_index] = _checked('foot force', force, 3, 'N')
+            reading = _Force(stamp_ns, _checked('foot force', force, 3, 'N'))
         except InvalidInput as error:
             self.reject(error)
             return
-        self._force_ns[leg_index] = stamp_ns
+        kept = self._forces[leg_index]
+        if kept and stamp_ns <= kept[-1].stamp_ns - SET_BACK_NS:
+            kept.clear()
+        kept.append(reading)
         self._process()
 
     def reject(self, error: InvalidInput) -> None:
@@ -444,9 +488,32 @@ class SensingStage:
 
     def _has_forces(self, stamp_ns: int) -> bool:
         """Return whether the forces of a moment are there, or none are awaited."""
-        if self._source == 'efforts' or max(self._force_ns) < stamp_ns - OLDEST_FORCE_NS:
+        last = [kept[-1].stamp_ns if kept else _NEVER for kept in self._forces]
+        if self._source == 'efforts' or max(last) < stamp_ns - OLDEST_FORCE_NS:
             return True
-        return min(self._force_ns) >= stamp_ns - SAME_NS
+        return min(last) >= stamp_ns - SAME_NS
+
+    def _forces_at(self, stamp_ns: int) -> Array | None:
+        """Return the last forces of all feet up to a time, (legs, 3), N; None if one is too old.
+
+        Forces that are all too late are reported.
+        """
+        found = []
+        for kept in self._forces:
+            past = (each for each in reversed(kept) if each.stamp_ns <= stamp_ns + SAME_NS)
+            force = next(past, None)
+            if force is None or force.stamp_ns < stamp_ns - OLDEST_FORCE_NS:
+                early = kept[0].stamp_ns - stamp_ns if kept else 0
+                if early > OLDEST_FORCE_NS:
+                    self._reject(
+                        InvalidInput(
+                            f'foot force: its stamp is {early * 1e-6:.3g} ms after that of the'
+                            f' joints: at most {SAME_NS * 1e-6:g} ms is allowed'
+                        )
+                    )
+                return None
+            found.append(force.force)
+        return np.array(found)
 
     def _starts(self, joints: _Joints, inertial: _Inertial) -> bool:
         """Return whether estimation may begin: the robot is calm, or has not been for long."""
@@ -460,9 +527,10 @@ class SensingStage:
     def _update(self, joints: _Joints, inertial: _Inertial) -> None:
         """Process a sample."""
         stamp_ns = joints.stamp_ns
-        forces, efforts, self.force_source = None, None, ''
-        if self._source != 'efforts' and min(self._force_ns) >= stamp_ns - OLDEST_FORCE_NS:
-            forces, self.force_source = self._forces.copy(), 'feet'
+        efforts, self.force_source = None, ''
+        forces = None if self._source == 'efforts' else self._forces_at(stamp_ns)
+        if forces is not None:
+            self.force_source = 'feet'
         elif self._source != 'feet' and joints.efforts is not None:
             efforts, self.force_source = joints.efforts, 'efforts'
         try:

@@ -30,13 +30,13 @@ from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.mujoco_model import POINT
 from ros_pad.simulation.mujoco_model import RECOMMENDED
 from ros_pad.simulation.mujoco_model import SolverSettings
-from ros_pad.simulation.mujoco_model import check_reach
 from ros_pad.simulation.mujoco_model import mjcf
 from ros_pad.simulation.mujoco_model import tow_step
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Proprioception
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
+from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -193,6 +193,8 @@ class FullRobot:
         mujoco = _import_mujoco()
         assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
+        if scene.body.robot.servo is None:
+            raise ConfigError(f'{scene.source}: the file of {scene.robot} has no servo')
         self._solver = check_reach(scene)
         self.legs = scene.legs
         self.joint_names = scene.body.robot.joint_names
@@ -202,7 +204,6 @@ class FullRobot:
         self.feet = [FootState() for _ in self.legs]
         self.dissipation = 0.0
         self.verdict: str | None = None
-        assert scene.body.robot.servo is not None
         self._robot, self._servo = scene.body.robot, scene.body.robot.servo
         self._weight = scene.body.mass * GRAVITY
         self._heading_gain = scene.heading_gain

@@ -17,12 +17,9 @@ from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.robots.inverse import FeetSolver
 from ros_pad.robots.rotation import Array
 from ros_pad.robots.rotation import quaternion
-from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import Tow
@@ -106,34 +103,6 @@ def tow_step(scene: Scene) -> float:
             f' are {_SHORTEST:g} s: increase tow.weight, set it to 0, or lower tow.stiffness'
         )
     return longest
-
-
-def check_reach(scene: Scene) -> FeetSolver:
-    """Return the solver of a scene's legs; raise `ConfigError` if they cannot walk its gait."""
-    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
-    body, gait = scene.body, scene.gait
-    robot, ground = body.robot, body.ground
-    if robot.servo is None:
-        raise ConfigError(f'scene {scene.name!r}: the file of {scene.robot} has no servo')
-    solver, home, travel = FeetSolver(robot), robot.home.ravel(), robot.servo.travel
-    for step in range(-8, 9):
-        ahead = gait.reach() * step / 8.0
-        for up in (0.0, gait.lift * math.cos(step * math.pi / 16.0) ** 2):
-            try:
-                turned = np.abs(
-                    solver.angles([(x + ahead, y, ground + up) for x, y in body.homes]) - home
-                )
-                if turned.max() > travel:
-                    raise InvalidInput(
-                        f'{robot.joint_names[turned.argmax()]} must turn {turned.max():.2f} rad'
-                        f' from home, at most {travel:.2f} is allowed'
-                    )
-            except InvalidInput as error:
-                raise ConfigError(
-                    f'scene {scene.name!r}: feet {ahead:+.4g} m ahead of home and {up:.4g} m up:'
-                    f' {error}; shorten gait.stride, lower gait.lift, or change the robot'
-                ) from error
-    return FeetSolver(robot)
 
 
 def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str:

@@ -27,6 +27,7 @@ from ros_pad.simulation.planar_step import PlanarModel
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
+from ros_pad.simulation.robot import check_reach
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import CELL
@@ -62,7 +63,8 @@ class PlanarRobot:
     Raises
     ------
     ConfigError
-        When steps are to be compiled and numba is not installed.
+        When the legs cannot walk the scene's gait, or when steps are to be compiled and numba is
+        not installed.
     InvalidInput
         When the period is not finite and above 0.
     """
@@ -77,6 +79,7 @@ class PlanarRobot:
     ) -> None:
         assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
+        check_reach(scene)
         if compile_steps is None:
             compile_steps = compiled.worth_loading(scene.duration / period)
         self.legs = scene.legs

@@ -4,11 +4,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from collections.abc import Sequence
 from typing import NamedTuple
 from typing import Protocol
 
+import numpy as np
+
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.robots.inverse import FeetSolver
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.scene import LeggedBody
+from ros_pad.simulation.scene import Scene
+
+STEERED = 0.1
+"""Error of the heading that legs must be able to steer back from, rad."""
 
 Vector = tuple[float, float, float]
 
@@ -135,3 +146,76 @@ def check_pressures(pressures: Sequence[float], legs: int) -> None:
     if len(pressures) != legs or not math.isfinite(sum(pressures)):
         needed = 'one finite number is' if legs == 1 else f'{legs} finite numbers are'
         raise InvalidInput(f'pressures = {pressures!r} Pa: {needed} needed, one for each leg')
+
+
+def check_reach(scene: Scene) -> FeetSolver:
+    """Return the solver of the legs of a scene.
+
+    Raises
+    ------
+    ConfigError
+        When a foot does not reach the places to which lift, stride and steering of the gait bring
+        it, or a joint would be beyond the travel of its servo or its limits.
+    """
+    assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
+    robot, lift, stride = scene.body.robot, scene.gait.lift, scene.gait.stride
+    if not _miss(scene, lift, stride, scene.heading_gain):
+        return FeetSolver(robot)
+    if why := _miss(scene, 0.0, 0.0, 0.0):
+        heights = robot.foot_positions(robot.home)[:, 2]
+        raise ConfigError(
+            f'{scene.source}: robot {robot.source} cannot stand at home, where its feet are'
+            f' {heights.min():.3g} to {heights.max():.3g} m high in the base: {why}'
+        )
+    motions: tuple[tuple[str, float, str, Callable[[float], str]], ...] = (
+        ('gait.lift', lift, 'm', lambda value: _miss(scene, value, 0.0, 0.0)),
+        ('gait.stride', stride, 'm', lambda value: _miss(scene, lift, value, 0.0)),
+        (
+            'gait.heading_gain', scene.heading_gain, '1/s',
+            lambda value: _miss(scene, lift, stride, value),
+        ),
+    )  # fmt: skip
+    name, value, unit, miss = next(each for each in motions if each[3](each[1]))
+    low, high = 0.0, value
+    while high - low > 0.01 * value:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if miss(middle) else (middle, high)
+    raise ConfigError(
+        f'{scene.source}: {name} = {value:g} {unit} is not allowed: at most {low:.3g} {unit} is'
+        f' within reach of the legs of {robot.source} from its home: {miss(value)}'
+    )
+
+
+def _miss(scene: Scene, lift: float, stride: float, gain: float) -> str:
+    """Return why the feet cannot follow the gait with these values, or an empty text."""
+    body, gait = scene.body, scene.gait
+    assert isinstance(body, LeggedBody) and isinstance(gait, WalkingGait)
+    robot, solver = body.robot, FeetSolver(body.robot)
+    home, travel = robot.home.ravel(), robot.servo.travel if robot.servo else math.inf
+    limits = np.array([joint.limits for leg in robot.chains.legs for joint in leg])
+    lows = np.maximum(limits[:, 0], home - travel)
+    highs = np.minimum(limits[:, 1], home + travel)
+    reach = gait.reach() * stride / gait.stride
+    turn = STEERED * gain * gait.duty * gait.cycle  # of a whole stance, rad
+    for step in range(8, -9, -1):
+        ahead, turned = reach * step / 8.0, turn * (8 - step) / 16.0
+        up = lift * (1.0 - (step / 8.0) ** 2)
+        for height, angle in {(h, a) for h in (0.0, up) for a in (turned, -turned)}:
+            c, s = math.cos(angle), math.sin(angle)
+            where = f'feet {ahead:+.3g} m ahead of home, {height:.3g} m up'
+            where += f', body turned by {angle:.3g} rad' if angle else ''
+            feet = [
+                (c * (x + ahead) + s * y, c * y - s * (x + ahead), body.ground + height)
+                for x, y in body.homes
+            ]
+            try:
+                joints = np.array(solver.angles(feet))
+            except InvalidInput as error:
+                return f'{where}: {error}'
+            if ((joints < lows - 1e-6) | (joints > highs + 1e-6)).any():
+                worst = int(np.maximum(lows - joints, joints - highs).argmax())
+                return (
+                    f'{where}: {robot.joint_names[worst]} would be at {joints[worst]:.3g}, from'
+                    f' {lows[worst]:.3g} to {highs[worst]:.3g} is allowed'
+                )
+    return ''

@@ -32,6 +32,9 @@ from ros_pad.simulation.terrain import patch_lengths
 
 T = TypeVar('T')
 
+LEAST_TRUNK = 0.01
+"""Least share of a robot's mass that is not legs."""
+
 RAIL_LEG = 'rail_leg'
 """The robot of a scene with the leg on its rail."""
 
@@ -74,6 +77,13 @@ class LeggedBody:
         """Read the table ``body`` of a scene: what is not as in the robot's file."""
         if not robot.mass > 0.0:
             raise ConfigError(f'{table.origin}: the links of robot {robot.name!r} have no mass')
+        legs = sum(joint.mass for leg in robot.chains.legs for joint in leg)
+        if robot.mass - legs < LEAST_TRUNK * robot.mass:
+            raise ConfigError(
+                f'{table.origin}: the legs of robot {robot.name!r} have {legs:.4g} of its'
+                f' {robot.mass:.4g} kg: at most {1.0 - LEAST_TRUNK:.0%} is allowed; has its base a'
+                ' mass?'
+            )
         mass = table.number('mass', 'kg', 0.05, 2000.0, default=robot.mass)
         inertia = robot.inertia * mass / robot.mass
         feet = robot.foot_positions(robot.home)[:, :2].round(12)

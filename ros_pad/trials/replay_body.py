@@ -22,9 +22,9 @@ from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
 from ros_pad.sensing.stage import SETTINGS
+from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
 from ros_pad.sensing.stage import foot_readings
-from ros_pad.sensing.stage import joint_order
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
@@ -120,7 +120,7 @@ class _Player:
             estimator = estimator_of(robot, values)
         except (KeyError, PadError) as error:
             raise self._not_valid(error) from error
-        self._robot = robot
+        self._order, self._wrong = JointOrder(robot), InvalidInput('no reading can be used')
         self._stage = SensingStage(
             robot, estimator, self._take, lambda _: None, _ignore, values['forces']
         )
@@ -136,15 +136,10 @@ class _Player:
         return len(ODOM.values) if kind == ODOM.kind else len(CONTACT_VELOCITY.values)
 
     def _paths(self) -> dict[str, tuple[str, ...]]:
-        """Return the fields to read of each topic; joints have the names of the first message."""
-        _, first, _ = next(iter(self._bag.messages([self._joints])))
-        names = list(first.name)
-        order = joint_order(self._robot, names).tolist()
-        self._parts = [part for part in ('velocity', 'effort') if len(getattr(first, part))]
-        joints = [f'{part}[{place}]' for part in ('position', *self._parts) for place in order]
+        """Return the fields to read of each topic."""
         return {
             self._imu: (*STAMP, *IMU.values),
-            self._joints: (*STAMP, *joints),
+            self._joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
             self._odom: (*STAMP, *ODOM.values),
             **dict.fromkeys(self._forces, (*STAMP, *FOOT_WRENCH.values)),
             **dict.fromkeys(self._velocities, (*STAMP, *CONTACT_VELOCITY.values)),
@@ -160,12 +155,20 @@ class _Player:
             elif topic == self._imu:
                 self._stage.imu(stamp_ns, numbers[:3], numbers[3:])
             elif topic == self._joints:
-                size = len(self._robot.joint_names)
-                rows = [numbers[start : start + size] for start in range(0, len(numbers), size)]
-                given = dict(zip(self._parts, rows[1:], strict=True))
-                self._stage.joints(stamp_ns, rows[0], given.get('velocity'), given.get('effort'))
+                self._take_joints(stamp_ns, *numbers)
             else:
                 self.recorded[topic].add(log_ns, tuple(numbers), stamp_ns)
+        if not self._stage.samples:
+            raise self._wrong
+
+    def _take_joints(self, stamp_ns: int, *values: Any) -> None:
+        try:
+            ordered = self._order(*values)
+        except InvalidInput as error:
+            self._wrong = error
+            self._stage.reject(error)
+            return
+        self._stage.joints(stamp_ns, *ordered)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         pose = (*estimate.position.tolist(), *estimate.orientation.tolist())

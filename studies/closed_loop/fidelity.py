@@ -40,6 +40,9 @@ MARGIN = 1.5
 RANGES = {
     'ch3r': {
         'body.mass': (1.0, 3.2),
+        'body.inertia': (0.03 * 1.0 / 2.09, 0.03 * 3.2 / 2.09),  # in proportion to the mass
+        'body.height': (0.12, 0.12),
+        'body.leg_stiffness': (3000.0, 3000.0),
         'gait.cycle': (0.8, 2.0),
         'gait.stride': (0.06, 0.15),
         'gait.duty': (0.55, 0.7),

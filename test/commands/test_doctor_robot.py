@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """``pad doctor --robot`` on bags, and on live topics over DDS."""
 
+import contextlib
 import dataclasses
 import functools
 import heapq
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 
 from ros_pad import cli
+from ros_pad.commands import robot_check
 from ros_pad.robots import Robot
 from studies.sensing import layouts
 
@@ -52,7 +55,37 @@ def test_a_bag_without_faults(tmp_path, capsys):
     status, found = doctor(capsys, '--robot', 'go2', '--bag', path)
     assert (status, found['sensors']['status']) == (0, 'ok')
     assert found['leg_4/foot_wrench']['found'] == '1500 messages'
+    assert 'forces' not in found
     assert {each['status'] for each in found.values()} <= {'ok', 'warning'}
+
+
+def test_a_robot_without_masses_is_a_problem(tmp_path, capsys):
+    path = bag(tmp_path, *plain(standing()), layouts.wrenches(standing(), GO2))
+    description = tmp_path / 'light.urdf'
+    description.write_text(re.sub('<mass[^>]*/>', '', layouts.urdf(GO2)))
+    feet = [f'{leg}_foot' for leg in GO2.legs]
+    words = ['--robot', str(description), '--feet', *feet, '--imu', 'imu', '--bag', path]
+    status, found = doctor(capsys, *words)
+    assert (status, found['robot']['status']) == (1, 'problem')
+    assert 'no mass' in found['robot']['found'] and '<inertial>' in found['robot']['advice']
+
+
+def test_progress_is_shown_while_sensors_are_checked(tmp_path, capsys, monkeypatch):
+    shares = []
+
+    @contextlib.contextmanager
+    def bar(text, total, unit='s'):
+        yield lambda share: shares.append(share) if text == 'checking' else None
+
+    monkeypatch.setattr(robot_check, 'bar', bar)
+    wrong = dataclasses.replace(log(), gyro=log().gyro * (1.0, 1.0, -1.0))
+    path = bag(tmp_path, *plain(wrong))
+    doctor(capsys, '--robot', 'go2', '--bag', path)
+    assert shares == sorted(shares)
+    # 47 turns and one scale of the gyro and 12 reversed joints, twice as one of them helps.
+    assert len(shares) == 2 * 60 + 2
+    assert shares[59] == pytest.approx(0.25)
+    assert shares[-1] == 1.0
 
 
 def test_a_bag_with_a_fault_in_its_gyro(tmp_path, capsys):
@@ -61,6 +94,7 @@ def test_a_bag_with_a_fault_in_its_gyro(tmp_path, capsys):
     assert (status, found['gyro']['status']) == (1, 'problem')
     assert 'about z is on -z' in found['gyro']['found']
     assert 'foot' not in ' '.join(found)  # efforts give the forces
+    assert found['forces']['found'].endswith('taken from the efforts of the joints')
 
 
 def test_messages_of_a_go2_need_no_package(tmp_path, capsys):
@@ -193,6 +227,15 @@ def robot(tmp_path, monkeypatch):
     yield child
     child.terminate()
     child.wait(10.0)
+
+
+def test_topics_that_nobody_publishes(monkeypatch, capsys):
+    pytest.importorskip('rclpy')
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    status, found = doctor(capsys, '--robot', 'go2', '--seconds', '1')
+    assert status == 1
+    assert found['imu/data']['advice'].startswith('no topic has sensor_msgs/msg/Imu: does the')
 
 
 def test_live_topics(robot, capsys):

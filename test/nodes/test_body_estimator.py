@@ -278,6 +278,19 @@ def test_bad_messages_are_refused_with_the_reason(robot, spoil, reason):
     )
 
 
+def test_the_source_of_the_forces_is_reported_once(robot, capfd):
+    robot.start()
+    for ms in range(4, 41, 4):
+        robot.imu(ms)
+        robot.joints(ms, effort=np.zeros(18))
+    robot.until(lambda: robot.estimator.stage.last_ns == 40_000_000)
+    robot.tick_until(0.2)
+    robot.until(lambda: robot.status)
+    (status,) = [each for each in robot.status[-1].status if each.name.endswith('sensing')]
+    assert 'efforts' in [each.value for each in status.values if each.key == 'forces']
+    assert capfd.readouterr().err.count('forces of the feet: from the efforts of the joints') == 1
+
+
 def test_neither_forces_nor_efforts(robot):
     robot.start(forces='efforts')
     robot.stand(40)

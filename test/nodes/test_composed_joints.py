@@ -5,10 +5,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer
 
 from ros_pad import configuration
 from ros_pad import trials
 from ros_pad.bags import BagReader
+from ros_pad.bags import annotate
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.nodes import composed
@@ -160,6 +164,49 @@ def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     # Without the velocities it is another estimate: nothing of markers is in this bag.
     settings = NodeSettings.of(bag).changed({'alarm.threshold': 1.0})
     assert replay(bag, settings).verdict == 'different'
+
+
+def rewritten(path, folder, change):
+    """Copy a bag with other messages of the joints; ``change`` gets their number and lists."""
+    made = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    with AnyReader([path]) as reader, made as bag:
+        connections, count = {}, 0
+        for connection, ns, data in reader.messages():
+            if connection.topic not in connections:
+                connections[connection.topic] = bag.add_connection(
+                    connection.topic, connection.msgtype,
+                    msgdef=connection.msgdef.data, rihs01=connection.digest,
+                )  # fmt: skip
+            if connection.topic == '/joint_states':
+                message = reader.deserialize(data, connection.msgtype)
+                for part in ('name', 'position', 'velocity', 'effort'):
+                    setattr(message, part, change(count, getattr(message, part)))
+                data = reader.typestore.serialize_cdr(message, connection.msgtype)
+                count += 1
+            bag.write(connections[connection.topic], ns, data)
+    annotate(folder, BagReader(path).custom_data)
+    return BagReader(folder)
+
+
+def test_joints_are_replayed_in_the_order_of_each_message(walked, tmp_path):
+    def turn(count, values):
+        return values if count % 2 else values[::-1].copy()
+
+    turned = rewritten(walked[-1], tmp_path / 'bag', turn)
+    found = replay(turned)
+    assert found.verdict == 'equal'
+    of_body = [each for each in found.comparisons if each.kind in ('odom', 'contact_velocity')]
+    assert [each.equal for each in of_body] == [SAMPLES] * 7
+
+
+def test_a_bag_with_the_joints_of_another_robot_has_a_note(walked, tmp_path):
+    others = rewritten(
+        walked[-1],
+        tmp_path / 'bag',
+        lambda _, values: [f'{each}_' for each in values] if isinstance(values, list) else values,
+    )
+    (note,) = replay(others).notes
+    assert note.startswith('the body estimator is not replayed: joint names without leg_1_coxa')
 
 
 def test_a_bag_without_its_robots_file_is_replayed_but_for_the_body(walked, monkeypatch):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inverse kinematics of single legs and of all of them, against forward kinematics."""
 
+import dataclasses
 import math
 import pathlib
 
@@ -80,6 +81,23 @@ def test_near_home_the_angles_are_those_that_made_the_place(name):
         q = robot.home + generator.uniform(-0.25, 0.25, robot.home.shape)
         found = solver.angles(robot.foot_positions(q).tolist())
         assert found == pytest.approx(q.ravel(), abs=1e-12)
+
+
+@pytest.mark.parametrize('turns', [0.0, 1.0, -2.0])
+@pytest.mark.parametrize('moved', [-0.3, 0.3])
+def test_angles_do_not_leap_by_a_turn_where_home_is_half_a_turn_off(turns, moved):
+    robot = Robot.load('ch3r')
+    joints, foot = robot.chains.legs[1], robot.chains.feet[1]
+    home = np.array([0.1, 0.2 + math.tau * turns - math.pi, 0.7])
+    # The thigh is zero when it points inwards.
+    back = transform(
+        joints[1].at[:3, 3], joints[1].at[:3, :3] @ rotation(math.pi * joints[1].axis)
+    )
+    joints = [joints[0], dataclasses.replace(joints[1], at=back), joints[2]]
+    leg = LegSolver(joints, foot, home.tolist())
+    angles = home + moved
+    place = Chains([joints], foot[None]).solve(angles[None]).positions[0]
+    assert leg.angles(*place.tolist()) == pytest.approx(angles, abs=1e-9)
 
 
 def test_out_of_reach():

@@ -3,6 +3,7 @@
 
 import json
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -204,6 +205,14 @@ def test_gaits_that_are_not_allowed(name, legs, duty, message):
             'True',
         ),
         ('home: 0.9', 'hom: 0.9', "unknown key 'hom'"),
+        ('at: [0.0, 0.0, -0.213]', 'at: [0.0, 0.0, -213.0]', r'-213.0 .* -5 to 5 m \(not mm\)'),
+        ('foot: [0.0, 0.0, -0.213]', 'foot: [0.0, 0.0, -4.9]', r'leg FL: length = 5\.2.* 5 m'),
+        ('at: [0.1934, 0.0465, 0.0]', 'at: [4.9, 4.9, 0]', 'hip from the base = 6.9'),
+        ('at: [-0.02557, 0.0, 0.04232]', 'at: [-25.57, 0.0, 42.32]', 'at = -25.57 .* m'),
+        ('mass: 15.02', 'mass: 15020.0', r'mass = 15020.0 .* 2000 kg \(not g\)'),
+        ('mass: 0.678', 'mass: -0.678', 'mass = -0.678'),
+        ('foot_radius: 0.022', 'foot_radius: 0.9', 'foot_radius = 0.9 .* 0 to 0.52'),
+        ('{axis: [1.0', '{kind: prismatic, axis: [1.0', 'servo is not allowed: .* FL_hip_joint'),
     ],
 )
 def test_yaml_files_that_are_not_valid(old, new, message, tmp_path):
@@ -242,6 +251,9 @@ def test_an_own_gait_and_fewer_legs(tmp_path):
         ('<mass value="0.7"/>', '<mass value="-1"/>', 'at least 0 kg'),
         ('<joint name="c_j3" type="revolute">', '<joint name="c_j3" type="fixed">', '2 and 3'),
         ('name="imu_joint" type="fixed"', 'name="imu_joint" type="revolute"', 'moves'),
+        ('<limit lower="-3" upper="3"', '<limit lower="3" upper="-3"', 'lower = 3 .* at most'),
+        ('<axis xyz="1 2 -1"/>', '<axis xyz="1 2 -1"/><mimic joint="b_j1"/>', 'mimic .*b_j1'),
+        ('<mass value="0.7"/>', '<mass value="7000"/>', r'mass = 700\d.* 2000 kg'),
     ],
 )  # fmt: skip
 def test_urdf_files_that_are_not_valid(old, new, message, tmp_path):
@@ -298,6 +310,33 @@ def test_a_home_of_joints_that_are_not_there(tmp_path):
 def test_arguments_that_are_not_allowed(arguments, message):
     with pytest.raises(InvalidInput, match=message):
         Robot.load(URDF, **arguments)
+
+
+def test_a_posture_beyond_the_limits_of_a_urdf(tmp_path):
+    path = tmp_path / 'odd.yaml'
+    for home, message in (
+        ({'a_j3': 1.1}, r'home: a_j3 \(a_j3\) = 1.1 .* from -1 to 1 m is'),
+        ({'b_j2': 3.1}, r'home: b_j2 \(b_j2\) = 3.1 .* from -3 to 3 rad'),
+        ({'b_j2': -3.0}, ''),
+    ):
+        path.write_text(f'urdf: {URDF}\nfeet: {FEET}\nhome: {home}\n')
+        if message:
+            with pytest.raises(ConfigError, match=message):
+                Robot.load(path)
+    assert Robot.load(path).home[1, 1] == -3.0
+
+
+def test_lengths_of_a_urdf_in_millimetres(tmp_path):
+    """As exported without a scale: every place is a thousand times as far off."""
+    text = re.sub(
+        r'(<origin xyz=")([^"]*)',
+        lambda found: found[1] + ' '.join(f'{1e3 * float(x)}' for x in found[2].split()),
+        URDF.read_text(),
+    )
+    path = tmp_path / 'odd.urdf'
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r'odd\.urdf: leg a_foot: .* 0 to 5 m \(not mm\)'):
+        Robot.load(path, feet=FEET)
 
 
 def test_names_and_links_that_are_not_there():

@@ -226,6 +226,35 @@ def test_forces_are_awaited_until_the_next_joints_then_the_last_ones_count():
     assert watched.used[-1][5] is None  # older than 20 ms
 
 
+def test_forces_of_a_later_moment_wait_for_it():
+    watched = Watched()
+    watched.sample(4)
+    watched.joints(8)  # the IMU is late
+    for ms in (8, 12, 16):
+        watched.forces(ms, 100.0 + ms)
+    watched.imu(8)
+    assert watched.times == [4, 8]
+    assert watched.used[-1][5][:, 2] == pytest.approx([108.0] * 6)
+    watched.imu(16)
+    watched.joints(16)
+    assert watched.used[-1][5][:, 2] == pytest.approx([116.0] * 6)
+
+
+@pytest.mark.parametrize('source', ['auto', 'feet'])
+def test_forces_stamped_long_after_the_joints_are_not_used(source):
+    watched = Watched(forces=source)
+    for ms in (4, 8, 12):
+        watched.forces(ms + 10_000)
+        watched.imu(ms)
+        watched.joints(ms, efforts=STILL)
+    assert watched.times == [4, 8, 12]
+    assert [each[5] is None for each in watched.used] == [True] * 3
+    assert watched.stage.force_source == ('efforts' if source == 'auto' else '')
+    text = 'foot force: its stamp is 1e+04 ms after that of the joints: at most 1 ms is allowed'
+    assert str(watched.rejected[0]) == text
+    assert len(watched.rejected) == 3
+
+
 @pytest.mark.parametrize(
     ('spoil', 'named'),
     [

@@ -2,6 +2,7 @@
 """Robots of three to eight legs on L1 and L2, from YAML and URDF."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -190,6 +191,14 @@ def test_links_without_mass_are_refused(tmp_path):
         Scene.load(path)
 
 
+def test_a_base_without_mass_is_refused(tmp_path):
+    path = urdf_scene(tmp_path)
+    text = (tmp_path / 'q.urdf').read_text()
+    (tmp_path / 'q.urdf').write_text(text.replace('<mass value="3.0"/>', ''))
+    with pytest.raises(ConfigError, match=r'have 1 of its 1 kg: at most 99% is .* has its base'):
+        Scene.load(path)
+
+
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
@@ -205,6 +214,46 @@ def test_robots_from_urdf_that_are_refused(tmp_path, changes, message):
     with pytest.raises(ConfigError) as caught:
         Scene.load(urdf_scene(tmp_path, **changes))
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize('level', ['L1', 'L2'])
+@pytest.mark.parametrize(
+    ('upper', 'lift', 'message'),
+    [
+        (0.71, 0.0, r'gait\.stride = 0\.05 m is not allowed: at most 0\.0.*thigh_joint would be'),
+        (0.71, 0.04, r'gait\.lift = 0\.04 m is not allowed: at most 0\.0.*thigh_joint would be'),
+        (1.5, 0.04, ''),
+        (0.0, 0.04, ''),  # as exporters write it that know no limits
+    ],
+)
+def test_a_gait_beyond_the_limits_of_a_urdf(tmp_path, level, upper, lift, message):
+    if level == 'L2':
+        pytest.importorskip('mujoco')
+    gait = {'kind': 'trot', 'cycle': 0.5, 'duty': 0.6, 'lift': lift}
+    path = urdf_scene(tmp_path, gait=gait)
+    text = (tmp_path / 'q.urdf').read_text()
+    limit = f'<limit lower="{-1.0 if upper else 0.0}" upper="{upper}" effort="1" velocity="1"/>'
+    text = re.sub('(_thigh_joint" type="revolute">)', rf'\1{limit}', text)
+    (tmp_path / 'q.urdf').write_text(text)
+    scene = Scene.load(path)
+    if not message:
+        walk(scene, level, cycles=0)
+        return
+    with pytest.raises(ConfigError, match=message):
+        walk(scene, level)
+
+
+def test_a_robot_that_stands_beyond_its_limits_may_be_estimated_but_not_walk(tmp_path):
+    """Without a posture all joints are at zero, which many knees cannot reach."""
+    path = urdf_scene(tmp_path, home={'thigh_joint': 0.7})
+    text = (tmp_path / 'q.urdf').read_text()
+    limit = '<limit lower="-2.7" upper="-0.8" effort="1" velocity="1"/>'
+    (tmp_path / 'q.urdf').write_text(
+        re.sub('(_shank_joint" type="revolute">)', rf'\1{limit}', text)
+    )
+    scene = Scene.load(path)
+    with pytest.raises(ConfigError, match=r'robot\.yaml cannot stand at home, .*shank_joint'):
+        walk(scene, 'L1')
 
 
 def test_what_a_scene_lacks_is_named(tmp_path):

@@ -108,6 +108,16 @@ def test_no_bound_outside_the_measured_ranges():
                 assert choice.level == 'L2'
 
 
+@pytest.mark.parametrize('name', ['inertia', 'height', 'leg_stiffness'])
+def test_no_bound_for_another_body(name):
+    dry = Scene.load('hexapod_smooth_dry_flat')
+    assert fidelity.choose(dry).bound < 1.0
+    body = dataclasses.replace(dry.body, **{name: 2.0 * getattr(dry.body, name)})
+    choice = fidelity.choose(dataclasses.replace(dry, body=body))
+    assert choice.bound == math.inf
+    assert f'body.{name} = ' in choice.note
+
+
 def test_a_fault_may_give_a_foot_the_other_morphology():
     silent = dataclasses.replace(HEXAPOD, faults=(Fault('silence', start=3.0),))
     reserves = [fidelity.reserve(HEXAPOD, policy) for policy in ('flat', 'dome')]

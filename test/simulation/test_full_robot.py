@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 import math
+import re
 import sys
 
 import numpy as np
@@ -88,23 +89,43 @@ def test_kinematics_against_mujoco(angles):
 KINEMATIC = FullRobot(scene_of(), DRY, 0.004)
 
 
-@pytest.mark.parametrize(
-    'part, message',
-    [
-        (
-            {'gait': dataclasses.replace(GAIT, stride=0.6)},
-            'ahead of home .*(reach|must turn)',
-        ),
-        (
-            {'gait': dataclasses.replace(GAIT, lift=0.19)},
-            'ahead of home .*(reach|must turn)',
-        ),
-        ({'body': dataclasses.replace(BODY, inertia=0.01)}, 'inertia = 0.01 kg m2'),
-    ],
-)
-def test_scene_that_legs_cannot_walk(part, message):
-    with pytest.raises(ConfigError, match=message):
-        FullRobot(scene_of(**part), DRY, 0.004)
+@pytest.mark.parametrize('level', [FullRobot, PlanarRobot])
+@pytest.mark.parametrize(('name', 'value'), [('stride', 0.6), ('lift', 0.19)])
+def test_a_gait_that_no_leg_reaches(level, name, value):
+    """The message has the largest value that is walked; legs may bend back when they step up."""
+
+    def built(value):
+        return level(scene_of(gait=dataclasses.replace(GAIT, **{name: value})), DRY, 0.004)
+
+    with pytest.raises(ConfigError) as caught:
+        built(value)
+    text = str(caught.value)
+    assert f'gait.{name} = {value} m is not allowed' in text
+    assert (
+        text.startswith('hexapod_smooth_dry_flat: ')
+        and 'legs of ch3r from its home: feet ' in text
+    )
+    most = float(re.search('at most ([0-9.]+) m', text)[1])
+    built(0.99 * most)
+    with pytest.raises(ConfigError):
+        built(1.03 * most)
+
+
+@pytest.mark.parametrize('level', [FullRobot, PlanarRobot])
+def test_steering_that_no_leg_reaches(level):
+    gait = dataclasses.replace(GAIT, cycle=3.0)
+    scene = dataclasses.replace(scene_of(gait=gait), heading_gain=10.0)
+    with pytest.raises(
+        ConfigError, match=r'heading_gain = 10 1/s is not .* turned by -?[01]\.\d* rad'
+    ):
+        level(scene, DRY, 0.004)
+    level(dataclasses.replace(scene, heading_gain=1.0), DRY, 0.004)
+
+
+def test_legs_with_more_inertia_than_the_body():
+    body = dataclasses.replace(BODY, inertia=0.01)
+    with pytest.raises(ConfigError, match=r'inertia = 0\.01 kg m2'):
+        FullRobot(scene_of(body=body), DRY, 0.004)
 
 
 def test_missing_mujoco_is_named(monkeypatch):

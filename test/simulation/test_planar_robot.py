@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
+from ros_pad.robots import Chains
 from ros_pad.simulation import Scene
 from ros_pad.simulation import planar_step
 from ros_pad.simulation.planar_robot import PlanarRobot
@@ -195,7 +196,11 @@ def test_wet_on_one_side_turns_the_robot_to_it(floor, side):
 def test_mirrored_robot_on_a_mirrored_floor():
     """A mirrored robot on a mirrored floor makes the mirrored walk."""
     tow = Tow(weight=3.0, friction_dry=0.5, friction_wet=0.5, height=0.03)
-    mirrored = dataclasses.replace(BODY, homes=tuple((x, -y) for x, y in BODY.homes))
+    robot = BODY.robot  # on the other side of leg 1 is leg 6
+    chains = Chains(robot.chains.legs[::-1], robot.chains.feet[::-1])
+    robot = dataclasses.replace(robot, chains=chains, hips=robot.hips[::-1], home=robot.home[::-1])
+    homes = tuple((x, -y) for x, y in BODY.homes)
+    mirrored = dataclasses.replace(BODY, homes=homes, robot=robot)
     one = walk(robot_of(scene_of(tow=tow), RIGHT_WET), 6.0)
     other = walk(robot_of(scene_of(tow=tow, body=mirrored), LEFT_WET), 6.0)
     assert abs(one[2]) > math.radians(1.0)
