@@ -39,7 +39,10 @@ from studies.sensing.walks import Log
 from studies.sensing.walks import walk
 
 CASES = ('dry', 'patches', 'ice', 'hexapod')
-METHODS = ('estimator', 'no rejection', 'plain filter', 'odometry', 'odometry, r = 0')
+METHODS = (
+    *('estimator', 'no rejection', 'plain filter', 'invariant', 'invariant, χ²'),
+    *('odometry', 'odometry, r = 0'),
+)
 FIRST_SEED = 111  # constants of the estimator were chosen on seeds below 102
 
 ALARM_NOISE = 0.015  # m/s
@@ -137,8 +140,8 @@ def track_of(robot: Robot, log: Log, course: Course, method: str) -> Track:
         fixed = {'radius_error': 0.0, 'length_error': 0.0}
         return estimated(robot, log, course, rejection=False, **fixed)
     begin = time.process_time()
-    if method == 'plain filter':
-        rows = rivals.plain(robot, log, course)
+    if method in rivals.FILTERS:
+        rows = rivals.FILTERS[method](robot, course).rows(log)
     else:
         radius = robot.foot_radius if method == 'odometry' else 0.0
         rows = rivals.odometry(robot, log, course, radius)
