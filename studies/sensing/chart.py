@@ -120,7 +120,7 @@ def _along(axis: Any, case: str) -> None:
         axis.set_xscale('log')
         axis.set_xlim(0.02, AFTER)
         axis.axvline(LONGEST, color='grey', linewidth=0.8, linestyle='-.')
-        axis.set_xlabel(f'time since then, s; it ends after {LONGEST:g} s')
+        axis.set_xlabel(f'time since it begins, s; it ends after {LONGEST:g} s')
         if case == 'no foot stands':
             axis.axvspan(*FLIGHTS, color='grey', alpha=0.15)
     elif case == 'low rates':

@@ -22,6 +22,7 @@ from ros_pad.robots.rotation import cross
 from ros_pad.robots.rotation import matrix
 from ros_pad.sensing.body_filter import GRAVITY
 from studies import command
+from studies.samples import Flags
 from studies.sensing import rivals
 from studies.sensing.methods import Track
 from studies.sensing.methods import track_of
@@ -44,6 +45,13 @@ SETTLED = 8.0  # s, from when errors of long cases count
 RATES = (500, 250, 100, 50, 25)  # Hz
 COURSE = Course(rate=float(RATES[0]))
 USUAL = 250  # Hz
+EDGES = np.unique(
+    np.r_[
+        0,
+        np.geomspace(2.0, USUAL * LONGEST, 50),
+        np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20),
+    ].astype(int)
+)  # samples between which errors are averaged
 UNLOADED = 1.0  # N
 RETURN = 0.05  # s, in which a foot in the air comes back over the ground that it slid
 
@@ -166,6 +174,11 @@ def missed(robot: Robot, log: Log) -> float:
 _Found = dict[str, tuple[Array, Array]]
 
 
+def averaged(values: Array | Flags) -> Array:
+    """Return means between :data:`EDGES` of the samples of each run, (runs, points)."""
+    return np.asarray(np.add.reduceat(values, EDGES[:-1], axis=1) / np.diff(EDGES))
+
+
 def over_time(case: str, seed: int) -> _Found:
     """Return errors and doubts over time since feet slip, or stand no more."""
     robot = Robot.load(COURSE.robot)
@@ -177,17 +190,17 @@ def over_time(case: str, seed: int) -> _Found:
         fast = SPEED * sliding(log.time, BEGINS, LONGEST)
         changed = slid(robot, log, fast[:, None, None] * ways)
     starts = [round(begin * course.rate) for begin in BEGINS]
-    rows = np.array(starts)[:, None] + np.arange(round(AFTER * course.rate))
+    rows = np.array(starts)[:, None] + np.arange(EDGES[-1])
     found: _Found = {}
     for method in METHODS:
         track = track_of(robot, changed, course, method)
         errors = ((track.velocity - log.velocity)[:, :2] ** 2).sum(1)
-        found[method] = errors[rows], track.doubt[rows].astype(float)
+        found[method] = averaged(errors[rows]), averaged(track.doubt[rows])
         if method == 'estimator':
             since = (rows[0] - rows[0, 0]) / course.rate
             laws = np.array([drifting(track, course, row - 1, since) for row in starts])
-            laws[:, since > LONGEST] = np.nan
-            found['law'] = laws, np.zeros_like(laws)
+            laws[:, since >= LONGEST] = np.nan
+            found['law'] = averaged(laws), averaged(np.zeros_like(laws))
     return found
 
 
@@ -242,7 +255,7 @@ def _rows(columns: dict[str, list[tuple[float, float]]]) -> _Found:
 TIMED = ('all feet slip alike', 'all feet slip apart', 'no foot stands')
 CASES: dict[str, tuple[Callable[[int], _Found], Array]] = {
     **{
-        case: (functools.partial(over_time, case), np.arange(round(AFTER * USUAL)) / USUAL)
+        case: (functools.partial(over_time, case), 0.5 * (EDGES[:-1] + EDGES[1:]) / USUAL)
         for case in TIMED
     },
     'feet slide for long': (over_feet, np.arange(6.0)),
@@ -259,8 +272,9 @@ def curves(case: str, found: Sequence[_Found]) -> list[Curve]:
         doubts = np.concatenate([each[name][1] for each in found])
         errors = np.sqrt(squares.mean(0))
         silent = ((squares > LIMIT**2) & (doubts < 0.5)).mean(0)
+        known = np.isfinite(errors)  # the law ends with the slip
         columns = (CASES[case][1], errors, doubts.mean(0), silent)
-        made.append(Curve(case, name, *(column.tolist() for column in columns)))
+        made.append(Curve(case, name, *(column[known].tolist() for column in columns)))
     return made
 
 
@@ -293,10 +307,12 @@ def table(found: Sequence[Curve]) -> str:
             lines.append(
                 f'{"":15}{head}  above {1e3 * LIMIT:.0f} from  in doubt from  silent from'
             )
-        rows = [int(np.abs(np.array(curve.x) - x).argmin()) for x in points]
-        errors = ''.join(f'{1e3 * curve.error[row]:8.1f}' for row in rows)
-        lines.append(
-            f'{curve.method:15}{errors}  {first(curve, curve.error, LIMIT):14.3g}'
-            f'  {first(curve, curve.doubt, 0.5):13.3g}  {first(curve, curve.silent, 0.5):11.3g}'
-        )
+        order = np.argsort(curve.x)
+        errors = np.interp(points, np.array(curve.x)[order], np.array(curve.error)[order])
+        shown = ''.join(f'{1e3 * error:8.1f}' for error in errors)
+        line = f'{curve.method:15}{shown}  {first(curve, curve.error, LIMIT):14.3g}'
+        if curve.method != 'law':
+            line += f'  {first(curve, curve.doubt, 0.5):13.3g}'
+            line += f'  {first(curve, curve.silent, 0.5):11.3g}'
+        lines.append(line)
     return '\n'.join(lines)

@@ -217,8 +217,8 @@ def table(rows: Sequence[Row]) -> str:
 def main(words: Sequence[str]) -> int:
     """Measure, and print the table; return the exit status."""
     part = command.parser('sensing', __doc__)
-    command.add_count(part, '--seeds', 2, 'walks of each kind')
-    command.add_count(part, '--duration', 30, 'length of a walk, s', least=6)
+    command.add_count(part, '--seeds', 3, 'walks of each kind')
+    command.add_count(part, '--duration', 20, 'length of a walk, s', least=6)
     part.add_argument('--all', action='store_true', help='all walks and failures')
     part.add_argument('--picture', action='store_true', help='write sensing.json and sensing.png')
     command.add_out(part)
