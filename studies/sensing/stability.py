@@ -293,6 +293,7 @@ def first(curve: Curve, values: Sequence[float], limit: float) -> float:
 
 
 POINTS = {'feet slide for long': range(6), 'low rates': RATES}
+UNITS = {'feet slide for long': 'feet', 'low rates': 'Hz'}
 TIMES = (0.05, 0.1, 0.2, 0.4, 1.0, 2.0, 2.9)  # s
 
 
@@ -316,3 +317,28 @@ def table(found: Sequence[Curve]) -> str:
             line += f'  {first(curve, curve.silent, 0.5):11.3g}'
         lines.append(line)
     return '\n'.join(lines)
+
+
+def summary(found: Sequence[Curve]) -> str:
+    """Return where each method diverges, is in doubt and is wrong without a doubt, in Markdown."""
+    lines = [
+        '| case | ' + ' | '.join(('law', *METHODS)) + ' |',
+        '|---' * (len(METHODS) + 2) + '|',
+    ]
+    for case in dict.fromkeys(curve.case for curve in found):
+        curves = [curve for curve in found if curve.case == case]
+        cells = [f'{case}, {UNITS.get(case, "s")}', *map(_limits, curves)]
+        lines.append('| ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines)
+
+
+def _limits(curve: Curve) -> str:
+    wrong, doubt, silent = (
+        first(curve, values, limit)
+        for values, limit in ((curve.error, LIMIT), (curve.doubt, 0.5), (curve.silent, 0.5))
+    )
+    shown = '–' if math.isnan(wrong) else f'{wrong:.3g}'
+    if not math.isnan(doubt):
+        shown += f'; doubt {doubt:.3g}'
+        shown += '' if math.isnan(silent) else f'; silent {silent:.3g}'
+    return shown

@@ -214,6 +214,19 @@ def table(rows: Sequence[Row]) -> str:
     return '\n'.join(lines)
 
 
+def summary(rows: Sequence[Row]) -> str:
+    """Return error of velocity x y, mm/s, and drift, %, of every method, in Markdown."""
+    lines = ['| walk | ' + ' | '.join(METHODS) + ' |', '|---' * (len(METHODS) + 1) + '|']
+    for name in dict.fromkeys(row.course for row in rows):
+        cells = [name]
+        for method in METHODS:
+            some = [row for row in rows if (row.course, row.method) == (name, method)]
+            error, drift = np.mean([(row.velocity_error, row.drift) for row in some], axis=0)
+            cells.append(f'{1e3 * error:.1f}; {1e2 * drift:.2f}')
+        lines.append('| ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines)
+
+
 def main(words: Sequence[str]) -> int:
     """Measure, and print the table; return the exit status."""
     part = command.parser('sensing', __doc__)
@@ -232,13 +245,13 @@ def main(words: Sequence[str]) -> int:
         for row in measure(name, seed, float(options.duration))
     ]
     kept = [dataclasses.asdict(row) for row in rows]
-    shown = table(rows)
+    shown = f'{table(rows)}\n\n{summary(rows)}'
     if options.picture:
         picture = chart.picture(kept, METHODS)
         command.write(options.out, 'sensing', {'rows': kept}, {'sensing': picture})
     if options.all:
         found = stability.measure(seeds)
-        shown += '\n' + stability.table(found)
+        shown += f'\n{stability.table(found)}\n\n{stability.summary(found)}'
         name, document = 'sensing_stability', {'curves': [vars(each) for each in found]}
         if options.picture:
             command.write(options.out, name, document, {name: chart.stability(found)})

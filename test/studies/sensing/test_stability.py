@@ -116,6 +116,7 @@ def test_all_walks_and_failures_run_to_the_end(monkeypatch, tmp_path, capsys):
     out = capsys.readouterr().out
     assert 'dry              invariant, χ²' in out
     assert 'low rates: error of v x y' in out
+    assert '| low rates, Hz | 500 | 500; doubt 500 |' in out
     curves = json.loads((tmp_path / 'sensing_stability.json').read_text())['curves']
     assert curves[0]['error'] == pytest.approx([np.sqrt(0.025)] * 5)
     for name in ('sensing.png', 'sensing_stability.png'):
