@@ -22,7 +22,6 @@ from ros_pad.robots.rotation import cross
 from ros_pad.robots.rotation import matrix
 from ros_pad.sensing.body_filter import GRAVITY
 from studies import command
-from studies.samples import Flags
 from studies.sensing import rivals
 from studies.sensing.methods import Track
 from studies.sensing.methods import track_of
@@ -174,7 +173,7 @@ def missed(robot: Robot, log: Log) -> float:
 _Found = dict[str, tuple[Array, Array]]
 
 
-def averaged(values: Array | Flags) -> Array:
+def averaged(values: Array) -> Array:
     """Return means between :data:`EDGES` of the samples of each run, (runs, points)."""
     return np.asarray(np.add.reduceat(values, EDGES[:-1], axis=1) / np.diff(EDGES))
 
@@ -195,7 +194,7 @@ def over_time(case: str, seed: int) -> _Found:
     for method in METHODS:
         track = track_of(robot, changed, course, method)
         errors = ((track.velocity - log.velocity)[:, :2] ** 2).sum(1)
-        found[method] = averaged(errors[rows]), averaged(track.doubt[rows])
+        found[method] = averaged(errors[rows]), averaged(track.doubt[rows].astype(float))
         if method == 'estimator':
             since = (rows[0] - rows[0, 0]) / course.rate
             laws = np.array([drifting(track, course, row - 1, since) for row in starts])
@@ -268,8 +267,7 @@ def curves(case: str, found: Sequence[_Found]) -> list[Curve]:
     """Return the curves of a case from what was found with each seed."""
     made = []
     for name in ('law', *METHODS):
-        squares = np.concatenate([each[name][0] for each in found])
-        doubts = np.concatenate([each[name][1] for each in found])
+        squares, doubts = (np.concatenate([each[name][i] for each in found]) for i in (0, 1))
         errors = np.sqrt(squares.mean(0))
         silent = ((squares > LIMIT**2) & (doubts < 0.5)).mean(0)
         known = np.isfinite(errors)  # the law ends with the slip

@@ -91,6 +91,8 @@ def test_while_all_feet_slip_the_accelerometer_carries_the_velocity_on(monkeypat
             assert best.error[index] < law.error[index]
     assert stability.first(law, law.error, stability.LIMIT) == pytest.approx(1.4, abs=0.3)
     assert stability.first(best, best.doubt, 0.5) == pytest.approx(0.3, abs=0.05)
+    doubts = [d for x, d in zip(best.x, best.doubt, strict=True) if 0.5 < x < 2.5]
+    assert min(doubts) == 1.0
     assert best.error[-1] < 0.01  # recovered
     assert not any(best.silent)
     for rival in ('no rejection', 'invariant', 'odometry'):
@@ -116,7 +118,7 @@ def test_all_walks_and_failures_run_to_the_end(monkeypatch, tmp_path, capsys):
     out = capsys.readouterr().out
     assert 'dry              invariant, χ²' in out
     assert 'low rates: error of v x y' in out
-    assert '| low rates, Hz | 500 | 500; doubt 500 |' in out
+    assert '| low rates, Hz | 500; doubt 500 | 500; doubt 500 |' in out
     curves = json.loads((tmp_path / 'sensing_stability.json').read_text())['curves']
     assert curves[0]['error'] == pytest.approx([np.sqrt(0.025)] * 5)
     for name in ('sensing.png', 'sensing_stability.png'):
