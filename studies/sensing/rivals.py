@@ -24,8 +24,6 @@ Rows = list[tuple[Any, ...]]
 GATE = 11.3  # 99 % of χ² with 3 degrees of freedom
 CALM, SLOW = 0.03, 2.5  # s, and standard deviations of the speed, until a foot sticks again
 SLIDING = 0.4  # m/s, noise of a foothold that slips
-STRAY = 0.002  # m after 1 s, random motion of a foothold
-SHAKES = 0.1  # m/s², change of the acceleration between two samples
 GYRO_BIAS = 5e-4  # rad/s, deviation of the mean of a second at rest
 LOAD = 0.1  # of the expected load, from which on a foot stands
 
@@ -78,6 +76,9 @@ class _Filter:
 
     Errors of rotation, velocity and position are the first nine of the covariance.
     """
+
+    shakes = 0.3  # m/s², change of the acceleration between two samples
+    stray = 0.01  # m after 1 s, random motion of a foothold; with less it is lost on some walks
 
     def __init__(self, robot: Robot, course: Course) -> None:
         self._robot, self._dt = robot, 1.0 / course.rate
@@ -170,9 +171,9 @@ class PlainFilter(_Filter):
         self.turn = turn @ rotation(rate * dt)
         self.feet += dt * rolling
         noise[0:3] = (dt * self._noise.gyro) ** 2
-        noise[3:6] = (dt * math.hypot(self._noise.accelerometer, SHAKES)) ** 2
+        noise[3:6] = (dt * math.hypot(self._noise.accelerometer, self.shakes)) ** 2
         slides = self._slow < CALM
-        strays = np.tile(STRAY**2 * dt, (len(slides), 3))
+        strays = np.tile(self.stray**2 * dt, (len(slides), 3))
         strays[slides, :2] = SLIDING**2 * dt * 0.05
         noise[15:] = strays.ravel()
         self.covariance = step @ self.covariance @ step.T + np.diag(noise)
@@ -231,6 +232,8 @@ class InvariantFilter(_Filter):
     it is set down anew where it is.
     """
 
+    shakes, stray = 0.1, 0.002  # chosen on seed 1
+
     def __init__(self, robot: Robot, course: Course, gate: float = math.inf) -> None:
         super().__init__(robot, course)
         self._gate = gate
@@ -265,10 +268,10 @@ class InvariantFilter(_Filter):
         self.velocity = self.velocity + dt * acceleration
         self.turn = turn @ rotation(rate * dt)
         self.feet = self.feet + dt * rolling
-        shakes = math.hypot(self._noise.accelerometer, SHAKES)
+        shakes = math.hypot(self._noise.accelerometer, self.shakes)
         noise = dt * inputs * np.repeat((self._noise.gyro, shakes), 3)
         self.covariance = step @ self.covariance @ step.T + noise @ noise.T
-        self.covariance.ravel()[:: len(step) + 1][9:-6] += STRAY**2 * dt
+        self.covariance.ravel()[:: len(step) + 1][9:-6] += self.stray**2 * dt
         return step
 
     def _spread(self, feet: _Feet) -> Array:

@@ -47,7 +47,7 @@ USUAL = 250  # Hz
 EDGES = np.unique(
     np.r_[
         0,
-        np.geomspace(2.0, USUAL * LONGEST, 50),
+        np.geomspace(2.0, USUAL * LONGEST, 90),
         np.geomspace(USUAL * LONGEST, USUAL * AFTER, 20),
     ].astype(int)
 )  # samples between which errors are averaged
