@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from studies.drawing import BLACK
 from studies.drawing import BLUE
@@ -58,7 +59,11 @@ def picture(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> Figure
                         axis.loglog(x, y, marker, color=COLOURS[method], markersize=6)
             axis.set_xlabel('time an update, µs')
             axis.set_ylabel(label)
-            axis.grid(True, which='both', alpha=0.3)
+            for along in (axis.xaxis, axis.yaxis):
+                along.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                along.set_major_formatter('{x:g}')
+            axis.minorticks_off()
+            axis.grid(True, alpha=0.3)
         for method in methods:
             axes[0].plot([], [], 'o', color=COLOURS[method], label=method)
         for walk, marker in MARKERS.items():
@@ -84,6 +89,7 @@ def stability(curves: Sequence[Curve]) -> Figure:
             _along(axis, case)
         panels[0, 0].set_yscale('log')
         panels[0, 0].set_ylim(1.0, 6000.0)
+        panels[0, 0].yaxis.set_major_formatter('{x:g}')
         for axis in panels[:, 0]:
             axis.set_ylabel('error of velocity x y, mm/s')
         last = panels.flat[-1]
@@ -101,6 +107,7 @@ def _line(axis: Any, curve: Curve) -> None:
     x, y = np.array(curve.x), 1e3 * np.array(curve.error)
     mark = '' if curve.case in TIMED else 'o'
     if curve.method == 'law':
+        y = np.where(y > 0.0, y, np.nan)
         axis.plot(x, y, '--', color=BLACK, linewidth=1.2, marker=mark, markersize=3, zorder=5)
         return
     colour = COLOURS[curve.method]
@@ -118,6 +125,7 @@ def _along(axis: Any, case: str) -> None:
     """Label what an axis has along it."""
     if case in TIMED:
         axis.set_xscale('log')
+        axis.xaxis.set_major_formatter('{x:g}')
         axis.set_xlim(0.02, AFTER)
         axis.axvline(LONGEST, color='grey', linewidth=0.8, linestyle='-.')
         axis.set_xlabel(f'time since it begins, s; it ends after {LONGEST:g} s')
