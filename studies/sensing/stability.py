@@ -88,19 +88,19 @@ def sampled(log: Log, rate: int) -> tuple[Log, Course]:
 def slid(robot: Robot, log: Log, speeds: Array) -> Log:
     """Return a log of the same body over feet that slide while they stand.
 
-    ``speeds``, (n, legs, 2), m/s, are those of the feet over the ground. In the air a foot comes
-    back to where it would have been.
+    ``speeds``, (n, legs, 2), m/s, are those of their centres over the ground. In the air a foot
+    comes back to where it would have been. The slip of contact points, which roll as well, is not
+    known.
     """
     dt = float(log.time[1] - log.time[0])
     joints, rates = log.joint_positions.copy(), log.joint_velocities.copy()
-    slip, feet = log.slip.copy(), log.feet.copy()
+    feet = log.feet.copy()
     away, near = np.zeros((len(robot.legs), 3)), robot.home
     for row in range(len(log.time)):
         stands = log.load[row] > UNLOADED
         moves = np.where(stands[:, None], 0.0, -away / RETURN)
         moves[stands, :2] = speeds[row, stands]
         away = away + dt * moves
-        slip[row] += moves[:, :2]
         feet[row] += away
         if not away.any():
             continue
@@ -116,7 +116,11 @@ def slid(robot: Robot, log: Log, speeds: Array) -> Log:
         joints[row] = near.ravel()
         rates[row] = np.linalg.solve(robot.foot_jacobians(near), change[..., None]).ravel()
     return dataclasses.replace(
-        log, joint_positions=joints, joint_velocities=rates, slip=slip, feet=feet
+        log,
+        joint_positions=joints,
+        joint_velocities=rates,
+        slip=np.full_like(log.slip, np.nan),
+        feet=feet,
     )
 
 

@@ -54,7 +54,6 @@ def test_feet_slide_as_they_should_under_the_same_body(log):
     np.testing.assert_allclose(
         np.diff(away[:, 1], axis=0)[stands[1:]] * CALM.rate, change, atol=1e-6
     )
-    np.testing.assert_allclose((slid.slip - log.slip)[stands, 1], change[:, :2], atol=1e-3)
     np.testing.assert_array_equal(slid.accelerometer, log.accelerometer)
 
 
