@@ -94,8 +94,7 @@ def slid(robot: Robot, log: Log, speeds: Array) -> Log:
     """
     dt = float(log.time[1] - log.time[0])
     joints, rates = log.joint_positions.copy(), log.joint_velocities.copy()
-    feet = log.feet.copy()
-    away, near = np.zeros((len(robot.legs), 3)), robot.home
+    feet, away = log.feet.copy(), np.zeros((len(robot.legs), 3))
     for row in range(len(log.time)):
         stands = log.load[row] > UNLOADED
         moves = np.where(stands[:, None], 0.0, -away / RETURN)
@@ -105,22 +104,16 @@ def slid(robot: Robot, log: Log, speeds: Array) -> Log:
         if not away.any():
             continue
         turn = matrix(log.orientation[row])
-        measured = joints[row].reshape(robot.home.shape)
-        seen = away @ turn
-        near = robot.joint_positions(robot.foot_positions(measured) + seen, near=measured)
-        spin = robot.imu[:3, :3] @ log.gyro[row]
-        change = moves @ turn - cross(spin, seen)
-        change += (robot.foot_jacobians(measured) @ rates[row].reshape(*robot.home.shape, 1))[
-            ..., 0
-        ]
-        joints[row] = near.ravel()
-        rates[row] = np.linalg.solve(robot.foot_jacobians(near), change[..., None]).ravel()
+        before = joints[row].reshape(robot.home.shape)
+        change = away @ turn
+        after = robot.joint_positions(robot.foot_positions(before) + change, near=before)
+        speed = robot.foot_jacobians(before) @ rates[row].reshape(*before.shape, 1)
+        speed[..., 0] += moves @ turn - cross(robot.imu[:3, :3] @ log.gyro[row], change)
+        joints[row] = after.ravel()
+        rates[row] = np.linalg.solve(robot.foot_jacobians(after), speed).ravel()
+    slip = np.full_like(log.slip, np.nan)
     return dataclasses.replace(
-        log,
-        joint_positions=joints,
-        joint_velocities=rates,
-        slip=np.full_like(log.slip, np.nan),
-        feet=feet,
+        log, joint_positions=joints, joint_velocities=rates, slip=slip, feet=feet
     )
 
 
