@@ -32,16 +32,16 @@ from studies import command
 from studies.samples import Flags
 from studies.samples import runs
 from studies.sensing import recordings
+from studies.sensing.methods import METHODS as RIVALS
+from studies.sensing.methods import Track
+from studies.sensing.methods import estimated
+from studies.sensing.methods import estimator_for
+from studies.sensing.methods import readings
+from studies.sensing.methods import track_of
 from studies.sensing.recordings import Recording
 from studies.sensing.rivals import loads_of
-from studies.sensing.study import METHODS as RIVALS
-from studies.sensing.study import Track
 from studies.sensing.study import alarms_of
-from studies.sensing.study import estimated
-from studies.sensing.study import estimator_for
-from studies.sensing.study import readings
 from studies.sensing.study import settled
-from studies.sensing.study import track_of
 from studies.sensing.walks import Course
 from studies.sensing.walks import Log
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rivals of the body estimator: a plain filter with 27 states, and legged odometry."""
+"""Rivals of the body estimator: a plain and an invariant filter, and legged odometry."""
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ Rows = list[tuple[Any, ...]]
 GATE = 11.3  # 99 % of χ² with 3 degrees of freedom
 CALM, SLOW = 0.03, 2.5  # s, and standard deviations of the speed, until a foot sticks again
 SLIDING = 0.4  # m/s, noise of a foothold that slips
-STRAY = 0.01  # m after 1 s, random motion of a foothold
+GYRO_BIAS = 5e-4  # rad/s, deviation of the mean of a second at rest
 LOAD = 0.1  # of the expected load, from which on a foot stands
 
 
@@ -69,13 +71,14 @@ def odometry(robot: Robot, log: Log, course: Course, radius: float) -> Rows:
     return rows
 
 
-class PlainFilter:
-    """Error-state filter of 15 + 3 legs states, feet taken one by one.
+class _Filter:
+    """What both filters have: state, start from the readings at rest, rolling, rows.
 
-    Rotation, velocity, position, biases and footholds, with errors in odom axes (Bloesch 2012);
-    a foot whose innovation is above 99 % of its χ² is taken to slip: then only its height counts,
-    until its speed was low for 30 ms.
+    Errors of rotation, velocity and position are the first nine of the covariance.
     """
+
+    shakes = 0.3  # m/s², change of the acceleration between two samples
+    stray = 0.01  # m after 1 s, random motion of a foothold; with less it is lost on some walks
 
     def __init__(self, robot: Robot, course: Course) -> None:
         self._robot, self._dt = robot, 1.0 / course.rate
@@ -84,11 +87,8 @@ class PlainFilter:
         self._to_imu: Array = np.asarray(np.linalg.inv(robot.imu), dtype=float)
         self.turn, self.velocity, self.position = np.eye(3), np.zeros(3), np.zeros(3)
         self.biases, self.feet = np.zeros((2, 3)), np.zeros((legs, 3))
-        deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[0.02] * 3]
-        deviations += [course.noise.accelerometer_bias] * 3 + [0.0] * 3 * legs
-        self._covariance = np.diag(np.square(deviations))
+        self.covariance = np.zeros((15 + 3 * legs, 15 + 3 * legs))
         self._stands = np.zeros(legs, dtype=bool)
-        self._slow = np.full(legs, math.inf)  # time for which each foot was slow, s
 
     def begin(self, log: Log) -> None:
         """Take tilt and bias of the gyro from the readings at rest."""
@@ -97,16 +97,54 @@ class PlainFilter:
         axis = cross(up / np.linalg.norm(up), np.array((0.0, 0.0, 1.0)))
         self.turn = rotation(axis)
         self.biases[0] = log.gyro[still].mean(0)
-        self._covariance[9:12, 9:12] = 5e-4**2 * np.eye(3)
+
+    def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
+        """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
+        raise NotImplementedError
+
+    def _rolling(self, feet: _Feet, rate: Array) -> Array:
+        radius = self._robot.foot_radius
+        return feet.slips(self.turn, rate, 0.0) - feet.slips(self.turn, rate, radius)
+
+    def _deviation(self) -> Array:
+        return np.asarray(np.sqrt(np.diag(self.covariance)[3:5]))
+
+    def rows(self, log: Log) -> Rows:
+        """Return position, velocity and its deviation, of the base, and the slips."""
+        self.begin(log)
+        arm = self._to_imu[:3, 3]
+        rows: Rows = []
+        for gyro, force, q, dq, stands in zip(
+            *(log.gyro, log.accelerometer, log.joint_positions, log.joint_velocities),
+            loads_of(self._robot, log),
+            strict=True,
+        ):
+            slips = self.update(gyro, force, q, dq, stands)
+            velocity = self.velocity + self.turn @ cross(gyro - self.biases[0], arm)
+            rows.append((self.position + self.turn @ arm, velocity, slips, self._deviation()))
+        return rows
+
+
+class PlainFilter(_Filter):
+    """Error-state filter of 15 + 3 legs states, feet taken one by one.
+
+    Rotation, velocity, position, biases and footholds, with errors in odom axes (Bloesch 2012);
+    a foot whose innovation is above 99 % of its χ² is taken to slip: then only its height counts,
+    until its speed was low for 30 ms.
+    """
+
+    def __init__(self, robot: Robot, course: Course) -> None:
+        super().__init__(robot, course)
+        deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[GYRO_BIAS] * 3]
+        deviations += [course.noise.accelerometer_bias] * 3 + [0.0] * self.feet.size
+        self.covariance = np.diag(np.square(deviations))
+        self._slow = np.full(len(self.feet), math.inf)  # time for which each foot was slow, s
 
     def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
         """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
         feet = _Feet(self._robot, self._to_imu, q, dq)
         rate = gyro - self.biases[0]
-        rolling = feet.slips(self.turn, rate, 0.0) - feet.slips(
-            self.turn, rate, self._robot.foot_radius
-        )
-        self._predict(rate, force - self.biases[1], rolling)
+        self._predict(rate, force - self.biases[1], self._rolling(feet, rate))
         for leg in np.flatnonzero(stands & ~self._stands).tolist():
             self._set_down(leg, feet)
         self._stands = stands
@@ -114,7 +152,7 @@ class PlainFilter:
         for leg in sorted(scores, key=scores.__getitem__):
             self._correct(leg, feet)
         slips = self.velocity + feet.slips(self.turn, rate, self._robot.foot_radius)
-        speed = np.sqrt(0.5 * (self._covariance[3, 3] + self._covariance[4, 4]) + 0.01**2)
+        speed = np.sqrt(0.5 * (self.covariance[3, 3] + self.covariance[4, 4]) + 0.01**2)
         slow = np.linalg.norm(slips[:, :2], axis=1) < SLOW * speed
         self._slow = np.where(slow, self._slow + self._dt, 0.0 * self._slow.clip(0.0, 1.0))
         return slips
@@ -122,7 +160,7 @@ class PlainFilter:
     def _predict(self, rate: Array, force: Array, rolling: Array) -> None:
         dt, turn = self._dt, self.turn
         acceleration = turn @ force
-        size = len(self._covariance)
+        size = len(self.covariance)
         step, noise = np.eye(size), np.zeros(size)
         step[0:3, 9:12] = -dt * turn
         step[3:6, 0:3] = -dt * skew(acceleration)
@@ -133,22 +171,22 @@ class PlainFilter:
         self.turn = turn @ rotation(rate * dt)
         self.feet += dt * rolling
         noise[0:3] = (dt * self._noise.gyro) ** 2
-        noise[3:6] = (dt * math.hypot(self._noise.accelerometer, 0.3)) ** 2
+        noise[3:6] = (dt * math.hypot(self._noise.accelerometer, self.shakes)) ** 2
         slides = self._slow < CALM
-        strays = np.tile(STRAY**2 * dt, (len(slides), 3))
+        strays = np.tile(self.stray**2 * dt, (len(slides), 3))
         strays[slides, :2] = SLIDING**2 * dt * 0.05
         noise[15:] = strays.ravel()
-        self._covariance = step @ self._covariance @ step.T + np.diag(noise)
+        self.covariance = step @ self.covariance @ step.T + np.diag(noise)
 
     def _set_down(self, leg: int, feet: _Feet) -> None:
         arm = self.turn @ feet.places[leg]
         self.feet[leg] = self.position + arm
         at = slice(15 + 3 * leg, 18 + 3 * leg)
-        line = np.zeros((3, len(self._covariance)))
+        line = np.zeros((3, len(self.covariance)))
         line[:, 0:3], line[:, 6:9] = -skew(arm), np.eye(3)
-        self._covariance[at] = line @ self._covariance
-        self._covariance[:, at] = self._covariance[at].T
-        self._covariance[at, at] = line @ self._covariance @ line.T + self._spread(leg, feet)
+        self.covariance[at] = line @ self.covariance
+        self.covariance[:, at] = self.covariance[at].T
+        self.covariance[at, at] = line @ self.covariance @ line.T + self._spread(leg, feet)
         self._slow[leg] = math.inf
 
     def _spread(self, leg: int, feet: _Feet) -> Array:
@@ -157,11 +195,11 @@ class PlainFilter:
 
     def _score(self, leg: int, feet: _Feet) -> tuple[Array, Array, float, Array]:
         arm = self.turn @ feet.places[leg]
-        line = np.zeros((3, len(self._covariance)))
+        line = np.zeros((3, len(self.covariance)))
         line[:, 0:3], line[:, 6:9] = skew(arm), -np.eye(3)
         line[:, 15 + 3 * leg : 18 + 3 * leg] = np.eye(3)
         miss = arm - (self.feet[leg] - self.position)
-        spread = line @ self._covariance @ line.T + self._spread(leg, feet)
+        spread = line @ self.covariance @ line.T + self._spread(leg, feet)
         return line, miss, float(miss @ np.linalg.solve(spread, miss)), spread
 
     def _correct(self, leg: int, feet: _Feet) -> None:
@@ -169,40 +207,126 @@ class PlainFilter:
         if score > GATE:
             self._slow[leg] = 0.0
             at = 15 + 3 * leg
-            self._covariance[at, at] += 0.02**2
-            self._covariance[at + 1, at + 1] += 0.02**2
+            self.covariance[at, at] += 0.02**2
+            self.covariance[at + 1, at + 1] += 0.02**2
             line, miss, _, spread = self._score(leg, feet)
-        gain = np.linalg.solve(spread, line @ self._covariance).T
+        gain = np.linalg.solve(spread, line @ self.covariance).T
         error = gain @ miss
-        self._covariance -= gain @ line @ self._covariance
-        self._covariance = 0.5 * (self._covariance + self._covariance.T)
+        self.covariance -= gain @ line @ self.covariance
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
         self.turn = rotation(error[0:3]) @ self.turn
         self.velocity = self.velocity + error[3:6]
         self.position = self.position + error[6:9]
         self.biases += error[9:15].reshape(2, 3)
         self.feet += error[15:].reshape(-1, 3)
 
-    def row(self, gyro: Array, slips: Array) -> tuple[Any, ...]:
-        """Return position, velocity and its deviation, of the base, and the slips."""
-        arm = self._to_imu[:3, 3]
+
+class InvariantFilter(_Filter):
+    """Right-invariant filter of contacts (Hartley 2020), biases appended.
+
+    Rotation, velocity, position and footholds are one element X of a group, with the error
+    X_estimated X_true⁻¹ = exp(ξ): rotation, velocity, position, footholds, then biases of gyro and
+    accelerometer. Its motion does not depend on X but through the biases, nor do measurements.
+
+    ``gate`` is the squared Mahalanobis distance of a foot's innovation above which it slips: then
+    it is set down anew where it is.
+    """
+
+    shakes, stray = 0.1, 0.002  # chosen on seed 1
+
+    def __init__(self, robot: Robot, course: Course, gate: float = math.inf) -> None:
+        super().__init__(robot, course)
+        self._gate = gate
+        deviations = [0.01, 0.01, 0.0, *[0.02] * 3, *[0.0] * 3, *[0.0] * self.feet.size]
+        deviations += [GYRO_BIAS] * 3 + [course.noise.accelerometer_bias] * 3
+        self.covariance = np.diag(np.square(deviations))
+
+    def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
+        """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
+        feet = _Feet(self._robot, self._to_imu, q, dq)
         rate = gyro - self.biases[0]
-        return (
-            self.position + self.turn @ arm,
-            self.velocity + self.turn @ cross(rate, arm),
-            slips,
-            np.sqrt(np.diag(self._covariance)[3:5]),
+        self.predict(rate, force - self.biases[1], self._rolling(feet, rate))
+        self._set_down(stands & ~self._stands, feet)
+        self._stands = stands
+        self._correct(feet, stands)
+        return self.velocity + feet.slips(self.turn, rate, self._robot.foot_radius)
+
+    def predict(self, rate: Array, force: Array, rolling: Array) -> Array:
+        """Advance by a sample; return what it does to an error, (size, size)."""
+        dt, turn = self._dt, self.turn
+        inputs = np.zeros((len(self.covariance), 6))  # what gyro and accelerometer do to the error
+        columns = np.concatenate([[self.velocity, self.position], self.feet])
+        inputs[0:3, :3], inputs[3:6, 3:] = turn, turn
+        inputs[3:-6, :3] = (skew(columns) @ turn).reshape(-1, 3)
+        motion = np.zeros_like(self.covariance)
+        motion[3:6, 0:3], motion[6:9, 3:6] = skew(GRAVITY), np.eye(3)
+        motion[:, -6:] = -inputs
+        motion *= dt
+        step = np.eye(len(motion)) + motion + 0.5 * motion @ motion
+        acceleration = turn @ force + GRAVITY
+        self.position = self.position + dt * (self.velocity + 0.5 * dt * acceleration)
+        self.velocity = self.velocity + dt * acceleration
+        self.turn = turn @ rotation(rate * dt)
+        self.feet = self.feet + dt * rolling
+        shakes = math.hypot(self._noise.accelerometer, self.shakes)
+        noise = dt * inputs * np.repeat((self._noise.gyro, shakes), 3)
+        self.covariance = step @ self.covariance @ step.T + noise @ noise.T
+        self.covariance.ravel()[:: len(step) + 1][9:-6] += self.stray**2 * dt
+        return step
+
+    def _spread(self, feet: _Feet) -> Array:
+        arms = self.turn @ feet.jacobians
+        return np.asarray(
+            self._noise.encoder**2 * arms @ arms.transpose(0, 2, 1) + 3e-4**2 * np.eye(3)
         )
 
+    def _set_down(self, chosen: Flags, feet: _Feet) -> None:
+        spread = self._spread(feet)
+        for leg in np.flatnonzero(chosen).tolist():
+            at = slice(9 + 3 * leg, 12 + 3 * leg)
+            self.feet[leg] = self.position + self.turn @ feet.places[leg]
+            self.covariance[at] = self.covariance[6:9]
+            self.covariance[:, at] = self.covariance[:, 6:9]
+            self.covariance[at, at] = self.covariance[6:9, 6:9] + spread[leg]
 
-def plain(robot: Robot, log: Log, course: Course) -> Rows:
-    """Return rows of :class:`PlainFilter`, like those of :func:`odometry`."""
-    found = PlainFilter(robot, course)
-    found.begin(log)
-    rows: Rows = []
-    for gyro, force, q, dq, stands in zip(
-        *(log.gyro, log.accelerometer, log.joint_positions, log.joint_velocities),
-        loads_of(robot, log),
-        strict=True,
-    ):
-        rows.append(found.row(gyro, found.update(gyro, force, q, dq, stands)))
-    return rows
+    def _correct(self, feet: _Feet, stands: Flags) -> None:
+        size, each = len(self.covariance), np.arange(len(stands))
+        miss = feet.places @ self.turn.T + self.position - self.feet
+        seen = self.covariance[9:-6].reshape(-1, 3, size) - self.covariance[6:9]
+        spread = seen[:, :, 9:-6].reshape(-1, 3, len(each), 3) - seen[:, :, None, 6:9]
+        spread[each, :, each] += self._spread(feet)
+        alone = np.linalg.solve(spread[each, :, each], miss[..., None])[..., 0]
+        slips = stands & ((miss * alone).sum(1) > self._gate)
+        chosen = stands & ~slips
+        rows = seen[chosen].reshape(-1, size)
+        kept = spread[chosen][:, :, chosen].reshape(len(rows), len(rows))
+        gain = np.linalg.solve(kept, rows).T
+        self.covariance -= gain @ rows
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.apply(gain @ miss[chosen].ravel())
+        self._set_down(slips, feet)
+
+    def apply(self, error: Array) -> None:
+        """Move the state by exp(error)."""
+        turn = rotation(error[:3])
+        angle = max(float(np.linalg.norm(error[:3])), 1e-6)
+        axis = skew(error[:3] / angle)
+        along = np.eye(3) + (1.0 - math.cos(angle)) / angle * axis
+        along += (1.0 - math.sin(angle) / angle) * axis @ axis
+        moves = error[3:-6].reshape(-1, 3) @ along.T
+        self.turn = turn @ self.turn
+        self.velocity = turn @ self.velocity + moves[0]
+        self.position = turn @ self.position + moves[1]
+        self.feet = self.feet @ turn.T + moves[2:]
+        self.biases = self.biases + error[-6:].reshape(2, 3)
+
+    def _deviation(self) -> Array:
+        line = np.concatenate([-skew(self.velocity), np.eye(3)], axis=1)
+        return np.asarray(np.sqrt(np.diag(line @ self.covariance[:6, :6] @ line.T)[:2]))
+
+
+FILTERS: dict[str, Callable[[Robot, Course], _Filter]] = {
+    'plain filter': PlainFilter,
+    'invariant': InvariantFilter,
+    'invariant, χ²': functools.partial(InvariantFilter, gate=GATE),
+}

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The invariant filter, a rival of the body estimator, has the properties that papers prove."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from ros_pad.robots import Robot
+from ros_pad.robots.rotation import rotation
+from ros_pad.robots.rotation import skew
+from ros_pad.sensing.body_filter import GRAVITY
+from studies.sensing import rivals
+from studies.sensing import study
+from studies.sensing import walks
+
+GO2 = Robot.load('go2')
+COURSE = walks.Course()
+STILL = np.zeros((4, 3))
+YAW, PLACE = 2, 6  # rows of the errors of heading and of the first coordinate of position
+
+
+@pytest.fixture(scope='module')
+def log():
+    pytest.importorskip('mujoco')
+    return walks.walk(COURSE, 1, 6.0)
+
+
+def element(found):
+    """Return rotation, velocity, position and footholds as one matrix of the group."""
+    made = np.eye(9)
+    made[:3, :3] = found.turn
+    made[:3, 3:] = np.vstack([found.velocity, found.position, found.feet]).T
+    return made
+
+
+def exponential(error):
+    """Return the matrix of the group whose logarithm is an error without biases, (21,)."""
+    algebra = np.zeros((9, 9))
+    algebra[:3, :3] = skew(error[:3])
+    algebra[:3, 3:] = error[3:].reshape(6, 3).T
+    return expm(algebra)
+
+
+def run(found, log, rows):
+    stands = rivals.loads_of(GO2, log)
+    for row in rows:
+        found.update(
+            *(log.gyro[row], log.accelerometer[row]),
+            *(log.joint_positions[row], log.joint_velocities[row], stands[row]),
+        )
+    return found
+
+
+def test_corrections_are_those_of_the_group():
+    found = rivals.InvariantFilter(GO2, COURSE)
+    error = np.random.default_rng(1).normal(0.0, 0.7, 27)
+    found.velocity, found.feet = np.array((1.0, 2.0, 3.0)), np.arange(12.0).reshape(4, 3)
+    goal = exponential(error[:21]) @ element(found)
+    found.apply(error)
+    np.testing.assert_allclose(element(found), goal, atol=1e-12)
+    np.testing.assert_array_equal(found.biases.ravel(), error[21:])
+
+
+def test_large_errors_move_the_same_along_any_path():
+    generator = np.random.default_rng(2)
+    estimate, truth = (rivals.InvariantFilter(GO2, COURSE) for _ in range(2))
+    error = generator.normal(0.0, 0.5, 21)
+    estimate.apply(np.concatenate([error, np.zeros(6)]))
+    for _ in range(200):
+        rate, force = generator.normal(0.0, 3.0, 3), generator.normal(0.0, 5.0, 3) - GRAVITY
+        step = estimate.predict(rate, force, STILL)[:21, :21]
+        np.testing.assert_array_equal(step, truth.predict(rate, force, STILL)[:21, :21])
+        error = step @ error
+    np.testing.assert_allclose(
+        element(estimate) @ np.linalg.inv(element(truth)), exponential(error), atol=1e-9
+    )
+
+
+def test_covariance_does_not_depend_on_heading_and_place(log):
+    first, second = (rivals.InvariantFilter(GO2, COURSE, rivals.GATE) for _ in range(2))
+    first.begin(log)
+    second.begin(log)
+    turn, place = rotation((0.0, 0.0, 2.0)), np.array((30.0, -5.0, 2.0))
+    second.turn, second.position = turn @ second.turn, place
+    change = np.kron(np.eye(9), turn)
+    change[21:, 21:] = np.eye(6)
+    for row in (6, 9, 12, 15, 18):
+        change[row : row + 3, :3] = skew(place) @ turn
+    second.covariance = change @ first.covariance @ change.T
+    for found in (first, second):
+        run(found, log, range(len(log.time)))
+    np.testing.assert_allclose(second.turn, turn @ first.turn, atol=1e-7)
+    np.testing.assert_allclose(second.velocity, turn @ first.velocity, atol=1e-7)
+    np.testing.assert_allclose(second.position, turn @ first.position + place, atol=1e-6)
+    np.testing.assert_allclose(
+        second.covariance, change @ first.covariance @ change.T, rtol=1e-5, atol=1e-9
+    )
+
+
+def test_nothing_is_learnt_about_heading_and_place(log):
+    found = rivals.InvariantFilter(GO2, COURSE)
+    found.begin(log)
+    unknown = [YAW, PLACE, PLACE + 1, PLACE + 2]
+    wide = np.zeros(27)
+    wide[[0, 1, 3, 4, 5]] = 1.0
+    found.covariance += np.diag(wide)
+    for index in unknown:
+        alike = np.zeros(27)
+        alike[index::3][: 5 if index >= PLACE else 1] = 1.0  # footholds are as far off as the body
+        found.covariance += np.outer(alike, alike)
+    run(found, log, range(len(log.time)))
+    kept = found.covariance[np.ix_(unknown, unknown)]
+    assert np.linalg.eigvalsh(kept).min() > 1.0 - 1e-6
+    learnt = np.diag(found.covariance)[[0, 1, 3, 4, 5]]
+    assert learnt.max() < 0.01
+
+
+def test_rejection_helps_where_feet_slip(log):
+    slid = walks.walk(walks.COURSES['ice'], 1, 8.0)
+    walking = slid.time > walks.REST + walks.RAMP
+
+    def error(method):
+        track = study.track_of(GO2, slid, walks.COURSES['ice'], method)
+        miss = (track.velocity - slid.velocity)[walking, :2]
+        return np.sqrt((miss**2).sum(1).mean())
+
+    assert error('invariant, χ²') < 0.5 * error('invariant')
+    assert error('invariant') < 0.7 * error('odometry')
