@@ -47,7 +47,7 @@ RECOVERY = 0.3
 """Time for which feet may slip or be in the air before there is a doubt, s, and time for which a
 gap leaves one."""
 
-LOST = 0.5
+LOST = 2.0
 """Time for which all feet may slip before the velocity is taken to be wrong, s, if they slip
 alike."""
 
