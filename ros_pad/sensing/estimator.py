@@ -25,7 +25,6 @@ from ros_pad.sensing.body_filter import GATE
 from ros_pad.sensing.body_filter import GRAVITY
 from ros_pad.sensing.body_filter import BodyFilter
 from ros_pad.sensing.body_filter import Flags
-from ros_pad.sensing.plausibility import SLIPPERY
 from ros_pad.sensing.plausibility import Delay
 from ros_pad.sensing.plausibility import Joints
 from ros_pad.sensing.plausibility import Legs
@@ -614,7 +613,7 @@ class BodyEstimator:
             # What such legs have shown about the others is wrong.
             self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._length_error)
             return True
-        self._filter.creep = CREEP * max(0.0, self._agreement.share - SLIPPERY)
+        self._filter.creep = CREEP * self._agreement.slippery
         # Joints that are late look like legs of another length, too.
         if not time < self._look and not self._delay.doubt():
             self._look = time + LOOK

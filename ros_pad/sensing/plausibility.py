@@ -33,6 +33,10 @@ SLIPPERY, SLIPS = 0.35, 0.45
 """Shares of their stances in which all feet slip, above which they creep while they seem to stick,
 and above which they show nothing about their radius and the length of their legs."""
 
+NONE_STICKS = 0.03
+"""Share of the time in which no foot sticks, above which feet creep. Where some foot always does,
+the others may be in the air, with force sensors that read something there."""
+
 FASTER = 0.6
 """Mean speed of its contact point over that of the foot against the body from which on it does."""
 
@@ -208,11 +212,17 @@ class Legs:
         self.against: Flags = np.zeros(len(robot.legs), dtype=bool)
         self._time = np.zeros(len(robot.legs))  # of stance in motion, s
         self._turn, self._spent = 0, 0.0
+        self._none = 0.0  # share of the time in which feet stand and none of them sticks
 
     @property
     def share(self) -> float:
         """Share of its last stances in which a foot slips, mean of all feet."""
         return float(self._means[0].sum()) / len(self._names)
+
+    @property
+    def slippery(self) -> float:
+        """Share of slips beyond SLIPPERY, if now and then no foot sticks, else 0."""
+        return max(0.0, self.share - SLIPPERY) if self._none > NONE_STICKS else 0.0
 
     @property
     def agree(self) -> bool:
@@ -249,6 +259,8 @@ class Legs:
         self._time += counts * dt
         gain = counts * dt / np.clip(self._time, max(dt, 1e-9), STANCES)
         means += gain * (np.stack([slipping, slips, moves]) - means)
+        if standing.any():
+            self._none += dt / STANCES * (float(not (standing & ~slipping).any()) - self._none)
         shares = means[0]
         if not (shares > AGREES).any():
             self.against = self.against & False

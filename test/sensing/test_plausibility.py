@@ -80,3 +80,21 @@ def test_legs_that_slip_most_of_all_under_a_load_are_not_named():
     assert legs.share == pytest.approx(0.677, abs=0.02)
     assert not legs.agree
     assert walked([0.3, 0.2, 0.1, 0.3, 0.2, 0.1]).agree
+
+
+def paced(slipping, seconds=12.0):
+    """Return the Legs of a quadruped whose standing feet slip as a function of the step says."""
+    legs = Legs(Robot.load('go2'))
+    for row in range(round(seconds / PERIOD)):
+        legs.update(PERIOD, STAND, slipping(row), np.full(4, 0.15), np.full(4, 0.2))
+    return legs
+
+
+def test_a_robot_slips_as_a_whole_where_now_and_then_no_foot_sticks():
+    together = paced(lambda row: np.full(4, (row * 0.618) % 1.0 < 0.6))
+    assert together.slippery == pytest.approx(0.25, abs=0.03)
+    # In a trot two feet are in the air; here their sensors read something there.
+    in_turns = paced(lambda row: np.array([True, False, False, True]) ^ bool(row // 60 % 2))
+    assert in_turns.share == pytest.approx(0.5, abs=0.05)
+    assert in_turns.slippery == 0.0
+    assert paced(lambda row: np.full(4, (row * 0.618) % 1.0 < 0.2)).slippery == 0.0
