@@ -275,6 +275,7 @@ class BodyEstimator:
         )
         self._shift = Shift(abs(self._late))
         self._time = math.nan
+        self._step = 0.0  # the last one, s
         self._measured = True  # whether forces are measured, not computed from torques
         self._standing = np.zeros(legs, dtype=bool)
         self._slipping = np.zeros(legs, dtype=bool)
@@ -456,12 +457,18 @@ class BodyEstimator:
 
     def _advance(self, time: float, gyro: Array, accelerometer: Array) -> float:
         """Advance the filter to the time of the readings; return the step, s, 0 after a gap."""
-        dt, self._time = time - self._time, time
+        dt, before, self._time = time - self._time, self._step, time
+        self._step = dt
         if dt > LONGEST_GAP:
             self._doubt_for(time, f'gap: no readings for {dt:.2g} s')
             self._filter.lose(BLIND_TURN)
         elif dt > LONGEST_STEP:
             self._filter.lose(BLIND_RATE * dt, BLIND_ACCELERATION * dt)
+            if before > LONGEST_STEP:  # no foot keeps its foothold
+                self._doubt_for(
+                    time,
+                    f'rate: readings are {dt:.2g} s apart, {LONGEST_STEP} s at most are needed',
+                )
         if dt > LONGEST_STEP:
             self._sliding_since = time
             self._standing[:] = False  # their footholds are made anew

@@ -391,6 +391,19 @@ def test_readings_wait_for_joints_that_are_late():
     assert shift.update(-1.0, [np.zeros(2)])[0] == pytest.approx(np.zeros(2))
 
 
+@pytest.mark.parametrize(('rate', 'kind'), [(50.0, ''), (25.0, 'rate')])
+def test_a_rate_at_which_no_foothold_is_kept_is_named(rate, kind):
+    estimator = BodyEstimator(POINTED, rate=rate)
+    still = np.zeros(POINTED.home.size)
+    for step in range(50):
+        found = estimator.update(
+            step / rate, np.zeros(3), (0.0, 0.0, 9.81), POINTED.home.ravel(), still, STANDING
+        )
+    assert found.doubt.partition(':')[0] == kind
+    if kind:
+        assert '0.04 s apart' in found.doubt
+
+
 def test_one_reading_after_a_gap_says_nothing_about_the_gap():
     """A foot lands with a jolt just when the readings come back."""
     times = [0.004 * step for step in range(250)]
