@@ -69,7 +69,7 @@ _FREE, _STRAINS, _LINES = 64, 48, 48
 # Smallest x of these, over the largest, and ends of the lines: nearly free, and nearly flat.
 _LOW, _SPAN = 0.02, (3e-3, 0.9999)
 # Rows and columns of the table of pressed domes: x, and s.
-_ROWS, _CONTACTS = 256, 512
+_ROWS, _CONTACTS = 512, 512
 # Places along a line between which its spline over s is made.
 _FINE = 800
 
