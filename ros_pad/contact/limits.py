@@ -81,7 +81,7 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         When the criterion is unknown, or a pressure is negative, not finite, or above the
         measurements.
     """
-    _check(pad, criterion)
+    choice('criterion', criterion, criteria(pad))
     p = quantity('pressure', pressure, 'Pa')
     tension = p * (pad.radius / pad.stiffness)
     end, status = _model_end(pad)
@@ -141,7 +141,7 @@ def pressure_for(
         When the criterion is unknown, a value is negative or not finite, or shapes do not
         broadcast.
     """
-    _check(pad, criterion)
+    choice('criterion', criterion, criteria(pad))
     load = quantity('force', force, 'N')
     factor = quantity('margin', margin, '(factor)', above=True)
     load, factor = broadcast('force and margin', load, factor)
@@ -176,13 +176,14 @@ def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
     This is the end of the model of the pressed dome. For ``measured`` it is at most 91.36 kPa, the
     end of the thesis' line, if the pad has no ``measured_limit`` of its own.
     """
-    _check(pad, criterion)
+    choice('criterion', criterion, criteria(pad))
     end = _model_end(pad)[0]
     return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
 
 
-def _check(pad: Pad, criterion: str) -> None:
-    choice('criterion', criterion, CRITERIA if pad.material is None else CRITERIA[:2])
+def criteria(pad: Pad) -> tuple[str, ...]:
+    """Return the criteria that a pad has: ``max_depth`` is one of the spherical dome alone."""
+    return CRITERIA if pad.material is None else ('measured', 'flattening')
 
 
 def _model_end(pad: Pad) -> tuple[float, str]:

@@ -5,10 +5,13 @@ import numpy as np
 import pytest
 
 from ros_pad import configuration
+from ros_pad.capillary.coupling import press_wet
+from ros_pad.contact import WATER
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
 from ros_pad.contact import Pad
 from ros_pad.contact import calibrate
+from ros_pad.contact import design
 from ros_pad.contact.material import equibiaxial
 from ros_pad.contact.material import tensions
 from ros_pad.errors import ConfigError
@@ -202,5 +205,9 @@ def test_a_foot_names_material_radius_and_thickness(tmp_path):
 def test_what_needs_a_stiffness_refuses_a_material(tmp_path):
     pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3}'
     foot = Foot.load(foot_file(tmp_path, pad))
+    with pytest.raises(InvalidInput, match='a design needs a pad with a measured stiffness'):
+        design(7.0, 1e-3, foot.pad)
+    with pytest.raises(InvalidInput, match='a pad in a bath needs'):
+        press_wet(foot.pad, 30e3, 0.1, WATER)
     with pytest.raises(InvalidInput, match='calibration needs a pad with a measured stiffness'):
         calibrate.calibrate(None, foot)
