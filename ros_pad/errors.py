@@ -25,9 +25,10 @@ class NoEquilibrium(PadError):
     Attributes
     ----------
     status : str
-        ``no_inflation`` (the dome would grow without limit), ``flattened`` (the contact would
-        cover the pad), ``fold_zone`` (the shape depends on the history of the load) or
-        ``no_rise`` (the equation printed in the thesis has no rise height).
+        ``no_inflation`` (the dome would grow without limit), ``out_of_range`` (the material would
+        be stretched beyond its range), ``flattened`` (the contact would cover the pad),
+        ``fold_zone`` (the shape depends on the history of the load) or ``no_rise`` (the equation
+        printed in the thesis has no rise height).
     """
 
     def __init__(self, message: str, status: str) -> None:

@@ -36,6 +36,7 @@ from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import need_stiffness
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoSurface
 
@@ -114,6 +115,7 @@ def press_wet(
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    need_stiffness('a pad in a bath', pad)
     p = number('pressure', pressure, 'Pa', above=True)
     load = number('force', force, 'N', above=True)
     weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)

@@ -14,6 +14,7 @@ from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.contact.dome import ADHESION_SIGNS
 from ros_pad.contact.dome import MODELS
+from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import largest_pressure
 from ros_pad.errors import NoEquilibrium
 
@@ -107,7 +108,8 @@ def run(options: argparse.Namespace) -> int:
         failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # The membrane model also has solutions above the pressures at which the force limits end.
-    ends = {each: largest_pressure(pad, each) for each in ('measured', 'max_depth', 'flattening')}
+    shown = (each for each in ('measured', 'max_depth', 'flattening') if each in criteria(pad))
+    ends = {each: largest_pressure(pad, each) for each in shown}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
         for criterion, end in ends.items()

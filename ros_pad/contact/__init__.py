@@ -19,6 +19,7 @@ from ros_pad.contact.film import Film
 from ros_pad.contact.film import film_thickness
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import pressure_for
+from ros_pad.contact.material import Material
 from ros_pad.contact.meniscus import THESIS_LIQUID
 from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.meniscus import Liquid
@@ -45,6 +46,7 @@ __all__ = [
     'Foot',
     'Inflated',
     'Liquid',
+    'Material',
     'MeasuredLimit',
     'Meniscus',
     'Pad',

@@ -34,6 +34,7 @@ from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import need_stiffness
 from ros_pad.contact.resistance import FOOT_SETTINGS
 from ros_pad.contact.resistance import LIMIT_SETTINGS
 from ros_pad.contact.resistance import PAD_SETTINGS
@@ -192,6 +193,7 @@ def calibrate(
     """
     number('film_thickness', film_thickness, 'm', above=True)
     number('viscosity', viscosity, 'Pa s', above=True)
+    need_stiffness('calibration', foot.pad)
     constants: list[Constant] = []
     warnings: list[str] = []
     pad = _stiffness(measurements, foot.pad, constants, warnings)

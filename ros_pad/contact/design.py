@@ -31,6 +31,7 @@ from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import broadcast
+from ros_pad.contact.pad import need_stiffness
 from ros_pad.contact.pad import plain
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -367,6 +368,7 @@ def design(
         its pads.
     """
     load = number('load', load, 'N', above=True)
+    need_stiffness('a design', pad)
     area = number('area', area, 'm²', above=True)
     end = largest_pressure(pad, criterion)
     # force_limit can refuse the end itself because of rounding.

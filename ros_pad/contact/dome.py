@@ -42,8 +42,8 @@ BURST = 6.0
 LARGEST_ADHESION = 0.01
 
 Codes: TypeAlias = npt.NDArray[np.int8]
-STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation'])
-OK, NO_CONTACT, FLATTENED, FOLD_ZONE, NO_INFLATION = range(5)
+STATUS = np.array(['ok', 'no_contact', 'flattened', 'fold_zone', 'no_inflation', 'out_of_range'])
+OK, NO_CONTACT, FLATTENED, FOLD_ZONE, NO_INFLATION, OUT_OF_RANGE = range(6)
 # Least-squares fits for start values of Newton's method; they affect time, not results.
 # tan of half the edge angle of the free dome, over P, by falling powers of P up to 6: error 4e-4.
 _FREE_SEED = (
@@ -75,7 +75,8 @@ class Inflated(NamedTuple):
     volume : float or array
         Volume under the dome, m³.
     status : str or array of str
-        ``ok``, or ``no_inflation``, where the numbers are NaN.
+        ``ok``; or ``no_inflation``, or with a material ``out_of_range``, where the numbers are
+        NaN.
     """
 
     height: Floats
@@ -101,7 +102,7 @@ class Pressed(NamedTuple):
         Distance from pad base to floor, m: ``height - depth``, computed without cancellation.
     status : str or array of str
         ``ok``; ``no_contact`` (the free dome, contact radius 0); or ``flattened``, ``fold_zone``,
-        ``no_inflation``, where the numbers are NaN.
+        ``no_inflation``, ``out_of_range``, where the numbers are NaN.
     """
 
     height: Floats
@@ -120,12 +121,15 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     pad : Pad
         Size and material.
     pressure : float or array
-        Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome.
+        Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome. A pad
+        of a material ends at its maximum pressure, or at the end of the material's range
+        (:mod:`ros_pad.contact.hyperelastic`).
 
     Raises
     ------
     NoEquilibrium
-        For a scalar pressure at or above that bound, status ``no_inflation``.
+        For a scalar pressure at or above that bound, status ``no_inflation``, or
+        ``out_of_range`` where the material's range ends first.
     InvalidInput
         When a pressure is negative or not finite.
 
@@ -139,6 +143,10 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     0.001941268
     """
     p = quantity('pressure', pressure, 'Pa')
+    if pad.material is not None:
+        from ros_pad.contact.hyperelastic import inflate_rubber
+
+        return inflate_rubber(pad, p)
     if isinstance(p, float):
         p = float(p)
         deficit = _deficit(pad, p)
@@ -183,14 +191,16 @@ def press(
         tangent.
     model : {'thesis', 'membrane'}
         The spherical dome of thesis 3.44-3.61, or the exact membrane of the same energy
-        (:mod:`ros_pad.contact.membrane`).
+        (:mod:`ros_pad.contact.membrane`). A pad of a material is an exact membrane in both cases
+        (:mod:`ros_pad.contact.hyperelastic`).
 
     Raises
     ------
     NoEquilibrium
         For scalar input without an equilibrium in the model. Its status is ``flattened`` (the
-        contact would cover the whole pad), ``fold_zone`` (pressure above the end of the model) or
-        ``no_inflation`` (pressure at which even the free dome has no equilibrium).
+        contact would cover the whole pad), ``fold_zone`` (pressure above the end of the model),
+        ``no_inflation`` (pressure at which even the free dome has no equilibrium) or
+        ``out_of_range`` (pressure at which the free dome is outside the material's range).
     InvalidInput
         When a value is negative or not finite, shapes do not broadcast, ``adhesion`` or ``model``
         is unknown, or ``adhesion_energy`` is above 0.01 ``stiffness``.
@@ -202,7 +212,7 @@ def press(
     is continuous with the free dome, the floor is above the pad base and the contact is inside the
     rim.
     """
-    if model != 'thesis':
+    if model != 'thesis' or pad.material is not None:
         choice('model', model, MODELS)
         choice('adhesion', adhesion, tuple(ADHESION_SIGNS))
         from ros_pad.contact.membrane import press_membrane

@@ -11,7 +11,8 @@
     The force at which the contact reaches the rim and the model ends.
 
 The last two follow from the model with its default adhesion; the code uses the dimensionless
-variables of :mod:`ros_pad.contact.dome`.
+variables of :mod:`ros_pad.contact.dome`. A pad of a material is a membrane without adhesion, which
+flattens at ``p π r²``; it is no cap, so it has no ``max_depth``.
 """
 
 from __future__ import annotations
@@ -80,14 +81,14 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         When the criterion is unknown, or a pressure is negative, not finite, or above the
         measurements.
     """
-    choice('criterion', criterion, CRITERIA)
+    choice('criterion', criterion, criteria(pad))
     p = quantity('pressure', pressure, 'Pa')
-    a = signed_adhesion(pad, 'matlab')
     tension = p * (pad.radius / pad.stiffness)
-    inside = tension <= largest_tension(a)
+    end, status = _model_end(pad)
+    inside = p <= end
     if np.ndim(p) == 0 and not inside:
-        status = 'fold_zone' if tension < BURST else 'no_inflation'
-        end = largest_tension(a) * pad.stiffness / pad.radius
+        if pad.material is None and tension >= BURST:
+            status = 'no_inflation'
         raise NoEquilibrium(
             f'pressure = {p:g} Pa on {pad} has no force limit: up to {end:.6g} Pa is needed',
             status,
@@ -96,7 +97,10 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_end_of_measurements(pad))
         line = measured_line(pad)
         limit = line.force + line.slope * (p - line.pressure)
+    elif pad.material is not None:
+        limit = p * (math.pi * pad.radius**2)
     else:
+        a = signed_adhesion(pad, 'matlab')
         tension = np.where(inside, tension, 1.0)
         if criterion == 'flattening':
             f = flattening_force(tension, a)
@@ -137,12 +141,11 @@ def pressure_for(
         When the criterion is unknown, a value is negative or not finite, or shapes do not
         broadcast.
     """
-    choice('criterion', criterion, CRITERIA)
+    choice('criterion', criterion, criteria(pad))
     load = quantity('force', force, 'N')
     factor = quantity('margin', margin, '(factor)', above=True)
     load, factor = broadcast('force and margin', load, factor)
     load = load * factor
-    a = signed_adhesion(pad, 'matlab')
     end = largest_pressure(pad, criterion)
     strongest = force_limit(pad, end * (1.0 - 1e-15), criterion)
     carried = load <= strongest
@@ -157,7 +160,10 @@ def pressure_for(
         line = measured_line(pad)
         # A line that is above 0 at pressure 0 carries small forces without any pressure.
         p = np.maximum(line.pressure + (load - line.force) / line.slope, 0.0)
+    elif pad.material is not None:
+        p = load / (math.pi * pad.radius**2)
     else:
+        a = signed_adhesion(pad, 'matlab')
         f = load / (math.pi * pad.stiffness * pad.radius)
         invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
         p = invert(f, a) * (pad.stiffness / pad.radius)
@@ -170,9 +176,24 @@ def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
     This is the end of the model of the pressed dome. For ``measured`` it is at most 91.36 kPa, the
     end of the thesis' line, if the pad has no ``measured_limit`` of its own.
     """
-    choice('criterion', criterion, CRITERIA)
-    end = largest_tension(signed_adhesion(pad, 'matlab')) * pad.stiffness / pad.radius
+    choice('criterion', criterion, criteria(pad))
+    end = _model_end(pad)[0]
     return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
+
+
+def criteria(pad: Pad) -> tuple[str, ...]:
+    """Return the criteria that a pad has: ``max_depth`` is one of the spherical dome alone."""
+    return CRITERIA if pad.material is None else ('measured', 'flattening')
+
+
+def _model_end(pad: Pad) -> tuple[float, str]:
+    """Return the pressure at which the model of the pressed dome ends, Pa, and its status."""
+    if pad.material is not None:
+        from ros_pad.contact.hyperelastic import pressure_end
+
+        return pressure_end(pad)
+    largest = largest_tension(signed_adhesion(pad, 'matlab'))
+    return largest * pad.stiffness / pad.radius, 'fold_zone'
 
 
 def measured_line(pad: Pad) -> MeasuredLimit:

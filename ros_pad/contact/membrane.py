@@ -120,15 +120,22 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
     p, load = quantity('pressure', pressure, 'Pa'), quantity('force', force, 'N')
     p, load = broadcast('pressure and force', p, load)
     r, k = pad.radius, pad.stiffness
-    rows = p.ravel()
-    deficit = (BURST * k / r - rows) * (r / k)
-    lengths, code = _press(rows * (r / k), load.ravel() / (math.pi * k * r), deficit)
+    rows, why = p.ravel(), _WHY
+    if pad.material is not None:
+        from ros_pad.contact.hyperelastic import press_rubber
+        from ros_pad.contact.hyperelastic import refusal
+
+        lengths, code = press_rubber(pad, rows, load.ravel())
+        why = _WHY | refusal(pad)
+    else:
+        deficit = (BURST * k / r - rows) * (r / k)
+        lengths, code = _press(rows * (r / k), load.ravel() / (math.pi * k * r), deficit)
     lengths *= r
     if p.ndim == 0:
         status = str(STATUS[code[0]])
-        if code[0] in _WHY:
+        if code[0] in why:
             what = f'pressure = {p:g} Pa, force = {load:g} N on {pad}'
-            raise NoEquilibrium(f'{what}: {_WHY[int(code[0])]}', status)
+            raise NoEquilibrium(f'{what}: {why[int(code[0])]}', status)
         height, depth, contact, sphere, gap = lengths[:, 0].tolist()
         return Pressed(height, depth, contact, sphere, gap, status)
     height, depth, contact, sphere, gap = lengths.reshape(5, *p.shape)
@@ -163,13 +170,19 @@ def _press(pressure: Array, force: Array, deficit: Array) -> tuple[Array, npt.ND
     t, certain = _rim(p, share, rest, deficit[rows])
     code[rows[~certain]] = NO_INFLATION  # too close to P = 6 to resolve the balance
     gap = _wall(t, share, rest)[2]
-    # Distance from the floor to the centre of the cap through rim and edge of contact.
-    centre = 0.5 * (gap + rest / gap)
+    lengths[:, rows] = np.where(certain, cap_through(gap, share, rest), np.nan)
+    return lengths, code
+
+
+def cap_through(gap: Array, share: Array, rest: Array) -> tuple[Array, ...]:
+    """Return the five lengths of the cap through rim and edge of contact, from the gap.
+
+    ``share`` is the contact radius squared, ``rest`` is 1 less that.
+    """
+    centre = 0.5 * (gap + rest / gap)  # from the floor to the centre of the sphere
     sphere = np.sqrt(centre * centre + share)
     depth = share / (sphere + centre)
-    cap = gap + depth, depth, np.sqrt(share), sphere, gap
-    lengths[:, rows] = np.where(certain, cap, np.nan)
-    return lengths, code
+    return gap + depth, depth, np.sqrt(share), sphere, gap
 
 
 def _wall(t: Array, share: Array, rest: Array) -> tuple[Array, Array, Array]:

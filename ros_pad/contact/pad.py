@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 from typing import TypeAlias
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import number
+from ros_pad.contact.material import Material
 from ros_pad.errors import InvalidInput
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -75,11 +77,17 @@ class Pad:
     stiffness : float
         Tension stiffness of the membrane, N/m, above 0. 40 N/m (Dragon Skin 10) is valid for the
         pressure law of the thesis only: another law needs another constant for the same membrane.
+        With a material it is shear modulus times thickness, and only a unit.
     adhesion_energy : float
         Work of adhesion between pad and floor, J/m², from 0.
     measured_limit : MeasuredLimit, optional
         Force limits measured on this pad. By default those of the thesis' large pad, in
         proportion to the area.
+    material : Material, optional
+        Law of the rubber: the pad is then an exact membrane without adhesion. Such pads are made
+        by :meth:`Pad.of`.
+    thickness : float, optional
+        Thickness of the flat pad, m, needed with a material.
 
     Raises
     ------
@@ -91,6 +99,8 @@ class Pad:
     stiffness: float
     adhesion_energy: float = 0.006
     measured_limit: MeasuredLimit | None = None
+    material: Material | None = None
+    thickness: float | None = None
 
     def __post_init__(self) -> None:
         number('radius', self.radius, 'm', above=True)
@@ -101,9 +111,69 @@ class Pad:
                 f'measured_limit = {self.measured_limit!r} is not allowed: a MeasuredLimit or None'
                 ' is needed'
             )
+        if not isinstance(self.material, Material | None):
+            raise InvalidInput(
+                f'material = {self.material!r} is not allowed: a Material or None is needed'
+            )
+        if (self.material is None) != (self.thickness is None):
+            raise InvalidInput(
+                f'material = {self.material} and thickness = {self.thickness} are not allowed:'
+                ' both or none are needed'
+            )
+        if self.material is not None and self.thickness is not None:
+            # A disc as thick as it is wide is no membrane.
+            number('thickness', self.thickness, 'm', 0.0, self.radius, above=True)
+            unit = self.material.shear_modulus * self.thickness
+            if not math.isclose(self.stiffness, unit, rel_tol=1e-9):
+                raise InvalidInput(
+                    f'stiffness = {self.stiffness:g} N/m is not allowed with a material: its'
+                    f' shear modulus times thickness, {unit:g} N/m, is needed (see Pad.of)'
+                )
+
+    @classmethod
+    def of(
+        cls,
+        material: Material,
+        radius: float,
+        thickness: float,
+        measured_limit: MeasuredLimit | None = None,
+    ) -> Pad:
+        """Return a pad of a material.
+
+        Parameters
+        ----------
+        material : Material
+            Law of the rubber.
+        radius : float
+            Radius of the flat pad, m, above 0.
+        thickness : float
+            Thickness of the flat pad, m, above 0 up to the radius.
+        measured_limit : MeasuredLimit, optional
+            As for :class:`Pad`.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or outside its range, or ``material`` is no `Material`.
+        """
+        if not isinstance(material, Material):
+            raise InvalidInput(f'material = {material!r} is not allowed: a Material is needed')
+        number('radius', radius, 'm', above=True)
+        number('thickness', thickness, 'm', 0.0, radius, above=True)
+        stiffness = material.shear_modulus * thickness
+        return cls(radius, stiffness, 0.0, measured_limit, material, thickness)
 
     def __str__(self) -> str:
+        if self.material is not None:
+            made = f'thickness = {self.thickness:g} m of {self.material}'
+            return f'a pad with radius = {self.radius:g} m and {made}'
         return f'a pad with radius = {self.radius:g} m and stiffness = {self.stiffness:g} N/m'
+
+
+def need_stiffness(what: str, pad: Pad) -> None:
+    """Raise `InvalidInput` for a pad of a material where the law of the thesis is computed."""
+    if pad.material is not None:
+        raise InvalidInput(f'{what} needs a pad with a measured stiffness, and not {pad}')
 
 
 DOME_PRESSURE = 1000.0

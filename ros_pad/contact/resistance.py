@@ -37,6 +37,7 @@ from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
+from ros_pad.contact.material import Material
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import broadcast
@@ -66,6 +67,13 @@ PAD_SETTINGS = (
     Setting('adhesion_energy', float, 'Work of adhesion on the floor.', 'J/m²', 0.0, 1.0),
 )
 """Settings of each pad in a foot file."""
+
+RUBBER_SETTINGS = (
+    PAD_SETTINGS[0],
+    Setting('material', str, 'Name of a shipped material, or path of a material file.'),
+    Setting('thickness', float, 'Thickness of the flat pad.', 'm', 1e-5, 1e-2),
+)
+"""Settings of each pad in a foot file that names a material."""
 
 LIMIT_SETTINGS = (
     Setting('force', float, 'Largest normal force at this pressure.', 'N', 0.0, 1e3),
@@ -208,7 +216,7 @@ class Foot:
         table = Table.load(path)
         table.text('description', default='')
         with table.table('pad') as part:
-            pad = Pad(**part.values(PAD_SETTINGS), measured_limit=_measured_limit(part))
+            pad = _pad(part)
         values = table.values(FOOT_SETTINGS)
         limit = table.choice('force_limit', FORCE_LIMITS, default='measured')
         table.finish()
@@ -329,6 +337,18 @@ class Foot:
         """Return the resistance, N, on a film, from the dry resistance and the load, N."""
         touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
         return touching * dry + (1.0 - touching) * self.boundary_friction * load
+
+
+def _pad(table: Table) -> Pad:
+    line = _measured_limit(table)
+    if 'material' not in table:
+        return Pad(**table.values(PAD_SETTINGS), measured_limit=line)
+    values = table.values(RUBBER_SETTINGS)
+    material = Material.load(values.pop('material'))
+    try:
+        return Pad.of(material, **values, measured_limit=line)
+    except InvalidInput as error:
+        raise ConfigError(f'{table.origin}: {error}') from error
 
 
 def _measured_limit(pad_table: Table) -> MeasuredLimit | None:

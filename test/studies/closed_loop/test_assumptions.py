@@ -24,7 +24,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 PAGE = ROOT / 'docs' / 'assumptions.md'
 DOCUMENT = ROOT / 'docs' / 'charts' / 'assumptions.json'
 FILES = sorted(
-    path for kind in ('feet', 'robots', 'scenes') for path in ROOT.glob(f'config/{kind}/*.yaml')
+    path
+    for kind in ('feet', 'materials', 'robots', 'scenes')
+    for path in ROOT.glob(f'config/{kind}/*.yaml')
 )
 STATUSES = ('thesis', 'measured', 'data', 'derived', 'assumed', 'chosen')
 

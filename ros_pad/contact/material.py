@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rubber by its strain energy: law, parameters, and the stretch up to which they hold.
+
+The energy W is per volume of the undeformed body, which keeps its volume: λ1 λ2 λ3 = 1. With
+``I1 = λ1² + λ2² + λ3²``, ``I2 = 1/λ1² + 1/λ2² + 1/λ3²`` and ``J = I1 - 3`` the laws are
+
+| law | W | parameters |
+|---|---|---|
+| ``yeoh`` | C1 J + C2 J² + C3 J³ | C1, C2, C3, Pa |
+| ``neo_hookean`` | μ/2 J | μ, Pa; or μ/2, 0, 0 as for ``yeoh`` |
+| ``mooney_rivlin`` | C10 (I1 - 3) + C01 (I2 - 3) | C10, C01, Pa |
+| ``ogden`` | Σ μi/αi (λ1^αi + λ2^αi + λ3^αi - 3) | μ1, Pa, α1, μ2, α2 and so on |
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from dataclasses import field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ros_pad import configuration
+from ros_pad.configuration import Table
+from ros_pad.configuration import choice
+from ros_pad.configuration import number
+from ros_pad.configuration import text
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+
+LAWS = {
+    'yeoh': ('C1', 'C2', 'C3'),
+    'neo_hookean': ('mu',),
+    'mooney_rivlin': ('C10', 'C01'),
+    'ogden': ('mu1', 'alpha1'),
+}
+"""Laws and the names of their parameters; ``ogden`` may have several such pairs."""
+
+SOFTEST, STIFFEST = 100.0, 1e8
+"""Shear moduli of a rubber, Pa: outside, the unit of the parameters must be wrong."""
+
+LARGEST_STRETCH = 20.0
+"""Largest uniaxial stretch for which a material may be declared to hold."""
+UNKNOWN_STRETCH = 5.0
+"""Uniaxial stretch up to which shapes are computed where the range of a material is unknown."""
+LEAST_STRETCH = 2.0
+"""A law of unknown range must have stable equibiaxial states up to this stretch."""
+
+_Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Material:
+    """A rubber.
+
+    Parameters
+    ----------
+    law : {'yeoh', 'neo_hookean', 'mooney_rivlin', 'ogden'}
+        Form of the strain energy; see the module's docstring.
+    parameters : sequence of float
+        Its parameters in the order of that table, Pa; the exponents of ``ogden`` have no unit.
+    largest_stretch : float, optional
+        Uniaxial stretch up to which the parameters hold, above 1 up to 20. In other states of
+        strain they hold up to the same I1, which is how far a tensile test says something about
+        them. By default unknown; shapes are then computed up to 5.
+    source : str
+        Where the parameters are from.
+
+    Raises
+    ------
+    InvalidInput
+        When the law is unknown, a parameter is missing or not finite, the shear modulus is not
+        that of a rubber, or the law has no stable states in its range, as with a negative C01.
+
+    Examples
+    --------
+    >>> Material('yeoh', (26258.19, 1854.391, -35.0519), 4.5).shear_modulus
+    52516.38
+    """
+
+    law: str
+    parameters: tuple[float, ...]
+    largest_stretch: float | None = None
+    source: str = field(default='', compare=False)
+
+    def __post_init__(self) -> None:
+        choice('law', self.law, tuple(LAWS))
+        given = np.atleast_1d(configuration.quantity('parameters', self.parameters, 'Pa', -np.inf))
+        names = LAWS[self.law]
+        fits = given.size == len(names)
+        fits |= self.law == 'ogden' and given.size % 2 == 0 < given.size
+        # A neo-Hookean rubber may be written as the Yeoh law that it is.
+        fits |= self.law == 'neo_hookean' and given.size == 3 and not given[1:].any()
+        if given.ndim != 1 or not fits:
+            more = ', mu2, alpha2 and so on' if self.law == 'ogden' else ''
+            raise InvalidInput(
+                f'parameters = {configuration.shown(self.parameters)} is not allowed: the law'
+                f' {self.law} needs {", ".join(names)}{more}'
+            )
+        object.__setattr__(self, 'parameters', tuple(given.tolist()))
+        text('source', self.source)
+        if self.largest_stretch is not None:
+            most = number('largest_stretch', self.largest_stretch, '', 1.0, LARGEST_STRETCH, True)
+            object.__setattr__(self, 'largest_stretch', most)
+        self._check_size()
+        self._check_stability()
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str]) -> Material:
+        """Read ``config/materials/<name>.yaml`` or another material file.
+
+        Raises
+        ------
+        ConfigError
+            When the file is missing, or a key or value is not allowed.
+        """
+        table = Table.load(configuration.locate('materials', name_or_path))
+        law = table.choice('law', tuple(LAWS))
+        names = LAWS[law]
+        with table.table('parameters') as part:
+            if law == 'ogden':
+                pairs = range(1, max(len(part.keys) // 2, 1) + 1)
+                names = tuple(f'{name}{k}' for k in pairs for name in ('mu', 'alpha'))
+            parameters = tuple(part.number(name, 'Pa') for name in names)
+        most = None
+        if 'largest_stretch' in table:
+            most = table.number('largest_stretch', '', 1.0, LARGEST_STRETCH)
+        source = table.text('source')
+        for remark in ('description', 'licence', 'doubts'):
+            table.text(remark, default='')
+        table.finish()
+        try:
+            return cls(law, parameters, most, source)
+        except InvalidInput as error:
+            raise ConfigError(f'{table.origin}: {error}') from error
+
+    def __str__(self) -> str:
+        return f'{self.law} {" ".join(f"{each:g}" for each in self.parameters)}'
+
+    @cached_property
+    def shear_modulus(self) -> float:
+        """Shear modulus at small strain, Pa."""
+        p = self.parameters
+        if self.law == 'ogden':
+            return 0.5 * sum(m * a for m, a in zip(p[::2], p[1::2], strict=True))
+        if self.law == 'neo_hookean' and len(p) == 1:
+            return p[0]
+        return 2.0 * (p[0] + p[1]) if self.law == 'mooney_rivlin' else 2.0 * p[0]
+
+    @cached_property
+    def range_end(self) -> float:
+        """The equibiaxial stretch up to which the material holds, less 1."""
+        return min(equibiaxial(self.largest_stretch or UNKNOWN_STRETCH), self.stable_end)
+
+    @property
+    def uniaxial_end(self) -> float:
+        """The uniaxial stretch with the I1 of that equibiaxial one."""
+        square = (1.0 + self.range_end) ** 2
+        return float(np.roots([1.0, 0.0, -(2.0 * square + square**-2), 2.0]).real.max())
+
+    @cached_property
+    def stable_end(self) -> float:
+        """The equibiaxial stretch up to which shapes can be computed, less 1."""
+        most = equibiaxial(max(self.largest_stretch or 0.0, UNKNOWN_STRETCH))
+        return 0.98 * self._stable_end(1.05 * most)
+
+    @cached_property
+    def unit_law(self) -> tuple[str, tuple[float, ...]]:
+        """Return the law as ``yeoh`` or ``ogden``, with parameters over the shear modulus."""
+        p, mu = self.parameters, self.shear_modulus
+        if self.law == 'mooney_rivlin':
+            return 'ogden', (2.0 * p[0] / mu, 2.0, -2.0 * p[1] / mu, -2.0)
+        if self.law == 'ogden':
+            return 'ogden', tuple(
+                each if k % 2 else each / mu for k, each in enumerate(self.parameters)
+            )
+        return 'yeoh', (0.5, 0.0, 0.0) if len(p) == 1 else tuple(each / mu for each in p)
+
+    def _check_size(self) -> None:
+        mu = self.shear_modulus
+        if not SOFTEST <= mu <= STIFFEST:
+            hint = ' (are the parameters in MPa or kPa?)' if 0.0 < mu < SOFTEST else ''
+            raise InvalidInput(
+                f'parameters = {self.parameters!r} is not allowed: they give a shear modulus of'
+                f' {mu:g} Pa, and a rubber has {SOFTEST:g} to {STIFFEST:g} Pa{hint}'
+            )
+
+    def _check_stability(self) -> None:
+        known = self.largest_stretch
+        needed = LEAST_STRETCH - 1.0 if known is None else equibiaxial(known)
+        end = self._stable_end(needed)
+        if end < needed:
+            negative = ' (C01 is negative)' if self.law == 'mooney_rivlin' and end else ''
+            raise InvalidInput(
+                f'parameters = {self.parameters!r} is not allowed: the law {self.law} loses'
+                f' ellipticity at an equibiaxial stretch of {1.0 + end:.4g}{negative}, where more'
+                f' stretch needs less tension; at least {1.0 + needed:.4g} is needed'
+                + (', or another largest_stretch' if known is None else ', or a smaller range')
+            )
+
+    def _stable_end(self, most: float) -> float:
+        """Return the equibiaxial strain up to which the law is elliptic, at most ``most``.
+
+        Tension is positive, and more stretch along or across needs more of it; this is also
+        checked in pure shear up to the same I1, which is the state at the rim of a dome.
+        """
+        strain = np.linspace(0.0, most, 801)[1:]
+        stretch = 1.0 + strain
+        rise = 2.0 * stretch**2 + stretch**-4 - 1.0  # λ² + 1/λ² of pure shear
+        shear = np.sqrt(0.5 * (rise + np.sqrt(rise**2 - 4.0)))
+        stable = np.ones(strain.size, dtype=bool)
+        for along, across in ((stretch, stretch), (shear, np.ones_like(shear))):
+            pull, _, more, cross = tensions(self.unit_law, np.log(along), np.log(across))
+            stable &= (pull > 0.0) & (more > 0.0) & ((more - cross) * along + pull > 0.0)
+        lost = np.flatnonzero(~stable)
+        return float(strain[lost[0]]) if lost.size else most
+
+
+def equibiaxial(stretch: float) -> float:
+    """Return the equibiaxial stretch, less 1, with the I1 of a uniaxial stretch."""
+    invariant = stretch**2 + 2.0 / stretch
+    square = np.roots([2.0, -invariant, 0.0, 1.0]).real.max()
+    return float(np.sqrt(square) - 1.0)
+
+
+def tensions(
+    law: tuple[str, tuple[float, ...]], first: _Array, second: _Array
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """Return ``dW/dλ1``, ``dW/dλ2``, ``d²W/dλ1²`` and ``d²W/dλ1 dλ2`` of a sheet.
+
+    Parameters
+    ----------
+    law : tuple
+        From :attr:`Material.unit_law`.
+    first, second : array
+        Logarithms of the stretches λ1 and λ2 in the plane: nothing cancels near 1.
+    """
+    kind, p = law
+    a, b = np.exp(first), np.exp(second)
+    if kind == 'yeoh':
+        c1, c2, c3 = p
+        along, across, thin = (np.expm1(2.0 * x) for x in (first, second, -first - second))
+        invariant = along + across + thin
+        slope = c1 + invariant * (2.0 * c2 + invariant * 3.0 * c3)
+        bend = 2.0 * c2 + 6.0 * c3 * invariant
+        one, two = 2.0 * (along - thin) / a, 2.0 * (across - thin) / b
+        square = 1.0 + thin
+        return (
+            slope * one,
+            slope * two,
+            slope * (2.0 + 6.0 * square / (a * a)) + bend * one * one,
+            slope * 4.0 * square / (a * b) + bend * one * two,
+        )
+    sums = [np.zeros_like(a) for _ in range(4)]
+    for m, alpha in zip(p[::2], p[1::2], strict=True):
+        along, across, thin = (np.expm1(alpha * x) for x in (first, second, -first - second))
+        sums[0] += m * (along - thin) / a
+        sums[1] += m * (across - thin) / b
+        sums[2] += m * ((alpha - 1.0) * (1.0 + along) + (alpha + 1.0) * (1.0 + thin)) / (a * a)
+        sums[3] += m * alpha * (1.0 + thin) / (a * b)
+    return sums[0], sums[1], sums[2], sums[3]

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad import configuration
+from ros_pad.capillary.coupling import press_wet
+from ros_pad.contact import WATER
+from ros_pad.contact import Foot
+from ros_pad.contact import Material
+from ros_pad.contact import Pad
+from ros_pad.contact import calibrate
+from ros_pad.contact import design
+from ros_pad.contact.material import equibiaxial
+from ros_pad.contact.material import tensions
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+
+YEOH = (26258.18995463, 1854.39136388, -35.05189509)
+LAWS = [
+    ('yeoh', YEOH),
+    ('neo_hookean', (1.5e5,)),
+    ('mooney_rivlin', (1e5, 1e4)),
+    ('ogden', (6.3e5, 1.3, 1.2e3, 5.0, -1e4, -2.0)),
+]
+
+
+def energy(law, p, a, b):
+    """Return the strain energy of the definitions, written out."""
+    c = 1.0 / (a * b)
+    first, second = a * a + b * b + c * c, a**-2 + b**-2 + c**-2
+    if law == 'yeoh':
+        return sum(each * (first - 3.0) ** k for k, each in enumerate(p, 1))
+    if law == 'neo_hookean':
+        return 0.5 * p[0] * (first - 3.0)
+    if law == 'mooney_rivlin':
+        return p[0] * (first - 3.0) + p[1] * (second - 3.0)
+    pairs = zip(p[::2], p[1::2], strict=True)
+    return sum(m / k * (a**k + b**k + c**k - 3.0) for m, k in pairs)
+
+
+@pytest.mark.parametrize(('law', 'parameters'), LAWS)
+def test_tensions_are_derivatives_of_the_energy(law, parameters):
+    material = Material(law, parameters)
+    mu, d = material.shear_modulus, 1e-4
+    for a, b in [(1.0, 1.0), (1.3, 1.1), (2.0, 2.0), (1.8, 1.0)]:
+
+        def w(x, y, a=a, b=b):
+            return energy(law, parameters, a + x * d, b + y * d) / mu
+
+        pull, push, more, cross = tensions(material.unit_law, np.log(a), np.log(b))
+        assert pull == pytest.approx((w(1, 0) - w(-1, 0)) / (2 * d), rel=1e-6, abs=1e-7)
+        assert push == pytest.approx((w(0, 1) - w(0, -1)) / (2 * d), rel=1e-6, abs=1e-7)
+        assert more == pytest.approx((w(1, 0) - 2 * w(0, 0) + w(-1, 0)) / d**2, rel=1e-5)
+        mixed = w(1, 1) - w(1, -1) - w(-1, 1) + w(-1, -1)
+        assert cross == pytest.approx(mixed / (4 * d * d), rel=1e-5)
+
+
+def test_shear_modulus():
+    found = [Material(*each).shear_modulus for each in LAWS]
+    ogden = 0.5 * (6.3e5 * 1.3 + 1.2e3 * 5.0 + 1e4 * 2.0)
+    assert found == pytest.approx([2 * YEOH[0], 1.5e5, 2.2e5, ogden], rel=1e-14)
+    # A neo-Hookean rubber in the numbers of the Yeoh law has half the modulus as its first.
+    assert Material('neo_hookean', (7.5e4, 0, 0)).shear_modulus == 1.5e5
+
+
+def test_equal_materials_are_equal_whatever_their_source():
+    assert Material('yeoh', list(YEOH), 4.5, 'here') == Material('yeoh', np.array(YEOH), 4.5)
+
+
+def test_the_range_is_one_of_the_invariant():
+    stretch = 1.0 + equibiaxial(3.9)
+    assert 2 * stretch**2 + stretch**-4 == pytest.approx(3.9**2 + 2 / 3.9, rel=1e-14)
+    assert stretch == pytest.approx(2.8, abs=0.02)
+    assert Material('yeoh', YEOH, 3.9).uniaxial_end == pytest.approx(3.9, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        (('rubber', YEOH), 'law = .*yeoh, neo_hookean, mooney_rivlin, ogden'),
+        (('yeoh', YEOH[:2]), 'needs C1, C2, C3'),
+        (('yeoh', [YEOH]), 'needs C1, C2, C3'),
+        (('neo_hookean', (7.5e4, 1.0, 0.0)), 'needs mu'),
+        (('mooney_rivlin', (1e5,)), 'needs C10, C01'),
+        (('ogden', (1e5, 2.0, 1e5)), 'needs mu1, alpha1, mu2, alpha2'),
+        (('ogden', ()), 'needs mu1'),
+        (('yeoh', (math.nan, 0.0, 0.0)), 'parameters = nan'),
+        (('yeoh', 'soft'), "parameters = 'soft'"),
+        (('yeoh', (0.02626, 0.001854, -3.505e-5)), r'shear modulus of 0\.05252 Pa.*MPa'),
+        (('neo_hookean', (150.0e9,)), 'shear modulus of 1.5e.11 Pa'),
+        (('neo_hookean', (-1.5e5,)), 'shear modulus of -150000 Pa'),
+        # The fits to the database: C01 < 0, useless under biaxial load.
+        (('mooney_rivlin', (59960.6, -52695.7)), r'ellipticity .* stretch of 1\.067 \(C01'),
+        (('mooney_rivlin', (1e5, -1e4), 6.0), r'ellipticity .* 3\.1.* smaller range'),
+        # A fit to 2.5 with C3 < 0 does not hold over the whole range of the data.
+        (('yeoh', (21741.5, 2979.07, -105.9), 11.4), r'ellipticity .* 2\.7'),
+        (('yeoh', YEOH, 1.0), r'largest_stretch = 1\.0'),
+        (('yeoh', YEOH, 21.0), r'largest_stretch = 21\.0'),
+        (('yeoh', YEOH, 4.5, None), 'source = None'),
+    ],
+)
+def test_bad_materials(values, words):
+    with pytest.raises(InvalidInput, match=words):
+        Material(*values)
+
+
+def test_a_small_negative_c01_may_hold_over_a_small_range():
+    assert Material('mooney_rivlin', (1e5, -1e4), 4.0).shear_modulus == 1.8e5
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        (('rubber', 1e-3, 1e-4), "material = 'rubber'"),
+        ((Material('yeoh', YEOH), 1e-3, 1.1e-3), r'thickness = 0\.0011 .* up to 0\.001 m'),
+        ((Material('yeoh', YEOH), 1e-3, 0.0), r'thickness = 0\.0 '),
+        ((Material('yeoh', YEOH), math.nan, 1e-4), 'radius = nan'),
+    ],
+)
+def test_bad_pads(values, words):
+    with pytest.raises(InvalidInput, match=words):
+        Pad.of(*values)
+
+
+def test_a_pad_is_of_a_material_or_has_a_stiffness_of_its_own():
+    material = Material('yeoh', YEOH)
+    assert Pad.of(material, 1.5e-3, 4e-4).stiffness == material.shear_modulus * 4e-4
+    for values in [{'material': material}, {'thickness': 4e-4}]:
+        with pytest.raises(InvalidInput, match='both or none'):
+            Pad(1.5e-3, 40.0, **values)
+    with pytest.raises(InvalidInput, match='stiffness = 40 N/m is not allowed with a material'):
+        Pad(1.5e-3, 40.0, material=material, thickness=4e-4)
+    with pytest.raises(InvalidInput, match=r"material = 'DS10'"):
+        Pad(1.5e-3, 40.0, material='DS10', thickness=4e-4)
+
+
+def test_shipped_materials_load_with_source_licence_and_doubts():
+    names = configuration.names('materials')
+    assert len(names) == 6
+    for name in names:
+        material = Material.load(name)
+        assert 'doi 10.1089/soro.2019.0115' in material.source
+        text = (configuration.shared_folder() / 'materials' / f'{name}.yaml').read_text()
+        assert 'ODbL 1.0' in text and 'crosshead' in text and 'factor of 1.5 to 2.1' in text
+    assert Material.load('dragon_skin_10') == Material('yeoh', YEOH, 4.5)
+
+
+OGDEN = (
+    'law: ogden\nparameters: {mu1: 6.3e+5, alpha1: 1.3, mu2: 1.2e+3, alpha2: 5.0}\nsource: me\n'
+)
+
+
+def test_a_material_file_of_ones_own(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(OGDEN)
+    assert Material.load(path) == Material('ogden', (6.3e5, 1.3, 1.2e3, 5.0))
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('alpha2', 'beta2', "'alpha2' is missing"),
+        ('1.3, mu2: 1.2e+3', '1.0e-5, mu2: 1.2e-3', 'mine.yaml: parameters = .* MPa'),
+        ('source: me', 'source: me\nrange: 3', "unknown key 'range'"),
+        ('source: me', 'source: me\nlargest_stretch: 0.5', 'largest_stretch = 0.5'),
+        ('law: ogden', 'law: yeoh', "'C1' is missing"),
+    ],
+)
+def test_bad_material_files(tmp_path, old, new, words):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(OGDEN.replace(old, new))
+    with pytest.raises(ConfigError, match=words):
+        Material.load(path)
+
+
+def test_an_unknown_material_lists_the_shipped_ones():
+    with pytest.raises(ConfigError, match=r'no material named .*dragon_skin_10, .*ecoflex_00_50'):
+        Material.load('dragon_skin')
+
+
+def foot_file(tmp_path, pad, ceiling='40.0e+3'):
+    shipped = configuration.locate('feet', 'large37').read_text()
+    kept = shipped[: shipped.index('pad:')] + shipped[shipped.index('pads:') :]
+    lines = [line for line in kept.splitlines() if not line.startswith('ceiling:')]
+    path = tmp_path / 'foot.yaml'
+    path.write_text('\n'.join([*lines, f'pad: {pad}', f'ceiling: {ceiling}', '']))
+    return path
+
+
+def test_a_foot_names_material_radius_and_thickness(tmp_path):
+    pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3}'
+    foot = Foot.load(foot_file(tmp_path, pad))
+    assert foot.pad == Pad.of(Material.load('dragon_skin_10'), 1.5e-3, 0.4e-3)
+    assert foot.air_volume(40e3) > foot.air_volume(20e3) > foot.chamber_volume
+    with pytest.raises(ConfigError, match=r'ceiling = 50000 Pa is not allowed: .* 46636\.9 Pa'):
+        Foot.load(foot_file(tmp_path, pad, '50.0e+3'))
+    with pytest.raises(ConfigError, match=r'foot\.yaml: pad: thickness = 0\.002'):
+        Foot.load(foot_file(tmp_path, pad.replace('0.4e-3', '2.0e-3')))
+    with pytest.raises(ConfigError, match="unknown key 'stiffness'"):
+        Foot.load(foot_file(tmp_path, pad.replace('{', '{stiffness: 40.0, ')))
+
+
+def test_what_needs_a_stiffness_refuses_a_material(tmp_path):
+    pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3}'
+    foot = Foot.load(foot_file(tmp_path, pad))
+    with pytest.raises(InvalidInput, match='a design needs a pad with a measured stiffness'):
+        design(7.0, 1e-3, foot.pad)
+    with pytest.raises(InvalidInput, match='a pad in a bath needs'):
+        press_wet(foot.pad, 30e3, 0.1, WATER)
+    with pytest.raises(InvalidInput, match='calibration needs a pad with a measured stiffness'):
+        calibrate.calibrate(None, foot)
