@@ -108,8 +108,8 @@ def run(options: argparse.Namespace) -> int:
         failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # The membrane model also has solutions above the pressures at which the force limits end.
-    shown = (each for each in ('measured', 'max_depth', 'flattening') if each in criteria(pad))
-    ends = {each: largest_pressure(pad, each) for each in shown}
+    shown = [each for each in ('measured', 'max_depth', 'flattening') if each in criteria(pad)]
+    ends: dict[str, float] = {each: largest_pressure(pad, each) for each in shown}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
         for criterion, end in ends.items()

@@ -26,6 +26,7 @@ w up to the maximum pressure of the free dome, so there is one root.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import Any
 from typing import NamedTuple
@@ -56,6 +57,8 @@ Law = tuple[str, tuple[float, ...]]
 _CHUNK = 4096
 # States integrated together: with more, BLAS would start threads for each step.
 _TOGETHER = 1000
+# Most evaluations of the equations in one integration; usual are 2,000.
+_EVALUATIONS = 20000
 # Relative tolerance of the integration.
 _TOLERANCE = 1e-11
 # The free dome is one with a contact of this radius, relative to μ h/p.
@@ -217,12 +220,18 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         pairs = zip(np.array_split(strain, parts), np.array_split(disc, parts), strict=True)
         found = [shapes(law, *pair, tolerance) for pair in pairs]
         return Shapes(*(np.concatenate(each) for each in zip(*found, strict=True)))
+    count = itertools.count()
     stretch = 1.0 + strain
     start = disc * stretch**2 / tensions(law, np.log(stretch), np.log(stretch))[0]
     start = start / (2.0 + start)  # angle at which the wall has left the contact
 
     def rates(angle: Array, run: Array, along: Array, across: Array) -> tuple[Array, ...]:
         """Return the rates of R, λ1, λ2, z and V over the angle."""
+        if next(count) > _EVALUATIONS:
+            raise InvalidInput(
+                f'the law {law[0]} {law[1]} (over its shear modulus) is too steep to be'
+                ' integrated: a smaller largest_stretch is needed'
+            )
         pull, push, more, cross = tensions(law, np.log1p(along), np.log1p(across))
         one, two = 1.0 + along, 1.0 + across
         flat, sine, drop = disc + run, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2
