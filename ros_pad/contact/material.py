@@ -192,7 +192,11 @@ class Material:
         needed = LEAST_STRETCH - 1.0 if known is None else equibiaxial(known)
         end = self._stable_end(needed)
         if end < needed:
-            negative = ' (C01 is negative)' if self.law == 'mooney_rivlin' and end else ''
+            negative = (
+                ' (C01 is negative)'
+                if self.law == 'mooney_rivlin' and self.parameters[1] < 0.0
+                else ''
+            )
             raise InvalidInput(
                 f'parameters = {self.parameters!r} is not allowed: the law {self.law} loses'
                 f' ellipticity at an equibiaxial stretch of {1.0 + end:.4g}{negative}, where more'
@@ -203,7 +207,7 @@ class Material:
     def _stable_end(self, most: float) -> float:
         """Return the equibiaxial strain up to which the law is elliptic, at most ``most``.
 
-        Tension is positive, and more stretch along or across needs more of it; this is also
+        Tension is positive and rises with stretch, and the longer way has more of it; this is also
         checked in pure shear up to the same I1, which is the state at the rim of a dome.
         """
         strain = np.linspace(0.0, most, 801)[1:]
@@ -212,8 +216,8 @@ class Material:
         shear = np.sqrt(0.5 * (rise + np.sqrt(rise**2 - 4.0)))
         stable = np.ones(strain.size, dtype=bool)
         for along, across in ((stretch, stretch), (shear, np.ones_like(shear))):
-            pull, _, more, cross = tensions(self.unit_law, np.log(along), np.log(across))
-            stable &= (pull > 0.0) & (more > 0.0) & ((more - cross) * along + pull > 0.0)
+            pull, push, more, _ = tensions(self.unit_law, np.log(along), np.log(across))
+            stable &= (pull > 0.0) & (more > 0.0) & (along * pull >= across * push)
         lost = np.flatnonzero(~stable)
         return float(strain[lost[0]]) if lost.size else most
 

@@ -106,6 +106,10 @@ def test_bad_materials(values, words):
         Material(*values)
 
 
+def test_a_large_positive_c01_is_stable():
+    assert Material('mooney_rivlin', (2e4, 8e4), 6.0).shear_modulus == 2e5
+
+
 def test_a_small_negative_c01_may_hold_over_a_small_range():
     assert Material('mooney_rivlin', (1e5, -1e4), 4.0).shear_modulus == 1.8e5
 
