@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import abc
 import functools
 import math
 from collections.abc import Callable
@@ -71,7 +72,7 @@ def odometry(robot: Robot, log: Log, course: Course, radius: float) -> Rows:
     return rows
 
 
-class _Filter:
+class _Filter(abc.ABC):
     """What both filters have: state, start from the readings at rest, rolling, rows.
 
     Errors of rotation, velocity and position are the first nine of the covariance.
@@ -98,9 +99,9 @@ class _Filter:
         self.turn = rotation(axis)
         self.biases[0] = log.gyro[still].mean(0)
 
+    @abc.abstractmethod
     def update(self, gyro: Array, force: Array, q: Array, dq: Array, stands: Flags) -> Array:
         """Process a sample; return the slip velocities of the feet, (legs, 3), m/s."""
-        raise NotImplementedError
 
     def _rolling(self, feet: _Feet, rate: Array) -> Array:
         radius = self._robot.foot_radius

@@ -83,7 +83,7 @@ def test_legs_that_slip_most_of_all_under_a_load_are_not_named():
 
 
 def paced(slipping, seconds=12.0):
-    """Return the Legs of a quadruped whose standing feet slip as a function of the step says."""
+    """Return the Legs of a quadruped whose feet slip in the steps that a function gives."""
     legs = Legs(Robot.load('go2'))
     for row in range(round(seconds / PERIOD)):
         legs.update(PERIOD, STAND, slipping(row), np.full(4, 0.15), np.full(4, 0.2))
