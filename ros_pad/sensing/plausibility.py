@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Readings that contradict each other.
 
-Sensors that repeat, foot sensors that show a force in the air, joints whose velocity is not theirs,
-legs that move against the others, joints later than the IMU.
+Sensors that repeat, force sensors that are off zero in the air, joints whose velocity is not
+theirs, legs that move against the others, joints later than the IMU.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ ALIKE = 0.15
 """Largest median of their distances from it, over it: contacts that last are not alike."""
 
 NOTHING, TOO_MUCH = 0.05, 0.5
-"""Shares of the expected load up to which a reading in the air is left as it is (contacts begin and
-end while a foot moves), and above which it is no error of the sensor alone."""
+"""Shares of the expected load up to which readings in the air are left as they are (contacts begin
+and end while feet move), and above which they are no error of the sensor alone."""
 
 STRETCH = 0.5
 """Time over which joint positions are compared with their velocities, s."""
@@ -150,7 +150,7 @@ class Unloaded:
         Whether an error was found in the last sample: until then that foot seemed to stand.
     """
 
-    def __init__(self, names: tuple[str, ...], expected: float) -> None:
+    def __init__(self, names: tuple[str | int, ...], expected: float) -> None:
         self._names, self._expected = names, expected
         self._rows = np.zeros((len(names), READINGS, 3))
         self._count = np.zeros(len(names), dtype=int)
@@ -174,7 +174,7 @@ class Unloaded:
         self.found = False
         if time >= self._next:
             self._next = time + APART
-            for leg in np.flatnonzero(np.abs(climbing) > SWINGS):
+            for leg in np.flatnonzero(np.abs(climbing) > SWINGS).tolist():
                 self._rows[leg, self._count[leg] % READINGS] = forces[leg]
                 self._count[leg] += 1
                 if self._count[leg] >= READINGS:

@@ -102,7 +102,7 @@ def test_a_robot_slips_as_a_whole_where_now_and_then_no_foot_sticks():
 
 
 def swung(offset, lasts=0.05, seconds=6.0, seed=4):
-    """Return the Unloaded of four feet, the last with an offset, N, and the errors of its readings.
+    """Return the Unloaded of four feet, the last one off by ``offset``, N, and its errors.
 
     All stand and swing for 0.3 s in turns; loads last while the feet rise, as a share of that.
     """
