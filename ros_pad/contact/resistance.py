@@ -38,6 +38,7 @@ from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.material import Material
+from ros_pad.contact.material import factor_in
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import broadcast
@@ -344,8 +345,10 @@ def _pad(table: Table) -> Pad:
     if 'material' not in table:
         return Pad(**table.values(PAD_SETTINGS), measured_limit=line)
     values = table.values(RUBBER_SETTINGS)
-    material = Material.load(values.pop('material'))
+    material, factor = Material.load(values.pop('material')), factor_in(table)
     try:
+        if factor:
+            material = material.times(*factor.values())
         return Pad.of(material, **values, measured_limit=line)
     except InvalidInput as error:
         raise ConfigError(f'{table.origin}: {error}') from error
