@@ -122,7 +122,7 @@ def pressure_for_height(pad: Pad, height: Array) -> Array:
         When a height is above the largest one.
     """
     end, status = pressure_end(pad)
-    highest = float(inflate(pad, end).height)
+    highest = highest_dome(pad)
     if (height > highest).any():
         why = (
             'there it balloons'
@@ -139,6 +139,11 @@ def pressure_for_height(pad: Pad, height: Array) -> Array:
         short = inflate(pad, middle).height < height
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.asarray(0.5 * (low + high))
+
+
+def highest_dome(pad: Pad) -> float:
+    """Return the height of the highest free dome of a pad of a material, m."""
+    return float(inflate(pad, pressure_end(pad)[0]).height)
 
 
 def with_constant(pad: Pad, name: str, value: float) -> Pad:
