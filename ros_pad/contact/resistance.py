@@ -36,6 +36,7 @@ from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.material import Material
 from ros_pad.contact.material import factor_in
@@ -275,7 +276,13 @@ class Foot:
         )
 
     def air_volume(self, pressure: float) -> float:
-        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³."""
+        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³.
+
+        Pads of a material that would balloon keep the volume that they have at their largest
+        pressure: a regulator can overshoot the ceiling, and no model has what they do then.
+        """
+        if self.pad.material is not None:
+            pressure = min(pressure, pressure_end(self.pad)[0])
         domes = self.pads * float(inflate(self.pad, pressure).volume) if pressure > 0.0 else 0.0
         return self.chamber_volume + domes
 
