@@ -90,6 +90,23 @@ def add(commands: Commands) -> None:
         choices=CRITERIA,
         help=f'criterion of the force limit (measured; of materials {MATERIAL_CRITERION})',
     )
+    _add_materials(part)
+    part.add_argument(
+        '--foot',
+        metavar='FOOT',
+        help='a name in config/feet or a YAML file: sole, pad, number of pads, ceiling and '
+        'criterion are taken from this foot unless an option gives them',
+    )
+    part.add_argument(
+        '--figure',
+        type=pathlib.Path,
+        metavar='FILE',
+        help='draw load and rise over the pad radius into a new .png, .pdf or .svg',
+    )
+    part.add_argument('--json', action='store_true', help='print one JSON object')
+
+
+def _add_materials(part: argparse.ArgumentParser) -> None:
     part.add_argument(
         '--material',
         nargs='+',
@@ -107,19 +124,6 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--height', type=float, metavar='M', help='least height of their free domes, m (0)'
     )
-    part.add_argument(
-        '--foot',
-        metavar='FOOT',
-        help='a name in config/feet or a YAML file: sole, pad, number of pads, ceiling and '
-        'criterion are taken from this foot unless an option gives them',
-    )
-    part.add_argument(
-        '--figure',
-        type=pathlib.Path,
-        metavar='FILE',
-        help='draw load and rise over the pad radius into a new .png, .pdf or .svg',
-    )
-    part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -237,7 +241,7 @@ def candidate_values(each: Candidate) -> dict[str, Any]:
         return [value if math.isfinite(value) else None for value in found]
 
     return {
-        'material': _name(each),
+        'material': each.material,
         'thickness_m': each.pad.thickness,
         'radius_m': each.pad.radius,
         'pads': each.pads,
@@ -249,11 +253,6 @@ def candidate_values(each: Candidate) -> dict[str, Any]:
         'ballooning_margin': span(each.ballooning_margin),
         'carried': each.carried,
     }
-
-
-def _name(each: Candidate) -> str:
-    material = each.pad.material
-    return '' if material is None else material.name or str(material)
 
 
 def material_advice(
@@ -446,7 +445,7 @@ def _print_candidates(found: Sequence[Candidate]) -> None:
     head = ('material', 'sheet, m', 'pressure, Pa', 'height, m', 'load, N', 'largest, Pa')
     rows = [
         [
-            _name(each),
+            each.material,
             f'{each.pad.thickness:g}',
             *(
                 _span(span)

@@ -206,9 +206,8 @@ def calibrate(
     viscosity : float
         Viscosity of that liquid, Pa s, above 0.
     fit : {'factor', 'thickness', 'constants'}, optional
-        What the shapes of domes give: the factor on the stresses of the material, the thickness of
-        its sheet, or the stiffness of the thesis' law. By default the factor for a pad of a
-        material, else the stiffness.
+        What the shapes of domes give: factor or thickness of the material, or the stiffness of
+        the thesis' law. By default the factor for a pad of a material, else the stiffness.
     rubber : Pad, optional
         A pad of a material in place of the foot's pad.
 
@@ -231,7 +230,7 @@ def calibrate(
     constants: list[Constant] = []
     warnings: list[str] = []
     _check_shapes(measurements)
-    laws = _laws(measurements, start)
+    laws = _laws(measurements, start, fit, warnings)
     if fit == 'constants':
         pad = _stiffness(measurements, _capped(measurements, start), constants, warnings)
     else:
@@ -240,29 +239,28 @@ def calibrate(
     foot = _with(foot, pad=pad, ceiling=_ceiling(foot, pad, warnings))
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
+    _check_constants(measurements.source, fit, constants)
+    residuals = (
+        *_shape_residuals(measurements, pad, len(measurements.free.pressure) >= 1),
+        *_limit_residuals(measurements, pad),
+        *_friction_residuals(measurements.friction, foot, wet_floor),
+    )
+    compared = compare(laws, measurements.free.pressure)
+    return Calibration(
+        measurements, foot, tuple(constants), residuals, tuple(warnings), laws, compared
+    )
+
+
+def _check_constants(source: str, fit: str, constants: Sequence[Constant]) -> None:
+    """Raise `InvalidInput` if nothing was fitted, or a constant that no foot file may have."""
     if not any(constant.fitted for constant in constants):
         raise InvalidInput(
-            f'{measurements.source}: nothing can be fitted: {_SHAPES[fit]} needs a free dome, or a'
+            f'{source}: nothing can be fitted: {_SHAPES[fit]} needs a free dome, or a'
             ' pressed dome with height or gap; the line of the force limit needs force limits at'
             ' two pressures; friction needs tangential forces'
         )
     for constant in constants:
-        _fits_a_foot(measurements.source, constant)
-    used_free = len(measurements.free.pressure) >= 1
-    residuals = (
-        *_shape_residuals(measurements, pad, used_free),
-        *_limit_residuals(measurements, pad),
-        *_friction_residuals(measurements.friction, foot, wet_floor),
-    )
-    return Calibration(
-        measurements,
-        foot,
-        tuple(constants),
-        residuals,
-        tuple(warnings),
-        laws,
-        compare(laws, measurements.free.pressure),
-    )
+        _fits_a_foot(source, constant)
 
 
 def _start(foot: Foot, fit: str | None, rubber: Pad | None) -> tuple[Pad, str]:
@@ -527,7 +525,7 @@ def _two_parameters(
         )
 
 
-def _laws(measurements: Measurements, pad: Pad) -> tuple[Law, ...]:
+def _laws(measurements: Measurements, pad: Pad, fit: str, warnings: list[str]) -> tuple[Law, ...]:
     """Return the laws of free domes, fitted; none without a material or without free domes."""
     free = measurements.free
     if pad.material is None or not len(free.pressure):
@@ -538,7 +536,10 @@ def _laws(measurements: Measurements, pad: Pad) -> tuple[Law, ...]:
     try:
         return (*laws, *rubber_laws(pad, *free))
     except InvalidInput as error:
-        raise InvalidInput(f'{measurements.source}: {error}') from error
+        if fit != 'constants':
+            raise InvalidInput(f'{measurements.source}: {error}') from error
+        warnings.append(f'the material is not compared: {error}')
+        return tuple(laws)
 
 
 def _capped(measurements: Measurements, pad: Pad) -> Pad:

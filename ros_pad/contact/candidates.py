@@ -78,6 +78,12 @@ class Candidate:
     ballooning_margin: Span
     carried: str
 
+    @property
+    def material(self) -> str:
+        """Name of the material, or its law."""
+        material = self.pad.material
+        return '' if material is None else material.name or str(material)
+
 
 def candidates(
     load: float,

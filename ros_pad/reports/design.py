@@ -83,7 +83,7 @@ def draw_candidates(
         pressures.plot([], [], 'o-', color=BLUE, label='for the load')
         pressures.plot([], [], 's-', color=VERMILION, label='largest')
         names = [
-            f'{each.pad.material.name}, {1e3 * each.pad.thickness:g} mm'  # type: ignore
+            f'{each.material}, {1e3 * (each.pad.thickness or 0.0):g} mm'
             + ('' if each.carried == 'yes' else f' ({each.carried})')
             for each in found
         ]

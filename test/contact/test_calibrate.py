@@ -261,6 +261,17 @@ class TestMaterial:
             value = constants(found)[fit].value
             assert constants(again)[fit].value == pytest.approx(value, rel=1e-7)
 
+    def test_a_single_dome_has_no_interval_and_no_comparison(self):
+        """One reference row, 1.88 times the law at 55 kPa."""
+        free = FreeDomes(np.array([55e3]), np.array([0.0013152800343899924]))
+        found = calibrate(dataclasses.replace(NOTHING, free=free), FOOT, rubber=self.pad)
+        factor = constants(found)['factor']
+        assert factor.value == pytest.approx(1.88, rel=1e-9)
+        assert math.isnan(factor.low) and math.isnan(factor.high)
+        assert found.foot.pad.material.factor_range == (1.0, 2.1)
+        assert found.comparisons == ()
+        assert 'too few for an interval' in foot_file(found)
+
     def test_a_factor_that_nothing_explains_is_named(self):
         doubted = dataclasses.replace(self.pad.material, factor_range=(0.9, 1.2))
         found = calibrate(THESIS, FOOT, rubber=Pad.of(doubted, 1.5e-3, 4e-4))
@@ -276,6 +287,10 @@ class TestMaterial:
         soft = Pad.of(Material.load('ecoflex_00_30'), 1.5e-3, 4e-4)
         with pytest.raises(InvalidInput, match=r'thesis\.csv: height = 0\.0024 m .* balloons'):
             calibrate(THESIS, FOOT, rubber=soft)
+        # The old constants need no material; it is only left out of the comparison.
+        found = calibrate(THESIS, FOOT, fit='constants', rubber=soft)
+        assert [law.name for law in found.laws] == ['stiffness', 'two constants']
+        assert 'the material is not compared: height = 0.0024 m' in found.warnings[0]
         low = FreeDomes(np.array([900e3]), np.array([1.25e-3]))
         with pytest.raises(InvalidInput, match='the fit is of no pad: factor = 32'):
             calibrate(dataclasses.replace(NOTHING, free=low), FOOT, rubber=self.pad)

@@ -67,6 +67,17 @@ def test_the_factor_of_the_thesis_pad():
     assert factor.error == pytest.approx(math.sqrt(missed @ missed / 4), rel=0.02)
 
 
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    height = np.linspace(0.8e-3, 2.4e-3, 6)
+    true = 1.88 * pressure_for_height(RAW, height)
+    inside = 0
+    for seed in range(200):
+        noisy = true * (1 + 0.03 * np.random.default_rng(seed).standard_normal(6))
+        factor = rubber_laws(RAW, noisy, height)[0]
+        inside += factor.low[0] <= 1.88 <= factor.high[0]
+    assert 0.90 <= inside / 200 <= 0.99
+
+
 def test_one_law_within_the_other_is_an_f_test():
     one, two, *_ = laws_of(PRESSURE, HEIGHT)
     found = compare([one, two], PRESSURE)[0]
