@@ -19,10 +19,8 @@ from ros_pad.errors import InvalidInput
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 RADIUS, THICKNESS = 1.5e-3, 4e-4
 RAW = Pad.of(Material.load('dragon_skin_10'), RADIUS, THICKNESS)
-# The thesis' free domes, and measured over computed pressures of the reference study for them.
-PRESSURE = np.array([55e3, 65e3, 75e3, 85e3])
-HEIGHT = np.array([1.25e-3, 1.6e-3, 2.0e-3, 2.4e-3])
-RATIOS = np.array([1.985, 1.853, 1.818, 1.874])
+THESIS = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['thesis']
+PRESSURE, HEIGHT = np.array(THESIS['pressure_Pa']), np.array(THESIS['height_m'])
 
 
 def reference(law):
@@ -43,6 +41,8 @@ def test_pressures_for_heights_are_those_of_the_reference_rows():
     pressure, height = reference('DS10_raw_l4.5')
     assert len(pressure) == 3
     np.testing.assert_allclose(pressure_for_height(RAW, height), pressure, rtol=1e-9)
+    known = pressure_for_height(RAW, HEIGHT)
+    np.testing.assert_allclose(known, THESIS['computed_Pa'], atol=5.0)
 
 
 def test_the_reference_rows_of_a_law_times_a_factor_give_the_factor():
@@ -56,9 +56,9 @@ def test_the_reference_rows_of_a_law_times_a_factor_give_the_factor():
 def test_the_factor_of_the_thesis_pad():
     """By hand: shares x = 1/ratio, factor Σx/Σx², Student's t = 3.182 on 3 degrees of freedom."""
     factor = laws_of(PRESSURE, HEIGHT)[2]
-    x = 1.0 / RATIOS
+    x = 1.0 / np.array(THESIS['ratio'])
     value = x.sum() / (x @ x)
-    assert value == pytest.approx(1.88, abs=0.005)
+    assert value == pytest.approx(THESIS['factor'], abs=0.005)
     assert factor.values[0] == pytest.approx(value, rel=5e-4)
     missed = value * x - 1.0
     width = 3.182446 * math.sqrt(missed @ missed / 3 / (x @ x)) / value

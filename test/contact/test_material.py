@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
+import json
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -12,11 +14,13 @@ from ros_pad.contact import Material
 from ros_pad.contact import Pad
 from ros_pad.contact import design
 from ros_pad.contact import inflate
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.material import equibiaxial
 from ros_pad.contact.material import tensions
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 YEOH = (26258.18995463, 1854.39136388, -35.05189509)
 LAWS = [
     ('yeoh', YEOH),
@@ -225,6 +229,18 @@ def test_a_foot_may_have_a_factor_on_its_material(tmp_path):
     ]:
         with pytest.raises(ConfigError, match=f'foot.yaml: pad.*{words}'):
             Foot.load(foot_file(tmp_path, pad.replace('{value: 1.88}', wrong)))
+
+
+def test_largest_pressures_are_those_of_the_reference():
+    files = {'DS10_raw_l4.5': 'dragon_skin_10', 'Ecoflex 00-30 full': 'ecoflex_00_30',
+             'Ecoflex 00-10 full': 'ecoflex_00_10'}  # fmt: skip
+    rows = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['maxima']
+    assert len(rows) == 4
+    for row in rows:
+        law, _, factor = row['law'].partition(' x')
+        material = Material.load(files[law]).times(float(factor or 1.0))
+        pad = Pad.of(material, row['radius_m'], row['thickness_m'])
+        assert pressure_end(pad)[0] == pytest.approx(row['maximum_Pa'], rel=4e-3)
 
 
 def test_a_factor_scales_all_stresses():
