@@ -469,6 +469,8 @@ def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> _Fit | Non
     else:
         end = pressure_end(pad)[0]
     least = start * float(pressed.pressure[known].max()) / end
+    if name == 'factor':
+        least = max(least, FACTORS[0])
 
     def walls(value: Array) -> Array:
         changed = with_constant(pad, name, float(value[0]))
