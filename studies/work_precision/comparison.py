@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 
 from ros_pad.contact.pad import Array
@@ -259,14 +260,25 @@ def table(results: Sequence[Result]) -> str:
     return '\n'.join(lines)
 
 
+WIDTH, HEIGHT = 5.2, 6.6
+"""Of a panel with the names of its methods, in."""
+
+
 def chart(results: Sequence[Result]) -> Figure:
-    """Return the log-log picture of time against error, a panel for each problem.
+    """Return the log-log picture of time against error, a panel for each problem."""
+    problems = len({result.problem for result in results})
+    figure = Figure(figsize=(WIDTH * problems, HEIGHT), layout='constrained')
+    draw(results, figure)
+    return figure
+
+
+def draw(results: Sequence[Result], figure: Figure | SubFigure) -> None:
+    """Draw time against error, a panel for each problem.
 
     A disc is the median error of a method; its whisker ends at the worst error. The list below the
     panel has the names of the methods, by rising time, and their numbers of failures.
     """
     problems = list(dict.fromkeys(result.problem for result in results))
-    figure = Figure(figsize=(5.2 * len(problems), 6.6), layout='constrained')
     panels = figure.subplots(1, len(problems), squeeze=False)[0]
     numbers = []
     for panel, name in zip(panels, problems, strict=True):
@@ -302,14 +314,15 @@ def chart(results: Sequence[Result]) -> Figure:
             fontsize=8.5,
             handletextpad=0.2,
         )
-    _write_numbers(figure, numbers)
     figure.supxlabel(_CAPTION, fontsize=8.5)
-    return figure
+    _write_numbers(figure, numbers)
 
 
-def _write_numbers(figure: Figure, numbers: Sequence[tuple[Axes, str, float, float, str]]) -> None:
+def _write_numbers(
+    figure: Figure | SubFigure, numbers: Sequence[tuple[Axes, str, float, float, str]]
+) -> None:
     """Write each number beside its disc, where it covers no disc and no other number."""
-    figure.draw_without_rendering()  # positions are final only after this call
+    figure.figure.draw_without_rendering()  # positions are final only after this call
     places = [panel.transData.transform((x, y)) for panel, _, x, y, _ in numbers]
     points = figure.dpi / 72.0
     taken = list(places)

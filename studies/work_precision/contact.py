@@ -38,10 +38,13 @@ from ros_pad.pace import Progress
 from studies.drawing import GREEN
 from studies.drawing import PALE
 from studies.drawing import VERMILION
+from studies.work_precision import measured
+from studies.work_precision.comparison import HEIGHT
+from studies.work_precision.comparison import WIDTH
 from studies.work_precision.comparison import Method
 from studies.work_precision.comparison import Problem
 from studies.work_precision.comparison import Result
-from studies.work_precision.comparison import chart
+from studies.work_precision.comparison import draw
 from studies.work_precision.comparison import run
 
 PAD = LARGE_PAD
@@ -72,14 +75,22 @@ def measure(progress: Progress) -> list[Result]:
     problem, starts = pressed_problem(lambda share: progress(0.4 + 0.2 * share))
     others = _pressed_methods(starts)
     pressed = run(problem, others, BASELINE, lambda done: progress(0.6 + 0.3 * done / len(others)))
-    model = run(gap_problem(), GAP_METHODS, QUADRATURE, lambda done: progress(0.9 + 0.02 * done))
-    return free + pressed + model
+    model = run(gap_problem(), GAP_METHODS, QUADRATURE, lambda done: progress(0.9 + 0.015 * done))
+    question, laws = measured.problem()
+    world = run(question, laws, laws[0].name, lambda done: progress(0.97 + 0.005 * done))
+    return free + pressed + model + world
 
 
 def figures(results: list[Result], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the pictures by name: the chart, and the map of where methods fail."""
     maps = failure_maps(progress=progress)
-    return {'contact': chart(results), 'contact_failures': draw_maps(maps)}
+    panels = len({result.problem for result in results})
+    size = (WIDTH * panels, HEIGHT + 4.4)
+    whole = Figure(figsize=size, layout='constrained')
+    parts: Any = whole.subfigures(2, 1, height_ratios=(HEIGHT, 4.4))
+    measured.draw(parts[1])
+    draw(results, parts[0])
+    return {'contact': whole, 'contact_failures': draw_maps(maps)}
 
 
 # --- free dome -----------------------------------------------------------------------------------
