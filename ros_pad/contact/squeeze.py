@@ -11,9 +11,9 @@ is solved with h = H(t) + κ r²/2 + w(r): height, curvature of the surface, and
 the pressure, as a half-space or as a membrane. H follows from the load, or is prescribed.
 
 Finite volumes on rings. Pressure is uniform on each, so deflections are closed forms. The flux
-between rings uses the mean 2 h₁² h₂²/(h₁ + h₂) of h³, which vanishes with either film, so films stay
-positive (Zhornitskaya and Bertozzi, SIAM J. Numer. Anal. 37 (2000) 523). In time: Radau IIA of
-SciPy, whose steps keep the sum of liquid in the film and liquid that has left.
+between rings uses the mean 2 h₁² h₂²/(h₁ + h₂) of h³, which vanishes with either film, so films
+stay positive (Zhornitskaya and Bertozzi, SIAM J. Numer. Anal. 37 (2000) 523). In time: Radau IIA
+of SciPy, whose steps keep the sum of liquid in the film and liquid that has left.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ CONTINUUM = 1e-9
 """Film, m, below which a liquid is no continuum."""
 
 _STIFFEST = 1e-6  # of the initial film: a smaller dimple is lost in rounding
-_GRADING = 10.0  # the ring at the rim of a flat surface is 2000 times narrower than in the middle
+# Rings are narrow near the rim of the contact, over this share of the contact's radius.
+_FLAT_RIM, _CURVED_RIM = 1e-4, 0.03
 
 
 class Squeezed(NamedTuple):
@@ -68,8 +69,8 @@ class Squeezed(NamedTuple):
     drained : array
         Volume that has left the film, m³, (times,).
     status : str
-        ``ok``; ``large_strain`` where the mean pressure of a half-space exceeds 0.2 of its modulus;
-        ``touching`` where the film is thinner than 1 nm somewhere, in reality a contact.
+        ``ok``; ``large_strain`` where the mean pressure on a half-space exceeds 0.2 of its
+        modulus; ``touching`` where a film is thinner than 1 nm somewhere, in reality a contact.
     """
 
     time: Array
@@ -100,7 +101,7 @@ class HalfSpace:
     ----------
     radius : float
         Radius of the sole, m, above 0. Of a sphere: where the pressure is that around the film, at
-        least twice the radius of the contact.
+        least 1.5 times the radius of the contact.
     modulus : float
         Reduced modulus E/(1 - ν²), Pa, above 0: 4 μ for rubber with shear modulus μ.
     curvature : float
@@ -121,10 +122,16 @@ class HalfSpace:
         """Deflection by unit pressure, without the factor of shape, m/Pa."""
         return self.radius / self.modulus
 
+    def contact_radius(self, load: float) -> float:
+        """Return the radius of the dry contact under a load, N: Hertz', m."""
+        if self.curvature == 0.0:
+            return self.radius
+        return float((0.75 * load / (self.curvature * self.modulus)) ** (1.0 / 3.0))
+
     def deflection(self, edges: Array, at: Array) -> Array:
         """Return the deflection at radii by unit pressure on each ring, in :attr:`compliance`.
 
-        Edges and radii are in units of the radius.
+        Edges and radii, above 0, are in units of the radius.
         """
         from scipy.special import ellipe
         from scipy.special import ellipkm1
@@ -146,7 +153,8 @@ class Membrane:
     Parameters
     ----------
     radius : float
-        Where the pressure is that around the film, m: at least 1.5 times that of the contact.
+        Where the pressure is that around the film, m: at least 1.5 times the radius of the
+        contact.
     tension : float
         Tension, N/m, above 0.
     pressure : float
@@ -171,6 +179,10 @@ class Membrane:
     def compliance(self) -> float:
         """Deflection by unit pressure, without the factor of shape, m/Pa."""
         return self.radius**2 / self.tension
+
+    def contact_radius(self, load: float) -> float:
+        """Return the radius of the dry contact under a load, N, which the air carries, m."""
+        return math.sqrt(load / (math.pi * self.pressure))
 
     def deflection(self, edges: Array, at: Array) -> Array:
         """Return the deflection at radii by unit pressure on each ring, in :attr:`compliance`."""
@@ -218,8 +230,8 @@ def squeeze(
     Raises
     ------
     InvalidInput
-        When a value is out of range, both or none of load and velocity are given, or the surface is
-        so stiff that it is rigid: use :func:`ros_pad.contact.film_thickness`.
+        When a value is out of range, both or none of load and velocity are given, or the surface
+        is so stiff that it is rigid: use :func:`ros_pad.contact.film_thickness`.
     """
     from scipy.integrate import solve_ivp
 
@@ -235,7 +247,7 @@ def squeeze(
             f'the surface deflects by {softness * initial:.2g} m, less than {_STIFFEST:g} of the'
             f' initial film of {initial:g} m: it is rigid, use film_thickness'
         )
-    edges = _edges(rings, flat=surface.curvature == 0.0)
+    edges = _edges(rings, surface, load)
     middles, area = 0.5 * (edges[1:] + edges[:-1]), math.pi * np.diff(edges**2)
     profile = 0.5 * surface.curvature * a**2 / initial * middles**2
     compliance = softness * surface.deflection(edges, middles)
@@ -294,7 +306,7 @@ def _checked(
     number('tolerance', tolerance, '', 1e-10, 1e-2)
     times = np.atleast_1d(np.asarray(quantity('time', time, 's'), dtype=float))
     if times.ndim > 1 or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
-        raise InvalidInput(f'time = {time} is not allowed: rising values from 0 s are needed')
+        raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
     if (load is None) == (velocity is None):
         raise InvalidInput('load or velocity is needed, and not both')
     if load is not None:
@@ -306,12 +318,24 @@ def _checked(
     return times
 
 
-def _edges(rings: int, flat: bool) -> Array:
-    """Return the edges of the rings, 0 to 1; the rim of a flat surface needs narrow rings."""
-    share = np.linspace(0.0, 1.0, rings + 1)
-    if not flat:
-        return share
-    return np.asarray(1.0 - np.sinh(_GRADING * (1.0 - share)) / math.sinh(_GRADING))
+def _edges(rings: int, surface: HalfSpace | Membrane, load: float | None) -> Array:
+    """Return the edges of the rings, 0 to 1."""
+    if surface.curvature == 0.0:
+        rim, width = 1.0, _FLAT_RIM
+    elif load is None:
+        return np.linspace(0.0, 1.0, rings + 1)
+    else:
+        rim = surface.contact_radius(load) / surface.radius
+        width = _CURVED_RIM * rim
+        if rim > 1.0 / 1.5:
+            raise InvalidInput(
+                f'radius = {surface.radius:g} m is not allowed: at least 1.5 times the radius of'
+                f' the contact, {1.5 * rim * surface.radius:.4g} m, is needed'
+            )
+    places = np.linspace(math.asinh(-rim / width), math.asinh((1.0 - rim) / width), rings + 1)
+    edges = rim + width * np.sinh(places)
+    edges[0], edges[-1] = 0.0, 1.0
+    return edges
 
 
 Pressures = Callable[[float, Array], Array]
@@ -326,10 +350,10 @@ def _pressures(
     """
     count = len(area)
     if rate is not None:
-        slope = np.linalg.inv(compliance)
+        slope = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
         return lambda t, h: slope @ (h - profile - 1.0 + rate * t), slope
     whole = np.block([[compliance, np.ones((count, 1))], [area[None, :], np.zeros((1, 1))]])
-    inverse = np.linalg.inv(whole)
+    inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
     slope, base = inverse[:count, :count], math.pi * inverse[:count, count]
     return lambda t, h: slope @ (h - profile) + base, slope
 
