@@ -32,6 +32,7 @@ from ros_pad.configuration import quantity
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoSurface
 
 TRAPPED = 4.0 / math.pi * (4.0 / 3.0 - 1.0)
 """Mean depth of the dimple that uniform pressure p presses into a half-space, in units of p a/E*:
@@ -240,6 +241,8 @@ def squeeze(
     InvalidInput
         When a value is out of range, both or none of load and velocity are given, or the surface
         is so stiff that it is rigid: use :func:`ros_pad.contact.film_thickness`.
+    NoSurface
+        With status ``no_convergence``, when the time steps fail.
     """
     from scipy.integrate import solve_ivp
 
@@ -268,7 +271,9 @@ def squeeze(
         jac=jacobian, rtol=tolerance, atol=1e-4 * tolerance,
     )  # fmt: skip
     if not found.success or not np.all(found.y[:-1] > 0.0):
-        raise RuntimeError(f'the film of {surface} was not found: {found.message}')
+        raise NoSurface(
+            f'the film under {surface} was not found: {found.message}', 'no_convergence'
+        )
     films = found.y[:-1].T
     pressures = np.array([pressure_of(t, h) for t, h in zip(found.t, films, strict=True)])
     strained = isinstance(surface, HalfSpace) and p0 > LARGE_STRAIN * surface.modulus
