@@ -213,14 +213,11 @@ def domes() -> list[dict[str, Any]]:
 
 def rule(rings: int = 100) -> list[dict[str, float]]:
     """Return by how much the mean film exceeds the rigid one, by dimple over rigid film."""
-    rows = []
+    rows, times = [], np.geomspace(1e-3, 1.0, 4)
+    rigid = np.array(film_thickness(DEPTH, MEAN, RADIUS, times))
+    grid = sole(4e10, times, rings).mean / rigid  # a rigid disc's, with so many rings
     for modulus in command.each(np.geomspace(4e6, 4e9, 7).tolist(), 'rule', 'sole'):
-        times = np.geomspace(1e-3, 1.0, 4)
-        mean = sole(modulus, times, rings).mean
-        # With so many rings Stefan's law itself is this much too high.
-        grid = sole(4e10, times, rings).mean / film_thickness(DEPTH, MEAN, RADIUS, times)
-        rigid = np.array(film_thickness(DEPTH, MEAN, RADIUS, times))
-        excess = mean / rigid / grid - 1.0
+        excess = sole(modulus, times, rings).mean / rigid / grid - 1.0
         lens = trapped_film(RADIUS, modulus, MEAN) / rigid
         rows += [
             {'dimple_over_film': float(x), 'excess': float(y)}
