@@ -208,6 +208,7 @@ def squeeze(
     load: float | None = None,
     velocity: float | None = None,
     viscosity: float = WATER_VISCOSITY,
+    rise: float = 0.0,
     rings: int = 200,
     tolerance: float = 1e-6,
 ) -> Squeezed:
@@ -225,12 +226,14 @@ def squeeze(
     time : array
         Times, s, rising, from 0.
     load : float or None
-        Constant force on the surface, N, above 0.
+        Force on the surface, N, above 0.
     velocity : float or None
         In place of a load: constant speed of the surface's far side towards the plane, m/s;
         negative to lift it (no cavitation).
     viscosity : float
         Dynamic viscosity, Pa s, above 0.
+    rise : float
+        Time in which the load grows from 0 to its value, linearly, s; 0 applies it at once.
     rings : int
         Number of rings, 10 to 2000. The error falls with its square.
     tolerance : float
@@ -247,6 +250,7 @@ def squeeze(
     from scipy.integrate import solve_ivp
 
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
+    number('rise', rise, 's')
     a, eta = surface.radius, viscosity
     force = load or 1.5 * math.pi * eta * a**4 * abs(velocity or 0.0) / initial**3
     # Units: radius a, film `initial`, pressure p0, time η a²/(p0 h0²).
@@ -262,8 +266,10 @@ def squeeze(
     middles, area = 0.5 * (edges[1:] + edges[:-1]), math.pi * np.diff(edges**2)
     profile = 0.5 * surface.curvature * a**2 / initial * middles**2
     compliance = softness * surface.deflection(edges, middles)
-    rate = None if velocity is None else velocity * unit / initial
-    pressure_of, slope = _pressures(compliance, area, profile, rate)
+    if velocity is None:
+        pressure_of, slope = _loaded(compliance, area, profile, rise / unit)
+    else:
+        pressure_of, slope = _moved(compliance, profile, velocity * unit / initial)
     flow, jacobian = _flow(edges, middles, area, pressure_of, slope)
     start = np.append(1.0 + profile, 0.0)
     found = solve_ivp(
@@ -407,21 +413,28 @@ def _edges(rings: int, surface: HalfSpace | Membrane, load: float | None) -> Arr
 Pressures = Callable[[float, Array], Array]
 
 
-def _pressures(
-    compliance: Array, area: Array, profile: Array, rate: float | None
+def _loaded(
+    compliance: Array, area: Array, profile: Array, rise: float
 ) -> tuple[Pressures, Array]:
     """Return pressure as a function of time and film, and its derivative by the film.
 
-    Without a rate the height is such that the load is π (one in SI units).
+    The height is such that the load is π, from a time ``rise`` on.
     """
     count = len(area)
-    if rate is not None:
-        slope = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
-        return lambda t, h: slope @ (h - profile - 1.0 + rate * t), slope
     whole = np.block([[compliance, np.ones((count, 1))], [area[None, :], np.zeros((1, 1))]])
     inverse = np.asarray(np.linalg.inv(whole), dtype=np.float64)
     slope, base = inverse[:count, :count], math.pi * inverse[:count, count]
-    return lambda t, h: slope @ (h - profile) + base, slope
+
+    def pressures(time: float, film: Array) -> Array:
+        return slope @ (film - profile) + (base if time >= rise else time / rise * base)
+
+    return pressures, slope
+
+
+def _moved(compliance: Array, profile: Array, speed: float) -> tuple[Pressures, Array]:
+    """Return the same for a surface that approaches at a speed."""
+    slope = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
+    return lambda time, film: slope @ (film - profile - 1.0 + speed * time), slope
 
 
 def _flow(

@@ -464,9 +464,9 @@ def _soft_film(scene: Scene, policy: str | None) -> Omission | None:
             dry = math.exp(-((rigid / foot.critical_film) ** foot.film_exponent))
             left = dry_share(middle, foot.critical_film, foot.film_exponent)
             found.append(
-                f'; under the {name} the dimple is {1e6 * middle:.2g} um thick and leaves'
-                f' {100.0 * left:.1f} % of the contact dry, the rigid film of'
-                f' {1e6 * rigid:.2g} um {100.0 * dry:.1f} %'
+                f'; for a load at once, under the {name} the dimple is'
+                f' {1e6 * middle:.2g} um thick and leaves {100.0 * left:.1f} % of the contact'
+                f' dry, the rigid film of {1e6 * rigid:.2g} um {100.0 * dry:.1f} %'
             )
     if not found:
         return None

@@ -211,6 +211,29 @@ def domes() -> list[dict[str, Any]]:
     return rows
 
 
+def rises() -> list[dict[str, Any]]:
+    """Return the film 1 s after a load that has grown linearly in some time, s."""
+    rows = []
+    for rise in command.each([0.0, 1e-3, 1e-2, 0.1, 1.0], 'rises', 'rise'):
+        time, b = [rise + 1.0], contact(0.19)
+        flat = squeeze(HalfSpace(RADIUS, 3.95e5), DEPTH, time, load=LOAD, rise=rise, rings=100)
+        surface = Membrane(1.5 * b, 0.5 * AIR * SPHERE, AIR)
+        domed = squeeze(surface, DEPTH, time, load=0.19, rise=rise, rings=150)
+        inside = domed.radius < b
+        area = domed.area[inside] / domed.area[inside].sum()
+        film = domed.thickness[0, inside]
+        rows.append(
+            {
+                'rise_s': rise,
+                'flat_mean_m': float(flat.mean[0]),
+                'flat_dry': float(flat.dry_share(CRITICAL)[0]),
+                'dome_mean_m': float(film @ area),
+                'dome_dry': float(np.exp(-((film / CRITICAL) ** 2)) @ area),
+            }
+        )
+    return rows
+
+
 def rule(rings: int = 100) -> list[dict[str, float]]:
     """Return by how much the mean film exceeds the rigid one, by dimple over rigid film."""
     rows, times = [], np.geomspace(1e-3, 1.0, 4)
@@ -294,6 +317,12 @@ def _texts(document: dict[str, Any]) -> list[str]:
             f'  dry {_share(row["dry"])}  rigid {_um(row["rigid_m"])}'
             f'  dry {_share(row["rigid_dry"])}'
         )
+    lines.append('time in which load grows; mean film, um, and dry: flat pad, dome of 0.19 N')
+    lines += [
+        f'  {row["rise_s"]:5g} s  {_um([row["flat_mean_m"]])}  {_share([row["flat_dry"]])}'
+        f'  {_um([row["dome_mean_m"]])}  {_share([row["dome_dry"]])}'
+        for row in document['rises']
+    ]
     lines.append('largest error of any ring in time, by tolerance (50 rings)')
     lines += [f'  {row["tolerance"]:g}  {row["error"]:.1e}' for row in document['tolerances']]
     lines.append('excess of the mean film over Stefan-Reynolds, by mean dimple over that film')
@@ -322,6 +351,7 @@ def main(words: Sequence[str]) -> int:
         'rows': [asdict(result) for result in results],
         'soles': sensitivity(),
         'domes': domes(),
+        'rises': rises(),
         'tolerances': tolerances(),
         'rule': rule(),
     }
