@@ -247,10 +247,24 @@ def squeeze(
     NoSurface
         With status ``no_convergence``, when the time steps fail.
     """
-    from scipy.integrate import solve_ivp
-
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
     number('rise', rise, 's')
+    return _solve(surface, initial, times, load, velocity, viscosity, rise, rings, tolerance)
+
+
+def _solve(
+    surface: HalfSpace | Membrane,
+    initial: float,
+    times: Array,
+    load: float | None,
+    velocity: float | None,
+    viscosity: float,
+    rise: float,
+    rings: int,
+    tolerance: float,
+) -> Squeezed:
+    from scipy.integrate import solve_ivp
+
     a, eta = surface.radius, viscosity
     force = load or 1.5 * math.pi * eta * a**4 * abs(velocity or 0.0) / initial**3
     # Units: radius a, film `initial`, pressure p0, time η a²/(p0 h0²).

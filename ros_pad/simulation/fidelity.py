@@ -465,8 +465,8 @@ def _soft_film(scene: Scene, policy: str | None) -> Omission | None:
             left = dry_share(middle, foot.critical_film, foot.film_exponent)
             found.append(
                 f'; for a load at once, under the {name} the dimple is'
-                f' {1e6 * middle:.2g} um thick and leaves {100.0 * left:.1f} % of the contact'
-                f' dry, the rigid film of {1e6 * rigid:.2g} um {100.0 * dry:.1f} %'
+                f' {_brief(1e6 * middle)} um thick and leaves {100.0 * left:.1f} % of the contact'
+                f' dry, the rigid film of {_brief(1e6 * rigid)} um {100.0 * dry:.1f} %'
             )
     if not found:
         return None
@@ -476,6 +476,10 @@ def _soft_film(scene: Scene, policy: str | None) -> Omission | None:
         1.0 - least / stand.resistance(*stand.films(time)),
         'of the friction on wet ground in mid-stance: no dry contact at all' + ''.join(found),
     )
+
+
+def _brief(value: float) -> str:
+    return f'{float(f"{value:.3g}"):g}'
 
 
 def _suction(scene: Scene, policy: str | None) -> Omission:
@@ -496,9 +500,10 @@ def _suction(scene: Scene, policy: str | None) -> Omission:
     return Omission(
         'suction of the film at lift-off',
         1.25 * most * until / (scene.expected_load * stance),
-        f'of the impulse of a load of {scene.expected_load:.2g} N in its stance: at most'
-        f' {most:.2g} N, the atmosphere on the contact, for {1e3 * until:.2g} ms; rigid discs with'
-        f' a film of {1e6 * film:.2g} um pull with {1e-3 * resistance / film**3:.3g} N a mm/s',
+        f'of the impulse of a load of {_brief(scene.expected_load)} N in its stance: at most'
+        f' {_brief(most)} N, the atmosphere on the contact, for {_brief(1e3 * until)} ms; rigid'
+        f' discs with a film of {_brief(1e6 * film)} um pull with'
+        f' {_brief(1e-3 * resistance / film**3)} N a mm/s',
     )
 
 
