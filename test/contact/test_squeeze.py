@@ -259,6 +259,31 @@ def test_liquid_and_load_are_kept_and_films_stay_positive(modulus):
     assert film.status == ('large_strain' if modulus == 40e3 else film.status)
 
 
+@pytest.mark.parametrize('seed', range(12))
+def test_films_of_random_surfaces(seed):
+    random = np.random.default_rng(seed)
+    radius, modulus = 10.0 ** random.uniform(-4.0, -1.5), 10.0 ** random.uniform(4.0, 7.0)
+    pressure, initial = 10.0 ** random.uniform(2.5, 5.5), 10.0 ** random.uniform(-6.0, -3.0)
+    load, time = pressure * math.pi * radius**2, 10.0 ** random.uniform(-3.0, 1.0)
+    surface = (
+        HalfSpace(radius, modulus),
+        HalfSpace(2.0 * radius, modulus, 0.75 * load / modulus / radius**3),
+        Membrane(2.0 * radius, pressure * radius, pressure),
+    )[seed % 3]
+    film = squeeze(
+        surface,
+        initial,
+        [0.5 * time, time],
+        load=load,
+        viscosity=10.0 ** random.uniform(-4.0, 0.0),
+        rise=float(random.choice([0.0, time])),
+        rings=40,
+    )
+    assert np.all(film.thickness > 0.0) and np.all(np.isfinite(film.pressure))
+    assert balance(film) < 1e-9
+    assert film.load[-1] == pytest.approx(load, rel=1e-9)
+
+
 def test_second_order_in_rings():
     sole = HalfSpace(RADIUS, MODULUS)
     means = [
