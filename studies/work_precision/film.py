@@ -338,7 +338,7 @@ def _um(values: Sequence[float]) -> str:
 
 
 def _share(values: Sequence[float]) -> str:
-    return ' '.join(f'{100.0 * value:.2g} %' for value in values)
+    return ' '.join(f'{100.0 * value:.3g} %' for value in values)
 
 
 def main(words: Sequence[str]) -> int:
