@@ -43,7 +43,7 @@ lint: .venv/test.stamp
 	$(BIN)/python -m ruff format --check
 	$(BIN)/python -m mypy
 
-STUDIES := contact meniscus capillary walk stability estimator hose
+STUDIES := contact meniscus capillary walk stability estimator hose film
 
 # What takes minutes at most; `python -m studies` lists the longer ones.
 studies: .venv/test.stamp

@@ -21,6 +21,7 @@ STUDIES = {
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
+    'film': ('work_precision.film', 'liquid squeezed from under soft pads (5 min)'),
     'hose': ('work_precision.hose', 'how long a pad takes to fill through a hose (1 min)'),
     'bench': ('thesis.bench_command', 'one pad of the thesis beside its measurements (5 s)'),
     'thesis': ('thesis.command', 'one page with all figures of the thesis (45 s)'),

@@ -33,6 +33,11 @@ from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
+from ros_pad.contact.squeeze import HalfSpace
+from ros_pad.contact.squeeze import Membrane
+from ros_pad.contact.squeeze import Squeezed
+from ros_pad.contact.squeeze import squeeze
+from ros_pad.contact.squeeze import trapped_film
 
 __all__ = [
     'DESIGN_WATER',
@@ -44,13 +49,16 @@ __all__ = [
     'Design',
     'Film',
     'Foot',
+    'HalfSpace',
     'Inflated',
     'Liquid',
     'Material',
     'MeasuredLimit',
+    'Membrane',
     'Meniscus',
     'Pad',
     'Pressed',
+    'Squeezed',
     'bridge',
     'contact_angle',
     'design',
@@ -66,5 +74,7 @@ __all__ = [
     'press',
     'pressure_for',
     'rise_height',
+    'squeeze',
     'tangential_resistance',
+    'trapped_film',
 ]

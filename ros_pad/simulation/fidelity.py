@@ -14,6 +14,7 @@ import functools
 import importlib.util
 import math
 import operator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
@@ -23,10 +24,18 @@ import yaml
 from ros_pad import configuration
 from ros_pad.configuration import choice
 from ros_pad.contact import WATER
+from ros_pad.contact import inflate
 from ros_pad.contact import pressure_for
+from ros_pad.contact import trapped_film
 from ros_pad.contact.film import Film
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.contact.resistance import THICK_FILM
+from ros_pad.contact.squeeze import DIMPLE
+from ros_pad.contact.squeeze import STIFF
+from ros_pad.contact.squeeze import TRAPPED
+from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.contact.squeeze import dry_share
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -43,6 +52,12 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')
+SOLE_MODULUS = 3.95e5
+"""Reduced modulus of a sole whose foot names no material, Pa: Dragon Skin 10, four times 2 C1 of
+``config/materials``, times 1.88."""
+
+ATMOSPHERE = 101325.0  # Pa
+
 _MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
 
@@ -318,17 +333,65 @@ def reserve(scene: Scene, policy: str | None = None) -> float:
 
 def mid_stance_grip(scene: Scene, dome: bool, wet: bool) -> float:
     """Return the tangential resistance of a foot in mid-stance over its load."""
-    foot, load = scene.foot.on_rough(scene.floor.roughness), scene.expected_load
-    pressure = _dome_pressure(scene) if dome else 0.0
-    on_domes = foot.dome_load(load, pressure)
-    thickness = 0.0, 0.0
-    if wet:
-        gait = scene.gait
-        stance = gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
-        film = Film(foot, scene.floor.viscosity)
-        film.touch_down(scene.floor.film_thickness)
-        thickness = film.drain(on_domes, load - on_domes, pressure, 0.5 * stance)
-    return foot.resistance_of(on_domes, load - on_domes, pressure, *thickness) / load
+    stand = _Stand(scene, dome)
+    films = stand.films(0.5 * _stance(scene)) if wet else (0.0, 0.0)
+    return stand.resistance(*films) / scene.expected_load
+
+
+class _Stand:
+    """A foot of a scene under its expected load: how domes and flat sole share it."""
+
+    def __init__(self, scene: Scene, dome: bool) -> None:
+        self.foot, self.floor = scene.foot.on_rough(scene.floor.roughness), scene.floor
+        self.pressure = _dome_pressure(scene) if dome else 0.0
+        self.on_domes = self.foot.dome_load(scene.expected_load, self.pressure)
+        self.on_sole = scene.expected_load - self.on_domes
+
+    def films(self, time: float) -> tuple[float, float]:
+        """Return the films under domes and sole after a time, s, by Stefan and Reynolds, m."""
+        film = Film(self.foot, self.floor.viscosity)
+        film.touch_down(self.floor.film_thickness)
+        return film.drain(self.on_domes, self.on_sole, self.pressure, time)
+
+    def resistance(self, dome_film: float, sole_film: float) -> float:
+        return self.foot.resistance_of(
+            self.on_domes, self.on_sole, self.pressure, dome_film, sole_film
+        )
+
+    @property
+    def discs(self) -> tuple[int, float]:
+        """Number and radius, m, of the discs that touch: the whole sole, or the domes."""
+        if self.on_sole > 0.0:
+            return 1, self.foot.sole_radius
+        pads = self.foot.pads
+        return pads, math.sqrt(self.on_domes / self.pressure / pads / math.pi)
+
+    def dimples(self, time: float) -> Iterator[tuple[str, float, float, float]]:
+        """Yield for domes and sole, if they carry load: name, and films after a time, s, in m.
+
+        These are the rigid film, and with a soft surface the dimple in its middle and its mean.
+        """
+        foot, (dome_film, sole_film) = self.foot, self.films(time)
+        if self.on_domes > 0.0:
+            contact = math.sqrt(self.on_domes / self.pressure / foot.pads / math.pi)
+            sphere = float(inflate(foot.pad, self.pressure).sphere_radius)
+            middle = dome_dimple(contact, sphere, self.pressure, time, self.floor.viscosity)
+            yield 'domes', dome_film, middle, 0.5 * middle
+        if self.on_sole > 0.0:
+            material = foot.pad.material
+            modulus = 4.0 * material.shear_modulus if material else SOLE_MODULUS
+            mean = trapped_film(foot.sole_radius, modulus, self.on_sole / foot.sole_area)
+            mean = min(mean, self.floor.film_thickness)
+            yield 'sole', sole_film, DIMPLE / TRAPPED * mean, mean
+
+
+def _stance(scene: Scene) -> float:
+    gait = scene.gait
+    return gait.stance if isinstance(gait, RailGait) else gait.duty * gait.cycle
+
+
+def _on_wet_ground(scene: Scene, policy: str | None) -> _Stand:
+    return _Stand(scene, (scene.policy if policy is None else policy) != 'flat')
 
 
 def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> list[Omission]:
@@ -345,7 +408,7 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
         When the level does not exist, or does not model the scene's robot.
     """
     name = level(scene, fidelity, policy)
-    terms = [] if scene.floor.kind == 'dry' else _omitted_of_liquid(scene)
+    terms = [] if scene.floor.kind == 'dry' else _omitted_of_liquid(scene, policy)
     if scene.foot.pad.material is not None:
         terms.append(
             Omission(
@@ -365,8 +428,11 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
     return terms
 
 
-def _omitted_of_liquid(scene: Scene) -> list[Omission]:
-    foot, terms = scene.foot, []
+def _omitted_of_liquid(scene: Scene, policy: str | None) -> list[Omission]:
+    foot, terms = scene.foot, [_suction(scene, policy)]
+    soft = _soft_film(scene, policy)
+    if soft is not None:
+        terms.append(soft)
     # A meniscus resists sliding at most by its hysteresis, γ w (cos θ_rec - cos θ_adv) <= 2 γ w,
     # with w = 2 r0 for each pad. Only domes have a meniscus.
     capillary = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
@@ -397,6 +463,58 @@ def _omitted_of_liquid(scene: Scene) -> list[Omission]:
             )
         )
     return terms
+
+
+def _soft_film(scene: Scene, policy: str | None) -> Omission | None:
+    """Return what Stefan and Reynolds leave out under a soft foot; None if that is nothing."""
+    stand, time = _on_wet_ground(scene, policy), 0.5 * _stance(scene)
+    foot, found = stand.foot, []
+    for name, rigid, middle, mean in stand.dimples(time):
+        if mean >= STIFF * rigid:
+            dry = math.exp(-((rigid / foot.critical_film) ** foot.film_exponent))
+            left = dry_share(middle, foot.critical_film, foot.film_exponent)
+            found.append(
+                f'; for a load at once, under the {name} the dimple is'
+                f' {_brief(1e6 * middle)} um thick and leaves {100.0 * left:.1f} % of the contact'
+                f' dry, the rigid film of {_brief(1e6 * rigid)} um {100.0 * dry:.1f} %'
+            )
+    if not found:
+        return None
+    least = stand.resistance(THICK_FILM, THICK_FILM)
+    return Omission(
+        'dimple of the film under a soft foot',
+        1.0 - least / stand.resistance(*stand.films(time)),
+        'of the friction on wet ground in mid-stance: no dry contact at all' + ''.join(found),
+    )
+
+
+def _brief(value: float) -> str:
+    return f'{float(f"{value:.3g}"):g}'
+
+
+def _suction(scene: Scene, policy: str | None) -> Omission:
+    """Return the pull of the film at lift-off.
+
+    Rigid discs that part at a speed V: F = 3 π η a⁴ V/(2 h³), at most the atmosphere on them. A
+    swing begins with h = k t²/2, so F falls below that after (12 π η a⁴/(k² F))^(1/5).
+    """
+    stand, gait, stance = _on_wet_ground(scene, policy), scene.gait, _stance(scene)
+    swing = gait.swing if isinstance(gait, RailGait) else gait.cycle - stance
+    count, radius = stand.discs
+    resistance = 1.5 * math.pi * scene.floor.viscosity * count * radius**4
+    most = ATMOSPHERE * count * math.pi * radius**2
+    rise = 2.0 * gait.lift * (math.pi / swing) ** 2
+    until = (8.0 * resistance / (rise**2 * most)) ** 0.2
+    films = stand.films(stance)
+    film = films[1] if stand.on_sole > 0.0 else films[0]
+    return Omission(
+        'suction of the film at lift-off',
+        1.25 * most * until / (scene.expected_load * stance),
+        f'of the impulse of a load of {_brief(scene.expected_load)} N in its stance: at most'
+        f' {_brief(most)} N, the atmosphere on the contact, for {_brief(1e3 * until)} ms; rigid'
+        f' discs with a film of {_brief(1e6 * film)} um pull with'
+        f' {_brief(1e-3 * resistance / film**3)} N a mm/s',
+    )
 
 
 def _omitted_joints(scene: Scene, policy: str | None) -> Omission:

@@ -249,6 +249,51 @@ def test_film_that_a_dome_can_drag():
     assert fidelity.dragged_film(scene, 0.01) == pytest.approx(film, rel=2e-3)
 
 
+def reason(scene, word):
+    return next(t.reason for t in fidelity.omitted(scene) if word in t.term)
+
+
+def test_suction_of_a_flat_sole_at_lift_off():
+    """By hand: 17 mm, 7.53 kPa, 0.6 s of water leave 6.93 um; 3 π η a⁴/(2 h³) = 1.18 N s/um.
+
+    Atmosphere on 9.08 cm²: 92 N. The foot rises as 30 mm sin²(π t/0.4 s), 1.85 m/s² t². The pull
+    12 π η a⁴/((3.70 m/s²)² t⁵) falls below 92 N after 4.8 ms, and a quarter of it follows.
+    """
+    scene = Scene.load('hexapod_smooth_wet_flat')
+    words = reason(scene, 'suction')
+    assert 'at most 92 N' in words and 'a film of 6.93 um pull with 1180 N a mm/s' in words
+    after = (12.0 * math.pi * 1e-3 * 0.017**4 / (3.701**2 * 92.0)) ** 0.2
+    expected = 1.25 * 92.0 * after / (6.834 * 0.6)
+    assert bound(scene, 'suction') == pytest.approx(expected, rel=2e-3)
+
+
+def test_suction_of_domes_acts_on_their_contact_alone():
+    scene = Scene.load('hexapod_smooth_wet_dome')
+    pressure = 70068.0  # 37 domes touch on 6.834 N / 70.07 kPa = 97.5 mm²
+    assert f'at most {101325.0 * 6.834 / pressure:.3g} N' in reason(scene, 'suction')
+
+
+def test_dimple_under_domes_and_under_a_sole():
+    """By hand: the lens of 0.424 · 7.53 kPa · 17 mm/395 kPa = 138 um has 235 um in its middle."""
+    flat = Scene.load('hexapod_smooth_wet_flat')
+    assert 'under the sole the dimple is 235 um' in reason(flat, 'dimple')
+    assert bound(flat, 'dimple') == pytest.approx(0.0, abs=1e-6)  # neither film is thin enough
+    # Rigid film 0.17 um: exp(-(0.17/0.5)²) = 0.89 dry; μ falls from 0.89 of dry to 0.12.
+    domes = Scene.load('hexapod_smooth_wet_dome')
+    assert 'under the domes the dimple is 5.54 um' in reason(domes, 'dimple')
+    assert 'of 0.173 um 88.7 %' in reason(domes, 'dimple')
+    dry = 0.35 + 4700.0 / 70068.0
+    wet = 0.89 * dry + 0.11 * 0.12
+    assert bound(domes, 'dimple') == pytest.approx(1.0 - 0.12 / wet, rel=0.01)
+
+
+def test_a_stiff_foot_has_no_dimple():
+    """In a very thick liquid the rigid film stays ten times as thick as the dimple."""
+    scene = Scene.load('hexapod_smooth_wet_flat')
+    floor = dataclasses.replace(scene.floor, viscosity=1e5, film_thickness=5e-3)
+    assert bound(dataclasses.replace(scene, floor=floor), 'dimple') is None
+
+
 def test_bound_of_soft_pads():
     # By hand: 0.80 of 6.834 N over 5 kN/m, twice in a cycle of 140 mm; a rail leg has it once.
     assert bound(HEXAPOD, 'soft pads') == pytest.approx(2 * 0.8 * 6.834 / 5e3 / 0.14, rel=2e-3)

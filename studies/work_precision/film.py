@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Soft squeeze films beside Stefan's and Reynolds': time against error, shapes, and a rule.
+
+Writes film.png and .json, and prints tables. The pad is the thesis' (1.5 mm), in water 0.3 mm
+deep: flat under 0.3 N, and as a dome of 75 kPa under 0.08 to 0.285 N. True films are extrapolated
+from 150 and 300 rings with a tolerance of 1e-8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import HalfSpace
+from ros_pad.contact import Membrane
+from ros_pad.contact import Squeezed
+from ros_pad.contact import film_thickness
+from ros_pad.contact import inflate
+from ros_pad.contact import squeeze
+from ros_pad.contact import trapped_film
+from ros_pad.contact.squeeze import dome_dimple
+from studies import command
+from studies.drawing import BLUE
+from studies.drawing import GREEN
+from studies.drawing import ORANGE
+from studies.drawing import PALE
+from studies.drawing import STYLE
+from studies.drawing import VERMILION
+from studies.work_precision.comparison import Method
+from studies.work_precision.comparison import Problem
+from studies.work_precision.comparison import Result
+from studies.work_precision.comparison import run
+from studies.work_precision.comparison import table
+
+RADIUS, LOAD, DEPTH = 1.5e-3, 0.3, 3e-4  # m, N, m
+MEAN = LOAD / (math.pi * RADIUS**2)
+CRITICAL = 0.5e-6  # m, as in config/feet
+AIR = 75e3  # Pa
+SPHERE = float(inflate(LARGE_PAD, AIR).sphere_radius)
+SOLES = {
+    'E = 29.5 kPa, thesis appendix': 4.0 / 3.0 * 29.5e3,
+    'Dragon Skin 10 as in the file': 4.0 * 2.0 * 26258.0,
+    'Dragon Skin 10, times 1.88': 3.95e5,
+    'Dragon Skin 30 as in the file': 4.0 * 2.0 * 141008.0,
+    '4 MPa': 4e6,
+    '40 MPa': 4e7,
+    '400 MPa': 4e8,
+}
+"""Reduced moduli, Pa."""
+
+TIMES = (1.0, 3.0)  # s, of the thesis' drag
+RIM = np.geomspace(1e-6, 10.0, 141)
+
+
+# --- time against error --------------------------------------------------------------------------
+
+
+def sole(modulus: float, time: Any, rings: int = 200, tolerance: float = 1e-6) -> Squeezed:
+    """Return the film under the flat pad."""
+    surface = HalfSpace(RADIUS, modulus)
+    return squeeze(surface, DEPTH, time, load=LOAD, rings=rings, tolerance=tolerance)
+
+
+def contact(load: float) -> float:
+    """Return the contact radius of the dome under a load, m."""
+    return math.sqrt(load / math.pi / AIR)
+
+
+def dome(load: float, time: Any, rings: int = 200, tolerance: float = 1e-6) -> Squeezed:
+    """Return the film under the dome."""
+    surface = Membrane(1.5 * contact(load), 0.5 * AIR * SPHERE, AIR)
+    return squeeze(surface, DEPTH, time, load=load, rings=rings, tolerance=tolerance)
+
+
+def sole_mean(modulus: float, time: float, rings: int, tolerance: float = 1e-6) -> float:
+    """Return the mean film under the flat pad, m."""
+    return float(sole(modulus, [time], rings, tolerance).mean[0])
+
+
+def dome_middle(load: float, time: float, rings: int, tolerance: float = 1e-6) -> float:
+    """Return the film in the middle under the dome, m."""
+    return float(dome(load, [time], rings, tolerance).thickness[0, 0])
+
+
+Film = Callable[..., float]
+
+
+def problem(name: str, film: Film, inputs: dict[str, list[float]]) -> Problem:
+    """Return cases with their true films."""
+    cases = list(zip(*inputs.values(), strict=True))
+    truth = []
+    for case in command.each(cases, f'true films, {name}', 'film'):
+        coarse, fine = (film(*case, rings, 1e-8) for rings in (150, 300))
+        truth.append(fine + (fine - coarse) / 3.0)
+    columns = {key: np.array(values) for key, values in inputs.items()}
+    return Problem(name, columns, np.array(truth), np.ones(len(cases), dtype=bool), math.inf)
+
+
+def soft_methods(film: Film) -> list[Method]:
+    """Return the soft film with more and more rings, and with loose time steps."""
+    methods = [
+        Method(f'{rings} rings', lambda x, time, n=rings: film(x, time, n), ours=True)
+        for rings in (25, 50, 100, 200)
+    ]
+    loose = [
+        Method(f'50 rings, tolerance {each:g}', lambda x, t, e=each: film(x, t, 50, e), ours=True)
+        for each in (1e-4,)
+    ]
+    return [*methods, *loose]
+
+
+def compare() -> list[Result]:
+    """Return time and error of each method."""
+    moduli = [each for each in SOLES.values() if each > 2e5][::2]
+    flat = problem(
+        'flat pad, mean film after 1 s',
+        sole_mean,
+        {'modulus_pa': moduli, 'time_s': [1.0] * len(moduli)},
+    )
+    flat_methods = [
+        Method('Stefan-Reynolds', lambda _, time: film_thickness(DEPTH, MEAN, RADIUS, time)),
+        Method('lens of uniform pressure', lambda modulus, _: trapped_film(RADIUS, modulus, MEAN)),
+        *soft_methods(sole_mean),
+    ]
+    loads = [0.08, 0.19, 0.285]
+    domed = problem(
+        'dome of 75 kPa, film in the middle after 0.3 s',
+        dome_middle,
+        {'load_n': loads, 'time_s': [0.3] * len(loads)},
+    )
+    domed_methods = [
+        Method(
+            'Stefan-Reynolds', lambda load, time: film_thickness(DEPTH, AIR, contact(load), time)
+        ),
+        Method('limit for long times', lambda f, time: dome_dimple(contact(f), SPHERE, AIR, time)),
+        *soft_methods(dome_middle),
+    ]
+    pairs = ((flat, flat_methods), (domed, domed_methods))
+    results = []
+    for each, methods in command.each(pairs, 'methods', 'problem'):
+        results += run(each, methods, 'Stefan-Reynolds')
+    return results
+
+
+def tolerances() -> list[dict[str, float]]:
+    """Return the largest relative error of a film of 50 rings in time, by tolerance."""
+    exact = sole(3.95e5, [1e-4, 1e-3], 50, 1e-10).thickness
+    rows = []
+    for tolerance in command.each([1e-2, 1e-3, 1e-4, 1e-5, 1e-6], 'tolerances', 'tolerance'):
+        film = sole(3.95e5, [1e-4, 1e-3], 50, tolerance).thickness
+        rows.append({'tolerance': tolerance, 'error': float(np.max(np.abs(film / exact - 1.0)))})
+    return rows
+
+
+# --- the thesis' pad, and the rule ---------------------------------------------------------------
+
+
+def sensitivity() -> list[dict[str, Any]]:
+    """Return for each modulus what the film is and when the rim closes."""
+    rows = []
+    for name, modulus in command.each(list(SOLES.items()), 'soles', 'sole'):
+        times = np.union1d(RIM, TIMES)
+        film = sole(modulus, times)
+        at = np.isin(times, TIMES)
+        rim = film.thickness.min(axis=1)
+        rigid = np.array(film_thickness(DEPTH, MEAN, RADIUS, TIMES))
+        rows.append(
+            {
+                'sole': name,
+                'modulus_pa': modulus,
+                'status': film.status,
+                'lens_mean_m': trapped_film(RADIUS, modulus, MEAN),
+                'mean_m': film.mean[at].tolist(),
+                'middle_m': film.thickness[at, 0].tolist(),
+                'rim_closed_s': float(np.interp(-CRITICAL, -rim, times)),
+                'dry': film.dry_share(CRITICAL)[at].tolist(),
+                'rigid_m': rigid.tolist(),
+                'rigid_dry': np.exp(-((rigid / CRITICAL) ** 2)).tolist(),
+            }
+        )
+    return rows
+
+
+def domes() -> list[dict[str, Any]]:
+    """Return the film under domes after 0.3 and 1 s."""
+    rows, times = [], [0.3, 1.0]
+    for load in command.each([0.08, 0.19, 0.285], 'domes', 'dome'):
+        film, b = dome(load, times), contact(load)
+        inside = film.radius < b
+        dry = np.exp(-((film.thickness[:, inside] / CRITICAL) ** 2)) @ film.area[inside]
+        rigid = np.array(film_thickness(DEPTH, AIR, b, times))
+        rows.append(
+            {
+                'load_n': load,
+                'contact_m': b,
+                'middle_m': film.thickness[:, 0].tolist(),
+                'rim_m': film.thickness.min(axis=1).tolist(),
+                'dry': (dry / film.area[inside].sum()).tolist(),
+                'rigid_m': rigid.tolist(),
+                'rigid_dry': np.exp(-((rigid / CRITICAL) ** 2)).tolist(),
+            }
+        )
+    return rows
+
+
+def rises() -> list[dict[str, Any]]:
+    """Return the film 1 s after a load that has grown linearly in some time, s."""
+    rows = []
+    for rise in command.each([0.0, 1e-3, 1e-2, 0.1, 1.0], 'rises', 'rise'):
+        time, b = [rise + 1.0], contact(0.19)
+        flat = squeeze(HalfSpace(RADIUS, 3.95e5), DEPTH, time, load=LOAD, rise=rise, rings=100)
+        surface = Membrane(1.5 * b, 0.5 * AIR * SPHERE, AIR)
+        domed = squeeze(surface, DEPTH, time, load=0.19, rise=rise, rings=150)
+        inside = domed.radius < b
+        area = domed.area[inside] / domed.area[inside].sum()
+        film = domed.thickness[0, inside]
+        rows.append(
+            {
+                'rise_s': rise,
+                'flat_mean_m': float(flat.mean[0]),
+                'flat_dry': float(flat.dry_share(CRITICAL)[0]),
+                'dome_mean_m': float(film @ area),
+                'dome_dry': float(np.exp(-((film / CRITICAL) ** 2)) @ area),
+            }
+        )
+    return rows
+
+
+def rule(rings: int = 100) -> list[dict[str, float]]:
+    """Return by how much the mean film exceeds the rigid one, by dimple over rigid film."""
+    rows, times = [], np.geomspace(1e-3, 1.0, 4)
+    rigid = np.array(film_thickness(DEPTH, MEAN, RADIUS, times))
+    grid = sole(4e10, times, rings).mean / rigid  # a rigid disc's, with so many rings
+    for modulus in command.each(np.geomspace(4e6, 4e9, 7).tolist(), 'rule', 'sole'):
+        excess = sole(modulus, times, rings).mean / rigid / grid - 1.0
+        lens = trapped_film(RADIUS, modulus, MEAN) / rigid
+        rows += [
+            {'dimple_over_film': float(x), 'excess': float(y)}
+            for x, y in zip(lens, excess, strict=True)
+        ]
+    return sorted(rows, key=lambda row: row['dimple_over_film'])
+
+
+# --- picture and tables --------------------------------------------------------------------------
+
+
+def draw(results: Sequence[Result]) -> Figure:
+    """Return the picture: time against error above, shapes below."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(8.6, 7.0), layout='constrained')
+        above, below = figure.subplots(2, 2)
+        names = list(dict.fromkeys(result.problem for result in results))
+        for panel, name in zip(above, names, strict=True):
+            _work(panel, [result for result in results if result.problem == name])
+        _shapes(below[0], sole(3.95e5, [1e-4, 1e-3, 1e-2, 1.0]), RADIUS, MEAN)
+        below[0].set_title('flat pad of Dragon Skin 10 under 0.3 N')
+        _shapes(below[1], dome(0.19, [1e-3, 1e-2, 0.1, 1.0]), contact(0.19), AIR)
+        below[1].set(title='dome of 75 kPa under 0.19 N', ylim=(3e-2, 1e3))
+    return figure
+
+
+def _work(panel: Any, results: Sequence[Result]) -> None:
+    panel.set(xscale='log', yscale='log', title=results[0].problem)
+    panel.set(xlabel='time for one film (ms)', ylabel='relative error, median to worst')
+    for result in results:
+        loose = 'tolerance' in result.method
+        colour = ORANGE if loose else GREEN if result.ours else VERMILION
+        x, low, high = 1e-3 * result.us_per_solve, result.median_error, result.error
+        panel.plot([x, x], [low, high], '-_', color=colour, lw=1.2)
+        panel.plot(x, low, 'o', color=colour, ms=5)
+        panel.annotate(
+            result.method,
+            (x, low),
+            (-4, 4) if loose else (6, -2),
+            textcoords='offset points',
+            ha='right' if loose else 'left',
+            fontsize=6.5,
+            color=colour,
+        )
+    panel.margins(x=0.3, y=0.15)
+    panel.grid(color=PALE, alpha=0.3, lw=0.5)
+
+
+def _shapes(panel: Any, film: Squeezed, radius: float, pressure: float) -> None:
+    colours = (PALE, ORANGE, BLUE, GREEN)
+    for row, (time, colour) in enumerate(zip(film.time, colours, strict=True)):
+        panel.plot(1e3 * film.radius, 1e6 * film.thickness[row], color=colour, label=f'{time:g} s')
+        rigid = 1e6 * float(film_thickness(DEPTH, pressure, radius, float(time)))
+        panel.plot([0.0, 1e3 * radius], [rigid, rigid], ':', color=colour)
+    panel.set(yscale='log', xlabel='radius (mm)', ylabel='film (µm); dotted: Stefan-Reynolds')
+    panel.legend(frameon=False, fontsize=7)
+
+
+def _texts(document: dict[str, Any]) -> list[str]:
+    lines = ['flat pad, 0.3 N: mean and middle film, um; dry contact, % (1 s and 3 s)']
+    for row in document['soles']:
+        lines.append(
+            f'  {row["sole"]:31} lens {1e6 * row["lens_mean_m"]:8.3g}'
+            f'  mean {_um(row["mean_m"])}  middle {_um(row["middle_m"])}'
+            f'  rim at 0.5 um after {row["rim_closed_s"]:.2g} s  dry {_share(row["dry"])}'
+            f'  ({row["status"]})'
+        )
+    first = document['soles'][0]
+    lines.append(f'  rigid: {_um(first["rigid_m"])}  dry {_share(first["rigid_dry"])}')
+    lines.append('dome of 75 kPa: film in the middle and at the rim, um; dry contact (0.3 s, 1 s)')
+    for row in document['domes']:
+        lines.append(
+            f'  {row["load_n"]:5.3f} N  middle {_um(row["middle_m"])}  rim {_um(row["rim_m"])}'
+            f'  dry {_share(row["dry"])}  rigid {_um(row["rigid_m"])}'
+            f'  dry {_share(row["rigid_dry"])}'
+        )
+    lines.append('time in which load grows; mean film, um, and dry: flat pad, dome of 0.19 N')
+    lines += [
+        f'  {row["rise_s"]:5g} s  {_um([row["flat_mean_m"]])}  {_share([row["flat_dry"]])}'
+        f'  {_um([row["dome_mean_m"]])}  {_share([row["dome_dry"]])}'
+        for row in document['rises']
+    ]
+    lines.append('largest error of any ring in time, by tolerance (50 rings)')
+    lines += [f'  {row["tolerance"]:g}  {row["error"]:.1e}' for row in document['tolerances']]
+    lines.append('excess of the mean film over Stefan-Reynolds, by mean dimple over that film')
+    lines += [
+        f'  {row["dimple_over_film"]:8.4f}  {100.0 * row["excess"]:7.2f} %'
+        for row in document['rule']
+    ]
+    return lines
+
+
+def _um(values: Sequence[float]) -> str:
+    return ' '.join(f'{1e6 * value:.3g}' for value in values)
+
+
+def _share(values: Sequence[float]) -> str:
+    return ' '.join(f'{100.0 * value:.3g} %' for value in values)
+
+
+def main(words: Sequence[str]) -> int:
+    """Measure, print and draw."""
+    parser = command.parser('film', __doc__)
+    command.add_out(parser)
+    options = parser.parse_args(words)
+    results = compare()
+    document = {
+        'rows': [asdict(result) for result in results],
+        'soles': sensitivity(),
+        'domes': domes(),
+        'rises': rises(),
+        'tolerances': tolerances(),
+        'rule': rule(),
+    }
+    kept = command.write(options.out, 'film', document, {'film': draw(results)})
+    command.show(options, kept, '\n'.join([table(results), *_texts(document)]))
+    return 0

@@ -1,0 +1,367 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.integrate import solve_ivp
+
+from ros_pad.contact.squeeze import HalfSpace
+from ros_pad.contact.squeeze import Membrane
+from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.contact.squeeze import dry_share
+from ros_pad.contact.squeeze import squeeze
+from ros_pad.contact.squeeze import trapped_film
+from ros_pad.errors import InvalidInput
+
+RADIUS, LOAD, MODULUS, WATER = 1.5e-3, 0.3, 395e3, 1.0e-3
+MEAN = LOAD / (math.pi * RADIUS**2)
+
+
+def balance(film):
+    """Return by how much the liquid in the film and the liquid that has left differ over time."""
+    liquid = film.thickness @ film.area + film.drained
+    return np.max(np.abs(liquid / liquid[0] - 1.0))
+
+
+# --- deflection -------------------------------------------------------------------------------
+
+
+def deflections(surface, force, rings):
+    """Return radii, and deflections in units of a/E* or a²/T, by a pressure.
+
+    It is given by its force on the disc of radius r, over π.
+    """
+    edges = np.linspace(0.0, 1.0, rings + 1)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    pressure = np.diff(force(edges)) / np.diff(edges**2)
+    return middles, surface.deflection(edges, middles) @ pressure
+
+
+@pytest.mark.parametrize(
+    'force, exact',
+    [
+        # Johnson, Contact Mechanics, 3.4: pressures √(1 - r²) and, of a flat punch, 1/√(1 - r²).
+        (lambda r: (1.0 - (1.0 - r**2) ** 1.5) / 1.5, lambda r: 0.25 * math.pi * (2.0 - r**2)),
+        (lambda r: 2.0 - 2.0 * np.sqrt(1.0 - r**2), lambda r: np.full_like(r, math.pi)),
+    ],
+)
+def test_a_half_space_deflects_as_in_the_books(force, exact):
+    errors = []
+    for rings in (50, 200):
+        r, found = deflections(HalfSpace(RADIUS, MODULUS), force, rings)
+        inner = r < 0.9
+        errors.append(np.max(np.abs(found - exact(r))[inner]))
+    assert errors[1] < 2e-3 and errors[1] < 0.3 * errors[0]
+
+
+def test_a_half_space_under_uniform_pressure():
+    """By integrals of Boussinesq's 1/(π E* distance): 2 p a/E* in the middle, 4/π at the rim."""
+    edges = np.array([0.0, 0.3, 0.7, 1.0])
+    at = np.array([1e-9, 0.5, 1.0, 4.0])
+    found = HalfSpace(RADIUS, MODULUS).deflection(edges, at)
+    assert found.sum(axis=1)[[0, 2]] == pytest.approx([2.0, 4.0 / math.pi], rel=1e-12)
+    for row, r in zip(found, at, strict=True):
+        for ring, (low, high) in zip(row, pairwise(edges), strict=True):
+
+            def chord(angle, r=r, low=low, high=high):
+                """Return how far a ray from radius r, at an angle to the axis, is in the ring."""
+                ends = []
+                for c in (low, high):
+                    root = c**2 - (r * math.sin(angle)) ** 2
+                    half = math.sqrt(max(root, 0.0))
+                    ends.append(max(0.0, r * math.cos(angle) + half)
+                                - max(0.0, r * math.cos(angle) - half))  # fmt: skip
+                return ends[1] - ends[0]
+
+            breaks = [math.asin(c / r) for c in edges if 0.0 < c < r]
+            value = quad(chord, 0.0, math.pi, points=breaks or None, limit=400, epsabs=1e-10)[0]
+            assert ring == pytest.approx(2.0 * value / math.pi, rel=1e-6)
+
+
+def test_a_membrane_deflects_as_a_paraboloid():
+    r, found = deflections(Membrane(RADIUS, 50.0, 75e3), np.square, 50)
+    assert found == pytest.approx(0.25 * (1.0 - r**2), rel=1e-10)
+
+
+# --- stiff and soft limits --------------------------------------------------------------------
+
+
+def test_a_stiff_sole_is_a_rigid_disc():
+    """Stefan: 1/h² grows by 4 p t/(3 η a²). A dent adds at most its depth to the mean film."""
+    times = np.array([1e-4, 1e-3, 1e-2])
+    stefan = (1.0 / 3e-4**2 + 4.0 * MEAN * times / (3.0 * WATER * RADIUS**2)) ** -0.5
+    for modulus in (2e8, 2e10):
+        film = squeeze(HalfSpace(RADIUS, modulus), 3e-4, times, load=LOAD).mean
+        dent = 2.0 * MEAN * RADIUS / modulus
+        assert np.all(film > stefan)
+        assert np.all(film < 1.0003 * stefan + dent)
+
+
+def test_early_dimple_of_a_rather_stiff_sole():
+    """The parabola of pressure under a rigid disc, 2 p (1 - r²), dents a half-space by 8/3 p a/E*
+    in the middle; at its rim by the integral of 1/(π E* distance). More dents are of second order.
+    """
+    film = squeeze(HalfSpace(RADIUS, 2e8), 3e-4, [2e-5, 2e-4], load=LOAD)
+
+    def along(angle):
+        # From the rim the ray crosses the disc over 2 cos(angle); r² = 1 - 2 s cos + s².
+        reach = 2.0 * math.cos(angle)
+        return 2.0 * (reach**2 * math.cos(angle) - reach**3 / 3.0)
+
+    rim = 2.0 * quad(along, 0.0, 0.5 * math.pi)[0] / math.pi
+    dimple = (8.0 / 3.0 - rim) * MEAN * RADIUS / 2e8
+    found = film.thickness[:, 0] - film.thickness[:, -1]
+    assert np.all(np.abs(found / dimple - 1.0) < dimple / film.thickness[:, -1])
+    assert dimple < 0.04 * film.thickness[-1, -1]
+
+
+def test_at_first_the_rim_falls_and_the_middle_keeps_its_height():
+    """The undented film has the pressure of a rigid punch, p/(2 √(1 - r²)), rising outward."""
+    film = squeeze(HalfSpace(RADIUS, MODULUS), 5e-6, [0.0, 1e-8, 1e-6, 1e-4], load=LOAD)
+    r = film.radius / RADIUS
+    inner = r < 0.9
+    punch = 0.5 * MEAN / np.sqrt(1.0 - r**2)
+    assert film.pressure[0, inner] == pytest.approx(punch[inner], rel=0.02)
+    assert film.thickness[1, 0] == pytest.approx(5e-6, rel=1e-3)
+    assert film.thickness[1, -1] < 0.8 * 5e-6
+    assert np.all(np.diff(film.thickness[:, -1]) < 0.0)
+
+
+def test_a_flat_soft_sole_traps_a_lens():
+    """Uniform pressure p: depth (2 - 4/π) p a/E* in the middle, 16/(3π) - 4/π in the mean."""
+    film = squeeze(HalfSpace(RADIUS, MODULUS), 3e-4, [1e-3, 0.01, 0.1], load=LOAD)
+    unit = MEAN * RADIUS / MODULUS
+    assert film.mean[-1] == pytest.approx((16.0 / 3.0 - 4.0) / math.pi * unit, rel=2e-3)
+    assert film.thickness[-1, 0] == pytest.approx((2.0 - 4.0 / math.pi) * unit, rel=2e-3)
+    assert trapped_film(RADIUS, MODULUS, MEAN) == pytest.approx(film.mean[-1], rel=2e-3)
+    middle = film.radius < 0.9 * RADIUS
+    assert film.pressure[-1, middle] == pytest.approx(MEAN, rel=0.01)
+    # The lens keeps its shape, and the rim closes as η E* a/(p² t): ten times in ten.
+    assert film.thickness[:2, -1][0] / film.thickness[1, -1] == pytest.approx(10.0, rel=0.4)
+    assert film.status == 'ok'
+
+
+def test_a_film_thinner_than_the_lens_stays():
+    film = squeeze(HalfSpace(RADIUS, MODULUS), 1e-5, [0.01, 1.0], load=LOAD)
+    assert trapped_film(RADIUS, MODULUS, MEAN) > 6e-5
+    assert np.all(film.mean > 0.9e-5) and np.all(film.thickness > 0.0)
+    assert film.status == 'touching'
+    assert balance(film) < 1e-11
+
+
+@pytest.mark.parametrize(
+    'surface', [HalfSpace(RADIUS, MODULUS), Membrane(1.5 * 0.9e-3, 58.0, 75e3)]
+)
+def test_a_load_that_grows_slowly_traps_less(surface):
+    """While the load is small its dent is shallow, and what has left does not come back."""
+    means, shares = [], []
+    for rise in (0.0, 1e-3, 1e-2):
+        times = [0.5e-3, 1e-3, 0.02]
+        film = squeeze(surface, 3e-4, times, load=0.19, rise=rise, rings=80)
+        expected = [0.19 * (min(1.0, time / rise) if rise else 1.0) for time in times]
+        assert film.load == pytest.approx(expected, rel=1e-9)
+        assert balance(film) < 1e-9
+        means.append(film.thickness[-1, 0])
+        shares.append(film.dry_share(0.5e-6)[-1])
+    assert means[0] > 1.2 * means[1] > 1.2**2 * means[2]
+    assert shares[0] < shares[1] < shares[2]
+
+
+# --- published results for curved surfaces ----------------------------------------------------
+
+
+def pinched_rim():
+    """Return K and the least H of H''' = 1/H³ with H' -> -1 inward and H'' -> K outward.
+
+    It is the rim of the dimple under a surface of constant tension (Frankel and Mysels, J. Phys.
+    Chem. 66 (1962) 190; Jones and Wilson, J. Fluid Mech. 87 (1978) 263).
+    """
+    start = 400.0  # far inside: H = start, H' = -1 + 1/(2 H), H'' = 1/(2 H²)
+    found = solve_ivp(
+        lambda x, y: [y[1], y[2], y[0] ** -3],
+        (0.0, 2.0 * start),
+        [start, -1.0 + 0.5 / start, 0.5 / start**2],
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=0.5,
+    )
+    return found.y[2, -1], found.y[0].min()
+
+
+def test_the_dimple_under_a_dome_drains_as_one_of_constant_tension():
+    """Parabola of height m, rim slope s = 2 m/b: dm/dt = -4 q/b, q = T K s⁵/(12 η κ), κ = p/T."""
+    pressure, contact, tension = 75e3, 0.57e-3, 58.0
+    load = pressure * math.pi * contact**2
+    times = np.array([0.03, 0.3, 3.0])
+    film = squeeze(Membrane(1.5 * contact, tension, pressure), 3e-4, times, load=load)
+    end, least = pinched_rim()
+    bend = pressure / tension
+    middle = (WATER * bend * contact**6 / (128.0 / 3.0 * end * tension * times)) ** 0.25
+    rim = least * end * (2.0 * middle / contact) ** 2 / bend
+    for found, limit in ((film.thickness[:, 0], middle), (film.thickness.min(axis=1), rim)):
+        away = np.abs(found / limit - 1.0)
+        assert away[2] < 0.03
+        assert away[2] < away[1] < away[0] < 0.15
+    assert film.radius[film.thickness[-1].argmin()] == pytest.approx(contact, rel=0.01)
+    closed = [dome_dimple(contact, 2.0 / bend, pressure, float(t), WATER) for t in times]
+    assert closed == pytest.approx(middle, rel=1e-4)
+
+
+def test_a_pressed_sphere_ends_in_hertz_contact():
+    """Its pressure falls outward, so it traps no lens: the film drains and the rest is Hertz'."""
+    curvature, load, modulus = 200.0, 0.05, 395e3
+    contact = (0.75 * load / (curvature * modulus)) ** (1.0 / 3.0)
+    surface = HalfSpace(2.5 * contact, modulus, curvature)
+    film = squeeze(surface, 2e-5, [0.1, 10.0, 1000.0], load=load, rings=150)
+    hertz = 1.5 * load / (math.pi * contact**2)
+    assert film.pressure[-1, 0] == pytest.approx(hertz, rel=0.02)
+    assert film.pressure[-1, film.radius > 1.1 * contact] == pytest.approx(0.0, abs=0.01 * hertz)
+    assert film.thickness[-1, 0] < 0.2 * film.thickness[0, 0]
+    assert film.load == pytest.approx([load] * 3, rel=1e-10)
+
+
+# --- prescribed speed -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('velocity', [1e-6, -1e-6])
+def test_force_of_a_stiff_disc_at_constant_speed(velocity):
+    """Rigid discs: F = 3 π η a⁴ V/(2 h³), a pull when they are lifted."""
+    film = squeeze(HalfSpace(RADIUS, 1e6), 2e-5, [2.0], velocity=velocity)
+    h = 2e-5 - velocity * 2.0
+    force = 1.5 * math.pi * WATER * RADIUS**4 * velocity / h**3
+    assert film.load == pytest.approx([force], rel=2e-3)
+    assert film.mean == pytest.approx([h], rel=1e-3)
+
+
+def test_a_soft_disc_is_lifted_with_less_force():
+    def pull(modulus):
+        surface = HalfSpace(RADIUS, modulus)
+        times = np.linspace(0.0, 0.1, 50)[1:]
+        return -squeeze(surface, 2e-5, times, velocity=-1e-4, rings=100).load.min()
+
+    rigid = 1.5 * math.pi * WATER * RADIUS**4 * 1e-4 / 2e-5**3
+    assert 0.0 < pull(1e5) < pull(1e6) < rigid
+
+
+# --- what holds for each film -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize('modulus', [40e3, 395e3, 4e6])
+def test_liquid_and_load_are_kept_and_films_stay_positive(modulus):
+    times = np.geomspace(1e-6, 3.0, 9)
+    film = squeeze(HalfSpace(RADIUS, modulus), 3e-4, times, load=LOAD, rings=80)
+    assert balance(film) < 1e-9
+    assert film.load == pytest.approx([LOAD] * 9, rel=1e-10)
+    assert np.all(film.thickness > 0.0)
+    assert film.drained[-1] > 0.0
+    assert film.status == ('large_strain' if modulus == 40e3 else film.status)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_films_of_random_surfaces(seed):
+    random = np.random.default_rng(seed)
+    radius, modulus = 10.0 ** random.uniform(-4.0, -1.5), 10.0 ** random.uniform(4.0, 7.0)
+    pressure, initial = 10.0 ** random.uniform(2.5, 5.5), 10.0 ** random.uniform(-6.0, -3.0)
+    load, time = pressure * math.pi * radius**2, 10.0 ** random.uniform(-3.0, 1.0)
+    surface = (
+        HalfSpace(radius, modulus),
+        HalfSpace(2.0 * radius, modulus, 0.75 * load / modulus / radius**3),
+        Membrane(2.0 * radius, pressure * radius, pressure),
+    )[seed % 3]
+    film = squeeze(
+        surface,
+        initial,
+        [0.5 * time, time],
+        load=load,
+        viscosity=10.0 ** random.uniform(-4.0, 0.0),
+        rise=float(random.choice([0.0, time])),
+        rings=40,
+    )
+    assert np.all(film.thickness > 0.0) and np.all(np.isfinite(film.pressure))
+    assert balance(film) < 1e-9
+    assert film.load[-1] == pytest.approx(load, rel=1e-9)
+
+
+def test_second_order_in_rings():
+    sole = HalfSpace(RADIUS, MODULUS)
+    means = [
+        squeeze(sole, 3e-4, [1e-3], load=LOAD, rings=rings, tolerance=1e-8).mean[0]
+        for rings in (25, 50, 100)
+    ]
+    order = math.log2((means[0] - means[1]) / (means[1] - means[2]))
+    assert 1.7 < order < 2.6
+
+
+def test_results_have_the_scales_of_the_equation():
+    """Viscosity scales time; lengths and pressures scale with radius and modulus."""
+    one = squeeze(HalfSpace(RADIUS, MODULUS), 3e-5, [0.01], load=LOAD, rings=60)
+    slow = squeeze(HalfSpace(RADIUS, MODULUS), 3e-5, [0.5], load=LOAD, viscosity=0.05, rings=60)
+    assert slow.thickness == pytest.approx(one.thickness, rel=1e-4)
+    twice = HalfSpace(2 * RADIUS, 3 * MODULUS)
+    large = squeeze(twice, 6e-5, [0.01 / 3.0], load=12 * LOAD, rings=60)
+    assert large.thickness == pytest.approx(2.0 * one.thickness, rel=1e-4)
+
+
+def test_share_of_dry_contact():
+    film = squeeze(HalfSpace(RADIUS, MODULUS), 3e-6, [0.0, 1.0], load=LOAD, rings=50)
+    assert film.dry_share(1e-6)[0] == pytest.approx(math.exp(-9.0), rel=1e-9)
+    assert film.dry_share(1e-6, 1.0)[0] == pytest.approx(math.exp(-3.0), rel=1e-9)
+    assert film.dry_share(1.0) == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize('middle, exponent', [(0.0, 2.0), (0.3e-6, 2.0), (5e-6, 2.0), (2e-6, 1.0)])
+def test_dry_share_under_a_paraboloid(middle, exponent):
+    def ring(r):
+        return 2.0 * r * math.exp(-((middle * (1.0 - r**2) / 0.5e-6) ** exponent))
+
+    expected = quad(ring, 0.0, 1.0, epsabs=1e-12)[0]
+    assert dry_share(middle, 0.5e-6, exponent) == pytest.approx(expected, rel=1e-9)
+
+
+# --- refusals ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'changed, words',
+    [
+        ({'initial': 0.0}, 'initial = 0.0 .* m'),
+        ({'load': -1.0}, 'load = -1.0 .* N'),
+        ({'load': None}, 'load or velocity is needed'),
+        ({'velocity': 1e-3}, 'not both'),
+        ({'load': None, 'velocity': 0.0}, 'velocity = 0 m/s'),
+        ({'load': None, 'velocity': math.nan}, 'velocity = nan .* m/s'),
+        ({'viscosity': 0.0}, 'viscosity = 0.0 .* Pa s'),
+        ({'time': [0.1, 0.1]}, 'time = .* rising'),
+        ({'time': [0.0]}, 'time = .* rising'),
+        ({'time': -1.0}, 'time = -1.0 .* s'),
+        ({'rings': 5}, 'rings = 5 .* 10 to 2000'),
+        ({'rise': -1.0}, 'rise = -1.0 .* s'),
+        ({'tolerance': 1.0}, 'tolerance = 1.0'),
+        ({'surface': HalfSpace(RADIUS, 1e13)}, 'it is rigid, use film_thickness'),
+        ({'surface': Membrane(1e-3, 50.0, 1e5)}, r'radius = 0.001 m .* 0.001466 m, is needed'),
+    ],
+)
+def test_refused(changed, words):
+    values = {'surface': HalfSpace(RADIUS, MODULUS), 'initial': 3e-4, 'time': [0.1], 'load': LOAD}
+    with pytest.raises(InvalidInput, match=words):
+        squeeze(**(values | changed))
+
+
+@pytest.mark.parametrize(
+    'make, words',
+    [
+        (lambda: HalfSpace(0.0, 1e5), 'radius = 0.0 .* m'),
+        (lambda: HalfSpace(1e-3, -1.0), 'modulus = -1.0 .* Pa'),
+        (lambda: HalfSpace(1e-3, 1e5, -1.0), 'curvature = -1.0 .* 1/m'),
+        (lambda: Membrane(1e-3, 0.0, 1.0), 'tension = 0.0 .* N/m'),
+        (lambda: Membrane(1e-3, 1.0, 0.0), 'pressure = 0.0 .* Pa'),
+        (lambda: trapped_film(1e-3, 1e5, -1.0), 'pressure = -1.0 .* Pa'),
+        (lambda: dome_dimple(1e-3, 1e-3, 1e5, 0.0), 'time = 0.0 .* s'),
+        (lambda: dry_share(-1e-6, 1e-6), 'middle = -1e-06 .* m'),
+    ],
+)
+def test_surfaces_refused(make, words):
+    with pytest.raises(InvalidInput, match=words):
+        make()
