@@ -27,11 +27,16 @@ from ros_pad.contact import pressure_for
 from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
+from ros_pad.contact.limits import DEFAULT_CRITERION
 from ros_pad.contact.limits import resized
 from ros_pad.errors import InvalidInput
 
 CEILING = 90e3  # Pa gauge, the ceiling of the shipped feet
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
+OTHER_RADII = (
+    'Limits measured on one pad do not hold for another radius: other radii are computed with the '
+    f'criterion {DEFAULT_CRITERION}.'
+)
 OPTIMUM = (
     'The thesis claims that a pad radius of 0.3 to 0.8 mm is best. Neither set of equations '
     'confirms this: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
@@ -72,7 +77,9 @@ def add(commands: Commands) -> None:
         '--margin', type=float, default=1.2, metavar='X', help='factor on the load (%(default)g)'
     )
     part.add_argument(
-        '--criterion', choices=CRITERIA, help='criterion of the force limit (measured)'
+        '--criterion',
+        choices=CRITERIA,
+        help=f'criterion of the force limit ({DEFAULT_CRITERION})',
     )
     part.add_argument(
         '--foot',
@@ -94,8 +101,8 @@ def run(options: argparse.Namespace) -> int:
     refuse_existing('--figure', options.figure)
     foot = None if options.foot is None else Foot.load(options.foot)
     pad = LARGE_PAD if foot is None else foot.pad
-    if options.stiffness is not None:
-        pad = replace(pad, stiffness=options.stiffness)
+    if options.stiffness not in (None, pad.stiffness):
+        pad = replace(pad, stiffness=options.stiffness, measured_limit=None)
     if options.radius is not None:
         pad = resized(pad, options.radius)
     area = _area(options, foot)
@@ -103,15 +110,19 @@ def run(options: argparse.Namespace) -> int:
     rules: dict[str, Any] = {
         'ceiling': ceiling if options.pressure is None else options.pressure,
         'margin': options.margin,
-        'criterion': options.criterion or ('measured' if foot is None else foot.limit),
+        'criterion': options.criterion or (DEFAULT_CRITERION if foot is None else foot.limit),
     }
     designs = {each: design(options.load, area, pad, reading=each, **rules) for each in READINGS}
     if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
         built = design(options.load, area, pad, pads=foot.pads, **rules)
         designs = {'as built': built, **designs}
-    rows = _over(RADII, options.load, area, pad, rules)
+    others = rules
+    if rules['criterion'] == 'measured':
+        others = rules | {'criterion': DEFAULT_CRITERION}
+    rows = _over(RADII, options.load, area, pad, others)
     sentences = [
         *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
+        *(() if others is rules else (OTHER_RADII,)),
         *_overlap('By the equations of the thesis, ', designs['thesis']),
         OPTIMUM,
     ]
@@ -119,7 +130,7 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.design import draw
 
         radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
-        draw(options.figure, *_over(radii, options.load, area, pad, rules))
+        draw(options.figure, *_over(radii, options.load, area, pad, others))
     if options.json:
         summary = {
             'designs': [{'name': name, **values(each)} for name, each in designs.items()],
@@ -142,7 +153,7 @@ def _over(
         [
             design(load, area, resized(pad, r), reading=reading, **rules)
             for r in radii
-            if area >= CELL['corrected'] * r * r
+            if area >= CELL['corrected'] * r * r and r >= (pad.thickness or 0.0)
         ]
         for reading in READINGS
     ]

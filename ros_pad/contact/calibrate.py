@@ -26,9 +26,10 @@ from ros_pad.contact.dome import largest_tension
 from ros_pad.contact.dome import press
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.film import Film
+from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.limits import measured_line
 from ros_pad.contact.measurements import Friction
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array
@@ -198,7 +199,8 @@ def calibrate(
     warnings: list[str] = []
     pad = _stiffness(measurements, foot.pad, constants, warnings)
     pad = _limit(measurements, pad, constants, warnings)
-    foot = _with(foot, pad=pad, ceiling=_ceiling(foot, pad, warnings))
+    foot = _with(foot, pad=pad, limit=_criterion(foot, pad, warnings))
+    foot = _with(foot, ceiling=_ceiling(foot, pad, warnings))
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     if not any(constant.fitted for constant in constants):
@@ -216,6 +218,19 @@ def calibrate(
         *_friction_residuals(measurements.friction, foot, wet_floor),
     )
     return Calibration(measurements, foot, tuple(constants), residuals, tuple(warnings))
+
+
+def _criterion(foot: Foot, pad: Pad, warnings: list[str]) -> str:
+    """Return the criterion of the force limit: that of the start foot, or the pad's own line."""
+    if pad.measured_limit not in (None, foot.pad.measured_limit):
+        return 'measured'
+    if foot.limit in criteria(pad):
+        return foot.limit
+    warnings.append(
+        f'the criterion of the force limit becomes {DEFAULT_CRITERION}: none was measured on a pad'
+        ' of this stiffness'
+    )
+    return DEFAULT_CRITERION
 
 
 def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
@@ -240,7 +255,7 @@ def _fits_a_foot(source: str, constant: Constant) -> None:
         )
 
 
-def _with(foot: Foot, **changes: float | Pad) -> Foot:
+def _with(foot: Foot, **changes: float | str | Pad) -> Foot:
     return dataclasses.replace(foot, **changes)  # type: ignore[arg-type]
 
 
@@ -275,6 +290,8 @@ def foot_file(calibration: Calibration) -> str:
         entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
         entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
     ]
+    if pad.thickness is not None:
+        lines.append(entry('thickness', pad.thickness, 'm', '  '))
     limit = pad.measured_limit
     if limit is not None:
         lines += [
@@ -470,15 +487,15 @@ def _limit(
     if len(np.unique(pressure)) < 2:
         if len(pressure):
             warnings.append(
-                'the line of the force limit is kept: the measured force limits are all at one'
-                ' pressure, and a line needs two'
+                'the line of the force limit is not fitted: the measured force limits are all at'
+                ' one pressure, and a line needs two'
             )
-        line = measured_line(pad)
-        note = "the thesis' line" if pad.measured_limit is None else "the start foot's line"
-        constants.append(
-            _kept('force_limit', 'N', line.force, f'{note}, on one pad at {line.pressure:g} Pa')
-        )
-        constants.append(_kept('force_limit_slope', 'N/Pa', line.slope, note))
+        line = pad.measured_limit
+        if line is not None:
+            note = "the start foot's line"
+            at = f'{note}, on one pad at {line.pressure:g} Pa'
+            constants.append(_kept('force_limit', 'N', line.force, at))
+            constants.append(_kept('force_limit_slope', 'N/Pa', line.slope, note))
         return pad
     middle = float(pressure.mean())
     fit = _line(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
@@ -502,8 +519,10 @@ def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
     if not len(pressure):
         return []
     used = pad.measured_limit is not None
-    known = pressure <= largest_pressure(pad)
-    modelled = np.where(known, force_limit(pad, np.where(known, pressure, 0.0)), np.nan)
+    criterion = 'measured' if used else DEFAULT_CRITERION
+    known = pressure <= largest_pressure(pad, criterion)
+    modelled = force_limit(pad, np.where(known, pressure, 0.0), criterion)
+    modelled = np.where(known, modelled, np.nan)
     return [
         Residual('force_limit', f'{p:g} Pa', p, value, float(model), used)
         for p, value, model in zip(pressure, limit, modelled, strict=True)
