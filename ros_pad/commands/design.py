@@ -28,6 +28,7 @@ from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import resized
 from ros_pad.errors import InvalidInput
 
@@ -107,10 +108,11 @@ def run(options: argparse.Namespace) -> int:
         pad = resized(pad, options.radius)
     area = _area(options, foot)
     ceiling = CEILING if foot is None else foot.ceiling
+    own = DEFAULT_CRITERION if foot is None else foot.limit
     rules: dict[str, Any] = {
         'ceiling': ceiling if options.pressure is None else options.pressure,
         'margin': options.margin,
-        'criterion': options.criterion or (DEFAULT_CRITERION if foot is None else foot.limit),
+        'criterion': options.criterion or (own if own in criteria(pad) else DEFAULT_CRITERION),
     }
     designs = {each: design(options.load, area, pad, reading=each, **rules) for each in READINGS}
     if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):

@@ -199,8 +199,9 @@ def calibrate(
     warnings: list[str] = []
     pad = _stiffness(measurements, foot.pad, constants, warnings)
     pad = _limit(measurements, pad, constants, warnings)
-    foot = _with(foot, pad=pad, limit=_criterion(foot, pad, warnings))
-    foot = _with(foot, ceiling=_ceiling(foot, pad, warnings))
+    limit = _criterion(foot, pad, warnings)
+    ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
+    foot = _with(foot, pad=pad, limit=limit, ceiling=ceiling)
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     if not any(constant.fitted for constant in constants):
@@ -233,14 +234,14 @@ def _criterion(foot: Foot, pad: Pad, warnings: list[str]) -> str:
     return DEFAULT_CRITERION
 
 
-def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
+def _ceiling(ceiling: float, pad: Pad, limit: str, warnings: list[str]) -> float:
     """Return the foot's ceiling, Pa; lower it to whole kPa if the pad's model ends below."""
-    end = largest_pressure(pad, foot.limit)
-    if foot.ceiling <= end:
-        return foot.ceiling
+    end = largest_pressure(pad, limit)
+    if ceiling <= end:
+        return ceiling
     lowered = 1e3 * math.floor(end / 1e3)
     warnings.append(
-        f'the ceiling is lowered from {foot.ceiling:g} to {lowered:g} Pa: the model of these'
+        f'the ceiling is lowered from {ceiling:g} to {lowered:g} Pa: the model of these'
         f' softer pads ends at {end:.6g} Pa'
     )
     return lowered

@@ -117,7 +117,9 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     else:
         limit = _flattening(pad, np.where(inside, p, 0.0))
         if criterion != 'flattening':
-            limit = _where_room_ends(pad, np.where(inside, p, 0.0), limit, criterion)
+            # press can refuse the end itself because of rounding.
+            p = np.minimum(np.where(inside, p, 0.0), end * (1.0 - 1e-15))
+            limit = _where_room_ends(pad, p, limit, criterion)
     return plain(np.where(inside, np.maximum(limit, 0.0), np.nan))
 
 

@@ -75,9 +75,7 @@ def like(pad: Pad, stiffer: float = 1.0, radius: float = 1.0) -> Pad:
         return replace(pad, radius=radius * pad.radius, stiffness=stiffer * pad.stiffness)
     parameters = tuple(stiffer * each for each in pad.material.parameters)
     assert pad.thickness is not None
-    return Pad.of(
-        replace(pad.material, parameters=parameters), radius * pad.radius, pad.thickness
-    )
+    return Pad.of(replace(pad.material, parameters=parameters), radius * pad.radius, pad.thickness)
 
 
 def limit(pad: Pad, pressure: float, criterion: str) -> float | None:

@@ -169,7 +169,7 @@ def test_illustrative_set_of_friction_coefficients():
 # --- sharing of the load ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('limit', ['measured', 'max_depth', 'flattening'])
+@pytest.mark.parametrize('limit', ['measured', 'thickness', 'max_depth', 'flattening'])
 @pytest.mark.parametrize('films', [(0.0, 0.0), (2e-7, 2e-5)])
 def test_continuous_in_load_and_pressure(limit, films):
     foot = bare_foot(limit=limit)
@@ -303,7 +303,7 @@ def written(tmp_path, change):
         ('friction', 'nan', 'friction = nan is not allowed'),
         ('shear_stiffness', 0, 'N/m'),
         ('film_exponent', True, 'film_exponent = True'),
-        ('force_limit', 'felt', 'one of measured, max_depth, flattening'),
+        ('force_limit', 'felt', 'one of thickness, wall, flattening, max_depth, measured'),
         ('ceiling', 100e3, 'ceiling = 100000 Pa is not allowed'),
         ('ceiling', 2e6, 'from 1000 to 1000000 Pa'),
         ('colour', 'red', "unknown key 'colour'"),
