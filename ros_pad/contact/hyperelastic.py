@@ -361,16 +361,16 @@ class Domes:
         share, rest : array
             ``F/(p π r²)`` and 1 less that, both above 0.
         """
-        angle = self._at(1, pressure, share)
+        angle = self._at(self._pressed[1], pressure, share)
         return rest / (1.0 + np.sqrt(share)) * np.tan(0.5 * angle)
 
     def rim(self, pressure: Array, share: Array) -> Array:
         """Return the angle of the wall at the rim, rad, of pressed domes."""
-        return self._at(2, pressure, share)
+        return self._at(self._rims, pressure, share)
 
-    def _at(self, field: int, pressure: Array, share: Array) -> Array:
-        """Return a field of the table at P and ``F/(p π r²)``."""
-        tables, starts, first, step = self._pressed
+    def _at(self, table: Array, pressure: Array, share: Array) -> Array:
+        """Return the value of a table at P and ``F/(p π r²)``."""
+        pushes, _, starts, first, step = self._pressed
         contact = np.sqrt(share)
         place = (np.sqrt(contact) - first) / step
         row = np.rint(self._coordinate(pressure) * ((_ROWS - 1) / self._last)).astype(np.intp)
@@ -379,8 +379,8 @@ class Domes:
         low = np.clip(start.astype(np.intp) - 1, 0, _ROWS - 4)
         left = np.clip(place.astype(np.intp) - 1, 0, _CONTACTS - 4)
         corner, weights = low * _CONTACTS + left, _weights(place - left)
-        x = _root(_across(tables[0], corner, weights), np.cbrt(pressure), start - low)
-        return _sum(_across(tables[field], corner, weights), _weights(x))
+        x = _root(_across(pushes, corner, weights), np.cbrt(pressure), start - low)
+        return _sum(_across(table, corner, weights), _weights(x))
 
     def _coordinate(self, pressure: Array) -> Array:
         """Return x, in which domes are analytic both where P is small and at a maximum of P."""
@@ -405,23 +405,36 @@ class Domes:
         return CubicSpline(x, np.stack([root * height, root * volume, root * root], axis=1))
 
     @functools.cached_property
-    def _pressed(self) -> tuple[tuple[Array, ...], Array, float, float]:
-        """Tables of ``P^(1/3)``, ψ, rim angle over x and s, start values, first s, step of s."""
-        from scipy.interpolate import CubicSpline
-
-        lines = _nodes(*_SPAN, _LINES)
-        x, given = np.linspace(0.0, self._last, _ROWS), _nodes(_LOW, 1.0, _STRAINS) * self._last
-        states = self._on_lines(given, self._reach(lines), lines, _TOLERANCE)
+    def _pressed(self) -> tuple[Array, Array, Array, float, float]:
+        """Tables of ``P^(1/3)`` and ψ over x and s, start values, first s and step of s."""
+        _, states, _, kept = self._states
         angle = 2.0 * np.arctan2(states.gap, states.rest)
-        fields = (
-            np.sqrt(states.contact),
-            np.cbrt(states.pressure) / given[:, None],
-            angle / given[:, None],
-            states.rim / given[:, None],
+        push, angle = self._tables(np.cbrt(states.pressure), angle)
+        x = np.linspace(0.0, self._last, _ROWS)
+        even = np.cbrt(self._turn * x**3 * (2.0 - x**3))
+        starts = np.array(
+            [np.interp(even, np.maximum.accumulate(each), np.arange(_ROWS)) for each in push.T]
+        ).T
+        return (
+            push.ravel(),
+            angle.ravel(),
+            starts.ravel(),
+            float(kept[0]),
+            float(kept[1] - kept[0]),
         )
-        to_rows = chebyshev.chebvander(_unit(x / self._last, (_LOW, 1.0)), _STRAINS - 1)
-        to_fine = chebyshev.chebvander(_unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1)
-        place, *values = (to_rows @ _fit((to_fine @ _fit(each.T)).T) for each in fields)
+
+    @functools.cached_property
+    def _rims(self) -> Array:
+        """Table of the angle at the rim over x and s."""
+        (table,) = self._tables(self._states[1].rim)
+        return table.ravel()
+
+    @functools.cached_property
+    def _states(self) -> tuple[Array, Shapes, Array, Array]:
+        """Given x, states over x and lines, s over finer x and lines, and the s of the tables."""
+        lines, given = _nodes(*_SPAN, _LINES), _nodes(_LOW, 1.0, _STRAINS) * self._last
+        states = self._on_lines(given, self._reach(lines), lines, _TOLERANCE)
+        place = _finer(np.sqrt(states.contact))
         if not (np.diff(place, axis=1) > 0.0).all():
             raise InvalidInput(
                 f'largest_stretch is too large for pressed domes of the law {self._law[0]}'
@@ -429,25 +442,17 @@ class Domes:
                 ' the load; a smaller one is needed'
             )
         kept = np.linspace(place[:, 0].max(), place[:, -1].min(), _CONTACTS)
-        table = x[:, None, None] * np.array(
-            [
-                CubicSpline(each, np.stack(row, axis=1))(kept)
-                for each, *row in zip(place, *values, strict=True)
-            ]
-        )
-        even = np.cbrt(self._turn * x**3 * (2.0 - x**3))
-        starts = np.array(
-            [
-                np.interp(even, np.maximum.accumulate(each), np.arange(_ROWS))
-                for each in table[..., 0].T
-            ]
-        ).T
-        return (
-            tuple(table[..., k].ravel() for k in range(len(values))),
-            starts.ravel(),
-            float(kept[0]),
-            float(kept[1] - kept[0]),
-        )
+        return given, states, place, kept
+
+    def _tables(self, *fields: Array) -> Array:
+        """Return tables over x and s of fields that are in proportion to x where it is small."""
+        from scipy.interpolate import CubicSpline
+
+        given, _, place, kept = self._states
+        finer = np.stack([_finer(each / given[:, None]) for each in fields], axis=-1)
+        rows = [CubicSpline(*pair)(kept) for pair in zip(place, finer, strict=True)]
+        x = np.linspace(0.0, self._last, _ROWS)
+        return np.moveaxis(x[:, None, None] * np.array(rows), -1, 0)
 
     def _reach(self, lines: Array) -> Array:
         """Return the factors on the line of largest x with which P is just above ``end``."""
@@ -489,6 +494,13 @@ def _fit(values: Array) -> Array:
     count = len(values)
     basis = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
     return np.asarray(np.linalg.solve(basis, values), dtype=np.float64)
+
+
+def _finer(values: Array) -> Array:
+    """Return a field at the nodes of x and lines on the finer grid of the tables."""
+    to_rows = chebyshev.chebvander(_unit(np.linspace(0.0, 1.0, _ROWS), (_LOW, 1.0)), _STRAINS - 1)
+    to_fine = chebyshev.chebvander(_unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1)
+    return np.asarray(to_rows @ _fit((to_fine @ _fit(values.T)).T))
 
 
 def _series(values: Array, span: tuple[float, float]) -> Any:
