@@ -84,7 +84,14 @@ def test_stiffer_rubber_lowers_the_limit_of_the_wall():
         assert found == pytest.approx(limit, rel=2e-3)
 
 
-@pytest.mark.parametrize('pad', [LARGE_PAD, SMALL_PAD, RUBBER, Pad(1.5e-3, 40.0)])
+@pytest.mark.parametrize(
+    'pad',
+    [LARGE_PAD, SMALL_PAD, RUBBER, Pad(1.5e-3, 40.0)]
+    + [
+        Pad.of(Material('neo_hookean', (1.5e5,)), 1.5e-3, share * 1.5e-3)
+        for share in (0.1, 0.27, 0.4)  # up to the pressure at which it balloons
+    ],
+)
 def test_the_default_is_never_zero_where_a_dome_stands(pad):
     pressures = np.linspace(DOME_PRESSURE, largest_pressure(pad), 300)
     limits = force_limit(pad, pressures)
