@@ -14,6 +14,9 @@ from typing import Any
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.contact import Foot
+from ros_pad.contact import Material
+from ros_pad.contact import Pad
+from ros_pad.contact.calibrate import FITS
 from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.calibrate import calibrate
 from ros_pad.contact.calibrate import foot_file
@@ -31,7 +34,8 @@ def add(commands: Commands) -> None:
         run,
         'Fit a foot to measured shapes and forces; write its YAML file and a picture of the fit '
         'and its residuals.',
-        'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml',
+        'pad calibrate my_pads.csv --foot large37 --out my_foot.yaml\n'
+        'pad calibrate my_pads.csv --material dragon_skin_10 --thickness 0.4e-3',
     )
     part.add_argument(
         'csv',
@@ -45,6 +49,20 @@ def add(commands: Commands) -> None:
         default='large37',
         help='foot whose values the fit starts from, and keeps where nothing was measured: a name '
         'in config/feet or a YAML file (default large37)',
+    )
+    part.add_argument(
+        '--material',
+        metavar='MATERIAL',
+        help='material of the pads in place of what the foot has: a name in config/materials or a '
+        'YAML file',
+    )
+    part.add_argument('--thickness', type=float, metavar='M', help='thickness of their sheet, m')
+    part.add_argument(
+        '--fit',
+        choices=FITS,
+        help='what the shapes of domes give: one factor on the stresses of the material (default '
+        'where there is a material), the thickness of the sheet, or the constants of the law of '
+        'the thesis (default where there is none)',
     )
     part.add_argument(
         '--film-thickness',
@@ -88,11 +106,14 @@ def run(options: argparse.Namespace) -> int:
         )
     for path in (foot_path, figure_path):
         refuse(path, options.force)
+    foot = Foot.load(options.foot)
     found = calibrate(
         Measurements.read(options.csv),
-        Foot.load(options.foot),
+        foot,
         options.film_thickness,
         options.viscosity,
+        fit=options.fit,
+        rubber=_rubber(options, foot),
     )
     picture = io.BytesIO()
     draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
@@ -103,6 +124,21 @@ def run(options: argparse.Namespace) -> int:
         _show(found)
         print(f'\nfoot:    {foot_path}\npicture: {figure_path}')
     return 0
+
+
+def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
+    """Return the pad of a material that the options ask for, if any."""
+    if options.material is None and options.thickness is None:
+        return None
+    material = foot.pad.material
+    if options.material is not None:
+        material = Material.load(options.material)
+    thickness = foot.pad.thickness if options.thickness is None else options.thickness
+    if material is None or thickness is None:
+        raise InvalidInput(
+            f'--material and --thickness are both needed: the foot {foot.source} has not both'
+        )
+    return Pad.of(material, foot.pad.radius, thickness, foot.pad.measured_limit)
 
 
 def _write(contents: dict[pathlib.Path, bytes]) -> None:
@@ -134,6 +170,17 @@ def _values(
         'residuals': [
             plain(asdict(residual) | {'error': residual.error}) for residual in found.residuals
         ],
+        'laws': [
+            {
+                'name': law.name,
+                'constants': law.values.tolist(),
+                'low': [None if math.isnan(end) else end for end in law.low.tolist()],
+                'high': [None if math.isnan(end) else end for end in law.high.tolist()],
+                'pressure_error': law.error,
+            }
+            for law in found.laws
+        ],
+        'comparisons': [plain(asdict(each)) | {'says': str(each)} for each in found.comparisons],
         'warnings': list(found.warnings),
         'foot': str(foot_path),
         'figure': str(figure_path),
@@ -159,5 +206,12 @@ def _show(found: Calibration) -> None:
             f'{row.quantity:18} {row.setting:34} {row.measured:11.5g} {row.modelled:11.5g}'
             f'  {error}{mark}'
         )
+    if found.laws:
+        print(f'\n{"law of free domes":18} {"constants":24} error of pressure, rms')
+        for law in found.laws:
+            constants = ' and '.join(f'{value:.4g}' for value in law.values)
+            print(f'{law.name:18} {constants:24} {100.0 * law.error:.2g} %')
+    for comparison in found.comparisons:
+        print(comparison)
     for warning in found.warnings:
         print(f'\nnote: {warning}')

@@ -92,6 +92,7 @@ _COMPLETERS: dict[str, Callable[..., list[str]]] = {
     'scene': _shipped('scenes'),
     'scenes': _shipped('scenes'),
     'foot': _shipped('feet'),
+    'material': _shipped('materials'),
     'robot': _shipped('robots', '.yaml', '.urdf'),
     'mapping': _shipped('mappings'),
     'feet': _nothing,

@@ -14,16 +14,23 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad import configuration
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.command import print_table
 from ros_pad.commands.folder import refuse_existing
+from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import Design
 from ros_pad.contact import Foot
+from ros_pad.contact import Material
 from ros_pad.contact import Pad
 from ros_pad.contact import design
 from ros_pad.contact import pressure_for
+from ros_pad.contact.candidates import Candidate
+from ros_pad.contact.candidates import Span
+from ros_pad.contact.candidates import candidates
 from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
@@ -38,6 +45,8 @@ OTHER_RADII = (
     'Limits measured on one pad do not hold for another radius: other radii are computed with the '
     f'criterion {DEFAULT_CRITERION}.'
 )
+MATERIAL_CRITERION = 'flattening'
+SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm of 1.5 and others
 OPTIMUM = (
     'The thesis claims that a pad radius of 0.3 to 0.8 mm is best. Neither set of equations '
     'confirms this: the liquid stands highest at 2.33 mm (corrected) or 2.67 mm (thesis).'
@@ -52,9 +61,14 @@ def add(commands: Commands) -> None:
         run,
         'Compute number, load, pressure and height of rise of the pads on a sole, with corrected '
         'equations and with those printed in the thesis.',
-        'pad design --load 7 --foot large37 --figure design.png',
+        'pad design --load 7 --foot large37 --figure design.png\n'
+        'pad design --load 2 --sole-radius 0.017 --material all --thickness 0.2e-3 0.4e-3',
     )
-    part.description = f'{part.description}\nOne of --area, --sole-radius and --foot is needed.'
+    part.description = (
+        f'{part.description}\nOne of --area, --sole-radius and --foot is needed.'
+        '\nWith --material, or a foot whose pads name one: a table of pads of each material and '
+        'thickness, with intervals from what is unsure of the materials.'
+    )
     part.add_argument('--load', type=float, required=True, metavar='N', help='load on one foot, N')
     sole = part.add_mutually_exclusive_group()
     sole.add_argument('--area', type=float, metavar='M2', help='area of the sole, m²')
@@ -80,8 +94,10 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--criterion',
         choices=CRITERIA,
-        help=f'criterion of the force limit ({DEFAULT_CRITERION})',
+        help=f'criterion of the force limit ({DEFAULT_CRITERION}; of materials '
+        f'{MATERIAL_CRITERION})',
     )
+    _add_materials(part)
     part.add_argument(
         '--foot',
         metavar='FOOT',
@@ -97,10 +113,35 @@ def add(commands: Commands) -> None:
     part.add_argument('--json', action='store_true', help='print one JSON object')
 
 
+def _add_materials(part: argparse.ArgumentParser) -> None:
+    part.add_argument(
+        '--material',
+        nargs='+',
+        metavar='MATERIAL',
+        help='materials to compare: names in config/materials, YAML files, or all',
+    )
+    part.add_argument(
+        '--thickness',
+        nargs='+',
+        type=float,
+        metavar='M',
+        help='thicknesses of their sheets, m (2/15, 4/15 and 6/15 of the radius, or that of the '
+        'foot)',
+    )
+    part.add_argument(
+        '--height', type=float, metavar='M', help='least height of their free domes, m (0)'
+    )
+
+
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
     refuse_existing('--figure', options.figure)
     foot = None if options.foot is None else Foot.load(options.foot)
+    if options.material is not None or (foot is not None and foot.pad.material is not None):
+        return _compare_materials(options, foot)
+    for name in ('thickness', 'height'):
+        if getattr(options, name) is not None:
+            raise InvalidInput(f'--{name} needs --material, or a foot whose pads name a material')
     pad = LARGE_PAD if foot is None else foot.pad
     if options.stiffness not in (None, pad.stiffness):
         pad = replace(pad, stiffness=options.stiffness, measured_limit=None)
@@ -145,6 +186,108 @@ def run(options: argparse.Namespace) -> int:
         _print(designs, rows)
         print('', *sentences, sep='\n')
     return 0
+
+
+def _compare_materials(options: argparse.Namespace, foot: Foot | None) -> int:
+    """Print pads of materials and thicknesses for the load; return the exit status."""
+    if options.stiffness is not None:
+        raise InvalidInput('--stiffness is not allowed with a material, which has its own')
+    own = None if foot is None or options.material is not None else foot.pad
+    radius = options.radius
+    if radius is None:
+        radius = LARGE_PAD.radius if foot is None else foot.pad.radius
+    area = _area(options, foot)
+    built = foot is not None and (radius, area) == (foot.pad.radius, foot.sole_area)
+    ceiling = options.pressure
+    if ceiling is None:
+        ceiling = CEILING if own is None or foot is None else foot.ceiling
+    rules: dict[str, Any] = {
+        'pads': foot.pads if built and foot is not None else None,
+        'ceiling': ceiling,
+        'margin': options.margin,
+        'criterion': options.criterion or (foot.limit if own and foot else MATERIAL_CRITERION),
+        'height': options.height or 0.0,
+    }
+    same = own is not None and (radius, options.thickness) == (own.radius, None)
+    with bar('candidates', 1.0, 'table', delay=2.0) as progress:
+        found = candidates(
+            options.load,
+            area,
+            [own.material] if own and own.material else _materials(options.material),
+            options.thickness or ([own.thickness] if own else [radius * each for each in SHEETS]),
+            radius,
+            measured_limit=own.measured_limit if own is not None and same else None,
+            progress=progress,
+            **rules,
+        )
+    sentences = list(material_advice(found, options.load, rules))
+    if options.figure is not None:
+        from ros_pad.reports.design import draw_candidates
+
+        draw_candidates(options.figure, found, ceiling)
+    if options.json:
+        summary = {
+            'load_n': options.load,
+            'area_m2': area,
+            **{name: value for name, value in rules.items() if name != 'pads'},
+            'candidates': [candidate_values(each) for each in found],
+            'says': sentences,
+            'figure': None if options.figure is None else str(options.figure),
+        }
+        print(json.dumps(summary))
+    else:
+        _print_candidates(found)
+        print('', *sentences, sep='\n')
+    return 0
+
+
+def _materials(names: Sequence[str]) -> list[Material]:
+    known = configuration.names('materials') if list(names) == ['all'] else names
+    return [Material.load(name) for name in known]
+
+
+def candidate_values(each: Candidate) -> dict[str, Any]:
+    """Return the values of a candidate by name with unit; None for values that are not finite."""
+
+    def span(found: Span) -> list[float | None]:
+        return [value if math.isfinite(value) else None for value in found]
+
+    return {
+        'material': each.material,
+        'thickness_m': each.pad.thickness,
+        'radius_m': each.pad.radius,
+        'pads': each.pads,
+        'pressure_pa': span(each.pressure),
+        'height_m': span(each.height),
+        'reachable_load_n': span(each.load),
+        'largest_pressure_pa': span(each.largest_pressure),
+        'balloons': each.balloons,
+        'ballooning_margin': span(each.ballooning_margin),
+        'carried': each.carried,
+    }
+
+
+def material_advice(
+    found: Sequence[Candidate], load: float, rules: dict[str, Any]
+) -> Iterator[str]:
+    """Yield sentences on which candidates carry the load."""
+    height = f', {rules["height"]:g} m high,' if rules['height'] else ''
+    counts = {word: sum(each.carried == word for each in found) for word in ('yes', 'in doubt')}
+    yield (
+        f'{counts["yes"]} of {len(found)} candidates carry {load:g} N{height} at up to'
+        f' {rules["ceiling"]:g} Pa, with a margin of {rules["margin"]:g} by the criterion'
+        f' {rules["criterion"]}; {counts["in doubt"]} more if their material is as favourable as'
+        ' it may be.'
+    )
+    yield (
+        'In brackets: from the lowest to the highest factor on the stresses that the doubts about'
+        ' a material leave open (see its file). pad calibrate narrows it to your pads.'
+    )
+    if rules['criterion'] == 'flattening':
+        yield (
+            'Flattening is the end of the model: the pad of the thesis carried 0.33, 0.57 and 0.67'
+            ' of it at 65, 75 and 85 kPa.'
+        )
 
 
 def _over(
@@ -306,6 +449,36 @@ def _print(designs: dict[str, Design], rows: Sequence[Sequence[Design]]) -> None
             for key in ('pads', 'pressure_pa', 'reachable_load_n', 'rise_height_m')
         )
         print(f'{pair[0].pad.radius:9.5g}' + cells)
+
+
+def _print_candidates(found: Sequence[Candidate]) -> None:
+    first = found[0]
+    print(f'{first.pads} pads of radius {first.pad.radius:g} m\n')
+    head = ('material', 'sheet, m', 'pressure, Pa', 'height, m', 'load, N', 'largest, Pa')
+    rows = [
+        [
+            each.material,
+            f'{each.pad.thickness:g}',
+            *(
+                _span(span)
+                for span in (each.pressure, each.height, each.load, each.largest_pressure)
+            ),
+            ('' if each.balloons else 'over ') + _span(each.ballooning_margin),
+            each.carried,
+        ]
+        for each in found
+    ]
+    print_table((*head, 'over pressure', 'carried'), rows)
+
+
+def _span(span: Span) -> str:
+    def text(value: float) -> str:
+        if math.isinf(value):
+            return 'none'
+        return f'{value:.0f}' if value >= 1e3 else f'{value:.3g}'
+
+    value, low, high = (text(each) for each in span)
+    return value if low == high else f'{value} ({low} to {high})'
 
 
 def _cell(value: object, width: int) -> str:

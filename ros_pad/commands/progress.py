@@ -13,15 +13,17 @@ from ros_pad.pace import Progress
 
 
 @contextmanager
-def bar(text: str, total: float, unit: str = 's') -> Iterator[Progress]:
+def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterator[Progress]:
     """Show a progress bar on stderr; yield the function that sets its position, 0 to ``total``.
 
     The bar ends full if the last report came within one reporting interval of the end, or if there
-    was no report. After an early end it stays at the last report.
+    was no report. After an early end it stays at the last report. It is shown after ``delay``, s.
     """
     shape = '{desc} {percentage:3.0f}% {bar} {n:.0f}/{total:.0f} {unit} [{elapsed}<{remaining}]'
     stride: float | None = None
-    with tqdm(total=total, desc=text, unit=unit, bar_format=shape, file=sys.stderr) as shown:
+    with tqdm(
+        total=total, desc=text, unit=unit, bar_format=shape, file=sys.stderr, delay=delay
+    ) as shown:
 
         def show(place: float) -> None:
             nonlocal stride

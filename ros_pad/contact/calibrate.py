@@ -2,8 +2,10 @@
 """Fit the constants of a foot to measurements: stiffness, force limit, friction, film.
 
 Stiffness and the constants of friction are fitted by their logarithms and minimise relative
-errors. The line of the force limit minimises absolute errors. Confidence intervals are those of
-Student's t at 95 %, from the curvature of the sum of squares at its minimum.
+errors. A pad of a material has the factor on its stresses, or its thickness, in place of the
+stiffness; free domes give it by relative errors of pressure (:mod:`ros_pad.contact.laws`). The
+line of the force limit minimises absolute errors. Confidence intervals are those of Student's t at
+95 %, from the curvature of the sum of squares at its minimum.
 """
 
 from __future__ import annotations
@@ -14,11 +16,13 @@ import json
 import math
 import pathlib
 from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ros_pad.configuration import choice
 from ros_pad.configuration import number
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import inflate
@@ -26,16 +30,26 @@ from ros_pad.contact.dome import largest_tension
 from ros_pad.contact.dome import press
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.film import Film
+from ros_pad.contact.hyperelastic import pressure_end
+from ros_pad.contact.laws import Comparison
+from ros_pad.contact.laws import Law
+from ros_pad.contact.laws import compare
+from ros_pad.contact.laws import rubber_laws
+from ros_pad.contact.laws import stiffness_law
+from ros_pad.contact.laws import two_constants_law
+from ros_pad.contact.laws import with_constant
 from ros_pad.contact.limits import DEFAULT_CRITERION
 from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact.material import FACTORS
+from ros_pad.contact.material import Material
 from ros_pad.contact.measurements import Friction
 from ros_pad.contact.measurements import Measurements
+from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import need_stiffness
 from ros_pad.contact.resistance import FOOT_SETTINGS
 from ros_pad.contact.resistance import LIMIT_SETTINGS
 from ros_pad.contact.resistance import PAD_SETTINGS
@@ -43,6 +57,8 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 
 CONFIDENCE = 0.95
+FITS = ('factor', 'thickness', 'constants')
+"""What shapes of domes can be fitted by; the last is the stiffness, with the two constants."""
 # A constant is identified if its interval is within this factor of its value, and if every change
 # of the constants by 1 % changes the modelled data by more than one part in 10^5.
 _WIDEST = 10.0
@@ -64,6 +80,8 @@ _FRICTION = {
     name: (_SETTINGS[name].unit, start, max(low, _SETTINGS[name].low), _SETTINGS[name].high)
     for name, (start, low) in _STARTS.items()
 }
+# Constant that the shapes of domes give, by what is fitted.
+_SHAPES = {'factor': 'factor', 'thickness': 'thickness', 'constants': 'stiffness'}
 # Settings of a foot file for the constants that are checked only after the fit.
 _IN_FOOT = {
     'stiffness': PAD_SETTINGS[1],
@@ -150,6 +168,10 @@ class Calibration:
         All measurements against the calibrated model.
     warnings : tuple of str
         Messages about results that the user should check.
+    laws : tuple of Law
+        If a material was given: laws of the free dome, fitted to the free domes.
+    comparisons : tuple of Comparison
+        Which of these laws the free domes distinguish.
     """
 
     measurements: Measurements
@@ -157,6 +179,8 @@ class Calibration:
     constants: tuple[Constant, ...]
     residuals: tuple[Residual, ...]
     warnings: tuple[str, ...]
+    laws: tuple[Law, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
 
 
 def calibrate(
@@ -164,6 +188,9 @@ def calibrate(
     foot: Foot,
     film_thickness: float = 3.0e-4,
     viscosity: float = WATER_VISCOSITY,
+    *,
+    fit: str | None = None,
+    rubber: Pad | None = None,
 ) -> Calibration:
     """Fit the constants of a foot to measurements.
 
@@ -179,6 +206,11 @@ def calibrate(
         Thickness of the film on the wet floor before the foot touches down, m, above 0.
     viscosity : float
         Viscosity of that liquid, Pa s, above 0.
+    fit : {'factor', 'thickness', 'constants'}, optional
+        What the shapes of domes give: factor or thickness of the material, or the stiffness of
+        the thesis' law. By default the factor for a pad of a material, else the stiffness.
+    rubber : Pad, optional
+        A pad of a material in place of the foot's pad.
 
     Returns
     -------
@@ -190,35 +222,62 @@ def calibrate(
     InvalidInput
         When nothing can be fitted (the message lists the data that each fit needs), when a
         measurement contradicts the model or the foot, when a fitted constant is out of the range
-        of a foot file, or when film thickness or viscosity is not finite or not above 0.
+        of a foot file, when ``fit`` needs a material and there is none, or when film thickness or
+        viscosity is not finite or not above 0.
     """
     number('film_thickness', film_thickness, 'm', above=True)
     number('viscosity', viscosity, 'Pa s', above=True)
-    need_stiffness('calibration', foot.pad)
+    start, fit = _start(foot, fit, rubber)
     constants: list[Constant] = []
     warnings: list[str] = []
-    pad = _stiffness(measurements, foot.pad, constants, warnings)
+    _check_shapes(measurements)
+    laws = _laws(measurements, start, fit, warnings)
+    if fit == 'constants':
+        pad = _stiffness(measurements, _capped(measurements, start), constants, warnings)
+    else:
+        pad = _of_rubber(measurements, start, fit, laws, constants, warnings)
     pad = _limit(measurements, pad, constants, warnings)
     limit = _criterion(foot, pad, warnings)
     ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
     foot = _with(foot, pad=pad, limit=limit, ceiling=ceiling)
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
+    _check_constants(measurements.source, fit, constants)
+    residuals = (
+        *_shape_residuals(measurements, pad, len(measurements.free.pressure) >= 1),
+        *_limit_residuals(measurements, pad),
+        *_friction_residuals(measurements.friction, foot, wet_floor),
+    )
+    compared = compare(laws, measurements.free.pressure)
+    return Calibration(
+        measurements, foot, tuple(constants), residuals, tuple(warnings), laws, compared
+    )
+
+
+def _check_constants(source: str, fit: str, constants: Sequence[Constant]) -> None:
+    """Raise `InvalidInput` if nothing was fitted, or a constant that no foot file may have."""
     if not any(constant.fitted for constant in constants):
         raise InvalidInput(
-            f'{measurements.source}: nothing can be fitted: stiffness needs a free dome, or a'
+            f'{source}: nothing can be fitted: {_SHAPES[fit]} needs a free dome, or a'
             ' pressed dome with height or gap; the line of the force limit needs force limits at'
             ' two pressures; friction needs tangential forces'
         )
     for constant in constants:
-        _fits_a_foot(measurements.source, constant)
-    used_free = len(measurements.free.pressure) >= 1
-    residuals = (
-        *_shape_residuals(measurements, pad, used_free),
-        *_limit_residuals(measurements, pad),
-        *_friction_residuals(measurements.friction, foot, wet_floor),
-    )
-    return Calibration(measurements, foot, tuple(constants), residuals, tuple(warnings))
+        _fits_a_foot(source, constant)
+
+
+def _start(foot: Foot, fit: str | None, rubber: Pad | None) -> tuple[Pad, str]:
+    """Return the pad from which the fit starts, and what is fitted."""
+    start = foot.pad if rubber is None else rubber
+    if fit is None:
+        fit = 'constants' if start.material is None else 'factor'
+    choice('fit', fit, FITS)
+    if fit != 'constants' and start.material is None:
+        raise InvalidInput(
+            f'fit = {fit!r} is not allowed without a material: a foot whose pad names a material'
+            ' is needed, or material and thickness beside the foot'
+        )
+    return start, fit
 
 
 def _criterion(foot: Foot, pad: Pad, warnings: list[str]) -> str:
@@ -288,11 +347,16 @@ def foot_file(calibration: Calibration) -> str:
         '',
         'pad:',
         entry('radius', pad.radius, 'm', '  '),
-        entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
-        entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
     ]
-    if pad.thickness is not None:
-        lines.append(entry('thickness', pad.thickness, 'm', '  '))
+    if pad.material is None:
+        if pad.thickness is not None:
+            lines.append(entry('thickness', pad.thickness, 'm', '  '))
+        lines += [
+            entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
+            entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
+        ]
+    else:
+        lines += _material_lines(pad, comments, entry)
     limit = pad.measured_limit
     if limit is not None:
         lines += [
@@ -310,6 +374,26 @@ def foot_file(calibration: Calibration) -> str:
         f'force_limit: {foot.limit}',
     ]
     return '\n'.join(lines) + '\n'
+
+
+def _material_lines(
+    pad: Pad, comments: dict[str, str], entry: Callable[..., str]
+) -> Iterator[str]:
+    """Yield the lines of a foot file for material, thickness and factor of a pad."""
+    material = pad.material
+    assert material is not None and material.factor_range is not None
+    if not material.name:
+        raise InvalidInput(
+            f'the material {material} has no name: a foot file needs one that was loaded from a'
+            ' file (Material.load)'
+        )
+    yield f'  material: {json.dumps(material.name, ensure_ascii=False)}'
+    yield entry('thickness', pad.thickness, f'm, {comments.get("thickness", "as given")}', '  ')
+    yield f'  factor: # on the stresses of the material, {comments.get("factor", "as given")}'
+    for name, value in zip(
+        ('value', 'low', 'high'), (material.factor, *material.factor_range), strict=True
+    ):
+        yield entry(name, value, '(factor)', '    ')
 
 
 def _comment(constant: Constant) -> str:
@@ -349,10 +433,8 @@ def _tension_and_stretch(pad: Pad, pressure: Array, height: Array) -> tuple[Arra
     return tension, np.sqrt(1.0 + relative**2)
 
 
-def _stiffness(
-    measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
-) -> Pad:
-    """Return the pad with its fitted stiffness; add constants and warnings."""
+def _check_shapes(measurements: Measurements) -> None:
+    """Raise `InvalidInput` for pressures and lengths of domes that are not above 0."""
     free, pressed = measurements.free, measurements.pressed
     for name, values in (
         ('height', free.height),
@@ -362,6 +444,13 @@ def _stiffness(
         ('gap', pressed.gap),
     ):
         _above_zero(measurements.source, name, values)
+
+
+def _stiffness(
+    measurements: Measurements, pad: Pad, constants: list[Constant], warnings: list[str]
+) -> Pad:
+    """Return the pad with its fitted stiffness; add constants and warnings."""
+    free = measurements.free
     if len(free.pressure):
         least = float(free.pressure.max()) * pad.radius / BURST
 
@@ -372,7 +461,7 @@ def _stiffness(
         constants.append(fit.constant('stiffness', 'N/m', "of the thesis' law, free domes"))
         pad = _stiff(pad, fit.values[0])
         _two_parameters(measurements, pad, constants, warnings)
-    by_pressed = _stiffness_pressed(measurements, pad)
+    by_pressed = _from_pressed(measurements, pad, 'stiffness')
     if by_pressed is None:
         if not len(free.pressure):
             constants.append(_kept('stiffness', 'N/m', pad.stiffness, 'no dome was measured'))
@@ -385,28 +474,43 @@ def _stiffness(
     return _stiff(pad, by_pressed.values[0])
 
 
-def _stiffness_pressed(measurements: Measurements, pad: Pad) -> _Fit | None:
-    """Fit the stiffness to height or gap of pressed domes; return None if neither is measured."""
+def _from_pressed(measurements: Measurements, pad: Pad, name: str) -> _Fit | None:
+    """Fit a constant of the pad to height or gap of pressed domes; None if neither is measured."""
     pressed = measurements.pressed
     wall = np.where(np.isnan(pressed.height), pressed.gap, pressed.height)
     known = ~np.isnan(wall)
     if not known.any():
         return None
-    least = float(pressed.pressure[known].max()) * pad.radius / largest_tension(0.01)
+    start = _value(pad, name)
+    if name == 'stiffness':
+        end = largest_tension(0.01) * start / pad.radius
+    else:
+        end = pressure_end(pad)[0]
+    least = start * float(pressed.pressure[known].max()) / end
+    if name == 'factor':
+        least = max(least, FACTORS[0])
 
-    def walls(k: Array) -> Array:
-        dome = press(_stiff(pad, k[0]), pressed.pressure[known], pressed.force[known])
+    def walls(value: Array) -> Array:
+        changed = with_constant(pad, name, float(value[0]))
+        dome = press(changed, pressed.pressure[known], pressed.force[known])
         by_gap = np.isnan(pressed.height[known])
         return np.asarray(np.where(by_gap, dome.gap, dome.height))
 
-    fit = _fit(walls, wall[known], [pad.stiffness], [least])
-    if np.isnan(fit.values).any():
+    most = {'factor': FACTORS[1], 'thickness': pad.radius}.get(name, math.inf)
+    fit = None if least >= most else _fit(walls, wall[known], [start], [least], [most])
+    if fit is None or np.isnan(fit.values).any():
         raise InvalidInput(
             f'{measurements.source}: the pressed domes carry more than the model of a pad of '
             f'radius = {pad.radius:g} m allows at their pressure: check the radius in the foot'
             ' file'
         )
     return fit
+
+
+def _value(pad: Pad, name: str) -> float:
+    if name == 'factor':
+        return pad.material.factor  # type: ignore[union-attr]
+    return float(getattr(pad, name))
 
 
 def _two_parameters(
@@ -439,6 +543,94 @@ def _two_parameters(
             f' the law of two constants the pressure error is {two:.3g} Pa instead of {one:.3g} Pa'
             ' (rms)'
         )
+
+
+def _laws(measurements: Measurements, pad: Pad, fit: str, warnings: list[str]) -> tuple[Law, ...]:
+    """Return the laws of free domes, fitted; none without a material or without free domes."""
+    free = measurements.free
+    if pad.material is None or not len(free.pressure):
+        return ()
+    laws = [stiffness_law(pad.radius, *free)]
+    if len(np.unique(free.pressure)) > 1:
+        laws.append(two_constants_law(pad.radius, *free))
+    try:
+        return (*laws, *rubber_laws(pad, *free))
+    except InvalidInput as error:
+        if fit != 'constants':
+            raise InvalidInput(f'{measurements.source}: {error}') from error
+        warnings.append(f'the material is not compared: {error}')
+        return tuple(laws)
+
+
+def _capped(measurements: Measurements, pad: Pad) -> Pad:
+    """Return a pad of the law of the thesis, with a first stiffness, for a pad of a material."""
+    if pad.material is None:
+        return pad
+    free = measurements.free
+    known = stiffness_of(pad, *free) if len(free.pressure) else [LARGE_PAD.stiffness]
+    return Pad(pad.radius, float(np.mean(known)), measured_limit=pad.measured_limit)
+
+
+def _of_rubber(
+    measurements: Measurements,
+    pad: Pad,
+    name: str,
+    laws: Sequence[Law],
+    constants: list[Constant],
+    warnings: list[str],
+) -> Pad:
+    """Return the pad with its fitted factor or thickness; add constants and warnings."""
+    material = pad.material
+    assert material is not None
+    unit = {'factor': '(factor)', 'thickness': 'm'}[name]
+    made = material.name or str(material)
+    what = {'factor': f'on the stresses of {made}', 'thickness': f'of the sheet of {made}'}[name]
+    found: list[Constant] = []
+    for law in laws:
+        if law.name == name:
+            value, low, high = (float(each[0]) for each in (law.values, law.low, law.high))
+            points = len(measurements.free.pressure)
+            note = f'{what}, free domes'
+            found.append(Constant(name, unit, value, low, high, points, True, note))
+    by_pressed = _from_pressed(measurements, pad, name)
+    if by_pressed is not None:
+        if found:
+            note = f'{name} from pressed domes: not used'
+            found.append(by_pressed.constant(f'{name}_pressed', unit, note))
+        else:
+            found.append(by_pressed.constant(name, unit, f'{what}, pressed domes'))
+    if not found:
+        constants.append(_kept(name, unit, _value(pad, name), 'no dome was measured'))
+        return pad
+    constants.extend(found)
+    try:
+        pad = with_constant(pad, name, found[0].value)
+        if name == 'factor':
+            pad = _with_range(pad, material, found[0], warnings)
+    except InvalidInput as error:
+        raise InvalidInput(f'{measurements.source}: the fit is of no pad: {error}') from error
+    return pad
+
+
+def _with_range(pad: Pad, material: Material, factor: Constant, warnings: list[str]) -> Pad:
+    """Return the pad with the interval of its factor; warn whether the doubts explain it."""
+    low, high = material.factor_range or (1.0, 1.0)
+    name = material.name or str(material)
+    if low <= factor.value <= high:
+        warnings.append(
+            f'the factor {factor.value:.3g} is one that the doubts about {name} explain'
+            f' ({low:g} to {high:g}): {material.doubts or "they are not stated"}'
+        )
+    else:
+        warnings.append(
+            f'the factor {factor.value:.3g} is outside {low:g} to {high:g}, which the doubts about'
+            f' {name} explain: check the material, the units, and the thickness of'
+            f' {pad.thickness:g} m, to which pressures are in proportion'
+        )
+    if math.isnan(factor.low):
+        return pad
+    measured = material.times(factor.value, (factor.low, factor.high))
+    return dataclasses.replace(pad, material=measured)
 
 
 def _stiff(pad: Pad, stiffness: float) -> Pad:

@@ -375,7 +375,7 @@ def design(
     # force_limit can refuse the end itself because of rounding.
     ceiling = min(number('ceiling', ceiling, 'Pa', above=True), end * (1.0 - 1e-15))
     margin = number('margin', margin, '(factor)', above=True)
-    pads = _number_of_pads(pads, area, pad, choice('reading', reading, READINGS))
+    pads = pads_for(area, pad, pads, choice('reading', reading, READINGS))
     try:
         pressure = pressure_for(pad, load / pads, criterion, margin)
     except NoEquilibrium:
@@ -402,7 +402,7 @@ def design(
     )
 
 
-def _number_of_pads(pads: int | None, area: float, pad: Pad, reading: str) -> int:
+def pads_for(area: float, pad: Pad, pads: int | None = None, reading: str = 'corrected') -> int:
     """Return the number of pads on a sole: the given one if allowed, or else as many as fit."""
     if area >= _MOST_PADS * pad.radius**2:
         least = math.sqrt(area / _MOST_PADS)

@@ -17,7 +17,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +28,8 @@ from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.configuration import choice
 from ros_pad.configuration import number
+from ros_pad.configuration import quantity
+from ros_pad.configuration import shown
 from ros_pad.configuration import text
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -38,8 +42,11 @@ LAWS = {
 }
 """Laws and the names of their parameters; ``ogden`` may have several such pairs."""
 
-SOFTEST, STIFFEST = 100.0, 1e8
+SOFTEST, STIFFEST = 1e3, 1e8
 """Shear moduli of a rubber, Pa: outside, the unit of the parameters must be wrong."""
+
+FACTORS = (0.1, 10.0)
+"""Allowed factors on the stress of a material."""
 
 LARGEST_STRETCH = 20.0
 """Largest uniaxial stretch for which a material may be declared to hold."""
@@ -67,12 +74,20 @@ class Material:
         them. By default unknown; shapes are then computed up to 5.
     source : str
         Where the parameters are from.
+    factor : float
+        Factor on all stresses of the law, from 0.1 to 10, as ``pad calibrate`` fits it.
+    factor_range : (float, float)
+        Lowest and highest factor that the doubts about the parameters allow; the factor is
+        between them. By default the factor itself, twice: no doubt.
+    name, doubts : str
+        Name or path of the file, and why ``factor_range`` is as wide as it is.
 
     Raises
     ------
     InvalidInput
         When the law is unknown, a parameter is missing or not finite, the shear modulus is not
-        that of a rubber, or the law has no stable states in its range, as with a negative C01.
+        that of a rubber, the law has no stable states in its range, as with a negative C01, or
+        the factor is not in its range.
 
     Examples
     --------
@@ -84,10 +99,14 @@ class Material:
     parameters: tuple[float, ...]
     largest_stretch: float | None = None
     source: str = field(default='', compare=False)
+    factor: float = 1.0
+    factor_range: tuple[float, float] | None = field(default=None, compare=False)
+    name: str = field(default='', compare=False)
+    doubts: str = field(default='', compare=False)
 
     def __post_init__(self) -> None:
         choice('law', self.law, tuple(LAWS))
-        given = np.atleast_1d(configuration.quantity('parameters', self.parameters, 'Pa', -np.inf))
+        given = np.atleast_1d(quantity('parameters', self.parameters, 'Pa', -np.inf))
         names = LAWS[self.law]
         fits = given.size == len(names)
         fits |= self.law == 'ogden' and given.size % 2 == 0 < given.size
@@ -96,11 +115,13 @@ class Material:
         if given.ndim != 1 or not fits:
             more = ', mu2, alpha2 and so on' if self.law == 'ogden' else ''
             raise InvalidInput(
-                f'parameters = {configuration.shown(self.parameters)} is not allowed: the law'
+                f'parameters = {shown(self.parameters)} is not allowed: the law'
                 f' {self.law} needs {", ".join(names)}{more}'
             )
         object.__setattr__(self, 'parameters', tuple(given.tolist()))
-        text('source', self.source)
+        for name in ('source', 'name', 'doubts'):
+            text(name, getattr(self, name))
+        self._check_factor()
         if self.largest_stretch is not None:
             most = number('largest_stretch', self.largest_stretch, '', 1.0, LARGEST_STRETCH, True)
             object.__setattr__(self, 'largest_stretch', most)
@@ -127,21 +148,50 @@ class Material:
         most = None
         if 'largest_stretch' in table:
             most = table.number('largest_stretch', '', 1.0, LARGEST_STRETCH)
-        source = table.text('source')
-        for remark in ('description', 'licence', 'doubts'):
+        source, doubts = table.text('source'), table.text('doubts', default='')
+        for remark in ('description', 'licence'):
             table.text(remark, default='')
+        factor = factor_in(table)
         table.finish()
         try:
-            return cls(law, parameters, most, source)
+            return cls(
+                law,
+                parameters,
+                most,
+                source,
+                **factor,
+                name=os.fspath(name_or_path),
+                doubts=doubts,
+            )
         except InvalidInput as error:
             raise ConfigError(f'{table.origin}: {error}') from error
 
     def __str__(self) -> str:
-        return f'{self.law} {" ".join(f"{each:g}" for each in self.parameters)}'
+        times = f'{self.factor:g} times ' if self.factor != 1.0 else ''
+        return f'{times}{self.law} {" ".join(f"{each:g}" for each in self.parameters)}'
+
+    def times(self, factor: float, factor_range: tuple[float, float] | None = None) -> Material:
+        """Return the material with another factor on its stresses.
+
+        Parameters
+        ----------
+        factor : float
+            The factor in place of the present one.
+        factor_range : (float, float), optional
+            Its range; by default that of this material, widened to the factor.
+        """
+        if factor_range is None:
+            low, high = self.factor_range or (factor, factor)
+            factor_range = min(low, factor), max(high, factor)
+        return replace(self, factor=factor, factor_range=factor_range)
 
     @cached_property
     def shear_modulus(self) -> float:
         """Shear modulus at small strain, Pa."""
+        return self.factor * self._modulus
+
+    @cached_property
+    def _modulus(self) -> float:
         p = self.parameters
         if self.law == 'ogden':
             return 0.5 * sum(m * a for m, a in zip(p[::2], p[1::2], strict=True))
@@ -169,7 +219,7 @@ class Material:
     @cached_property
     def unit_law(self) -> tuple[str, tuple[float, ...]]:
         """Return the law as ``yeoh`` or ``ogden``, with parameters over the shear modulus."""
-        p, mu = self.parameters, self.shear_modulus
+        p, mu = self.parameters, self._modulus
         if self.law == 'mooney_rivlin':
             return 'ogden', (2.0 * p[0] / mu, 2.0, -2.0 * p[1] / mu, -2.0)
         if self.law == 'ogden':
@@ -177,6 +227,18 @@ class Material:
                 each if k % 2 else each / mu for k, each in enumerate(self.parameters)
             )
         return 'yeoh', (0.5, 0.0, 0.0) if len(p) == 1 else tuple(each / mu for each in p)
+
+    def _check_factor(self) -> None:
+        value = number('factor', self.factor, '', *FACTORS)
+        ends = (value, value) if self.factor_range is None else self.factor_range
+        pair = quantity('factor_range', ends, '', above=True)
+        if pair.shape != (2,) or not pair[0] <= value <= pair[1]:
+            raise InvalidInput(
+                f'factor_range = {shown(ends)} is not allowed: a lowest and a highest factor are'
+                f' needed, with the factor {value:g} between them'
+            )
+        object.__setattr__(self, 'factor', value)
+        object.__setattr__(self, 'factor_range', tuple(pair.tolist()))
 
     def _check_size(self) -> None:
         mu = self.shear_modulus
@@ -220,6 +282,17 @@ class Material:
             stable &= (pull > 0.0) & (more > 0.0) & (along * pull >= across * push)
         lost = np.flatnonzero(~stable)
         return float(strain[lost[0]]) if lost.size else most
+
+
+def factor_in(table: Table) -> dict[str, Any]:
+    """Return ``factor`` and ``factor_range`` of a table with the key ``factor``, or nothing."""
+    if 'factor' not in table:
+        return {}
+    with table.table('factor') as part:
+        found: dict[str, Any] = {'factor': part.number('value', '', *FACTORS, default=1.0)}
+        if 'low' in part or 'high' in part:
+            found['factor_range'] = tuple(part.number(end, '', 0.0) for end in ('low', 'high'))
+    return found
 
 
 def equibiaxial(stretch: float) -> float:

@@ -37,11 +37,13 @@ from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.contact.limits import DEFAULT_CRITERION
 from ros_pad.contact.limits import check_criterion
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.material import Material
+from ros_pad.contact.material import factor_in
 from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import broadcast
@@ -277,7 +279,13 @@ class Foot:
         )
 
     def air_volume(self, pressure: float) -> float:
-        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³."""
+        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³.
+
+        Pads of a material that would balloon keep the volume that they have at their largest
+        pressure: a regulator can overshoot the ceiling, and no model has what they do then.
+        """
+        if self.pad.material is not None:
+            pressure = min(pressure, pressure_end(self.pad)[0])
         domes = self.pads * float(inflate(self.pad, pressure).volume) if pressure > 0.0 else 0.0
         return self.chamber_volume + domes
 
@@ -347,12 +355,16 @@ def _pad(table: Table) -> Pad:
     make: Callable[..., Pad] = Pad
     if 'material' in table:
         values = table.values(RUBBER_SETTINGS)
-        make, values['material'] = Pad.of, Material.load(values['material'])
+        material, factor = Material.load(values.pop('material')), factor_in(table)
     else:
+        material, factor = None, {}
         values = table.values(PAD_SETTINGS)
         if 'thickness' in table:
             values['thickness'] = table.value(RUBBER_SETTINGS[-1])
     try:
+        if material is not None:
+            values['material'] = material.times(*factor.values()) if factor else material
+            make = Pad.of
         return make(**values, measured_limit=line)
     except InvalidInput as error:
         raise ConfigError(f'{table.origin}: {error}') from error

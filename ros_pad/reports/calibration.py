@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -16,6 +15,7 @@ from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.calibrate import Constant
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import inflate
+from ros_pad.contact.laws import with_constant
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Pad
 from ros_pad.reports.style import BLACK
@@ -51,14 +51,22 @@ def _shape(calibration: Calibration, above: Axes, below: Axes) -> None:
     free, pad = calibration.measurements.free, calibration.foot.pad
     known = {constant.name: constant for constant in calibration.constants}
     pressure = np.linspace(0.0, 1.05 * float(free.pressure.max()), 300)
-    k = known['stiffness']
-    label = f'model, k = {k.value:.4g} N/m'
-    above.plot(pressure / 1e3, 1e3 * _heights(pad, k.value, pressure), color=BLUE, label=label)
+    k = next(known[name] for name in ('stiffness', 'factor', 'thickness') if name in known)
+    label = {
+        'stiffness': f'model, k = {k.value:.4g} N/m',
+        'factor': f'{k.value:.3g} × the material',
+        'thickness': f'the material, {1e3 * k.value:.3g} mm thick',
+    }[k.name]
+    above.plot(
+        pressure / 1e3, 1e3 * _heights(pad, k.name, k.value, pressure), color=BLUE, label=label
+    )
     if not math.isnan(k.low):
+        high, low = (1e3 * _heights(pad, k.name, end, pressure) for end in (k.low, k.high))
         above.fill_between(
             pressure / 1e3,
-            1e3 * _heights(pad, k.low, pressure),
-            1e3 * _heights(pad, k.high, pressure),
+            # Where the softest pad has no dome, any height is in the interval.
+            np.where(np.isnan(high), 1.1e3 * float(free.height.max()), high),
+            low,
             color=BLUE,
             alpha=0.15,
             lw=0,
@@ -195,8 +203,10 @@ def _residual_axes(panel: Axes, where: str) -> None:
     panel.set(xlabel=where, ylabel='model over measured − 1, %')
 
 
-def _heights(pad: Pad, stiffness: float, pressure: Array) -> Array:
-    softer = dataclasses.replace(pad, stiffness=stiffness)
-    inside = np.minimum(pressure, 0.9999 * BURST * stiffness / pad.radius)
-    heights = inflate(softer, inside).height
+def _heights(pad: Pad, name: str, value: float, pressure: Array) -> Array:
+    changed = with_constant(pad, name, value)
+    if changed.material is not None:
+        return np.asarray(inflate(changed, pressure).height)
+    inside = np.minimum(pressure, 0.9999 * BURST * value / pad.radius)
+    heights = inflate(changed, inside).height
     return np.asarray(np.where(inside == pressure, heights, np.nan))

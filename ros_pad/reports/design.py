@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 from ros_pad.contact import Design
 from ros_pad.contact import foot_force
 from ros_pad.contact import rise_height
+from ros_pad.contact.candidates import Candidate
+from ros_pad.contact.candidates import Span
 from ros_pad.contact.design import DOME
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
@@ -53,6 +55,59 @@ def draw(
         return found
 
     write_picture(path, figure)
+
+
+def draw_candidates(
+    path: str | os.PathLike[str], found: Sequence[Candidate], ceiling: float
+) -> None:
+    """Draw needed and largest pressures of pads of materials, and heights of their domes.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .png, .svg or .pdf. An existing file is replaced.
+    found : sequence of Candidate
+        The pads.
+    ceiling : float
+        Highest pressure of the supply, Pa gauge.
+    """
+
+    def figure() -> Figure:
+        drawn = Figure(figsize=(WIDE, 1.0 + 0.2 * len(found)), layout='constrained')
+        pressures, heights = drawn.subplots(1, 2, sharey=True, width_ratios=[3, 2])
+        for place, each in enumerate(found):
+            _bar(pressures, 1e-3, each.largest_pressure, place + 0.15, VERMILION, 's')
+            _bar(pressures, 1e-3, each.pressure, place - 0.15, BLUE, 'o')
+            _bar(heights, 1e3, each.height, place, BLUE, 'o')
+        pressures.axvline(1e-3 * ceiling, color=BLACK, lw=1.0, ls=':', label='supply')
+        pressures.plot([], [], 'o-', color=BLUE, label='for the load')
+        pressures.plot([], [], 's-', color=VERMILION, label='largest')
+        names = [
+            f'{each.material}, {1e3 * (each.pad.thickness or 0.0):g} mm'
+            + ('' if each.carried == 'yes' else f' ({each.carried})')
+            for each in found
+        ]
+        pressures.set_yticks(range(len(found)), names)
+        pressures.invert_yaxis()
+        pressures.set(xscale='log', xlabel='gauge pressure, kPa')
+        pressures.xaxis.set_major_formatter('{x:g}')
+        heights.set(xlim=(0.0, None), xlabel='height of the free dome, mm')
+        drawn.legend(loc='outside upper right', ncols=3)
+        return drawn
+
+    write_picture(path, figure)
+
+
+def _bar(axes: Axes, scale: float, span: Span, place: float, colour: str, mark: str) -> None:
+    """Draw a value and its interval; the lowest one, hollow, where the value is infinite."""
+    value, low, high = (scale * each for each in span)
+    if np.isfinite(low):
+        right = high if np.isfinite(high) else value
+        if np.isfinite(right):
+            axes.plot([low, right], [place, place], color=colour, lw=1.4)
+        fill = 'full' if np.isfinite(value) else 'none'
+        at = value if np.isfinite(value) else low
+        axes.plot(at, place, mark, color=colour, ms=4.0, fillstyle=fill)
 
 
 def _loads(axes: Axes, corrected: Sequence[Design], thesis: Sequence[Design]) -> None:

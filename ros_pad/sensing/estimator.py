@@ -30,6 +30,7 @@ from ros_pad.sensing.plausibility import Joints
 from ros_pad.sensing.plausibility import Legs
 from ros_pad.sensing.plausibility import Repeats
 from ros_pad.sensing.plausibility import Shift
+from ros_pad.sensing.plausibility import Unloaded
 from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²
@@ -294,6 +295,8 @@ class BodyEstimator:
         self._rest_since, self._rest_sum, self._rest_count = math.nan, np.zeros(3), 0
         self._pull = WEIGHT
         self._expected = robot.mass * WEIGHT / (0.5 * legs)
+        self._unloaded = Unloaded(robot.legs, self._expected)
+        self._climbing = np.zeros(legs)  # vertical speeds of the feet, m/s
 
     def update(
         self,
@@ -335,7 +338,7 @@ class BodyEstimator:
             given[2:] = self._shift.update(time, given[2:])
         gyro, accelerometer, q, dq = given[:4]
         kinematics = self._robot.chains.solve(q, self._to_imu)
-        forces = self._forces(kinematics, accelerometer, foot_forces is not None, given[4])
+        forces = self._forces(time, kinematics, accelerometer, foot_forces is not None, given[4])
         if time < self._time:
             self._reset()
             self._doubt_for(time, 'clock: time went back, odom begins anew')
@@ -405,13 +408,19 @@ class BodyEstimator:
         return time, [*arrays, _NONE]
 
     def _forces(
-        self, kinematics: Kinematics, accelerometer: Array, measured: bool, given: Array
+        self,
+        time: float,
+        kinematics: Kinematics,
+        accelerometer: Array,
+        measured: bool,
+        given: Array,
     ) -> Array | None:
         """Return the forces on the feet, (legs, 3), N, in IMU axes, or None."""
         if not given.size:
             return None
         self._measured = measured
         if measured:
+            given = self._unloaded.update(time, given, self._climbing)
             if self._in_foot_axes:
                 return np.asarray((kinematics.rotations @ given[..., None])[..., 0])
             return np.asarray(given @ self._robot.imu[:3, :3])
@@ -517,6 +526,7 @@ class BodyEstimator:
         swaying += (places @ turn) @ skew(rate).T
         moving, turning = (np.concatenate([swaying, turning]) @ turn.T).reshape(2, legs, 3)
         velocities = body.velocity + moving
+        self._climbing = velocities[:, 2]
         self._spin = np.stack([turning[:, 1], -turning[:, 0], np.zeros(legs)], axis=1)
         slips = velocities - body.radius * self._spin
         window = self._window
@@ -616,8 +626,9 @@ class BodyEstimator:
         Return whether what was learnt about them was discarded.
         """
         radius = self._radius_error * self._robot.foot_radius
-        if self._agreement.update(dt, self._standing, self._slipping, slips, moves):
-            # What such legs have shown about the others is wrong.
+        changed = self._agreement.update(dt, self._standing, self._slipping, slips, moves)
+        if changed or self._unloaded.found:
+            # What such legs, or feet that were in the air, have shown is wrong.
             self._filter.reshape(self._robot.foot_radius, radius, 0.0, self._length_error)
             return True
         self._filter.creep = CREEP * self._agreement.slippery
@@ -711,8 +722,9 @@ class BodyEstimator:
             return self._reason
         if abs(self._pull - WEIGHT) > 1.0:
             return f'gravity: the accelerometer shows {self._pull:.2g} m/s2 on average'
-        if doubt := self._agreement.doubt() or self._delay.doubt():
-            return doubt
+        for readings in (self._agreement, self._delay, self._unloaded):
+            if doubt := readings.doubt():
+                return doubt
         if time - self._held > RECOVERY:
             if self._standing.any():
                 return 'slipping: all feet that stand may slip'

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Readings that contradict each other.
 
-Sensors that repeat, joints whose velocity is not theirs, legs that move against the others, joints
-later than the IMU.
+Sensors that repeat, force sensors that are off zero in the air, joints whose velocity is not
+theirs, legs that move against the others, joints later than the IMU.
 """
 
 from __future__ import annotations
@@ -45,6 +45,19 @@ MOVES = 0.02
 
 AGREES = 0.5
 """Share below which a foot moves with the others."""
+
+SWINGS = 0.1
+"""Vertical speed from which on a foot is in the air, m/s."""
+
+READINGS, APART = 20, 0.016
+"""Number of readings in the air whose median is that of the sensor, and time between them, s."""
+
+ALIKE = 0.15
+"""Largest median of their distances from it, over it: contacts that last are not alike."""
+
+NOTHING, TOO_MUCH = 0.05, 0.5
+"""Shares of the expected load up to which readings in the air are left as they are (contacts begin
+and end while feet move), and above which they are no error of the sensor alone."""
 
 STRETCH = 0.5
 """Time over which joint positions are compared with their velocities, s."""
@@ -117,6 +130,76 @@ class Repeats:
             elif moves and time - self._since[index] > patience * STUCK and values.any():
                 self._doubt = f'{name} repeat{"s its reading" if index < 2 else ""}'
         return self._doubt
+
+
+class Unloaded:
+    """What force sensors of the feet show in the air: the error of their zero.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the legs.
+    expected : float
+        Load that a foot is expected to carry, N.
+
+    Attributes
+    ----------
+    offset : array (legs, 3)
+        The error, N, in the axes of the readings; 0 where it is small or not known.
+    found : bool
+        Whether an error was found in the last sample: until then that foot seemed to stand.
+    """
+
+    def __init__(self, names: tuple[str | int, ...], expected: float) -> None:
+        self._names, self._expected = names, expected
+        self._rows = np.zeros((len(names), READINGS, 3))
+        self._count = np.zeros(len(names), dtype=int)
+        self._next = -math.inf  # time of the next reading, s
+        self._much: Flags = np.zeros(len(names), dtype=bool)
+        self.offset = np.zeros((len(names), 3))
+        self.found = False
+
+    def update(self, time: float, forces: Array, climbing: Array) -> Array:
+        """Return readings, (legs, 3), N, without the error, and learn it from them.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        forces : array (legs, 3)
+            The readings, N.
+        climbing : array (legs,)
+            Vertical speeds of the feet over the ground, m/s.
+        """
+        self.found = False
+        if time >= self._next:
+            self._next = time + APART
+            for leg in np.flatnonzero(np.abs(climbing) > SWINGS).tolist():
+                self._rows[leg, self._count[leg] % READINGS] = forces[leg]
+                self._count[leg] += 1
+                if self._count[leg] >= READINGS:
+                    self._learn(leg)
+        return forces - self.offset
+
+    def _learn(self, leg: int) -> None:
+        rows = self._rows[leg]
+        offset = np.median(rows, axis=0)
+        size = float(np.abs(offset).max())
+        if np.median(np.abs(rows - offset), axis=0).max() > ALIKE * max(
+            size, NOTHING * self._expected
+        ):
+            return
+        self._much[leg] = size > TOO_MUCH * self._expected
+        wrong = size > NOTHING * self._expected and not self._much[leg]
+        self.found |= wrong and not self.offset[leg].any()
+        self.offset[leg] = offset if wrong else 0.0
+
+    def doubt(self) -> str:
+        """Return which feet show too much, or an empty text."""
+        if not self._much.any():
+            return ''
+        names = ', '.join(str(self._names[leg]) for leg in np.flatnonzero(self._much))
+        return f'force: foot {names} shows more than half of the expected load in the air'
 
 
 class Joints:

@@ -25,6 +25,7 @@ from ros_pad.configuration import choice
 from ros_pad.contact import WATER
 from ros_pad.contact import pressure_for
 from ros_pad.contact.film import Film
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -345,6 +346,15 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
     """
     name = level(scene, fidelity, policy)
     terms = [] if scene.floor.kind == 'dry' else _omitted_of_liquid(scene)
+    if scene.foot.pad.material is not None:
+        terms.append(
+            Omission(
+                'pads that balloon',
+                None,
+                f'above {pressure_end(scene.foot.pad)[0]:.6g} Pa the air under the pads keeps its'
+                f' volume; the ceiling of the foot is {scene.foot.ceiling:g} Pa',
+            )
+        )
     if name == 'L0':
         terms.append(_friction_of_the_rail(scene, policy))
     terms.append(_omitted_joints(scene, policy) if name == 'L1' else _soft_pads(scene))

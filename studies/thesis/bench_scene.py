@@ -18,6 +18,7 @@ from ros_pad.contact.dome import largest_tension
 from ros_pad.contact.dome import signed_adhesion
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import need_stiffness
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene
@@ -169,6 +170,8 @@ class BenchScene:
         foot = foot or own_foot
         measurements = _measurements(table)
         setup: Setup
+        if kind in ('inflation', 'press'):
+            need_stiffness(f'the bench {kind}', foot.pad)
         if kind == 'inflation':
             setup = _inflation(table, foot.pad)
         elif kind == 'press':

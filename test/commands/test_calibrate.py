@@ -55,6 +55,26 @@ def test_the_table_and_the_residuals_are_printed(here, capsys):
     assert cli.main(['calibrate', THESIS, *out, '--force']) == 0
 
 
+def test_a_material_has_a_factor_and_is_compared(here, capsys):
+    material = ['--material', 'dragon_skin_10', '--thickness', '0.4e-3']
+    assert cli.main(['calibrate', THESIS, *material, '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found['constants'][0]['name'] == 'factor'
+    assert found['constants'][0]['value'] == pytest.approx(1.88, abs=0.005)
+    laws = {law['name']: law for law in found['laws']}
+    assert laws['two constants']['pressure_error'] < laws['factor']['pressure_error']
+    assert [each['first_chance'] is None for each in found['comparisons']] == [
+        *(False, False, False, True)
+    ]
+    assert Foot.load(found['foot']).pad.material.factor == pytest.approx(1.88, abs=0.005)
+    assert (here / found['figure']).stat().st_size > 20_000
+    out = ['--out', 'thick.yaml', '--fit', 'thickness']
+    assert cli.main(['calibrate', THESIS, '--foot', found['foot'], *out]) == 0
+    said = capsys.readouterr().out
+    assert 'factor and thickness give the same domes' in said
+    assert Foot.load('thick.yaml').pad.thickness == pytest.approx(0.4e-3, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ('arguments', 'complaint'),
     [
@@ -63,6 +83,13 @@ def test_the_table_and_the_residuals_are_printed(here, capsys):
         ([THESIS, '--out', 'foot.txt'], 'ends in .yaml'),
         ([THESIS, '--figure', 'foot.gif'], '.png, .pdf or .svg'),
         ([THESIS, '--viscosity', '0'], 'viscosity = 0'),
+        ([THESIS, '--fit', 'factor'], "fit = 'factor' is not allowed without a material"),
+        ([THESIS, '--thickness', '4e-4'], '--material and --thickness are both needed'),
+        ([THESIS, '--material', 'dragon', '--thickness', '4e-4'], 'no material named'),
+        (
+            [THESIS, '--material', 'dragon_skin_10', '--thickness', '0.4'],
+            'thickness = 0.4 is not allowed: a number above 0 and up to 0.0015 m',
+        ),
     ],
 )
 def test_bad_input_writes_nothing(here, capsys, arguments, complaint):

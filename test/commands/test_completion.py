@@ -90,6 +90,7 @@ def test_commands(here: pathlib.Path):
         ('pad contact --pad ', ['large', 'small']),
         ('pad contact --force ', []),  # a number is needed: no file is offered
         ('pad contact --foot large1', ['large19']),
+        ('pad design --material dragon_skin_3', ['dragon_skin_30']),
         ('pad sweep leg_wet_dome_4', ['leg_wet_dome_40']),
         ('pad bag ', ['info', 'repair']),
         ('pad bag info runs/walk_', ['runs/walk_2/bag']),

@@ -161,3 +161,93 @@ def test_a_measured_limit_holds_for_its_radius(
                 assert b[key] == (a[key] if a[key] is None else pytest.approx(a[key], rel=1e-9))
         assert {each['criterion'] for each in mine['designs']} == {criterion}
         assert {each['criterion'] for each in mine['radii']} == {'thickness'}
+
+
+def of_materials(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    """Return what is printed; a slow machine shows a progress bar."""
+    assert cli.main(['design', *arguments, '--json']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+class TestMaterials:
+    def test_materials_and_thicknesses(self, capsys: pytest.CaptureFixture[str]):
+        values = of_materials(
+            capsys,
+            *('--load', '2', '--sole-radius', '0.017', '--pressure', '60e3'),
+            *('--material', 'dragon_skin_10', 'ecoflex_00_30', '--thickness', '0.2e-3', '0.4e-3'),
+        )
+        found = values['candidates']
+        assert [(each['material'], each['thickness_m']) for each in found] == [
+            ('dragon_skin_10', 0.2e-3),
+            ('dragon_skin_10', 0.4e-3),
+            ('ecoflex_00_30', 0.2e-3),
+            ('ecoflex_00_30', 0.4e-3),
+        ]
+        # 51 pads are flat at p π r²; Dragon Skin 10 ends at 46.65 kPa (reference study).
+        pressure = 1.2 * 2.0 / (51 * math.pi * 1.5e-3**2)
+        assert found[1]['pressure_pa'] == pytest.approx([pressure] * 3, rel=1e-9)
+        assert found[1]['largest_pressure_pa'][0] == pytest.approx(46.65e3, rel=1e-3)
+        assert found[1]['ballooning_margin'][2] == pytest.approx(
+            2.1 * 46.65e3 / pressure, rel=1e-3
+        )
+        assert found[2]['pressure_pa'] == [None, pytest.approx(pressure), None]
+        assert [each['carried'] for each in found] == ['yes', 'yes', 'in doubt', 'yes']
+        assert (values['criterion'], values['ceiling']) == ('flattening', 60e3)
+        assert '3 of 4 candidates carry 2 N at up to 60000 Pa' in values['says'][0]
+
+    def test_the_table_and_the_picture(
+        self, tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+    ):
+        path = tmp_path / 'materials.png'
+        arguments = ['--load', '7', '--area', '9e-4', '--height', '1e-3', '--figure', str(path)]
+        assert cli.main(['design', *arguments, '--material', 'all']) == 0
+        lines = capsys.readouterr().out.splitlines()
+        rows = [line for line in lines if line.startswith(('dragon', 'ecoflex'))]
+        assert len(rows) == 3 * len(configuration.names('materials'))
+        assert all(line.endswith(('yes', 'in doubt', 'no')) for line in rows)
+        assert '7 N, 0.001 m high, at up to' in lines[-3]
+        assert path.read_bytes().startswith(b'\x89PNG')
+
+    def test_a_foot_of_a_material(self, capsys: pytest.CaptureFixture[str]):
+        values = of_materials(capsys, '--load', '1', '--foot', 'small217')
+        (found,) = values['candidates']
+        assert (found['material'], found['pads']) == ('ecoflex_00_20', 217)
+        assert (values['ceiling'], values['criterion']) == (11e3, 'flattening')
+        # The neighbours of its material balloon at 11.7 and 13.6 kPa.
+        assert 11.7e3 < found['largest_pressure_pa'][0] < 13.6e3
+        other = of_materials(
+            capsys, '--load', '1', '--foot', 'small217', '--material', 'dragon_skin_10'
+        )
+        assert other['candidates'][0]['radius_m'] == 0.5e-3
+        assert other['ceiling'] == 90e3
+
+    def test_the_line_of_a_foot_is_its_criterion(
+        self, tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+    ):
+        shipped = configuration.locate('feet', 'small217').read_text()
+        line = 'measured_limit: {force: 0.005, pressure: 1.0e+4, slope: 1.0e-6}'
+        own = tmp_path / 'own.yaml'
+        own.write_text(
+            shipped.replace('pad:', f'pad:\n  {line}', 1).replace('flattening', 'measured')
+        )
+        found = of_materials(capsys, '--load', '1', '--foot', str(own))
+        needed = 1e4 + (1.2 / 217 - 0.005) / 1e-6
+        assert found['criterion'] == 'measured'
+        assert found['candidates'][0]['pressure_pa'] == pytest.approx([needed] * 3, rel=1e-9)
+
+    @pytest.mark.parametrize(
+        ('arguments', 'part'),
+        [
+            (['--material', 'clay'], "no material named 'clay'"),
+            (['--material', 'all', '--stiffness', '40'], '--stiffness is not allowed with'),
+            (['--thickness', '4e-4'], '--thickness needs --material'),
+            (['--height', '1e-3'], '--height needs --material'),
+            (['--material', 'all', '--thickness', '2e-3'], 'thickness = 0.002 is not allowed'),
+            (['--material', 'all', '--criterion', 'max_depth'], "criterion = 'max_depth'"),
+        ],
+    )
+    def test_bad_input(self, arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
+        assert cli.main(['design', '--load', '7', '--area', '1e-3', *arguments]) == 2
+        printed = capsys.readouterr()
+        assert printed.out == ''
+        assert part in printed.err

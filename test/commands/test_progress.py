@@ -32,3 +32,9 @@ def test_what_was_interrupted_stays_where_it_was(capsys: pytest.CaptureFixture[s
         reach(30.0)
         raise KeyboardInterrupt
     assert 'walk  50%' in last(capsys)
+
+
+def test_what_ends_before_the_delay_shows_nothing(capsys: pytest.CaptureFixture[str]):
+    with bar('candidates', 1.0, delay=3600.0) as reach:
+        reach(0.5)
+    assert capsys.readouterr().err == ''

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
+import json
 import math
+import pathlib
 from collections import Counter
 
 import numpy as np
@@ -8,7 +10,9 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
+from ros_pad.contact import Material
 from ros_pad.contact import MeasuredLimit
+from ros_pad.contact import Pad
 from ros_pad.contact import force_limit
 from ros_pad.contact import inflate
 from ros_pad.contact import press
@@ -26,6 +30,7 @@ from ros_pad.errors import InvalidInput
 
 THESIS = Measurements.read(configuration.shared_folder() / 'measurements' / 'thesis.csv')
 FOOT = Foot.load('large37')
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 FILM, VISCOSITY = 3e-4, 1e-3
 NONE = np.array([])
 NOTHING = Measurements(
@@ -195,6 +200,111 @@ class TestShapes:
             k = constants(calibrate(data, FOOT))['stiffness']
             inside += k.low <= 40.0 <= k.high
         assert 0.90 <= inside / 200 <= 0.99
+
+
+class TestMaterial:
+    """The thesis' pad as Dragon Skin 10, 0.4 mm thick."""
+
+    pad = Pad.of(Material.load('dragon_skin_10'), 1.5e-3, 4e-4)
+
+    def test_the_factor_and_what_explains_it(self):
+        found = calibrate(THESIS, FOOT, rubber=self.pad)
+        factor = constants(found)['factor']
+        # The strain of the tensile tests explains 1.5 to 2.1 of it.
+        reference = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['thesis']
+        assert factor.value == pytest.approx(reference['factor'], abs=0.005)
+        assert 1.5 < factor.low < 1.8 < 1.95 < factor.high < 2.1
+        assert 'explain (1 to 2.1): strain is crosshead travel' in found.warnings[0]
+        assert found.foot.pad.material.factor_range == (factor.low, factor.high)
+        errors = [r.error for r in found.residuals if r.setting.startswith('free')]
+        np.testing.assert_allclose(errors, reference['errors'], atol=0.003)
+        # The maximum pressure of 46.65 kPa as given is 87.6 kPa with the factor.
+        assert found.foot.ceiling == 87e3
+
+    def test_the_thickness_in_its_place(self):
+        found = calibrate(THESIS, FOOT, fit='thickness', rubber=self.pad)
+        assert found.foot.pad.thickness == pytest.approx(1.88 * 4e-4, abs=2e-6)
+        assert found.foot.pad.material == self.pad.material
+        assert [law.name for law in found.laws] == [
+            *('stiffness', 'two constants', 'factor', 'thickness')
+        ]
+
+    def test_the_constants_are_those_without_a_material(self):
+        found = calibrate(THESIS, FOOT, fit='constants', rubber=self.pad)
+        for name, known in constants(TestThesis.found).items():
+            assert constants(found)[name].value == pytest.approx(known.value, rel=1e-9)
+        assert found.foot.pad.material is None
+        assert len(found.comparisons) == 4
+
+    def test_pressed_domes_alone_give_factor_or_thickness(self):
+        """A pressed dome of the reference rows: 1.88 times the law, or the thickness."""
+        rows = json.loads((REFERENCE / 'hyper_pressed.json').read_text())['rows']
+        kept = [row for row in rows if row['law'] == 'DS10_raw_l4.5 x1.88']
+        columns = [np.array([row[key] for row in kept]) for key in
+                   ('pressure_Pa', 'force_N', 'gap_m')]  # fmt: skip
+        blank = np.full(len(kept), np.nan)
+        pressed = PressedDomes(*columns[:2], blank, blank, blank, columns[2])
+        data = dataclasses.replace(NOTHING, pressed=pressed)
+        for fit, value in (('factor', 1.88), ('thickness', 1.88 * 4e-4)):
+            found = constants(calibrate(data, FOOT, fit=fit, rubber=self.pad))[fit]
+            assert found.value == pytest.approx(value, rel=1e-6)
+            assert found.points == len(kept) > 1
+
+    def test_the_foot_file_is_the_calibrated_foot(self, tmp_path):
+        for fit in ('factor', 'thickness'):
+            found = calibrate(THESIS, FOOT, fit=fit, rubber=self.pad)
+            path = tmp_path / f'{fit}.yaml'
+            path.write_text(foot_file(found))
+            pad = Foot.load(path).pad
+            assert pad.thickness == pytest.approx(found.foot.pad.thickness, rel=1e-8)
+            for each in ('factor', 'factor_range'):
+                value = getattr(found.foot.pad.material, each)
+                assert getattr(pad.material, each) == pytest.approx(value, rel=1e-8)
+            assert 'fitted: ' in path.read_text()
+            # The foot is a start for another fit, which finds the same.
+            again = calibrate(THESIS, Foot.load(path), fit=fit)
+            value = constants(found)[fit].value
+            assert constants(again)[fit].value == pytest.approx(value, rel=1e-7)
+
+    def test_a_single_dome_has_no_interval_and_no_comparison(self):
+        """One reference row, 1.88 times the law at 55 kPa."""
+        free = FreeDomes(np.array([55e3]), np.array([0.0013152800343899924]))
+        found = calibrate(dataclasses.replace(NOTHING, free=free), FOOT, rubber=self.pad)
+        factor = constants(found)['factor']
+        assert factor.value == pytest.approx(1.88, rel=1e-9)
+        assert math.isnan(factor.low) and math.isnan(factor.high)
+        assert found.foot.pad.material.factor_range == (1.0, 2.1)
+        assert found.comparisons == ()
+        assert 'too few for an interval' in foot_file(found)
+
+    def test_a_factor_that_nothing_explains_is_named(self):
+        doubted = dataclasses.replace(self.pad.material, factor_range=(0.9, 1.2))
+        found = calibrate(THESIS, FOOT, rubber=Pad.of(doubted, 1.5e-3, 4e-4))
+        assert 'the factor 1.88 is outside 0.9 to 1.2, which' in found.warnings[0]
+
+    def test_a_fit_without_a_material_or_of_no_pad_is_refused(self):
+        for fit in ('factor', 'thickness'):
+            with pytest.raises(InvalidInput, match=f"fit = '{fit}' .* without a material"):
+                calibrate(THESIS, FOOT, fit=fit)
+        with pytest.raises(InvalidInput, match=r"fit = 'law' .*factor, thickness, constants"):
+            calibrate(THESIS, FOOT, fit='law')
+        # A sheet of Ecoflex balloons before it is 2.4 mm high.
+        soft = Pad.of(Material.load('ecoflex_00_30'), 1.5e-3, 4e-4)
+        with pytest.raises(InvalidInput, match=r'thesis\.csv: height = 0\.0024 m .* balloons'):
+            calibrate(THESIS, FOOT, rubber=soft)
+        # The old constants need no material; it is only left out of the comparison.
+        found = calibrate(THESIS, FOOT, fit='constants', rubber=soft)
+        assert [law.name for law in found.laws] == ['stiffness', 'two constants']
+        assert 'the material is not compared: height = 0.0024 m' in found.warnings[0]
+        low = FreeDomes(np.array([900e3]), np.array([1.25e-3]))
+        with pytest.raises(InvalidInput, match='the fit is of no pad: factor = 32'):
+            calibrate(dataclasses.replace(NOTHING, free=low), FOOT, rubber=self.pad)
+        with pytest.raises(InvalidInput, match=r'the fit is of no pad: thickness = 0\.0129'):
+            data = dataclasses.replace(NOTHING, free=low)
+            calibrate(data, FOOT, fit='thickness', rubber=self.pad)
+        unnamed = Pad.of(dataclasses.replace(self.pad.material, name=''), 1.5e-3, 4e-4)
+        with pytest.raises(InvalidInput, match='has no name'):
+            foot_file(calibrate(THESIS, FOOT, rubber=unnamed))
 
 
 class TestForceLimit:

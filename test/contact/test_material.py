@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
+import json
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -10,13 +12,15 @@ from ros_pad.contact import WATER
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
 from ros_pad.contact import Pad
-from ros_pad.contact import calibrate
 from ros_pad.contact import design
+from ros_pad.contact import inflate
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.material import equibiaxial
 from ros_pad.contact.material import tensions
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 
+REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 YEOH = (26258.18995463, 1854.39136388, -35.05189509)
 LAWS = [
     ('yeoh', YEOH),
@@ -142,9 +146,12 @@ def test_a_pad_is_of_a_material_or_has_a_stiffness_of_its_own():
 
 def test_shipped_materials_load_with_source_licence_and_doubts():
     names = configuration.names('materials')
-    assert len(names) == 6
+    assert len(names) == 7
     for name in names:
         material = Material.load(name)
+        low, high = material.factor_range
+        assert low <= material.factor == 1.0 < 2.1 <= high
+        assert (material.name, 'crosshead' in material.doubts) == (name, True)
         assert 'doi 10.1089/soro.2019.0115' in material.source
         text = (configuration.shared_folder() / 'materials' / f'{name}.yaml').read_text()
         assert 'ODbL 1.0' in text and 'crosshead' in text and 'factor of 1.5 to 2.1' in text
@@ -206,6 +213,59 @@ def test_a_foot_names_material_radius_and_thickness(tmp_path):
         Foot.load(foot_file(tmp_path, pad.replace('{', '{stiffness: 40.0, ')))
 
 
+def test_a_foot_may_have_a_factor_on_its_material(tmp_path):
+    """Reference rows: 1.88 times Dragon Skin 10 at 55 kPa is 1.31528 mm high."""
+    pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3, factor: {value: 1.88}}'
+    foot = Foot.load(foot_file(tmp_path, pad, '80.0e+3'))
+    assert inflate(foot.pad, 55e3).height == pytest.approx(1.3152800343899924e-3, rel=1e-9)
+    assert foot.pad.material.factor_range == (1.0, 2.1)
+    bounds = pad.replace('{value: 1.88}', '{value: 1.88, low: 1.77, high: 1.99}')
+    assert Foot.load(foot_file(tmp_path, bounds)).pad.material.factor_range == (1.77, 1.99)
+    for wrong, words in [
+        ('{value: 1.88, low: 1.9, high: 2.0}', 'with the factor 1.88 between them'),
+        ('{value: 1.88, low: 1.7}', "'high' is missing"),
+        ('{value: 188.0}', 'value = 188.0 is not allowed: a number from 0.1 to 10'),
+        ('{worth: 1.88}', "unknown key 'worth'"),
+    ]:
+        with pytest.raises(ConfigError, match=f'foot.yaml: pad.*{words}'):
+            Foot.load(foot_file(tmp_path, pad.replace('{value: 1.88}', wrong)))
+
+
+def test_largest_pressures_are_those_of_the_reference():
+    files = {'DS10_raw_l4.5': 'dragon_skin_10', 'Ecoflex 00-30 full': 'ecoflex_00_30',
+             'Ecoflex 00-10 full': 'ecoflex_00_10'}  # fmt: skip
+    rows = json.loads((REFERENCE / 'hyper_thesis.json').read_text())['maxima']
+    assert len(rows) == 4
+    for row in rows:
+        law, _, factor = row['law'].partition(' x')
+        material = Material.load(files[law]).times(float(factor or 1.0))
+        pad = Pad.of(material, row['radius_m'], row['thickness_m'])
+        assert pressure_end(pad)[0] == pytest.approx(row['maximum_Pa'], rel=4e-3)
+
+
+def test_a_factor_scales_all_stresses():
+    material = Material('yeoh', YEOH, factor_range=(0.5, 2.1))
+    stiffer = material.times(1.88)
+    assert stiffer.shear_modulus == pytest.approx(1.88 * 2 * YEOH[0])
+    assert stiffer.unit_law == material.unit_law
+    assert (stiffer.factor_range, stiffer == material) == ((0.5, 2.1), False)
+    assert material.times(3.0).factor_range == (0.5, 3.0)
+    assert str(stiffer).startswith('1.88 times yeoh 26258')
+    for wrong in ({'factor': 0.0}, {'factor': math.nan}, {'factor_range': (1.1, 2.0)},
+                  {'factor_range': (0.5,)}, {'factor_range': (0.0, 2.0)}):  # fmt: skip
+        with pytest.raises(InvalidInput, match='factor'):
+            Material('yeoh', YEOH, **wrong)
+
+
+@pytest.mark.parametrize('unit', [1e-6, 1e-3])
+def test_parameters_of_every_shipped_material_in_mpa_or_kpa_are_refused(unit):
+    for name in configuration.names('materials'):
+        material = Material.load(name)
+        scaled = [unit * each for each in material.parameters]
+        with pytest.raises(InvalidInput, match=r'shear modulus of .* \(are the parameters in MPa'):
+            Material(material.law, scaled, material.largest_stretch)
+
+
 def test_what_needs_a_stiffness_refuses_a_material(tmp_path):
     pad = '{material: dragon_skin_10, radius: 1.5e-3, thickness: 0.4e-3}'
     foot = Foot.load(foot_file(tmp_path, pad))
@@ -213,5 +273,3 @@ def test_what_needs_a_stiffness_refuses_a_material(tmp_path):
         design(7.0, 1e-3, foot.pad)
     with pytest.raises(InvalidInput, match='a pad in a bath needs'):
         press_wet(foot.pad, 30e3, 0.1, WATER)
-    with pytest.raises(InvalidInput, match='calibration needs a pad with a measured stiffness'):
-        calibrate.calibrate(None, foot)

@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from ros_pad import configuration
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import MeasuredLimit
+from ros_pad.contact import Pad
+from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.resistance import tangential_resistance
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 
-FEET = configuration.names('feet')
+FEET = [name for name in configuration.names('feet') if name.startswith('large')]
 THICK = 1.0e-3  # m, a film too thick for dry contact
 
 
@@ -285,6 +287,27 @@ def test_shipped_feet(name):
     cap = math.pi * 1.37540981938e-3 * (3.0 * 1.5e-3**2 + 1.37540981938e-3**2) / 6.0
     assert foot.air_volume(55e3) - foot.chamber_volume == pytest.approx(foot.pads * cap, rel=1e-9)
     assert foot.air_volume(0.0) == foot.chamber_volume
+
+
+def test_the_small_foot():
+    """The neighbours of its material balloon at 11.7 and 13.6 kPa (reference study)."""
+    foot = Foot.load('small217')
+    assert (foot.pad.radius, foot.pad.thickness) == (0.5e-3, 0.2e-3)
+    assert foot.pads * 2.0 * math.sqrt(3.0) * 2.25 * foot.pad.radius**2 <= foot.sole_area
+    softest = dataclasses.replace(foot.pad.material, factor=foot.pad.material.factor_range[0])
+    assert (
+        foot.ceiling
+        < pressure_end(Pad.of(softest, 0.5e-3, 0.2e-3))[0]
+        == pytest.approx(11.7e3, rel=0.01)
+    )
+    # The hardest that it may be is far from the 40 to 75 kPa of the thesis.
+    hardest = foot.pad.material.times(foot.pad.material.factor_range[1])
+    assert pressure_end(Pad.of(hardest, 0.5e-3, 0.2e-3))[0] < 30e3
+    # A regulator of 100 kPa can overshoot: beyond its maximum the volume stays as it is.
+    assert foot.air_volume(11e3) < foot.air_volume(12.6e3) < foot.air_volume(13e3)
+    assert foot.air_volume(100e3) == foot.air_volume(13e3)
+    # A flat pad carries p π r²: 1.87 N on all.
+    assert foot.dome_load(9.0, 11e3) == pytest.approx(217 * 11e3 * math.pi * 0.25e-6)
 
 
 def written(tmp_path, change):

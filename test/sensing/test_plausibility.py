@@ -7,6 +7,7 @@ import pytest
 from ros_pad.robots import Robot
 from ros_pad.sensing.plausibility import Delay
 from ros_pad.sensing.plausibility import Legs
+from ros_pad.sensing.plausibility import Unloaded
 
 PERIOD = 0.004
 ARMS = np.array([[0.2, 0.15, -0.3], [0.2, -0.15, -0.3], [-0.2, 0.15, -0.3], [-0.2, -0.15, -0.3]])
@@ -98,3 +99,42 @@ def test_a_robot_slips_as_a_whole_where_now_and_then_no_foot_sticks():
     assert in_turns.share == pytest.approx(0.5, abs=0.05)
     assert in_turns.slippery == 0.0
     assert paced(lambda row: np.full(4, (row * 0.618) % 1.0 < 0.2)).slippery == 0.0
+
+
+def swung(offset, lasts=0.05, seconds=6.0, seed=4):
+    """Return the Unloaded of four feet, the last one off by ``offset``, N, and its errors.
+
+    All stand and swing for 0.3 s in turns; loads last while the feet rise, as a share of that.
+    """
+    unloaded, generator = Unloaded(('a', 'b', 'c', 'd'), 80.0), np.random.default_rng(seed)
+    errors = []
+    for row in range(round(seconds / PERIOD)):
+        step = (row * PERIOD / 0.3) % 2.0
+        climbing = 0.6 * np.cos(np.pi * (step - 1.0)) if step > 1.0 else 0.0
+        forces = 0.3 * generator.standard_normal((4, 3))
+        forces[:, 2] += (40.0 + 40.0 * np.sin(37.0 * row)) * (step < 1.0 + lasts)
+        given = forces.copy()
+        given[3] += offset
+        errors.append(unloaded.update(row * PERIOD, given, np.full(4, climbing))[3] - forces[3])
+    return unloaded, np.array(errors)
+
+
+@pytest.mark.parametrize('offset', [(0.0, 0.0, 8.0), (6.0, -5.0, 0.0), (0.0, 3.0, -30.0)])
+def test_what_a_force_sensor_shows_in_the_air_is_taken_off(offset):
+    unloaded, errors = swung(offset)
+    assert np.abs(errors[500:]).max() < 0.5
+    assert not unloaded.offset[:3].any()
+    assert unloaded.doubt() == ''
+
+
+def test_an_offset_of_more_than_half_of_the_load_is_named():
+    unloaded, _ = swung((0.0, 0.0, 50.0))
+    assert unloaded.doubt() == 'force: foot d shows more than half of the expected load in the air'
+    assert not unloaded.offset.any()
+
+
+@pytest.mark.parametrize('lasts', [0.05, 0.7])
+def test_contacts_that_last_are_no_offset(lasts):
+    unloaded, _ = swung((0.0, 0.0, 0.0), lasts)
+    assert not unloaded.offset.any()
+    assert unloaded.doubt() == ''

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad import configuration
+from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
@@ -209,6 +210,14 @@ def test_what_is_left_out(name):
         assert term.term and term.reason
         assert term.bound is None or 0.0 <= term.bound < 1.0
         assert term.bound is None or term.reason.startswith('of the ')
+
+
+def test_pads_of_a_material_leave_ballooning_out():
+    """The maximum of the small foot is between those of the neighbours of its material."""
+    assert not [t for t in fidelity.omitted(HEXAPOD) if 'balloon' in t.term]
+    scene = dataclasses.replace(HEXAPOD, foot=Foot.load('small217'))
+    (term,) = (t for t in fidelity.omitted(scene) if 'balloon' in t.term)
+    assert 'above 12663 Pa' in term.reason and '11000 Pa' in term.reason
 
 
 def bound(scene, word):

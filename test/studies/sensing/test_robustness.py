@@ -199,3 +199,14 @@ def test_forces_that_repeat_are_in_doubt(log):
     log.foot_forces[1500:] = log.foot_forces[1499]
     found, _, _ = run(log)
     assert any(each.doubt == 'force: all foot forces repeat' for each in found)
+
+
+@pytest.mark.parametrize('offset', [8.0, -8.0, 25.0])
+def test_force_sensors_that_show_something_in_the_air_are_zeroed(log, offset):
+    log.foot_forces[..., 2] += offset
+    found, error, _ = run(log)
+    assert rms(error[750:]) < 0.012
+    loads = np.array([[foot.force[2] for foot in each.feet] for each in found[1000:]])
+    assert np.abs(loads - log.load[1000:]).mean() < 2.0
+    in_contact = np.array([[foot.in_contact for foot in each.feet] for each in found[1000:]])
+    assert np.mean(in_contact == (log.load[1000:] > 7.5)) > 0.97

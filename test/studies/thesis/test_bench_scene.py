@@ -10,6 +10,7 @@ import yaml
 from ros_pad import configuration
 from ros_pad.contact import Foot
 from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
 from studies.thesis import bench_scene as bench
 from studies.thesis.bench_scene import BENCHES
@@ -129,6 +130,12 @@ def test_files_of_ones_own_lie_beside_the_scene(tmp_path, monkeypatch):
     assert scene.name == 'mine'
     assert scene.measurements == tmp_path / 'mine.csv'
     assert pathlib.Path(scene.foot.source) == tmp_path / 'my_foot.yaml'
+
+
+def test_benches_of_the_thesis_law_refuse_a_material():
+    for name in ('inflation', 'press'):
+        with pytest.raises(InvalidInput, match=f'the bench {name} needs a pad with a measured'):
+            BenchScene.load(f'bench_{name}', Foot.load('small217'))
 
 
 def test_another_foot_in_place_of_the_scenes_own():

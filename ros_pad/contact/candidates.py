@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pads of different materials and thicknesses for one load, with what is unsure of the materials.
+
+Each quantity is computed for the material as it is, and for the lowest and the highest factor on
+its stresses (:attr:`ros_pad.contact.Material.factor_range`). In between it lies between both: a
+factor changes the pressures of all domes in proportion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.configuration import number
+from ros_pad.contact.design import pads_for
+from ros_pad.contact.dome import inflate
+from ros_pad.contact.hyperelastic import pressure_end
+from ros_pad.contact.laws import highest_dome
+from ros_pad.contact.laws import pressure_for_height
+from ros_pad.contact.laws import with_constant
+from ros_pad.contact.limits import force_limit
+from ros_pad.contact.limits import pressure_for
+from ros_pad.contact.material import Material
+from ros_pad.contact.pad import MeasuredLimit
+from ros_pad.contact.pad import Pad
+from ros_pad.errors import NoEquilibrium
+from ros_pad.pace import Progress
+
+
+class Span(NamedTuple):
+    """A value, and its lowest and highest one by the doubts about the material."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pad for a load. Where no pressure is enough, numbers that need one are NaN.
+
+    Attributes
+    ----------
+    pad : Pad
+        The pad.
+    pads : int
+        Number of pads that share the load.
+    pressure : Span
+        Lowest pressure for the load with its margin, and for the height, Pa gauge; infinite where
+        none is enough.
+    height : Span
+        Height of the free dome at this pressure, m; of the largest dome where none is enough.
+    load : Span
+        Largest load of the whole foot at the ceiling, N, divided by the margin.
+    largest_pressure : Span
+        Pressure at which the pad balloons, or at which the range of its material ends, Pa.
+    balloons : bool
+        Whether it balloons there; otherwise it does so at this or a higher pressure.
+    ballooning_margin : Span
+        Largest over needed pressure; 0 where no pressure is enough.
+    carried : str
+        Whether a pressure up to the ceiling is enough: ``yes`` and ``no`` for the whole range of
+        the factor, else ``in doubt``.
+    """
+
+    pad: Pad
+    pads: int
+    pressure: Span
+    height: Span
+    load: Span
+    largest_pressure: Span
+    balloons: bool
+    ballooning_margin: Span
+    carried: str
+
+    @property
+    def material(self) -> str:
+        """Name of the material, or its law."""
+        material = self.pad.material
+        return '' if material is None else material.name or str(material)
+
+
+def candidates(
+    load: float,
+    area: float,
+    materials: Sequence[Material],
+    thicknesses: Sequence[float],
+    radius: float,
+    *,
+    pads: int | None = None,
+    ceiling: float = 90e3,
+    margin: float = 1.2,
+    criterion: str = 'flattening',
+    height: float = 0.0,
+    measured_limit: MeasuredLimit | None = None,
+    progress: Progress | None = None,
+) -> tuple[Candidate, ...]:
+    """Return pads of each material and thickness for a load.
+
+    Parameters
+    ----------
+    load : float
+        Normal force on the foot, N, above 0.
+    area : float
+        Area of the sole, m², at least one cell of :func:`ros_pad.contact.pads_in`.
+    materials : sequence of Material
+        The materials.
+    thicknesses : sequence of float
+        Thicknesses of the sheet, m, above 0 up to the radius.
+    radius : float
+        Radius of the pads, m, above 0.
+    pads : int, optional
+        Number of pads. By default as many as fit.
+    ceiling : float
+        Highest pressure of the supply, Pa gauge, above 0.
+    margin : float
+        Safety factor on the load, above 0.
+    criterion : str
+        Criterion of the force limit, one of :func:`ros_pad.contact.limits.criteria`.
+    height : float
+        Least height of the free dome, m, from 0.
+    measured_limit : MeasuredLimit, optional
+        Force limits measured on such pads.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is out of range, a pad has no such criterion, or the sole is too small.
+    """
+    number('load', load, 'N', above=True)
+    number('ceiling', ceiling, 'Pa', above=True)
+    number('margin', margin, '(factor)', above=True)
+    number('height', height, 'm')
+    found: list[Candidate] = []
+    for material in materials:
+        for thickness in thicknesses:
+            pad = Pad.of(material, radius, thickness, measured_limit)
+            count = pads_for(area, pad, pads)
+            found.append(_candidate(pad, count, load, ceiling, margin, criterion, height))
+            if progress is not None:
+                progress(len(found) / (len(materials) * len(thicknesses)))
+    return tuple(found)
+
+
+class _State(NamedTuple):
+    """The quantities of a candidate for one factor, or their spans."""
+
+    pressure: Any
+    height: Any
+    load: Any
+    largest_pressure: Any
+    ballooning_margin: Any
+
+
+def _candidate(
+    pad: Pad,
+    pads: int,
+    load: float,
+    ceiling: float,
+    margin: float,
+    criterion: str,
+    height: float,
+) -> Candidate:
+    material = pad.material
+    assert material is not None and material.factor_range is not None
+    states = [
+        _state(
+            with_constant(pad, 'factor', factor), pads, load, ceiling, margin, criterion, height
+        )
+        for factor in (material.factor, *material.factor_range)
+    ]
+    enough = [state.pressure <= ceiling for state in states]
+    spans = _State(*(Span(each[0], min(each), max(each)) for each in zip(*states, strict=True)))
+    return Candidate(
+        pad=pad,
+        pads=pads,
+        pressure=spans.pressure,
+        height=spans.height,
+        load=spans.load,
+        largest_pressure=spans.largest_pressure,
+        balloons=pressure_end(pad)[1] == 'no_inflation',
+        ballooning_margin=spans.ballooning_margin,
+        carried='yes' if all(enough) else 'in doubt' if any(enough) else 'no',
+    )
+
+
+def _state(
+    pad: Pad,
+    pads: int,
+    load: float,
+    ceiling: float,
+    margin: float,
+    criterion: str,
+    height: float,
+) -> _State:
+    end = pressure_end(pad)[0]
+    try:
+        pressure = pressure_for(pad, load / pads, criterion, margin)
+    except NoEquilibrium:
+        pressure = math.inf
+    if height > highest_dome(pad):
+        pressure = math.inf
+    elif height > 0.0:
+        pressure = max(pressure, float(pressure_for_height(pad, np.array([height]))[0]))
+    # force_limit can refuse the end itself because of rounding.
+    limit = force_limit(pad, min(ceiling, end * (1.0 - 1e-15)), criterion)
+    return _State(
+        pressure,
+        inflate(pad, min(pressure, end)).height,
+        pads * limit / margin,
+        end,
+        end / pressure,
+    )

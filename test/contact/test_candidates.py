@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+
+from ros_pad.contact import Material
+from ros_pad.contact.candidates import candidates
+from ros_pad.errors import InvalidInput
+
+RADIUS, THICKNESS = 1.5e-3, 4e-4
+AREA = 20 * 4.5 * math.sqrt(3.0) * RADIUS**2  # 20 cells
+FLAT = 20 * math.pi * RADIUS**2
+# Reference rows: 0.7968 mm high at 40 kPa and 1.3223 mm at 70 kPa; P = 1.87917 at the maximum,
+# where H/a = 1.1739.
+NEO = Material('neo_hookean', (150e3,), factor_range=(4.0 / 7.0, 2.0))
+AT_40, AT_70 = 0.0007968214022832315, 0.001322336716624393
+MAXIMUM = 1.87917 * 150e3 * THICKNESS / RADIUS
+# Dragon Skin 10 as given is 1.9065 mm high at 40 kPa.
+RAW = Material.load('dragon_skin_10')
+
+
+def one(load, material=NEO, thickness=THICKNESS, **rules):
+    (found,) = candidates(load, AREA, [material], [thickness], RADIUS, **rules)
+    return found
+
+
+def test_a_material_by_reference_rows():
+    found = one(40e3 * FLAT / 1.2)
+    assert found.pads == 20
+    assert found.pressure == pytest.approx((40e3, 40e3, 40e3), rel=1e-12)
+    assert found.height.value == pytest.approx(AT_40, rel=1e-9)
+    # At 4/7 of the stress 40 kPa are like 70 kPa.
+    assert found.height.high == pytest.approx(AT_70, rel=1e-9)
+    spans = np.array([1.0, 4.0 / 7.0, 2.0])
+    np.testing.assert_allclose(found.largest_pressure, MAXIMUM * spans, rtol=1e-5)
+    np.testing.assert_allclose(found.ballooning_margin, MAXIMUM * spans / 40e3, rtol=1e-5)
+    # All pads flat, at the supply or where they balloon.
+    reach = [min(90e3, MAXIMUM * each) * FLAT / 1.2 for each in spans]
+    np.testing.assert_allclose(found.load, reach, rtol=1e-5)
+    assert (found.balloons, found.carried) == (True, 'yes')
+
+
+def test_a_least_height_by_reference_rows():
+    material = RAW.times(1.0, (1.0, 1.88))
+    found = one(1.0, material, height=0.00190652850585761)
+    # Pressures of equal domes are in proportion to the factor.
+    assert found.pressure == pytest.approx((40e3, 40e3, 75.2e3), rel=1e-7)
+    assert found.height == pytest.approx((0.00190652850585761,) * 3, rel=1e-7)
+    # 46.65 kPa is the maximum; the range of the material ends just below.
+    assert found.largest_pressure == pytest.approx((46.65e3, 46.65e3, 87.7e3), rel=1e-3)
+    assert found.ballooning_margin.high == pytest.approx(46.65 / 40.0, rel=1e-3)
+    assert not found.balloons
+    # Twice as thick, twice the pressure.
+    thick = one(1.0, material, 2 * THICKNESS, height=0.00190652850585761)
+    assert thick.pressure == pytest.approx((80e3, 80e3, 150.4e3), rel=1e-7)
+
+
+def test_doubt_decides_between_yes_and_no():
+    # 4/7 of the stress balloons at 43 kPa; 45 kPa are needed.
+    found = one(45e3 * FLAT / 1.2)
+    assert found.carried == 'in doubt'
+    assert found.pressure == (pytest.approx(45e3), pytest.approx(45e3), math.inf)
+    assert found.ballooning_margin.low == 0.0
+    # Where no pressure is enough, the highest dome.
+    assert found.height.high == pytest.approx(1.1739 * RADIUS, rel=1e-5)
+    assert one(45e3 * FLAT / 1.2, ceiling=44e3).carried == 'no'
+    assert one(200e3 * FLAT).carried == 'no'
+    assert one(200e3 * FLAT, ceiling=300e3, margin=1.0).carried == 'no'
+    assert one(40e3 * FLAT / 1.2, height=2e-3).pressure == (math.inf,) * 3
+
+
+@pytest.mark.parametrize('height', [0.0, 1.2e-3])
+def test_every_factor_of_the_range_is_within_the_spans(height):
+    found = one(35e3 * FLAT / 1.2, RAW, height=height)
+    for factor in np.linspace(1.0, 2.1, 7):
+        other = one(35e3 * FLAT / 1.2, RAW.times(factor, (factor, factor)), height=height)
+        for name in ('pressure', 'height', 'load', 'largest_pressure', 'ballooning_margin'):
+            _, low, high = getattr(found, name)
+            assert low * (1 - 1e-9) <= getattr(other, name).value <= high * (1 + 1e-9)
+
+
+def test_order_number_of_pads_and_progress():
+    shares = []
+    found = candidates(1.0, AREA, [RAW, NEO], [2e-4, 4e-4], RADIUS, pads=7, progress=shares.append)
+    assert [(each.pad.material, each.pad.thickness) for each in found] == [
+        *((RAW, 2e-4), (RAW, 4e-4), (NEO, 2e-4), (NEO, 4e-4))
+    ]
+    assert {each.pads for each in found} == {7}
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+
+
+@pytest.mark.parametrize(
+    ('rules', 'words'),
+    [
+        ({'load': 0.0}, 'load = 0'),
+        ({'thickness': 2e-3}, r'thickness = 0\.002 .* up to 0\.0015 m'),
+        ({'ceiling': 0.0}, 'ceiling = 0'),
+        ({'margin': -1.0}, 'margin = -1'),
+        ({'height': -1e-3}, r'height = -0\.001'),
+        ({'criterion': 'max_depth'}, "criterion = 'max_depth'"),
+        ({'pads': 0}, 'pads = 0'),
+    ],
+)
+def test_bad_input(rules, words):
+    with pytest.raises(InvalidInput, match=words):
+        one(**({'load': 1.0} | rules))
