@@ -34,7 +34,7 @@ Shape of a pad at a pressure, free or pressed, and its force limits.
   ring of liquid    balance of weight and surface tension around a single pad; it does not
                     depend on the width of the gap, and is no prediction (docs/errata.md)
   tangential force  of one half of the ring: a bound, because the other half pushes back
-  force limit       largest load of one pad; measured is the line through measurements"""
+  force limit       largest load of one pad, by criterion: docs/model/force_limit.md"""
 
 
 def add(commands: Commands) -> None:
@@ -108,8 +108,7 @@ def run(options: argparse.Namespace) -> int:
         failure = error
         values[next(part for part in _TITLES if part not in values)] = {'status': error.status}
     # The membrane model also has solutions above the pressures at which the force limits end.
-    shown = [each for each in ('measured', 'max_depth', 'flattening') if each in criteria(pad)]
-    ends: dict[str, float] = {each: largest_pressure(pad, each) for each in shown}
+    ends: dict[str, float] = {each: largest_pressure(pad, each) for each in criteria(pad)}
     values['force_limit_n'] = {
         criterion: contact.force_limit(pad, pressure, criterion) if pressure < end else None
         for criterion, end in ends.items()

@@ -34,11 +34,17 @@ from ros_pad.contact.candidates import candidates
 from ros_pad.contact.design import CELL
 from ros_pad.contact.design import READINGS
 from ros_pad.contact.limits import CRITERIA
+from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import resized
 from ros_pad.errors import InvalidInput
 
 CEILING = 90e3  # Pa gauge, the ceiling of the shipped feet
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
+OTHER_RADII = (
+    'Limits measured on one pad do not hold for another radius: other radii are computed with the '
+    f'criterion {DEFAULT_CRITERION}.'
+)
 MATERIAL_CRITERION = 'flattening'
 SHEETS = (2.0 / 15.0, 4.0 / 15.0, 6.0 / 15.0)  # thickness over radius: 0.4 mm of 1.5 and others
 OPTIMUM = (
@@ -88,7 +94,8 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--criterion',
         choices=CRITERIA,
-        help=f'criterion of the force limit (measured; of materials {MATERIAL_CRITERION})',
+        help=f'criterion of the force limit ({DEFAULT_CRITERION}; of materials '
+        f'{MATERIAL_CRITERION})',
     )
     _add_materials(part)
     part.add_argument(
@@ -136,24 +143,29 @@ def run(options: argparse.Namespace) -> int:
         if getattr(options, name) is not None:
             raise InvalidInput(f'--{name} needs --material, or a foot whose pads name a material')
     pad = LARGE_PAD if foot is None else foot.pad
-    if options.stiffness is not None:
-        pad = replace(pad, stiffness=options.stiffness)
+    if options.stiffness not in (None, pad.stiffness):
+        pad = replace(pad, stiffness=options.stiffness, measured_limit=None)
     if options.radius is not None:
         pad = resized(pad, options.radius)
     area = _area(options, foot)
     ceiling = CEILING if foot is None else foot.ceiling
+    own = DEFAULT_CRITERION if foot is None else foot.limit
     rules: dict[str, Any] = {
         'ceiling': ceiling if options.pressure is None else options.pressure,
         'margin': options.margin,
-        'criterion': options.criterion or ('measured' if foot is None else foot.limit),
+        'criterion': options.criterion or (own if own in criteria(pad) else DEFAULT_CRITERION),
     }
     designs = {each: design(options.load, area, pad, reading=each, **rules) for each in READINGS}
     if foot is not None and (pad.radius, area) == (foot.pad.radius, foot.sole_area):
         built = design(options.load, area, pad, pads=foot.pads, **rules)
         designs = {'as built': built, **designs}
-    rows = _over(RADII, options.load, area, pad, rules)
+    others = rules
+    if rules['criterion'] == 'measured':
+        others = rules | {'criterion': DEFAULT_CRITERION}
+    rows = _over(RADII, options.load, area, pad, others)
     sentences = [
         *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
+        *(() if others is rules else (OTHER_RADII,)),
         *_overlap('By the equations of the thesis, ', designs['thesis']),
         OPTIMUM,
     ]
@@ -161,7 +173,7 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.design import draw
 
         radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
-        draw(options.figure, *_over(radii, options.load, area, pad, rules))
+        draw(options.figure, *_over(radii, options.load, area, pad, others))
     if options.json:
         summary = {
             'designs': [{'name': name, **values(each)} for name, each in designs.items()],
@@ -286,7 +298,7 @@ def _over(
         [
             design(load, area, resized(pad, r), reading=reading, **rules)
             for r in radii
-            if area >= CELL['corrected'] * r * r
+            if area >= CELL['corrected'] * r * r and r >= (pad.thickness or 0.0)
         ]
         for reading in READINGS
     ]

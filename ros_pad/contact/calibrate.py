@@ -38,9 +38,10 @@ from ros_pad.contact.laws import rubber_laws
 from ros_pad.contact.laws import stiffness_law
 from ros_pad.contact.laws import two_constants_law
 from ros_pad.contact.laws import with_constant
+from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.limits import measured_line
 from ros_pad.contact.material import FACTORS
 from ros_pad.contact.material import Material
 from ros_pad.contact.measurements import Friction
@@ -236,7 +237,9 @@ def calibrate(
     else:
         pad = _of_rubber(measurements, start, fit, laws, constants, warnings)
     pad = _limit(measurements, pad, constants, warnings)
-    foot = _with(foot, pad=pad, ceiling=_ceiling(foot, pad, warnings))
+    limit = _criterion(foot, pad, warnings)
+    ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
+    foot = _with(foot, pad=pad, limit=limit, ceiling=ceiling)
     wet_floor = _WetFloor(film_thickness, viscosity)
     foot = _friction(measurements, foot, wet_floor, constants, warnings)
     _check_constants(measurements.source, fit, constants)
@@ -277,14 +280,27 @@ def _start(foot: Foot, fit: str | None, rubber: Pad | None) -> tuple[Pad, str]:
     return start, fit
 
 
-def _ceiling(foot: Foot, pad: Pad, warnings: list[str]) -> float:
+def _criterion(foot: Foot, pad: Pad, warnings: list[str]) -> str:
+    """Return the criterion of the force limit: that of the start foot, or the pad's own line."""
+    if pad.measured_limit not in (None, foot.pad.measured_limit):
+        return 'measured'
+    if foot.limit in criteria(pad):
+        return foot.limit
+    warnings.append(
+        f'the criterion of the force limit becomes {DEFAULT_CRITERION}: none was measured on a pad'
+        ' of this stiffness'
+    )
+    return DEFAULT_CRITERION
+
+
+def _ceiling(ceiling: float, pad: Pad, limit: str, warnings: list[str]) -> float:
     """Return the foot's ceiling, Pa; lower it to whole kPa if the pad's model ends below."""
-    end = largest_pressure(pad, foot.limit)
-    if foot.ceiling <= end:
-        return foot.ceiling
+    end = largest_pressure(pad, limit)
+    if ceiling <= end:
+        return ceiling
     lowered = 1e3 * math.floor(end / 1e3)
     warnings.append(
-        f'the ceiling is lowered from {foot.ceiling:g} to {lowered:g} Pa: the model of these'
+        f'the ceiling is lowered from {ceiling:g} to {lowered:g} Pa: the model of these'
         f' softer pads ends at {end:.6g} Pa'
     )
     return lowered
@@ -299,7 +315,7 @@ def _fits_a_foot(source: str, constant: Constant) -> None:
         )
 
 
-def _with(foot: Foot, **changes: float | Pad) -> Foot:
+def _with(foot: Foot, **changes: float | str | Pad) -> Foot:
     return dataclasses.replace(foot, **changes)  # type: ignore[arg-type]
 
 
@@ -333,6 +349,8 @@ def foot_file(calibration: Calibration) -> str:
         entry('radius', pad.radius, 'm', '  '),
     ]
     if pad.material is None:
+        if pad.thickness is not None:
+            lines.append(entry('thickness', pad.thickness, 'm', '  '))
         lines += [
             entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
             entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
@@ -662,15 +680,15 @@ def _limit(
     if len(np.unique(pressure)) < 2:
         if len(pressure):
             warnings.append(
-                'the line of the force limit is kept: the measured force limits are all at one'
-                ' pressure, and a line needs two'
+                'the line of the force limit is not fitted: the measured force limits are all at'
+                ' one pressure, and a line needs two'
             )
-        line = measured_line(pad)
-        note = "the thesis' line" if pad.measured_limit is None else "the start foot's line"
-        constants.append(
-            _kept('force_limit', 'N', line.force, f'{note}, on one pad at {line.pressure:g} Pa')
-        )
-        constants.append(_kept('force_limit_slope', 'N/Pa', line.slope, note))
+        line = pad.measured_limit
+        if line is not None:
+            note = "the start foot's line"
+            at = f'{note}, on one pad at {line.pressure:g} Pa'
+            constants.append(_kept('force_limit', 'N', line.force, at))
+            constants.append(_kept('force_limit_slope', 'N/Pa', line.slope, note))
         return pad
     middle = float(pressure.mean())
     fit = _line(np.column_stack([np.ones_like(pressure), pressure - middle]), limit)
@@ -694,8 +712,10 @@ def _limit_residuals(measurements: Measurements, pad: Pad) -> list[Residual]:
     if not len(pressure):
         return []
     used = pad.measured_limit is not None
-    known = pressure <= largest_pressure(pad)
-    modelled = np.where(known, force_limit(pad, np.where(known, pressure, 0.0)), np.nan)
+    criterion = 'measured' if used else DEFAULT_CRITERION
+    known = pressure <= largest_pressure(pad, criterion)
+    modelled = force_limit(pad, np.where(known, pressure, 0.0), criterion)
+    modelled = np.where(known, modelled, np.nan)
     return [
         Residual('force_limit', f'{p:g} Pa', p, value, float(model), used)
         for p, value, model in zip(pressure, limit, modelled, strict=True)

@@ -21,6 +21,7 @@ from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
+from ros_pad.contact.limits import DEFAULT_CRITERION
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import largest_pressure
 from ros_pad.contact.limits import pressure_for
@@ -328,7 +329,7 @@ def design(
     pads: int | None = None,
     ceiling: float = 90e3,
     margin: float = 1.2,
-    criterion: str = 'measured',
+    criterion: str = DEFAULT_CRITERION,
     liquid: Liquid = DESIGN_WATER,
     reading: str = 'corrected',
 ) -> Design:
@@ -349,7 +350,7 @@ def design(
         :func:`ros_pad.contact.limits.largest_pressure` of the criterion.
     margin : float
         Safety factor on the load, above 0.
-    criterion : {'measured', 'flattening', 'max_depth'}
+    criterion : {'thickness', 'wall', 'flattening', 'max_depth', 'measured'}
         Criterion of the force limit.
     liquid : Liquid
         Liquid for the rise height.

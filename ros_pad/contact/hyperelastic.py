@@ -73,6 +73,9 @@ _FREE, _STRAINS, _LINES = 64, 48, 48
 _LOW, _SPAN = 0.02, (3e-3, 0.9999)
 # Rows and columns of the table of pressed domes: x, and s.
 _ROWS, _CONTACTS = 512, 512
+# Least ``F/(p π r²)`` at which the angle at the rim is looked up: it differs from that of the free
+# dome by less than rounding.
+_LEAST = 1e-18
 # Places along a line between which its spline over s is made.
 _FINE = 800
 
@@ -130,6 +133,22 @@ def press_rubber(pad: Pad, pressure: Array, force: Array) -> tuple[Array, Codes]
     return lengths, code
 
 
+def rim_angle(pad: Pad, pressure: Array, force: Array) -> Array:
+    """Return the angle of the wall at the rim, rad, as :func:`press_rubber` takes its input.
+
+    Pressures are up to the end of the pad's model; 0 where the dome is flattened.
+    """
+    domes, unit = _of(pad)
+    whole = pressure * (math.pi * pad.radius**2)
+    least = _LEAST * whole
+    angle = np.zeros_like(pressure)
+    for rows in np.split(np.arange(pressure.size), range(_CHUNK, pressure.size, _CHUNK)):
+        rows = rows[force[rows] < whole[rows]]
+        p, f, most = pressure[rows], np.maximum(force, least)[rows], whole[rows]
+        angle[rows] = domes.rim(p / unit, f / most)
+    return angle
+
+
 def pressure_end(pad: Pad) -> tuple[float, str]:
     """Return the largest pressure of a pad of a material, Pa, and the status above it."""
     domes, unit = _of(pad)
@@ -184,6 +203,8 @@ class Shapes(NamedTuple):
         Distance from pad base to floor: the height of a free dome.
     volume : array
         Volume under the membrane.
+    rim : array
+        Angle of the wall at the rim, rad.
     """
 
     pressure: Array
@@ -191,6 +212,7 @@ class Shapes(NamedTuple):
     rest: Array
     gap: Array
     volume: Array
+    rim: Array
 
 
 def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) -> Shapes:
@@ -264,7 +286,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         )
 
     state = solve_ivp(arrive, (0.0, 1.0), state, t_eval=[1.0], **options).y[:, -1]
-    _, run, _, _, height, volume = state.reshape(6, -1)
+    angle, run, _, _, height, volume = state.reshape(6, -1)
     rim = disc + run
     return Shapes(
         rim,
@@ -272,6 +294,7 @@ def shapes(law: Law, strain: Array, disc: Array, tolerance: float = _TOLERANCE) 
         (run - strain * disc) / rim,
         height / rim,
         math.pi * volume / rim**3,
+        angle,
     )
 
 
@@ -338,7 +361,16 @@ class Domes:
         share, rest : array
             ``F/(p π r²)`` and 1 less that, both above 0.
         """
-        pushes, angles, starts, first, step = self._pressed
+        angle = self._at(self._pressed[1], pressure, share)
+        return rest / (1.0 + np.sqrt(share)) * np.tan(0.5 * angle)
+
+    def rim(self, pressure: Array, share: Array) -> Array:
+        """Return the angle of the wall at the rim, rad, of pressed domes."""
+        return self._at(self._rims, pressure, share)
+
+    def _at(self, table: Array, pressure: Array, share: Array) -> Array:
+        """Return the value of a table at P and ``F/(p π r²)``."""
+        pushes, _, starts, first, step = self._pressed
         contact = np.sqrt(share)
         place = (np.sqrt(contact) - first) / step
         row = np.rint(self._coordinate(pressure) * ((_ROWS - 1) / self._last)).astype(np.intp)
@@ -348,8 +380,7 @@ class Domes:
         left = np.clip(place.astype(np.intp) - 1, 0, _CONTACTS - 4)
         corner, weights = low * _CONTACTS + left, _weights(place - left)
         x = _root(_across(pushes, corner, weights), np.cbrt(pressure), start - low)
-        angle = _sum(_across(angles, corner, weights), _weights(x))
-        return rest / (1.0 + contact) * np.tan(0.5 * angle)
+        return _sum(_across(table, corner, weights), _weights(x))
 
     def _coordinate(self, pressure: Array) -> Array:
         """Return x, in which domes are analytic both where P is small and at a maximum of P."""
@@ -369,41 +400,17 @@ class Domes:
             under = middle * self._push(middle) < aim
             low, high = np.where(under, middle, low), np.where(under, high, middle)
         e = np.where(x < 0.5, aim / self._push(high), high)
-        height, volume = (_series(each / np.sqrt(strain), span)(e) for each in free[3:])
+        height, volume = (_series(each / np.sqrt(strain), span)(e) for each in free[3:5])
         root = np.sqrt(e) / x
         return CubicSpline(x, np.stack([root * height, root * volume, root * root], axis=1))
 
     @functools.cached_property
     def _pressed(self) -> tuple[Array, Array, Array, float, float]:
         """Tables of ``P^(1/3)`` and ψ over x and s, start values, first s and step of s."""
-        from scipy.interpolate import CubicSpline
-
-        lines = _nodes(*_SPAN, _LINES)
-        x, given = np.linspace(0.0, self._last, _ROWS), _nodes(_LOW, 1.0, _STRAINS) * self._last
-        states = self._on_lines(given, self._reach(lines), lines, _TOLERANCE)
+        _, states, _, kept = self._states
         angle = 2.0 * np.arctan2(states.gap, states.rest)
-        fields = (
-            np.sqrt(states.contact),
-            np.cbrt(states.pressure) / given[:, None],
-            angle / given[:, None],
-        )
-        to_rows = chebyshev.chebvander(_unit(x / self._last, (_LOW, 1.0)), _STRAINS - 1)
-        to_fine = chebyshev.chebvander(_unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1)
-        place, push, angle = (to_rows @ _fit((to_fine @ _fit(each.T)).T) for each in fields)
-        if not (np.diff(place, axis=1) > 0.0).all():
-            raise InvalidInput(
-                f'largest_stretch is too large for pressed domes of the law {self._law[0]}'
-                f' {self._law[1]} (over its shear modulus): their shape depends on the history of'
-                ' the load; a smaller one is needed'
-            )
-        kept = np.linspace(place[:, 0].max(), place[:, -1].min(), _CONTACTS)
-        table = x[:, None, None] * np.array(
-            [
-                CubicSpline(each, np.stack(pair, axis=1))(kept)
-                for each, *pair in zip(place, push, angle, strict=True)
-            ]
-        )
-        push, angle = table[..., 0], table[..., 1]
+        push, angle = self._tables(np.cbrt(states.pressure), angle)
+        x = np.linspace(0.0, self._last, _ROWS)
         even = np.cbrt(self._turn * x**3 * (2.0 - x**3))
         starts = np.array(
             [np.interp(even, np.maximum.accumulate(each), np.arange(_ROWS)) for each in push.T]
@@ -415,6 +422,37 @@ class Domes:
             float(kept[0]),
             float(kept[1] - kept[0]),
         )
+
+    @functools.cached_property
+    def _rims(self) -> Array:
+        """Table of the angle at the rim over x and s."""
+        (table,) = self._tables(self._states[1].rim)
+        return table.ravel()
+
+    @functools.cached_property
+    def _states(self) -> tuple[Array, Shapes, Array, Array]:
+        """Given x, states over x and lines, s over finer x and lines, and the s of the tables."""
+        lines, given = _nodes(*_SPAN, _LINES), _nodes(_LOW, 1.0, _STRAINS) * self._last
+        states = self._on_lines(given, self._reach(lines), lines, _TOLERANCE)
+        place = _finer(np.sqrt(states.contact))
+        if not (np.diff(place, axis=1) > 0.0).all():
+            raise InvalidInput(
+                f'largest_stretch is too large for pressed domes of the law {self._law[0]}'
+                f' {self._law[1]} (over its shear modulus): their shape depends on the history of'
+                ' the load; a smaller one is needed'
+            )
+        kept = np.linspace(place[:, 0].max(), place[:, -1].min(), _CONTACTS)
+        return given, states, place, kept
+
+    def _tables(self, *fields: Array) -> Array:
+        """Return tables over x and s of fields that are in proportion to x where it is small."""
+        from scipy.interpolate import CubicSpline
+
+        given, _, place, kept = self._states
+        finer = np.stack([_finer(each / given[:, None]) for each in fields], axis=-1)
+        rows = [CubicSpline(*pair)(kept) for pair in zip(place, finer, strict=True)]
+        x = np.linspace(0.0, self._last, _ROWS)
+        return np.moveaxis(x[:, None, None] * np.array(rows), -1, 0)
 
     def _reach(self, lines: Array) -> Array:
         """Return the factors on the line of largest x with which P is just above ``end``."""
@@ -456,6 +494,13 @@ def _fit(values: Array) -> Array:
     count = len(values)
     basis = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
     return np.asarray(np.linalg.solve(basis, values), dtype=np.float64)
+
+
+def _finer(values: Array) -> Array:
+    """Return a field at the nodes of x and lines on the finer grid of the tables."""
+    to_rows = chebyshev.chebvander(_unit(np.linspace(0.0, 1.0, _ROWS), (_LOW, 1.0)), _STRAINS - 1)
+    to_fine = chebyshev.chebvander(_unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1)
+    return np.asarray(to_rows @ _fit((to_fine @ _fit(values.T)).T))
 
 
 def _series(values: Array, span: tuple[float, float]) -> Any:

@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Largest force on an inflated pad by three criteria, and the pressure for a force.
+"""Largest force on an inflated pad by several criteria, and the pressure for a force.
 
-``measured``
-    A straight line through measurements: of this pad, or else the three measurements of the thesis
-    on its large pad (0.15, 0.30, 0.40 N at 65, 75, 85 kPa), in proportion to the area.
+``thickness`` (default)
+    The force that presses the dome down to a gap as high as its sheet is thick, or to half of its
+    free height where that is less or the thickness is not known.
+``wall``
+    The force at which the wall of the dome is vertical at the rim: below it the dome overhangs. 0
+    at pressures at which even the free dome does not.
+``flattening``
+    The force at which the contact reaches the rim and the model ends.
 ``max_depth``
     The force at which the floor cuts deepest into the cap; under a larger force the dome
     collapses sideways.
-``flattening``
-    The force at which the contact reaches the rim and the model ends.
+``measured``
+    A straight line through force limits measured on this pad: those of its ``measured_limit``, or
+    on the large pad of the thesis 0.15, 0.30, 0.40 N at 65, 75, 85 kPa. It says nothing of a pad
+    with another radius or stiffness.
 
-The last two follow from the model with its default adhesion; the code uses the dimensionless
+All but the last follow from the model with its default adhesion; the code uses the dimensionless
 variables of :mod:`ros_pad.contact.dome`. A pad of a material is a membrane without adhesion, which
 flattens at ``p π r²``; it is no cap, so it has no ``max_depth``.
 """
@@ -28,7 +35,9 @@ from ros_pad.configuration import choice
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import flattening_force
+from ros_pad.contact.dome import inflate
 from ros_pad.contact.dome import largest_tension
+from ros_pad.contact.dome import press
 from ros_pad.contact.dome import signed_adhesion
 from ros_pad.contact.pad import LARGE_PAD
 from ros_pad.contact.pad import Array
@@ -37,21 +46,26 @@ from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import broadcast
 from ros_pad.contact.pad import plain
+from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
-CRITERIA = ('measured', 'flattening', 'max_depth')
+CRITERIA = ('thickness', 'wall', 'flattening', 'max_depth', 'measured')
+DEFAULT_CRITERION = 'thickness'
 
 # Line fitted to the thesis' measurements on its large pad.
 THESIS_LIMIT = MeasuredLimit(force=0.2833, pressure=75e3, slope=1.25e-5)
 # The thesis measured up to 85 kPa; the line is extrapolated to the end of this pad's model.
 _THESIS_END = 3.426 * LARGE_PAD.stiffness / LARGE_PAD.radius
 
+# Share of its free height to which a dome lower than two sheets, or of unknown thickness, may go.
+LEAST_SHARE = 0.5
+
 # Upper bounds of height and depth (over the radius) of the deepest dome. A second solution, which
 # fails the certificate, has depths above 0.57.
 _HIGHEST, _DEEPEST = 0.655, 0.55
 
 
-def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') -> Floats:
+def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRITERION) -> Floats:
     """Return the largest normal force on one pad at a pressure, N.
 
     Parameters
@@ -60,17 +74,16 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         Size and material.
     pressure : float or array
         Gauge pressure, Pa, from 0 to the end of the model (see :func:`ros_pad.contact.press`).
-        With the measurements of the thesis also at most 91.36 kPa, for every pad.
-    criterion : {'measured', 'flattening', 'max_depth'}
-        ``measured`` is the pad's own ``measured_limit``. Without one it is
-        ``0.2833 + 0.0125 (p/kPa - 75)`` N for a pad of 1.5 mm radius; for other radii this is
-        scaled with the radius squared, which has not been measured.
+        With the measurements of the thesis also at most 91.36 kPa.
+    criterion : {'thickness', 'wall', 'flattening', 'max_depth', 'measured'}
+        See :mod:`ros_pad.contact.limits`. ``measured`` needs a ``measured_limit`` of the pad, or
+        the large pad of the thesis: ``0.2833 + 0.0125 (p/kPa - 75)`` N.
 
     Returns
     -------
     float or array
-        0 where the pad carries nothing (``measured``: below 52.3 kPa). In arrays NaN above the
-        end of the model.
+        0 where the pad carries nothing (``measured`` of the thesis: below 52.3 kPa). In arrays
+        NaN above the end of the model.
 
     Raises
     ------
@@ -78,10 +91,10 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         For a scalar pressure above the end of the model; status ``fold_zone`` or
         ``no_inflation``.
     InvalidInput
-        When the criterion is unknown, or a pressure is negative, not finite, or above the
-        measurements.
+        When the criterion is unknown or not known for this pad, or a pressure is negative, not
+        finite, or above the measurements.
     """
-    choice('criterion', criterion, criteria(pad))
+    check_criterion(pad, criterion)
     p = quantity('pressure', pressure, 'Pa')
     tension = p * (pad.radius / pad.stiffness)
     end, status = _model_end(pad)
@@ -97,21 +110,24 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = 'measured') 
         quantity('pressure', np.where(inside, p, 0.0), 'Pa', high=_end_of_measurements(pad))
         line = measured_line(pad)
         limit = line.force + line.slope * (p - line.pressure)
-    elif pad.material is not None:
-        limit = p * (math.pi * pad.radius**2)
-    else:
-        a = signed_adhesion(pad, 'matlab')
+    elif criterion == 'max_depth':
         tension = np.where(inside, tension, 1.0)
-        if criterion == 'flattening':
-            f = flattening_force(tension, a)
-        else:
-            f = _deepest_force(tension, a)
-        limit = f * (math.pi * pad.stiffness * pad.radius)
+        limit = _deepest_force(tension, signed_adhesion(pad, 'matlab'))
+        limit = limit * (math.pi * pad.stiffness * pad.radius)
+    else:
+        limit = _flattening(pad, np.where(inside, p, 0.0))
+        if criterion != 'flattening':
+            # press can refuse the end itself because of rounding.
+            p = np.minimum(np.where(inside, p, 0.0), end * (1.0 - 1e-15))
+            limit = _where_room_ends(pad, p, limit, criterion)
     return plain(np.where(inside, np.maximum(limit, 0.0), np.nan))
 
 
 def pressure_for(
-    pad: Pad, force: npt.ArrayLike, criterion: str = 'measured', margin: npt.ArrayLike = 1.0
+    pad: Pad,
+    force: npt.ArrayLike,
+    criterion: str = DEFAULT_CRITERION,
+    margin: npt.ArrayLike = 1.0,
 ) -> Floats:
     """Return the lowest pressure with a force limit of ``margin * force``, Pa gauge.
 
@@ -122,7 +138,7 @@ def pressure_for(
     force : float or array
         Normal force on this one pad, N, from 0. For 0 the result is the pressure above which the
         limit is above 0.
-    criterion : {'measured', 'flattening', 'max_depth'}
+    criterion : {'thickness', 'wall', 'flattening', 'max_depth', 'measured'}
         As for :func:`force_limit`.
     margin : float or array
         Factor on the force, above 0.
@@ -138,10 +154,10 @@ def pressure_for(
         For scalars where no pressure up to the end of the model carries the force; status
         ``fold_zone``.
     InvalidInput
-        When the criterion is unknown, a value is negative or not finite, or shapes do not
-        broadcast.
+        When the criterion is unknown or not known for this pad, a value is negative or not finite,
+        or shapes do not broadcast.
     """
-    choice('criterion', criterion, criteria(pad))
+    check_criterion(pad, criterion)
     load = quantity('force', force, 'N')
     factor = quantity('margin', margin, '(factor)', above=True)
     load, factor = broadcast('force and margin', load, factor)
@@ -160,30 +176,53 @@ def pressure_for(
         line = measured_line(pad)
         # A line that is above 0 at pressure 0 carries small forces without any pressure.
         p = np.maximum(line.pressure + (load - line.force) / line.slope, 0.0)
-    elif pad.material is not None:
-        p = load / (math.pi * pad.radius**2)
-    else:
-        a = signed_adhesion(pad, 'matlab')
+    elif criterion == 'max_depth':
         f = load / (math.pi * pad.stiffness * pad.radius)
-        invert = _tension_at_flattening if criterion == 'flattening' else _tension_at_deepest
-        p = invert(f, a) * (pad.stiffness / pad.radius)
+        p = _tension_at_deepest(f, signed_adhesion(pad, 'matlab')) * (pad.stiffness / pad.radius)
+    else:
+        p = _pressure_at_flattening(pad, load)
+        if criterion != 'flattening':
+            p = _where_room_begins(pad, load, p, criterion)
     return plain(np.where(carried, p, np.nan))
 
 
-def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
+def largest_pressure(pad: Pad, criterion: str = DEFAULT_CRITERION) -> float:
     """Return the highest pressure for which a criterion has a force limit, Pa gauge.
 
     This is the end of the model of the pressed dome. For ``measured`` it is at most 91.36 kPa, the
     end of the thesis' line, if the pad has no ``measured_limit`` of its own.
     """
-    choice('criterion', criterion, criteria(pad))
+    check_criterion(pad, criterion)
     end = _model_end(pad)[0]
     return min(end, _end_of_measurements(pad)) if criterion == 'measured' else end
 
 
 def criteria(pad: Pad) -> tuple[str, ...]:
-    """Return the criteria that a pad has: ``max_depth`` is one of the spherical dome alone."""
-    return CRITERIA if pad.material is None else ('measured', 'flattening')
+    """Return the criteria that a pad has.
+
+    ``max_depth`` is one of the spherical dome alone, ``measured`` one of pads that were measured.
+    """
+    cap, measured = pad.material is None, pad.measured_limit is not None or _is_large_pad(pad)
+    missing = {'max_depth': not cap, 'measured': not measured}
+    return tuple(each for each in CRITERIA if not missing.get(each))
+
+
+def check_criterion(pad: Pad, criterion: str) -> None:
+    """Raise `InvalidInput` for a criterion that is unknown, or not known for the pad."""
+    if criterion == 'measured' and criterion not in criteria(pad):
+        raise InvalidInput(
+            f'criterion = {criterion!r} is not allowed for {pad}: no force limit was measured on'
+            f' it; a measured_limit of the pad, or one of {", ".join(criteria(pad))} is needed'
+        )
+    choice('criterion', criterion, criteria(pad))
+
+
+def _is_large_pad(pad: Pad) -> bool:
+    """Return whether this is the pad on which the thesis measured force limits."""
+    return pad.material is None and all(
+        math.isclose(getattr(pad, name), getattr(LARGE_PAD, name), rel_tol=1e-9)
+        for name in ('radius', 'stiffness')
+    )
 
 
 def _model_end(pad: Pad) -> tuple[float, str]:
@@ -197,40 +236,85 @@ def _model_end(pad: Pad) -> tuple[float, str]:
 
 
 def measured_line(pad: Pad) -> MeasuredLimit:
-    """Return the line of measured force limits for a pad: its own, or that of the thesis."""
-    if pad.measured_limit is not None:
-        return pad.measured_limit
-    scale = (pad.radius / LARGE_PAD.radius) ** 2
-    return MeasuredLimit(
-        THESIS_LIMIT.force * scale, THESIS_LIMIT.pressure, THESIS_LIMIT.slope * scale
-    )
+    """Return the line of measured force limits of a pad: its own, or that of the thesis."""
+    return pad.measured_limit or THESIS_LIMIT
 
 
 def resized(pad: Pad, radius: float) -> Pad:
-    """Return the pad with another radius, m; a measured force limit is scaled with the area.
+    """Return a pad of the same sheet with another radius, m, on which no limit was measured.
 
     Raises
     ------
     InvalidInput
-        When the radius is not finite or not above 0.
+        When the radius is not finite, not above 0, or below the thickness of the sheet.
     """
-    pad, old = replace(pad, radius=radius), pad
-    line = pad.measured_limit
-    if line is None:
+    if radius == pad.radius:
         return pad
-    scale = (radius / old.radius) ** 2
-    line = MeasuredLimit(line.force * scale, line.pressure, line.slope * scale)
-    return replace(pad, measured_limit=line)
+    return replace(pad, radius=radius, measured_limit=None)
 
 
 def _end_of_measurements(pad: Pad) -> float:
     return _THESIS_END if pad.measured_limit is None else math.inf
 
 
-def _tension_at_flattening(f: Array, a: float) -> Array:
-    return _rising_root(
+def _flattening(pad: Pad, p: Array) -> Array:
+    """Return the force at which the contact reaches the rim, N."""
+    if pad.material is not None:
+        return p * (math.pi * pad.radius**2)
+    a = signed_adhesion(pad, 'matlab')
+    unit = math.pi * pad.stiffness * pad.radius
+    return flattening_force(p * (pad.radius / pad.stiffness), a) * unit
+
+
+def _pressure_at_flattening(pad: Pad, force: Array) -> Array:
+    """Return the pressure at which a force just brings the contact to the rim, Pa."""
+    if pad.material is not None:
+        return force / (math.pi * pad.radius**2)
+    a = signed_adhesion(pad, 'matlab')
+    f = force / (math.pi * pad.stiffness * pad.radius)
+    tension = _rising_root(
         lambda tension: flattening_force(tension, a) - f, 0.0 * f, largest_tension(a) + 0.0 * f
     )
+    return tension * (pad.stiffness / pad.radius)
+
+
+def _where_room_ends(pad: Pad, p: Array, flat: Array, criterion: str) -> Array:
+    """Return the force up to the flattening one at which a pressed dome has no room left, N."""
+    flat = np.maximum(flat, 0.0)
+    share = _rising_root(
+        lambda share: -_room(pad, p, share * flat, criterion), 0.0 * flat, 1.0 + 0.0 * flat
+    )
+    return share * flat
+
+
+def _where_room_begins(pad: Pad, force: Array, low: Array, criterion: str) -> Array:
+    """Return the pressure from that of flattening on at which a pressed dome gets room, Pa."""
+    high = _model_end(pad)[0] * (1.0 - 1e-15) + 0.0 * low
+    return _rising_root(lambda p: _room(pad, p, force, criterion), low, high)
+
+
+def _room(pad: Pad, p: Array, force: Array, criterion: str) -> Array:
+    """Return what a pressed dome has left before it reaches a criterion, above 0 below its limit.
+
+    ``thickness``: gap less its least value, over the radius. ``wall``: angle at the rim past 90
+    degrees, rad. At flattening both are what a flat wall has.
+    """
+    shape = np.shape(p)
+    rows, loads = np.ravel(p), np.ravel(force)
+    if criterion == 'thickness':
+        least = LEAST_SHARE * inflate(pad, rows).height
+        if pad.thickness is not None:
+            least = np.minimum(least, pad.thickness)
+        left = np.nan_to_num(press(pad, rows, loads).gap) - least
+        return (left / pad.radius).reshape(shape)
+    if pad.material is not None:
+        from ros_pad.contact.hyperelastic import rim_angle
+
+        angle = rim_angle(pad, rows, loads)
+    else:
+        # The cap meets the base at twice the angle with the tangent height over radius.
+        angle = 2.0 * np.arctan(np.nan_to_num(press(pad, rows, loads).height) / pad.radius)
+    return (angle - 0.5 * math.pi).reshape(shape)
 
 
 def _deepest_force(tension: Array, a: float) -> Array:

@@ -81,13 +81,13 @@ class Pad:
     adhesion_energy : float
         Work of adhesion between pad and floor, J/m², from 0.
     measured_limit : MeasuredLimit, optional
-        Force limits measured on this pad. By default those of the thesis' large pad, in
-        proportion to the area.
+        Force limits measured on this pad.
     material : Material, optional
         Law of the rubber: the pad is then an exact membrane without adhesion. Such pads are made
         by :meth:`Pad.of`.
     thickness : float, optional
-        Thickness of the flat pad, m, needed with a material.
+        Thickness of the flat pad, m, up to the radius; needed with a material. Without one it is
+        used in the force limit alone, see :mod:`ros_pad.contact.limits`.
 
     Raises
     ------
@@ -115,14 +115,15 @@ class Pad:
             raise InvalidInput(
                 f'material = {self.material!r} is not allowed: a Material or None is needed'
             )
-        if (self.material is None) != (self.thickness is None):
-            raise InvalidInput(
-                f'material = {self.material} and thickness = {self.thickness} are not allowed:'
-                ' both or none are needed'
-            )
-        if self.material is not None and self.thickness is not None:
+        if self.thickness is not None:
             # A disc as thick as it is wide is no membrane.
             number('thickness', self.thickness, 'm', 0.0, self.radius, above=True)
+        if self.material is not None:
+            if self.thickness is None:
+                raise InvalidInput(
+                    f'thickness = None is not allowed with material = {self.material}: a length'
+                    ' is needed'
+                )
             unit = self.material.shear_modulus * self.thickness
             if not math.isclose(self.stiffness, unit, rel_tol=1e-9):
                 raise InvalidInput(
@@ -179,5 +180,10 @@ def need_stiffness(what: str, pad: Pad) -> None:
 DOME_PRESSURE = 1000.0
 """Gauge pressure above which a pad counts as a dome, Pa; below it, it is flat."""
 
-LARGE_PAD = Pad(radius=1.5e-3, stiffness=40.0)
-SMALL_PAD = Pad(radius=0.5e-3, stiffness=40.0)
+LARGE_PAD = Pad(radius=1.5e-3, stiffness=40.0, thickness=0.4e-3)
+"""The large pad of the thesis, of Dragon Skin 10."""
+
+SMALL_PAD = Pad(radius=0.5e-3, stiffness=7.0, thickness=0.2e-3)
+"""The small pad of the thesis, of Ecoflex: its stiffness is no measurement, but that of the large
+pad by modulus times thickness, 40 * (8 psi/22 psi) * (0.2 mm/0.4 mm) = 7 N/m, with the makers'
+moduli at 100 % (Ecoflex 00-10, Dragon Skin 10)."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
@@ -37,6 +38,9 @@ from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
+from ros_pad.contact.limits import CRITERIA
+from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import check_criterion
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.material import Material
 from ros_pad.contact.material import factor_in
@@ -61,8 +65,6 @@ Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 531, approximate the limi
 sliding contact by an ellipsoid through its largest force and its largest moment. For a disc of
 radius R under uniform pressure these are μN and 2/3 R μN."""
 
-FORCE_LIMITS = ('measured', 'max_depth', 'flattening')
-
 PAD_SETTINGS = (
     Setting('radius', float, 'Radius of the flat pad.', 'm', 1e-4, 1e-2),
     Setting('stiffness', float, 'Tension stiffness of the membrane.', 'N/m', 1.0, 1e4),
@@ -75,7 +77,7 @@ RUBBER_SETTINGS = (
     Setting('material', str, 'Name of a shipped material, or path of a material file.'),
     Setting('thickness', float, 'Thickness of the flat pad.', 'm', 1e-5, 1e-2),
 )
-"""Settings of each pad in a foot file that names a material."""
+"""Settings of each pad in a foot file that names a material; the last is optional without one."""
 
 LIMIT_SETTINGS = (
     Setting('force', float, 'Largest normal force at this pressure.', 'N', 0.0, 1e3),
@@ -152,7 +154,7 @@ class Foot:
     ceiling : float
         Highest gauge pressure that may be commanded, Pa.
     limit : str
-        Criterion of the force limit: ``measured``, ``max_depth`` or ``flattening``.
+        Criterion of the force limit, see :mod:`ros_pad.contact.limits`.
     capillary_force : float
         Tangential force that the liquid around one dome adds on wet ground, F_cap of Eq. 3.65, N:
         from ``pad wet``, or measured. 0 for none.
@@ -177,7 +179,7 @@ class Foot:
     shear_stiffness: float
     chamber_volume: float
     ceiling: float
-    limit: str = 'measured'
+    limit: str = DEFAULT_CRITERION
     capillary_force: float = 0.0
     _limit_table: tuple[float, ...] = field(init=False, repr=False, compare=False)
     _limit_cell: float = field(init=False, repr=False, compare=False)
@@ -193,7 +195,8 @@ class Foot:
                 f' sole_radius = {self.sole_radius:g} m: the area of the sole allows at most'
                 f' {int((self.sole_radius / self.pad.radius) ** 2)}'
             )
-        choice('limit', self.limit, FORCE_LIMITS)
+        choice('limit', self.limit, CRITERIA)
+        check_criterion(self.pad, self.limit)
         # Every simulated step needs the limit: tabulate it once, in steps of about 0.5 kPa.
         cells = math.ceil(self.ceiling / 500.0)
         try:
@@ -220,7 +223,7 @@ class Foot:
         with table.table('pad') as part:
             pad = _pad(part)
         values = table.values(FOOT_SETTINGS)
-        limit = table.choice('force_limit', FORCE_LIMITS, default='measured')
+        limit = table.choice('force_limit', CRITERIA, default=DEFAULT_CRITERION)
         table.finish()
         try:
             return cls(source=os.fspath(name_or_path), pad=pad, limit=limit, **values)
@@ -349,14 +352,20 @@ class Foot:
 
 def _pad(table: Table) -> Pad:
     line = _measured_limit(table)
-    if 'material' not in table:
-        return Pad(**table.values(PAD_SETTINGS), measured_limit=line)
-    values = table.values(RUBBER_SETTINGS)
-    material, factor = Material.load(values.pop('material')), factor_in(table)
+    make: Callable[..., Pad] = Pad
+    if 'material' in table:
+        values = table.values(RUBBER_SETTINGS)
+        material, factor = Material.load(values.pop('material')), factor_in(table)
+    else:
+        material, factor = None, {}
+        values = table.values(PAD_SETTINGS)
+        if 'thickness' in table:
+            values['thickness'] = table.value(RUBBER_SETTINGS[-1])
     try:
-        if factor:
-            material = material.times(*factor.values())
-        return Pad.of(material, **values, measured_limit=line)
+        if material is not None:
+            values['material'] = material.times(*factor.values()) if factor else material
+            make = Pad.of
+        return make(**values, measured_limit=line)
     except InvalidInput as error:
         raise ConfigError(f'{table.origin}: {error}') from error
 

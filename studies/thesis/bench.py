@@ -32,6 +32,7 @@ from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import Pad
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.squeeze import trapped_film
 from ros_pad.errors import ConfigError
@@ -52,6 +53,7 @@ ON_ONE_SPHERE = 0.02  # relative error up to which values are of one sphere; not
 NO_ERROR = 'no error stated'
 NOT_CODED = 'no numbers in the thesis'
 _POINTS = 161  # of a curve
+STIFFER = 1.2  # times as stiff as the pad of the bench
 _STEPS = 500  # of the tangential force from 0 to the dry resistance
 
 
@@ -673,6 +675,7 @@ def _tangential_claims(
             _rises(ends),
         ),
         _limits_claim(rows, limits),
+        _stiffer_claim(scene.pad, _pick(rows, 'force limit', 'max_depth')),
         _capillary_claim(rows),
         _rise_claim(setup, rows),
     )
@@ -689,6 +692,25 @@ def _limits_claim(rows: Sequence[Row], limits: Array) -> Claim:
         'the measured limits.',
         tuple(deep.tolist()),
         None,
+    )
+
+
+def _stiffer_claim(pad: Pad, limits: Sequence[Row]) -> Claim:
+    """Return whether a stiffer pad carries more at the pressures of the measured limits."""
+    pressures = np.array([row.pressure for row in limits], dtype=np.float64)
+    stiffer = dataclasses.replace(pad, stiffness=STIFFER * pad.stiffness)
+    raised = np.array([
+        force_limit(stiffer, pressures, criterion) / force_limit(pad, pressures, criterion)
+        for criterion in ('thickness', 'flattening')
+    ])  # fmt: skip
+    return Claim(
+        20,
+        'A stiffer silicone raises the limit of the load.',
+        f'At the same pressure a pad {STIFFER:g} times as stiff is pressed down to the thickness '
+        f'of its sheet by {_numbers(raised[0], ".2f")} of the force, and flat by the same. It '
+        'carries more only if the pressure rises with the stiffness.',
+        tuple(raised[0].tolist()),
+        bool((raised > 1.0).all()),
     )
 
 

@@ -84,7 +84,7 @@ def test_a_material_has_a_factor_and_is_compared(here, capsys):
         ([THESIS, '--figure', 'foot.gif'], '.png, .pdf or .svg'),
         ([THESIS, '--viscosity', '0'], 'viscosity = 0'),
         ([THESIS, '--fit', 'factor'], "fit = 'factor' is not allowed without a material"),
-        ([THESIS, '--material', 'dragon_skin_10'], '--material and --thickness are both needed'),
+        ([THESIS, '--thickness', '4e-4'], '--material and --thickness are both needed'),
         ([THESIS, '--material', 'dragon', '--thickness', '4e-4'], 'no material named'),
         (
             [THESIS, '--material', 'dragon_skin_10', '--thickness', '0.4'],

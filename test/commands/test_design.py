@@ -58,13 +58,25 @@ def test_what_is_given_goes_before_the_foot(capsys: pytest.CaptureFixture[str]):
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
-        (['25'], ['cannot be carried', '64 pads would be enough', 'closer pattern', '90000 Pa']),
-        (['16', '--pressure', '80e3'], ['cannot be carried', 'A supply of 82', 'would be enough']),
-        (['7', '--pressure', '50e3'], ['No number of pads', 'nothing below 52336 Pa']),
         (
-            ['7', '--radius', '2.4e-3'],
-            ['the data for such pads end', 'radius 0.0003 to 0.002 m'],
+            ['25', '--criterion', 'measured'],
+            ['cannot be carried', '64 pads would be enough', 'closer pattern', '90000 Pa'],
         ),
+        (
+            ['16', '--pressure', '80e3', '--criterion', 'measured'],
+            [
+                'cannot be carried',
+                'A supply of 82',
+                'would be enough',
+                'with the criterion thickn',
+            ],
+        ),
+        (
+            ['7', '--pressure', '50e3', '--criterion', 'measured'],
+            ['No number of pads', 'nothing below 52336 Pa'],
+        ),
+        (['25'], ['cannot be carried', 'pads would be enough', '90000 Pa']),
+        (['50', '--radius', '2.4e-3'], ['the data for such pads end']),
         (['7'], ['is carried: 51 pads']),
     ],
 )
@@ -92,7 +104,7 @@ def test_table_has_a_column_for_each_reading(capsys: pytest.CaptureFixture[str])
     radii = [line.split() for line in lines if line.startswith('   0.00')]
     assert [float(each[0]) for each in radii] == sorted(float(each[0]) for each in radii)
     assert {len(each) for each in radii} == {9}
-    assert float(radii[0][0]) == 0.0003
+    assert float(radii[0][0]) == 0.0004  # the thickness of the sheet
 
 
 @pytest.mark.parametrize(
@@ -131,7 +143,7 @@ def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     assert str(missing) in capsys.readouterr().err
 
 
-def test_pads_of_another_radius_carry_in_proportion_to_their_area(
+def test_a_measured_limit_holds_for_its_radius(
     tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
 ):
     """A foot file that states the thesis' line itself gives the designs of the shipped foot."""
@@ -139,7 +151,7 @@ def test_pads_of_another_radius_carry_in_proportion_to_their_area(
     own = tmp_path / 'own.yaml'
     line = '{force: 0.2833, pressure: 75.0e+3, slope: 1.25e-5}'
     own.write_text(shipped.replace('pad:', f'pad:\n  measured_limit: {line}', 1))
-    for radius in ([], ['--radius', '0.0005']):
+    for radius, criterion in ([], 'measured'), (['--radius', '0.0005'], 'thickness'):
         theirs = said(capsys, '--load', '7', '--foot', 'large37', *radius)
         mine = said(capsys, '--load', '7', '--foot', str(own), *radius)
         for a, b in zip(
@@ -147,6 +159,8 @@ def test_pads_of_another_radius_carry_in_proportion_to_their_area(
         ):
             for key in ('pads_needed', 'carried', 'reachable_load_n', 'pressure_pa'):
                 assert b[key] == (a[key] if a[key] is None else pytest.approx(a[key], rel=1e-9))
+        assert {each['criterion'] for each in mine['designs']} == {criterion}
+        assert {each['criterion'] for each in mine['radii']} == {'thickness'}
 
 
 def of_materials(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:

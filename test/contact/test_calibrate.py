@@ -11,6 +11,7 @@ import pytest
 from ros_pad import configuration
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
+from ros_pad.contact import MeasuredLimit
 from ros_pad.contact import Pad
 from ros_pad.contact import force_limit
 from ros_pad.contact import inflate
@@ -149,7 +150,7 @@ class TestShapes:
     def test_the_truth_comes_back_from_free_domes_of_any_radius(self):
         pad = dataclasses.replace(FOOT.pad, radius=0.8e-3, stiffness=55.0)
         foot = dataclasses.replace(
-            FOOT, pad=dataclasses.replace(pad, stiffness=20.0), ceiling=80e3
+            FOOT, pad=dataclasses.replace(pad, stiffness=20.0), ceiling=80e3, limit='thickness'
         )
         p = np.array([20e3, 100e3, 250e3])
         data = dataclasses.replace(NOTHING, free=FreeDomes(p, inflate(pad, p).height))
@@ -183,7 +184,10 @@ class TestShapes:
         found = calibrate(data, FOOT)
         # With k = 39.06 N/m the model ends just below 3.426 k/r, at 89.2 kPa.
         assert found.foot.ceiling == 89e3
-        assert 'lowered from 90000 to 89000 Pa' in found.warnings[0]
+        # No force limit was measured on such a pad either.
+        assert 'criterion of the force limit becomes thickness' in found.warnings[0]
+        assert found.foot.limit == 'thickness'
+        assert 'lowered from 90000 to 89000 Pa' in found.warnings[1]
         assert calibrate(THESIS, FOOT).foot.ceiling == 90e3
 
     def test_intervals_hold_the_truth_as_often_as_they_say(self):
@@ -318,8 +322,13 @@ class TestForceLimit:
         found = calibrate(data, FOOT)
         assert found.foot.pad.measured_limit is None
         assert any('force limit' in warning for warning in found.warnings)
+        assert 'force_limit' not in constants(found)
+        line = MeasuredLimit(0.2, 60e3, 1e-5)
+        own = dataclasses.replace(FOOT, pad=dataclasses.replace(FOOT.pad, measured_limit=line))
+        found = calibrate(data, own)
+        assert (found.foot.pad.measured_limit, found.foot.limit) == (line, 'measured')
         kept = constants(found)['force_limit']
-        assert (kept.fitted, kept.value) == (False, 0.2833)
+        assert (kept.fitted, kept.value) == (False, 0.2)
 
 
 class TestFriction:
@@ -397,7 +406,11 @@ def test_the_foot_file_is_the_calibrated_foot(tmp_path):
             expected = pytest.approx(value, rel=1e-8) if isinstance(value, float) else value
             assert getattr(foot, field.name) == expected
     assert foot.pad.stiffness == pytest.approx(found.foot.pad.stiffness, rel=1e-8)
-    assert force_limit(foot.pad, 80e3) == pytest.approx(0.2833 + 5e3 * 1.25e-5, abs=1e-4)
+    assert foot.limit == 'measured'
+    assert foot.pad.thickness == 0.4e-3
+    assert force_limit(foot.pad, 80e3, foot.limit) == pytest.approx(
+        0.2833 + 5e3 * 1.25e-5, abs=1e-4
+    )
     assert 'N/m, fitted: 36.8' in path.read_text()
 
 
@@ -457,9 +470,10 @@ def test_the_start_foot_may_have_any_path(tmp_path):
 
 
 def test_a_single_force_limit_past_the_thesis_measurements_stops_no_fit(tmp_path):
-    text = 'pressure [kPa],height [mm],force_limit [N]\n100,0.9,\n130,1.2,\n120,,0.9\n'
+    text = 'pressure [kPa],height [mm],force_limit [N]\n100,0.9,\n130,1.2,\n120,,0.3\n'
     found = calibrate(text_of(tmp_path, text), FOOT)
     assert constants(found)['stiffness'].fitted
     (limit,) = [row for row in found.residuals if row.quantity == 'force_limit']
-    assert math.isnan(limit.modelled)
+    # The thesis measured on another pad; the model of this one has a limit.
+    assert limit.modelled == force_limit(found.foot.pad, 120e3, 'thickness')
     assert not limit.used

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
 from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import SMALL_PAD
 from ros_pad.contact import Pad
 from ros_pad.contact import inflate
 from ros_pad.contact import press
@@ -384,7 +383,7 @@ class TestPressed:
         # A third of the radius, three times the pressure and a third of the force are the same
         # dimensionless state without adhesion.
         large = press(LARGE_PAD, 30e3, 0.09, adhesion='none')
-        small = press(SMALL_PAD, 90e3, 0.03, adhesion='none')
+        small = press(Pad(0.5e-3, 40.0), 90e3, 0.03, adhesion='none')
         assert small.height * 3 == pytest.approx(large.height, rel=1e-13)
 
     @settings(max_examples=300)

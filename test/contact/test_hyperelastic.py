@@ -16,6 +16,7 @@ from ros_pad.contact import inflate
 from ros_pad.contact import press
 from ros_pad.contact import pressure_for
 from ros_pad.contact.hyperelastic import pressure_end
+from ros_pad.contact.hyperelastic import rim_angle
 from ros_pad.contact.limits import largest_pressure
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -84,6 +85,7 @@ class Wall:
         (self.end,), ((along, _, angle, height, volume),) = end.t_events[0], end.y_events[0]
         self.pressure, self.contact = self.end, contact / self.end
         self.gap, self.volume = height / self.end, volume / self.end**3
+        self.rim = angle
         # First integral: the tension at the rim carries pressure outside of the contact.
         pull = self.tensions(along, 1.0)[0] * math.sin(angle)
         self.off = pull - 0.5 * (self.end**2 - contact**2) / self.end
@@ -208,7 +210,10 @@ class TestPressed:
             checked += 1
             assert abs(wall.off) < 1e-9
             p = wall.pressure * unit(pad)
-            dome = press(pad, p, p * math.pi * (RADIUS * wall.contact) ** 2)
+            force = p * math.pi * (RADIUS * wall.contact) ** 2
+            dome = press(pad, p, force)
+            angle = rim_angle(pad, np.array([p]), np.array([force]))
+            assert angle[0] == pytest.approx(wall.rim, rel=1e-6)
             assert dome.gap == pytest.approx(RADIUS * wall.gap, rel=1e-6)
             assert dome.contact_radius == pytest.approx(RADIUS * wall.contact, rel=1e-12)
 
@@ -291,8 +296,8 @@ class TestLimits:
     def test_measured(self):
         line = MeasuredLimit(0.3, 75e3, 1e-5)
         pad = Pad.of(RAW, RADIUS, THICKNESS, line)
-        assert force_limit(pad, 70e3) == pytest.approx(0.25)
-        assert pressure_for(pad, 0.25) == pytest.approx(70e3)
+        assert force_limit(pad, 70e3, 'measured') == pytest.approx(0.25)
+        assert pressure_for(pad, 0.25, 'measured') == pytest.approx(70e3)
 
     def test_ends(self):
         pad = of(RAW)
@@ -304,5 +309,5 @@ class TestLimits:
         assert caught.value.status == 'no_inflation'
         with pytest.raises(NoEquilibrium, match='too high for any pressure'):
             pressure_for(pad, 1.0, 'flattening')
-        with pytest.raises(InvalidInput, match=r'criterion = .*measured, flattening'):
+        with pytest.raises(InvalidInput, match='thickness, wall, flattening is needed'):
             force_limit(pad, 60e3, 'max_depth')

@@ -12,8 +12,10 @@ from ros_pad.errors import InvalidInput
 
 
 def test_the_thesis_pads():
-    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006, None, None, None)
-    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006, None, None, None)
+    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006, None, None, 0.4e-3)
+    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 7.0, 0.006, None, None, 0.2e-3)
+    # Young's modulus times thickness, from the makers' moduli at 100 %, psi.
+    assert SMALL_PAD.stiffness == pytest.approx(40.0 * (8 / 22) * (0.2 / 0.4), rel=0.05)
 
 
 def test_frozen():
@@ -47,6 +49,13 @@ def test_only_adhesion_may_be_zero():
 def test_a_measured_limit_rises(values, name):
     with pytest.raises(InvalidInput, match=f'{name} = .* is not allowed'):
         MeasuredLimit(*values)
+
+
+def test_a_thickness_needs_no_material_but_is_checked():
+    assert Pad(1.5e-3, 40.0, thickness=0.4e-3).material is None
+    for value in (0.0, -1e-4, 2e-3, math.nan, '1 mm'):
+        with pytest.raises(InvalidInput, match='thickness'):
+            Pad(1.5e-3, 40.0, thickness=value)
 
 
 def test_a_measured_limit_is_one():

@@ -171,7 +171,7 @@ def test_illustrative_set_of_friction_coefficients():
 # --- sharing of the load ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('limit', ['measured', 'max_depth', 'flattening'])
+@pytest.mark.parametrize('limit', ['measured', 'thickness', 'max_depth', 'flattening'])
 @pytest.mark.parametrize('films', [(0.0, 0.0), (2e-7, 2e-5)])
 def test_continuous_in_load_and_pressure(limit, films):
     foot = bare_foot(limit=limit)
@@ -326,7 +326,7 @@ def written(tmp_path, change):
         ('friction', 'nan', 'friction = nan is not allowed'),
         ('shear_stiffness', 0, 'N/m'),
         ('film_exponent', True, 'film_exponent = True'),
-        ('force_limit', 'felt', 'one of measured, max_depth, flattening'),
+        ('force_limit', 'felt', 'one of thickness, wall, flattening, max_depth, measured'),
         ('ceiling', 100e3, 'ceiling = 100000 Pa is not allowed'),
         ('ceiling', 2e6, 'from 1000 to 1000000 Pa'),
         ('colour', 'red', "unknown key 'colour'"),
@@ -340,7 +340,15 @@ def test_bad_files(tmp_path, key, value, message):
 
 
 @pytest.mark.parametrize(
-    'key, value', [('radius', 0), ('stiffness', -40), ('adhesion_energy', 0.9), ('Radius', 1)]
+    'key, value',
+    [
+        ('radius', 0),
+        ('stiffness', -40),
+        ('adhesion_energy', 0.9),
+        ('thickness', 0.4),
+        ('thickness', 2e-3),
+        ('Radius', 1),
+    ],
 )
 def test_bad_pads_in_files(tmp_path, key, value):
     path = written(tmp_path, lambda values: values['pad'].update({key: value}))
@@ -352,6 +360,16 @@ def test_bad_pads_in_files(tmp_path, key, value):
 def test_unknown_foot():
     with pytest.raises(ConfigError, match=r"no foot named 'large73'.* Did you mean 'large37'"):
         Foot.load('large73')
+
+
+def test_the_measured_line_is_of_one_pad(tmp_path):
+    path = written(tmp_path, lambda values: values['pad'].update(stiffness=44.0))
+    with pytest.raises(ConfigError, match=r'no force limit was measured on it.*one of thickness'):
+        Foot.load(path)
+    path.write_text(path.read_text().replace('force_limit: measured', 'force_limit: thickness'))
+    assert Foot.load(path).dome_load(100.0, 50e3) > 0.0
+    path.write_text(path.read_text().replace('force_limit: thickness', ''))
+    assert Foot.load(path).limit == 'thickness'
 
 
 def test_a_foot_file_may_give_the_limit_of_its_pads(tmp_path):
