@@ -35,6 +35,8 @@ _MOST_STEPS = 14
 _DONE = 1e-9
 # Steps of a path that are tried, over the wanted one.
 _SHARES = (1.0, 0.5, 0.25, 1.5, 2.0, 3.0, 0.1)
+# Least pressure over that of the state before.
+_FALL = 0.9
 # Graded to the rim, where stress is singular: powers of the share of the distance.
 _GRADING = 1.5
 
@@ -274,9 +276,15 @@ class Solid:
         while now.outer < last:
             for share in _SHARES:
                 ahead = min(share * step, last - now.outer)
+                start = _ahead(before, now, ahead)
                 try:
-                    found = self.solve(_ahead(before, now, ahead), now.outer + ahead)
+                    found = self.solve(start, now.outer + ahead)
                 except NoConvergence:
+                    continue
+                # Pressure rises at most as the cube of the height: else it is another branch.
+                most = (found.outer / now.outer) ** 3 if now.outer else 1.0
+                rise = found.pressure / now.pressure if now.pressure else 1.0
+                if not _FALL < rise < 1.05 * most:
                     continue
                 before, now = now, found
                 yield now
