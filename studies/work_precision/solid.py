@@ -325,7 +325,8 @@ def _ahead(before: State, now: State, step: float) -> State:
 def _grid(thickness: float, edge: str, cells: int) -> tuple[Array, Array]:
     """Return the lines of the mesh over R and Z."""
     graded = thickness * np.linspace(0.0, 1.0, cells + 1) ** _GRADING
-    inside = np.linspace(0.0, 1.0 - thickness, 4 * cells + 1)
+    across = round(4 * cells * max(1.0, 0.05 / thickness))  # the rim zone of thin sheets is narrow
+    inside = np.linspace(0.0, 1.0 - thickness, across + 1)
     radius = np.append(inside[:-1], 1.0 - graded[::-1])
     if edge == 'clamped':
         return radius, thickness * np.linspace(0.0, 1.0, cells + 1)
