@@ -182,7 +182,12 @@ def largest_pressure(pad: Pad, criterion: str = 'measured') -> float:
 
 
 def criteria(pad: Pad) -> tuple[str, ...]:
-    """Return the criteria that a pad has: ``max_depth`` is one of the spherical dome alone."""
+    """Return the criteria that a pad has: ``max_depth`` is one of the spherical dome alone.
+
+    Of a pad with an edge, pressed shapes are not known, and so only what was measured.
+    """
+    if pad.edge is not None:
+        return ('measured',)
     return CRITERIA if pad.material is None else ('measured', 'flattening')
 
 

@@ -45,11 +45,11 @@ from studies.drawing import VERMILION
 EDGES = {'bonded': BLUE, 'clamped': VERMILION}
 REFERENCE = command.ROOT / 'test' / 'reference' / 'fe_free.json'
 MESHES = (2, 3)  # elements over the thickness
-STEP = 0.075  # of the height
-HEIGHTS = np.arange(1, 31) * 0.05
+STEP, FIRST = 0.075, 0.0125  # of the height; the first four
+HEIGHTS = np.concatenate([FIRST * np.arange(1, 4), 0.05 * np.arange(1, 31)])
 # C2 and C3 over the shear modulus, and thickness over radius.
 FIT_LAWS = ((0.0, 0.0), (0.0353, -0.00067), (0.07, -0.0024), (0.08, 0.0))
-FIT_RATIOS = (0.05, 0.1, 0.2, 0.3, 0.4)
+FIT_RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
 HELD_LAWS = ((0.0047, -1.8e-5), (0.02, -0.0003), (0.0406, -0.00076))
 HELD_RATIOS = (0.15, 0.25, 0.35)
 THIN = (0.02, 0.01, 0.005)
@@ -82,10 +82,10 @@ def curve(edge: str, ratio: float, law: tuple[float, float]) -> Curve:
     start = time.perf_counter()
     paths = []
     for cells in MESHES:
-        path = Solid(Rubber(0.5, *law), ratio, edge, cells).path(
-            STEP, thickness.HIGHEST[edge] + STEP
-        )
-        paths.append(np.array([(s.outer, s.pressure / ratio, s.volume) for s in path]))
+        solid = Solid(Rubber(0.5, *law), ratio, edge, cells)
+        last = thickness.HIGHEST[edge] + STEP
+        states = [*solid.path(FIRST, 4 * FIRST), *solid.path(STEP, last)]
+        paths.append(np.array([(s.outer, s.pressure / ratio, s.volume) for s in states]))
     return extrapolated(edge, ratio, law, paths, time.perf_counter() - start)
 
 
@@ -98,7 +98,7 @@ def extrapolated(
     apart = np.abs(whole / fine - 1.0).max(axis=1)
     top = int(np.nanargmax(fine[:, 0]))
     keep = (apart < _APART) & (np.arange(len(HEIGHTS)) <= top)
-    keep &= HEIGHTS < thickness.HIGHEST[edge] + 1e-9
+    keep &= HEIGHTS < thickness.HIGHEST[edge] + STEP
     kept = (each[keep] for each in (HEIGHTS, whole[:, 0], whole[:, 1], apart))
     return Curve(edge, ratio, law, *kept, seconds)
 
@@ -107,7 +107,7 @@ def _over_height(states: Array, ratio: float) -> Array:
     """Return P and V at the heights; NaN above the last state."""
     far = [0]
     for k in range(1, len(states)):
-        if states[k, 0] > states[far[-1], 0] + 0.25 * STEP:
+        if states[k, 0] > states[far[-1], 0] + 0.9 * FIRST:
             far.append(k)
     height, rows = states[far, 0], states[far, 1:]
 
@@ -115,7 +115,7 @@ def _over_height(states: Array, ratio: float) -> Array:
         return np.stack([14.0 * h**3 / (1.0 + 4.0 * h**3) + 21.0 * ratio**2 * h, h], axis=1)
 
     share = PchipInterpolator(height, rows / scale(height), extrapolate=False)
-    return np.asarray(share(np.maximum(HEIGHTS, height[0])) * scale(HEIGHTS))
+    return np.asarray(share(HEIGHTS) * scale(HEIGHTS))
 
 
 def curves(laws: Any, ratios: Any, text: str) -> list[Curve]:
@@ -186,11 +186,11 @@ def errors(solid: Curve) -> dict[str, Any]:
     pad = pad_of(solid.edge, solid.ratio, solid.law)
     unit = 1e3 * solid.ratio
     end = pressure_end(pad)[0] / unit
-    fine = np.linspace(0.0, end, 20001)
+    fine = end * np.linspace(0.0, 1.0, 20001) ** 3
     height = inflate(pad, fine * unit).height
     inside = solid.height <= height[-1]
     pressure = np.interp(solid.height[inside], height, fine) / solid.pressure[inside] - 1.0
-    lower = solid.pressure < 0.95 * min(end, solid.pressure.max())
+    lower = inside & (solid.pressure < 0.95 * min(end, solid.pressure.max()))
     dome = inflate(pad, solid.pressure[lower] * unit)
     return {
         'edge': solid.edge,
@@ -253,7 +253,6 @@ def thin() -> list[dict[str, Any]]:
     rows = []
     for ratio in command.each(THIN, 'thin sheets', 'solid'):
         for edge in EDGES:
-            # The zone of the rim is as wide as the sheet is thick: more of it is meshed here.
             path = Solid(Rubber(), ratio, edge, MESHES[1]).path(0.05, 0.3)
             *_, last = path
             rows.append(
