@@ -484,7 +484,7 @@ class ThickDomes:
         parts = np.cbrt(found.pressure), found.gap, found.volume
         fine = np.linspace(0.0, root[-1], _PLACES)
         push, height, volume = CubicSpline(
-            np.append(0.0, root), np.append([[0.0] * 3], np.stack(parts, axis=1), axis=0)
+            np.append(0.0, root), np.vstack([np.zeros(3), np.stack(parts, axis=1)])
         )(fine).T
         membrane = push**3, height, volume
         states = np.array(thickened(edge, ratio, law[1], fine**2, membrane))

@@ -15,9 +15,10 @@ stretch λ at its apex becomes a state of the solid:
     pressure  P = (P_m + 7 t² H) (1 + Σ a_k f_k)
     volume    V = V_m (1 + Σ b_k f_k)
 
-The height is that of the outer face over its flat state, the volume that under the inner face. What
-bends is in t² H. The functions f are powers of t and H, also with
-C2/μ and C3/μ, and of ``u = t/(t + H)``, in which bending turns into stretching. All vanish with t.
+The height is that of the outer face over its flat state, the volume that under the inner face.
+The term with t² is the order of what bends a plate. The functions f are powers of t, H and
+``u = t/(t + H)``, in which bending turns into stretching, also with C2/μ and C3/μ. All vanish
+with t.
 The coefficients are fitted to solid finite elements by ``python -m studies thickness --fit``, and
 the errors are measured on solids that are not in the fit (docs/model/hyperelastic.md).
 """

@@ -105,11 +105,11 @@ class Solid:
         basis = skfem.Basis(mesh, element, intorder=5)
         self._size = size = basis.N
         count, points = mesh.nelements, basis.X.shape[1]
-        radius = basis.global_coordinates().value[0]
+        radius = np.asarray(basis.global_coordinates())[0]
         self._weight = (basis.dx * radius).ravel()
         # Rows: the four derivatives of displacement and the radial one over the radius.
         rows = [_operator(basis, lambda f, i=i, j=j: f.grad[i, j]) for i in (0, 1) for j in (0, 1)]
-        rows.append(_operator(basis, lambda f: f.value[0] / radius))
+        rows.append(_operator(basis, lambda f: np.asarray(f)[0] / radius))
         self._gradient = sparse.vstack(rows, format='csr')
         linear = np.stack([np.ones(points), *(2.0 * basis.X - 1.0)], axis=1)
         self._linear = sparse.kron(sparse.identity(count), linear, format='csr')
@@ -121,10 +121,10 @@ class Solid:
         """Prepare the inner face under pressure: r, z and their derivatives over R."""
         facets = mesh.facets_satisfying(lambda x: (x[1] < 1e-9) & (x[0] < 1.0), True)
         face = skfem.FacetBasis(mesh, element, facets=facets, intorder=6)
-        at = face.global_coordinates().value[0]
+        at = np.asarray(face.global_coordinates())[0]
         self._face_rows = sparse.vstack(
             [
-                _operator(face, lambda f: f.value[0]),
+                _operator(face, lambda f: np.asarray(f)[0]),
                 _operator(face, lambda f: f.grad[0, 0]),
                 _operator(face, lambda f: f.grad[1, 0]),
             ],
@@ -306,7 +306,8 @@ def _kept(invariant: Any, volume: Any, power: float) -> tuple[Array, Array, Arra
     k = power / j
     d = d_i - k * i * d_j
     dd = dd_i - k * _pairs(d_i, d_j) + k * i * ((power + 1.0) / j * d_j[:, None] * d_j - dd_j)
-    share = j**-power
+    with np.errstate(invalid='ignore'):  # a step that turned a point inside out fails by NaN
+        share = j**-power
     return share * i, share * d, share * dd
 
 

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Solids beside the membrane: free domes of thick sheets, and the error of their correction.
 
-Axisymmetric finite elements (scikit-fem; `pip install scikit-fem`) give pressure, height and volume
-of bonded and of clamped sheets. Each path is computed on two meshes, with 2 and 3 elements over
-the thickness, and extrapolated, because the stress at the rim is singular and the error falls with
-the first power of the size. Prints:
+Axisymmetric finite elements (scikit-fem; `pip install scikit-fem`) give pressure, height and
+volume of bonded and of clamped sheets. Each path is computed on two meshes, with 2 and 3 elements
+over the thickness, and extrapolated: stress at the rim is singular, and the error falls with the
+first power of the size. Prints:
 
 - the solids beside the reference rows, test/reference/fe_free.json
 - the limit of thin sheets: pressure over the membrane's less 1, which is in proportion to h/r
 - the error of the correction in ros_pad, against reference rows and solids outside of the fit
 
-Writes thickness.json and .png. With --fit the solids of the fit are computed first (7 min), and the
-coefficients printed as they stand in ros_pad/contact/thickness.py.
+Writes thickness.json and .png. With --fit it computes the solids of the fit (10 min) and prints
+the coefficients as they stand in ros_pad/contact/thickness.py.
 """
 
 from __future__ import annotations
@@ -48,8 +48,9 @@ MESHES = (2, 3)  # elements over the thickness
 STEP, FIRST = 0.075, 0.0125  # of the height; the first four
 HEIGHTS = np.concatenate([FIRST * np.arange(1, 4), 0.05 * np.arange(1, 31)])
 # C2 and C3 over the shear modulus, and thickness over radius.
-FIT_LAWS = ((0.0, 0.0), (0.0353, -0.00067), (0.07, -0.0024), (0.08, 0.0))
-FIT_RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
+THIN_LAWS = ((0.0, 0.0), (0.0353, -0.00067), (0.08, 0.0))
+FIT_LAWS = (*THIN_LAWS, (0.07, -0.0024))
+THIN_RATIOS, FIT_RATIOS = (0.01, 0.02), (0.05, 0.1, 0.2, 0.3, 0.4)
 HELD_LAWS = ((0.0047, -1.8e-5), (0.02, -0.0003), (0.0406, -0.00076))
 HELD_RATIOS = (0.15, 0.25, 0.35)
 THIN = (0.02, 0.01, 0.005)
@@ -98,9 +99,9 @@ def extrapolated(
     apart = np.abs(whole / fine - 1.0).max(axis=1)
     top = int(np.nanargmax(fine[:, 0]))
     keep = (apart < _APART) & (np.arange(len(HEIGHTS)) <= top)
-    keep &= HEIGHTS < thickness.HIGHEST[edge] + STEP
-    kept = (each[keep] for each in (HEIGHTS, whole[:, 0], whole[:, 1], apart))
-    return Curve(edge, ratio, law, *kept, seconds)
+    keep &= thickness.HIGHEST[edge] + STEP > HEIGHTS
+    height, pressure, volume, apart = np.stack([HEIGHTS, *whole.T, apart])[:, keep]
+    return Curve(edge, ratio, law, height, pressure, volume, apart, seconds)
 
 
 def _over_height(states: Array, ratio: float) -> Array:
@@ -131,7 +132,7 @@ def _membrane(law: tuple[float, float]) -> Any:
     strain = np.linspace(0.0, 1.5, 97)[1:] ** 2
     states = shapes(('yeoh', (0.5, *law)), strain, np.full_like(strain, 1e-9))
     rows = np.stack([states.pressure, strain, states.volume], axis=1)
-    return CubicSpline(np.append(0.0, states.gap), np.append([[0.0] * 3], rows, axis=0))
+    return CubicSpline(np.append(0.0, states.gap), np.vstack([np.zeros(3), rows]))
 
 
 def fit(solids: Sequence[Curve]) -> tuple[Array, Array]:
@@ -333,7 +334,9 @@ def draw(held: Sequence[dict[str, Any]]) -> Figure:
             label = f'{row["edge"]}, h/r = {row["ratio"]:g}'
             style = '-' if row['ratio'] > 0.25 else '--'
             height = inflate(pad, fine).height
-            left.plot(height, fine / (1e3 * row['ratio']), style, color=colour, lw=1.2, label=label)
+            left.plot(
+                height, fine / (1e3 * row['ratio']), style, color=colour, lw=1.2, label=label
+            )
             left.plot(row['heights'][::2], row['solid'][::2], 'o', color=colour, ms=2.5)
         left.set(xlim=(0.0, 1.4), ylim=(0.0, None), xlabel='height of the outer face / r')
         left.set(ylabel='p r/(μ h)', title='corrected membrane, and solids (points)')
@@ -363,7 +366,8 @@ def main(words: Sequence[str]) -> int:
     command.add_out(parser)
     options = parser.parse_args(words)
     if options.fit:
-        print(printed(curves(FIT_LAWS, FIT_RATIOS, 'solids of the fit')))
+        thin_solids = curves(THIN_LAWS, THIN_RATIOS, 'thin solids of the fit')
+        print(printed(thin_solids + curves(FIT_LAWS, FIT_RATIOS, 'solids of the fit')))
         return 0
     prepared, row = cost()
     document: dict[str, Any] = {
