@@ -76,7 +76,7 @@ class Curve:
 
 
 def curve(edge: str, ratio: float, law: tuple[float, float]) -> Curve:
-    """Compute a solid up to its maximum pressure, or to the largest height of the correction."""
+    """Compute a solid to the largest height of the correction, also past a maximum pressure."""
     from studies.work_precision.solid import Rubber
     from studies.work_precision.solid import Solid
 
@@ -97,9 +97,7 @@ def extrapolated(
     coarse, fine = (_over_height(path, ratio) for path in paths)
     whole = coarse + MESHES[1] / (MESHES[1] - MESHES[0]) * (fine - coarse)
     apart = np.abs(whole / fine - 1.0).max(axis=1)
-    top = int(np.nanargmax(fine[:, 0]))
-    keep = (apart < _APART) & (np.arange(len(HEIGHTS)) <= top)
-    keep &= thickness.HIGHEST[edge] + STEP > HEIGHTS
+    keep = (apart < _APART) & (thickness.HIGHEST[edge] + STEP > HEIGHTS)
     height, pressure, volume, apart = np.stack([HEIGHTS, *whole.T, apart])[:, keep]
     return Curve(edge, ratio, law, height, pressure, volume, apart, seconds)
 
@@ -182,7 +180,8 @@ def errors(solid: Curve) -> dict[str, Any]:
     """Return relative errors of the correction against a solid.
 
     ``pressure`` is at given height; ``height`` and ``volume`` are at given pressure, up to 95 % of
-    the largest one: at a maximum of the pressure they have no bound.
+    the largest one: at a maximum of the pressure they have no bound. ``maximum`` is that of the
+    largest pressure, where both balloon.
     """
     pad = pad_of(solid.edge, solid.ratio, solid.law)
     unit = 1e3 * solid.ratio
@@ -191,7 +190,10 @@ def errors(solid: Curve) -> dict[str, Any]:
     height = inflate(pad, fine * unit).height
     inside = solid.height <= height[-1]
     pressure = np.interp(solid.height[inside], height, fine) / solid.pressure[inside] - 1.0
-    lower = inside & (solid.pressure < 0.95 * min(end, solid.pressure.max()))
+    top = int(solid.pressure.argmax())
+    lower = inside & (solid.pressure < 0.95 * min(end, solid.pressure[top]))
+    lower[top:] = False
+    balloons = pressure_end(pad)[1] == 'no_inflation' and top < solid.height.size - 1
     dome = inflate(pad, solid.pressure[lower] * unit)
     return {
         'edge': solid.edge,
@@ -202,6 +204,7 @@ def errors(solid: Curve) -> dict[str, Any]:
         'pressure': pressure.tolist(),
         'height': (dome.height / solid.height[lower] - 1.0).tolist(),
         'volume': (dome.volume / solid.volume[lower] - 1.0).tolist(),
+        'maximum': end / solid.pressure[top] - 1.0 if balloons else 0.0,
         'of_solid': float(solid.error[inside].max()),
         'seconds': solid.seconds,
     }
@@ -272,7 +275,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         part = [row for row in rows if row['edge'] == edge]
         largest = {
             name: max(float(np.abs(row[name]).max()) for row in part)
-            for name in ('pressure', 'height', 'volume')
+            for name in ('pressure', 'height', 'volume', 'maximum')
         }
         off = np.concatenate([row['pressure'] for row in part])
         lines.append(
@@ -306,7 +309,8 @@ def table(document: dict[str, Any]) -> str:
         lines.append(
             f'{row["edge"]:8} {row["states"]} states of {row["solids"]} solids: pressure'
             f' {row["pressure"]:.2%} (rms {row["rms_pressure"]:.2%}), height {row["height"]:.2%},'
-            f' volume {row["volume"]:.2%}; solids themselves {row["of_solids"]:.2%}'
+            f' volume {row["volume"]:.2%}, maximum {row["maximum"]:.2%};'
+            f' solids themselves {row["of_solids"]:.2%}'
         )
     seconds = [row['seconds'] for row in document['held']]
     lines.append(f'a solid takes {np.mean(seconds):.0f} s, the correction of a pad')
