@@ -123,7 +123,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     pressure : float or array
         Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome. A pad
         of a material ends at its maximum pressure, or at the end of the material's range
-        (:mod:`ros_pad.contact.hyperelastic`) or of the correction for thickness, if it has an edge.
+        (:mod:`ros_pad.contact.hyperelastic`) or, with an edge, of the correction for thickness.
 
     Raises
     ------

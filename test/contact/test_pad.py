@@ -12,8 +12,8 @@ from ros_pad.errors import InvalidInput
 
 
 def test_the_thesis_pads():
-    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006, None, None, None)
-    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006, None, None, None)
+    assert dataclasses.astuple(LARGE_PAD) == (1.5e-3, 40.0, 0.006, None, None, None, None)
+    assert dataclasses.astuple(SMALL_PAD) == (0.5e-3, 40.0, 0.006, None, None, None, None)
 
 
 def test_frozen():
