@@ -94,6 +94,7 @@ setup(
             'pytest>=7.4',
             'pytest-xdist',
             'ruff==0.17.*',
+            'scikit-fem>=9',
             'types-PyYAML',
         ],
     },

@@ -19,6 +19,7 @@ STUDIES = {
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
+    'thickness': ('work_precision.thickness', 'solids beside the membrane of a pad (5 min)'),
     'sensing': ('sensing.study', 'body and slip from IMU, joints and forces (3 min)'),
     'foreign': ('sensing.foreign', 'the same on recordings of real robots (2 min)'),
     'film': ('work_precision.film', 'liquid squeezed from under soft pads (5 min)'),

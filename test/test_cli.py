@@ -162,6 +162,23 @@ def test_contact_of_the_pad_of_a_foot(capsys: pytest.CaptureFixture[str]):
     assert answers[0]['contact_radius_m'] > radius
 
 
+def test_contact_of_a_pad_of_a_material(capsys: pytest.CaptureFixture[str]):
+    sheet = ['--material', 'dragon_skin_10', '--radius', '1.5e-3', '--thickness', '0.4e-3']
+    answers = []
+    for edge in ([], ['--edge', 'bonded'], ['--edge', 'clamped']):
+        assert cli.main(['contact', '--pressure', '30e3', *sheet, *edge, '--json']) == 0
+        answers.append(json.loads(capsys.readouterr().out))
+    heights = [each['free']['height_m'] for each in answers]
+    assert heights == sorted(heights, reverse=True) and heights[2] < 0.9 * heights[0]
+    limits = [set(each['force_limit_n']) for each in answers]
+    assert limits[0] > limits[1] == limits[2] == {'measured'}
+    bonded = ['contact', '--pressure', '30e3', '--edge', 'bonded']
+    assert cli.main([*bonded, *sheet, '--force', '0.1']) == 2
+    assert 'free domes only' in capsys.readouterr().err
+    assert cli.main(bonded) == 2
+    assert '--edge is not allowed without --material' in capsys.readouterr().err
+
+
 def test_contact_prints_the_thesis_height(capsys: pytest.CaptureFixture[str]):
     assert cli.main(['contact', '--pressure', '75e3', '--force', '0.1', '--json']) == 0
     values = json.loads(capsys.readouterr().out)

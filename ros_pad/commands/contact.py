@@ -16,6 +16,8 @@ from ros_pad.contact.dome import ADHESION_SIGNS
 from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact.thickness import HIGHEST
+from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
 _TITLES = {
@@ -61,6 +63,19 @@ def add(commands: Commands) -> None:
         help="one of the thesis' pads: radius 1.5 mm (large, default) or 0.5 mm (small)",
     )
     which.add_argument('--foot', help='the pad of a foot: a name in config/feet or a YAML file')
+    which.add_argument(
+        '--material',
+        help='a pad of a material: a name in config/materials or a YAML file, with --radius and '
+        '--thickness',
+    )
+    part.add_argument('--radius', type=float, metavar='M', help='of a pad of a material, m')
+    part.add_argument('--thickness', type=float, metavar='M', help='of a pad of a material, m')
+    part.add_argument(
+        '--edge',
+        choices=tuple(HIGHEST),
+        help='how the sheet of a pad of a material is held at its rim: its free dome is corrected '
+        'for thickness (default: a membrane)',
+    )
     part.add_argument(
         '--adhesion',
         choices=tuple(ADHESION_SIGNS),
@@ -85,16 +100,14 @@ def add(commands: Commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print shape, ring of liquid and force limits of the pad; return the exit status."""
-    pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
-    name = f'{options.pad} pad'
-    if options.foot is not None:
-        pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
+    pad, name = _pad(options)
     liquid = contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
     pressure, force = options.pressure, options.force
     values: dict[str, Any] = {
-        'pad': options.foot or options.pad,
+        'pad': options.material or options.foot or options.pad,
         'radius_m': pad.radius,
         'stiffness_n_per_m': pad.stiffness,
+        'edge': pad.edge,
         'adhesion': options.adhesion,
         'model': options.model,
         'pressure_pa': pressure,
@@ -118,6 +131,22 @@ def run(options: argparse.Namespace) -> int:
     else:
         _show(f'{name}, {pressure:g} Pa gauge, {force:g} N', values, ends, pad.radius)
     return 0 if failure is None else complain(f'{failure} (status {failure.status})', 1)
+
+
+def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
+    """Return the pad that the options name, and its name."""
+    pad = contact.LARGE_PAD if options.pad == 'large' else contact.SMALL_PAD
+    name = f'{options.pad} pad'
+    if options.foot is not None:
+        pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
+    if options.material is not None:
+        material = contact.Material.load(options.material)
+        name = f'pad of {options.material}'
+        return contact.Pad.of(material, options.radius, options.thickness, edge=options.edge), name
+    for key in ('radius', 'thickness', 'edge'):
+        if getattr(options, key) is not None:
+            raise InvalidInput(f'--{key} is not allowed without --material')
+    return pad, name
 
 
 def _shapes(

@@ -123,7 +123,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     pressure : float or array
         Gauge pressure, Pa, from 0; below ``6 stiffness/radius`` there is exactly one dome. A pad
         of a material ends at its maximum pressure, or at the end of the material's range
-        (:mod:`ros_pad.contact.hyperelastic`).
+        (:mod:`ros_pad.contact.hyperelastic`) or, with an edge, of the correction for thickness.
 
     Raises
     ------
@@ -203,7 +203,8 @@ def press(
         ``out_of_range`` (pressure at which the free dome is outside the material's range).
     InvalidInput
         When a value is negative or not finite, shapes do not broadcast, ``adhesion`` or ``model``
-        is unknown, or ``adhesion_energy`` is above 0.01 ``stiffness``.
+        is unknown, ``adhesion_energy`` is above 0.01 ``stiffness``, or a force is above 0 on a pad
+        with an edge, whose pressed shapes are not known.
 
     Notes
     -----

@@ -48,6 +48,8 @@ from ros_pad.contact.membrane import cap_through
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
 from ros_pad.contact.pad import Pad
+from ros_pad.contact.thickness import HIGHEST
+from ros_pad.contact.thickness import thickened
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 
@@ -76,6 +78,8 @@ _ROWS, _CONTACTS = 512, 512
 # Least ``F/(p π r²)`` at which the angle at the rim is looked up: it differs from that of the free
 # dome by less than rounding.
 _LEAST = 1e-18
+# With an edge: largest strain of the apex, states that are integrated, and places between them.
+_HIGH, _STATES, _PLACES = 2.2, 97, 4001
 # Places along a line between which its spline over s is made.
 _FINE = 800
 
@@ -113,6 +117,11 @@ def press_rubber(pad: Pad, pressure: Array, force: Array) -> tuple[Array, Codes]
     As :func:`ros_pad.contact.press` with one-dimensional pressures, Pa, and forces, N.
     """
     domes, unit = _of(pad)
+    if isinstance(domes, ThickDomes) and force.any():
+        raise InvalidInput(
+            f'force = {force.max():g} N on {pad} is not allowed: the correction for thickness is'
+            ' known for free domes only; 0 N, or a pad without edge, is needed'
+        )
     whole = pressure * (math.pi * pad.radius**2)
     code = np.where(force > 0.0, OK, NO_CONTACT).astype(np.int8)
     code[force >= whole] = FLATTENED
@@ -129,6 +138,7 @@ def press_rubber(pad: Pad, pressure: Array, force: Array) -> tuple[Array, Codes]
         part = rows[start : start + _CHUNK]
         p, f, most = pressure[part], force[part], whole[part]
         share, rest = f / most, (most - f) / most
+        assert isinstance(domes, Domes)
         lengths[:, part] = cap_through(domes.gap(p / unit, share, rest), share, rest)
     return lengths, code
 
@@ -139,6 +149,7 @@ def rim_angle(pad: Pad, pressure: Array, force: Array) -> Array:
     Pressures are up to the end of the pad's model; 0 where the dome is flattened.
     """
     domes, unit = _of(pad)
+    assert isinstance(domes, Domes)
     whole = pressure * (math.pi * pad.radius**2)
     least = _LEAST * whole
     angle = np.zeros_like(pressure)
@@ -152,6 +163,8 @@ def rim_angle(pad: Pad, pressure: Array, force: Array) -> Array:
 def pressure_end(pad: Pad) -> tuple[float, str]:
     """Return the largest pressure of a pad of a material, Pa, and the status above it."""
     domes, unit = _of(pad)
+    if isinstance(domes, ThickDomes):
+        return domes.end * unit, domes.status
     known = pad.material.range_end  # type: ignore[union-attr]
     end = domes.pressure_at(known)
     balloons = domes.balloons and end == domes.end
@@ -161,28 +174,39 @@ def pressure_end(pad: Pad) -> tuple[float, str]:
 def refusal(pad: Pad) -> dict[int, str]:
     """Return why a pad of a material is refused, by status code."""
     end = pressure_end(pad)[0]
+    known = f'a uniaxial stretch of {pad.material.uniaxial_end:.4g}'  # type: ignore[union-attr]
+    if pad.edge is not None:
+        known += f', or rise above {HIGHEST[pad.edge]:g} radii, the highest in the correction'
     return {
         NO_INFLATION: (
             f'it would balloon: the pressure has its maximum at {end:.6g} Pa, and at most that is'
             ' allowed'
         ),
         OUT_OF_RANGE: (
-            'the dome would stretch the material beyond its range, a uniaxial stretch of'
-            f' {pad.material.uniaxial_end:.4g}: at most {end:.6g} Pa is allowed'  # type: ignore[union-attr]
+            f'the dome would stretch the material beyond its range, {known}: at most'
+            f' {end:.6g} Pa is allowed'
         ),
     }
 
 
-def _of(pad: Pad) -> tuple[Domes, float]:
+def _of(pad: Pad) -> tuple[Domes | ThickDomes, float]:
     """Return the domes of a pad's law, prepared once, and the unit ``μ h/r`` of its pressure."""
-    material = pad.material
-    assert material is not None
-    return _prepared(material.unit_law, material.stable_end), pad.stiffness / pad.radius
+    material, unit = pad.material, pad.stiffness / pad.radius
+    assert material is not None and pad.thickness is not None
+    if pad.edge is not None:
+        ratio = pad.thickness / pad.radius
+        return _thick(material.unit_law, material.range_end, ratio, pad.edge), unit
+    return _prepared(material.unit_law, material.stable_end), unit
 
 
 @functools.lru_cache(maxsize=64)
 def _prepared(law: Law, most: float) -> Domes:
     return Domes(law, most)
+
+
+@functools.lru_cache(maxsize=64)
+def _thick(law: Law, most: float, ratio: float, edge: str) -> ThickDomes:
+    return ThickDomes(law, most, ratio, edge)
 
 
 def _past_end(pad: Pad, pressure: Array) -> Codes:
@@ -477,6 +501,43 @@ class Domes:
         disc = (self._turn * x**3 * (2.0 - x**3))[:, None] * reach**1.5 * lines**2
         states = shapes(self._law, strain.ravel(), disc.ravel(), tolerance)
         return Shapes(*(each.reshape(strain.shape) for each in states))
+
+
+class ThickDomes:
+    """Free domes of one law, thickness and edge (:mod:`ros_pad.contact.thickness`).
+
+    Attributes
+    ----------
+    end : float
+        Largest ``P = p r/(μ h)``.
+    status : str
+        That of pressures above it: ``no_inflation`` at a maximum of P.
+    """
+
+    def __init__(self, law: Law, most: float, ratio: float, edge: str) -> None:
+        from scipy.interpolate import CubicSpline
+
+        root = np.linspace(0.0, math.sqrt(min(most, _HIGH)), _STATES)[1:]
+        found = shapes(law, root**2, np.full_like(root, _POINT))
+        # P^(1/3), height and volume begin in proportion to the root of the strain.
+        parts = np.cbrt(found.pressure), found.gap, found.volume
+        fine = np.linspace(0.0, root[-1], _PLACES)
+        push, height, volume = CubicSpline(
+            np.append(0.0, root), np.vstack([np.zeros(3), np.stack(parts, axis=1)])
+        )(fine).T
+        membrane = push**3, height, volume
+        states = np.array(thickened(edge, ratio, law[1], fine**2, membrane))
+        beyond = states[1] > HIGHEST[edge]
+        end = int(np.argmax(beyond)) if beyond.any() else fine.size
+        falls = np.diff(states[0, :end]) <= 0.0
+        self.status = str(STATUS[NO_INFLATION if falls.any() else OUT_OF_RANGE])
+        self._states = states[:, : int(np.argmax(falls)) + 1 if falls.any() else end]
+        self.end = float(self._states[0, -1])
+
+    def free(self, pressure: Array) -> tuple[Array, Array]:
+        """Return height of the outer face and volume of free domes, for P from 0 to ``end``."""
+        known, height, volume = self._states
+        return np.interp(pressure, known, height), np.interp(pressure, known, volume)
 
 
 def _nodes(low: float, high: float, count: int) -> Array:

@@ -156,7 +156,7 @@ def with_constant(pad: Pad, name: str, value: float) -> Pad:
         material = material.times(value)
     else:
         thickness = value
-    return Pad.of(material, pad.radius, thickness, pad.measured_limit)
+    return Pad.of(material, pad.radius, thickness, pad.measured_limit, pad.edge)
 
 
 def stiffness_law(radius: float, pressure: Array, height: Array) -> Law:

@@ -200,15 +200,23 @@ def largest_pressure(pad: Pad, criterion: str = DEFAULT_CRITERION) -> float:
 def criteria(pad: Pad) -> tuple[str, ...]:
     """Return the criteria that a pad has.
 
-    ``max_depth`` is one of the spherical dome alone, ``measured`` one of pads that were measured.
+    ``max_depth`` is one of the spherical dome alone, ``measured`` one of pads that were measured,
+    and the only one of pads with an edge, whose pressed shapes are not known.
     """
-    cap, measured = pad.material is None, pad.measured_limit is not None or _is_large_pad(pad)
-    missing = {'max_depth': not cap, 'measured': not measured}
-    return tuple(each for each in CRITERIA if not missing.get(each))
+    measured = ('measured',) if pad.measured_limit is not None or _is_large_pad(pad) else ()
+    if pad.edge is not None:
+        return measured
+    missing = 'max_depth' if pad.material is not None else ''
+    return tuple(each for each in CRITERIA[:-1] if each != missing) + measured
 
 
 def check_criterion(pad: Pad, criterion: str) -> None:
     """Raise `InvalidInput` for a criterion that is unknown, or not known for the pad."""
+    if pad.edge is not None and criterion in CRITERIA[:-1]:
+        raise InvalidInput(
+            f'criterion = {criterion!r} is not allowed for {pad}: shapes under load are not known'
+            ' with an edge; a measured_limit and the criterion measured, or no edge, is needed'
+        )
     if criterion == 'measured' and criterion not in criteria(pad):
         raise InvalidInput(
             f'criterion = {criterion!r} is not allowed for {pad}: no force limit was measured on'

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ros_pad.configuration import number
 from ros_pad.contact.material import Material
+from ros_pad.contact.thickness import check_edge
 from ros_pad.errors import InvalidInput
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -88,6 +89,9 @@ class Pad:
     thickness : float, optional
         Thickness of the flat pad, m, up to the radius; needed with a material. Without one it is
         used in the force limit alone, see :mod:`ros_pad.contact.limits`.
+    edge : {None, 'bonded', 'clamped'}
+        How the sheet is held at the rim: free domes are then corrected for thickness
+        (:mod:`ros_pad.contact.thickness`), and pressed ones refused. By default none: a membrane.
 
     Raises
     ------
@@ -101,6 +105,7 @@ class Pad:
     measured_limit: MeasuredLimit | None = None
     material: Material | None = None
     thickness: float | None = None
+    edge: str | None = None
 
     def __post_init__(self) -> None:
         number('radius', self.radius, 'm', above=True)
@@ -130,6 +135,7 @@ class Pad:
                     f'stiffness = {self.stiffness:g} N/m is not allowed with a material: its'
                     f' shear modulus times thickness, {unit:g} N/m, is needed (see Pad.of)'
                 )
+        check_edge(self.edge, self.radius, self.thickness, self.material)
 
     @classmethod
     def of(
@@ -138,6 +144,7 @@ class Pad:
         radius: float,
         thickness: float,
         measured_limit: MeasuredLimit | None = None,
+        edge: str | None = None,
     ) -> Pad:
         """Return a pad of a material.
 
@@ -149,7 +156,7 @@ class Pad:
             Radius of the flat pad, m, above 0.
         thickness : float
             Thickness of the flat pad, m, above 0 up to the radius.
-        measured_limit : MeasuredLimit, optional
+        measured_limit, edge
             As for :class:`Pad`.
 
         Raises
@@ -162,11 +169,12 @@ class Pad:
         number('radius', radius, 'm', above=True)
         number('thickness', thickness, 'm', 0.0, radius, above=True)
         stiffness = material.shear_modulus * thickness
-        return cls(radius, stiffness, 0.0, measured_limit, material, thickness)
+        return cls(radius, stiffness, 0.0, measured_limit, material, thickness, edge)
 
     def __str__(self) -> str:
         if self.material is not None:
             made = f'thickness = {self.thickness:g} m of {self.material}'
+            made += '' if self.edge is None else f', {self.edge} at its edge'
             return f'a pad with radius = {self.radius:g} m and {made}'
         return f'a pad with radius = {self.radius:g} m and stiffness = {self.stiffness:g} N/m'
 
