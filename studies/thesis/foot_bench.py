@@ -16,10 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_pad.capillary import Mesh
+from ros_pad.capillary import wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.meniscus import WATER
+from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import Array
@@ -154,7 +157,7 @@ def compute(scene: BenchScene, setup: FootBench) -> BenchTrial:
     lines = {name: straight(*curve) for name, curve in curves.items() if name.endswith((DRY, WET))}
     rows = _force_rows(setup, curves, lines)
     rows += _difference_rows(setup, found, _drawn(foot, setup))
-    rows += _capillary_rows(setup, curves)
+    rows += _capillary_rows(foot, setup, curves)
     return BenchTrial(
         scene,
         tuple(rows),
@@ -258,15 +261,38 @@ def _difference_rows(
     return rows
 
 
-def _capillary_rows(setup: FootBench, curves: Mapping[str, Curve]) -> list[Row]:
-    claimed = f'within {100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %'
-    return [
-        Row(34, 'capillary force of the thesis', 'N', name, WET, setup.pressure,
-            float(curve.x[place]), float(curve.y[place]), None, claimed)
+def _capillary_rows(foot: Foot, setup: FootBench, curves: Mapping[str, Curve]) -> list[Row]:
+    """Return the estimates of the thesis for all domes, as magnitudes."""
+    found = [
+        (name, float(curve.x[place]), float(curve.y[place]))
         for name, curve in curves.items()
         if name == PATTERN or name.startswith('3.82')
         for place in (0, -1)
+    ]
+    load = setup.lowest_load
+    for (liquid_name, liquid), balance in itertools.product(
+        _LIQUIDS.items(), ('energy', 'thesis')
+    ):
+        force = _by_layers(foot, setup.pressure, load, liquid, balance)
+        if math.isfinite(force):  # not where the liquid reaches the base of the pads
+            found.append((f'4.18, {balance}, {liquid_name}', load, force))
+    claimed = f'within {100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %'
+    return [
+        Row(34, 'capillary force of the thesis', 'N', name, WET, setup.pressure, load, force, None,
+            claimed)
+        for name, load, force in found
     ]  # fmt: skip
+
+
+_LIQUIDS = {'water': WATER, '4 mN/m': Liquid(0.004, 0.002)}  # the second is that of 4.2.1
+
+
+def _by_layers(foot: Foot, pressure: float, load: float, liquid: Liquid, balance: str) -> float:
+    """Return 4.18 for all domes, each alone, N; NaN where the liquid reaches their base."""
+    pressed = press(foot.pad, pressure, load / foot.pads)
+    sphere, contact = float(pressed.sphere_radius), float(pressed.contact_radius)
+    mesh = Mesh.dome(sphere, contact, float(pressed.gap), rings=48, sectors=48)
+    return foot.pads * abs(wet(mesh, liquid, balance, slices=4, strict=False).force(0.0))
 
 
 # --- claims --------------------------------------------------------------------------------------
@@ -372,7 +398,7 @@ def _error_claim(
         f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %.',
         'No measured number is printed. The estimates for the foot: '
         + '; '.join(
-            f'{name} {_few(low)} to {_few(high)} mN' for name, (low, high) in estimates.items()
+            f'{name} {" to ".join(map(_few, each))} mN' for name, each in estimates.items()
         )
         + '. To check it, one would need F_wet and F_dry at each load with their scatter, the '
         'number of domes, depth of water, contact angles, and roughness. F_cap is a '
