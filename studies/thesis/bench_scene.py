@@ -228,6 +228,12 @@ class BenchScene:
         elif kind == 'press':
             setup = _press(table, foot.pad)
         elif kind == 'foot':
+            if foot.capillary_force:
+                raise ConfigError(
+                    f'{table.origin}: foot {foot.source}: capillary_force = '
+                    f'{foot.capillary_force:g} N is not allowed: 0 is needed, for this bench puts '
+                    'bounds of its own on that force'
+                )
             foot = dataclasses.replace(foot, limit=table.choice('criterion', criteria(foot.pad)))
             setup = _foot(table, foot)
         else:

@@ -307,7 +307,7 @@ def _claims(
     return (
         *(_sign_claim(rows, *case) for case in CASES),
         _linear_claim(setup, lines),
-        _small_claim(found),
+        _small_claim(rows, found),
         _error_claim(setup, rows, found),
         _title_claim(found),
     )
@@ -364,16 +364,21 @@ def _linear_claim(setup: FootBench, lines: Mapping[str, Line]) -> Claim:
     )
 
 
-def _small_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
+def _small_claim(rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
     share = max(each.lines / each.wet for each in (*found[DOME, SMOOTH], *found[DOME, ROUGH]))
     first, last = found[DOME, SMOOTH][0], found[DOME, SMOOTH][-1]
+    estimates = [row.modelled for row in rows if row.model == '3.82, corrected, water']
     return Claim(
         34,
         'The capillary force is much smaller than the tangential force, and not proportional to '
         'the contact force.',
-        f'Pinned lines hold at most {100 * share:.2g} % of the tangential force of domes, and '
-        f'{last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
-        f'where dry friction is {last.dry / first.dry:.1f} times as much.',
+        f'On flooded ground pinned lines hold at most {100 * share:.2g} % of the force of domes, '
+        f'and {last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
+        f'where dry friction is {last.dry / first.dry:.1f} times as much. On moist ground suction '
+        f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest and '
+        f"{100 * last.suction / last.dry:.1f} % at the highest load. The thesis' estimate (3.82 "
+        f'corrected, water), which has no net force, would be {100 * estimates[0] / first.dry:.0f} '
+        f'and {100 * estimates[1] / last.dry:.1f} %: not small at light loads.',
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
     )

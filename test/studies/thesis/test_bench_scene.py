@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
+import dataclasses
 import pathlib
 import re
 import shutil
@@ -149,6 +150,12 @@ def test_benches_of_the_thesis_law_refuse_a_material():
     for name in ('inflation', 'press', 'foot'):
         with pytest.raises(InvalidInput, match=f'the bench {name} needs a pad with a measured'):
             BenchScene.load(f'bench_{name}', Foot.load('small217'))
+
+
+def test_the_bench_of_a_foot_refuses_a_capillary_force():
+    foot = dataclasses.replace(Foot.load('large19'), capillary_force=2e-5)
+    with pytest.raises(ConfigError, match=r'capillary_force = 2e-05 N is not allowed: 0 is'):
+        BenchScene.load('bench_foot', foot)
 
 
 def test_another_foot_in_place_of_the_scenes_own():
