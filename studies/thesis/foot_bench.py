@@ -377,8 +377,8 @@ def _small_claim(rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[P
         f'where dry friction is {last.dry / first.dry:.1f} times as much. On moist ground suction '
         f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest and '
         f"{100 * last.suction / last.dry:.1f} % at the highest load. The thesis' estimate (3.82 "
-        f'corrected, water), which has no net force, would be {100 * estimates[0] / first.dry:.0f} '
-        f'and {100 * estimates[1] / last.dry:.1f} %: not small at light loads.',
+        f'corrected, water), which has no net force, is {100 * estimates[0] / first.dry:.0f} and '
+        f'{100 * estimates[1] / last.dry:.1f} %: not small at light loads.',
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
     )
