@@ -40,6 +40,7 @@ from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation.fidelity import SOLE_MODULUS
 from ros_pad.simulation.fidelity import Omission
 from studies.thesis.bench_scene import BenchScene
+from studies.thesis.bench_scene import FootBench
 from studies.thesis.bench_scene import InflationBench
 from studies.thesis.bench_scene import PressBench
 from studies.thesis.bench_scene import TangentialBench
@@ -185,6 +186,10 @@ def run(scene: BenchScene | str | os.PathLike[str]) -> BenchTrial:
         return _inflation(scene, scene.setup, measured)
     if isinstance(scene.setup, PressBench):
         return _press(scene, scene.setup, measured)
+    if isinstance(scene.setup, FootBench):
+        from studies.thesis import foot_bench
+
+        return foot_bench.compute(scene, scene.setup)
     return _tangential(scene, scene.setup, measured)
 
 

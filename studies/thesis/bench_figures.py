@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw figures 14 to 18, 20, 21 and 10 of the thesis from the model, with the measured points.
+"""Draw figures 14 to 18, 20, 21, 10 and 34 of the thesis by the model, with measured points.
 
 The meaning of solid and dashed lines differs between figures, as in the thesis; captions explain
 it.
@@ -7,6 +7,7 @@ it.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from collections.abc import Sequence
 from typing import Any
@@ -41,6 +42,13 @@ from studies.thesis.bench import Row
 from studies.thesis.bench import shape_name
 from studies.thesis.bench_scene import InflationBench
 from studies.thesis.bench_scene import TangentialBench
+from studies.thesis.foot_bench import DOME
+from studies.thesis.foot_bench import FLAT
+from studies.thesis.foot_bench import LINES
+from studies.thesis.foot_bench import NONE
+from studies.thesis.foot_bench import ROUGH
+from studies.thesis.foot_bench import SMOOTH
+from studies.thesis.foot_bench import SUCTION
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)
@@ -474,10 +482,72 @@ def figure_10(trial: BenchTrial) -> Drawn:
     )
 
 
+# --- foot ----------------------------------------------------------------------------------------
+
+
+def figure_34(trial: BenchTrial) -> Drawn:
+    """Draw tangential over normal force of a foot on four floors, and wet less dry force."""
+    figure = Figure(figsize=(WIDE, 3.3), layout='constrained')
+    *forces, less = figure.subplots(1, 3)
+    for ax, floor in zip(forces, (SMOOTH, ROUGH), strict=True):
+        for shape, ground in itertools.product(_OF_FOOT, (DRY, WET)):
+            curve = trial.curves[f'{shape}, {floor}, {ground}']
+            style = (0, (4, 2)) if ground == DRY else '-'
+            ax.plot(curve.x, curve.y, color=_OF_FOOT[shape], ls=style)
+        ax.set_title(f'(a) {floor}')
+        ax.set_ylabel('tangential force / N')
+    highest = max(ax.get_ylim()[1] for ax in forces)
+    for ax in forces:
+        ax.set_ylim(0.0, highest)
+    for (floor, colour), (kind, style) in itertools.product(_FLOORS.items(), _KINDS.items()):
+        curve = trial.curves[f'{DOME}, {floor}, {kind}']
+        less.plot(curve.x, 1e3 * curve.y, color=colour, ls=style)
+    curve = trial.curves['3.82, corrected, water']
+    less.plot(curve.x, 1e3 * curve.y, color=PURPLE, ls=(0, (4, 1, 1, 1)))
+    less.axhline(0.0, color=PALE, lw=0.8)
+    less.set_title('(b) domes, wet less dry')
+    less.set_ylabel('F_wet − F_dry / mN')
+    for ax in (*forces, less):
+        ax.set_xlim(0.0, None)
+        ax.set_xlabel('normal force / N')
+    legend(figure, _handles_of_34(), columns=3)
+    return Drawn(
+        figure,
+        'Figure 34: a foot, flat and domed, dry and wet, on smooth and rough plastic',
+        'Tangential over normal force: domes wet and dry alike, flat dry high, flat wet lowest; '
+        'wet less dry force of domes, below 0 without capillary force',
+        'The flat foot is off (b), it loses 0.1 to 2 N. Pinned lines and suction are upper bounds.'
+        ' One-sided force: that of half a ring by 3.82, which the other half cancels. The thesis '
+        'prints no number of its figure.',
+    )
+
+
+_OF_FOOT = {FLAT: BLACK, DOME: VERMILION}
+_FLOORS = {SMOOTH: BLUE, ROUGH: GREEN}
+_KINDS: dict[str, Any] = {NONE: '-', LINES: (0, (4, 2)), SUCTION: (0, (1, 1.2))}
+
+
+def _handles_of_34() -> list[Any]:
+    return [
+        *(
+            Line2D([], [], color=colour, label=f'(a) {shape}')
+            for shape, colour in _OF_FOOT.items()
+        ),
+        Line2D([], [], color=BLACK, ls=(0, (4, 2)), label='(a) dry'),
+        *(Line2D([], [], color=colour, label=f'(b) {floor}') for floor, colour in _FLOORS.items()),
+        *(
+            Line2D([], [], color=BLACK, ls=style, label=f'(b) {kind}')
+            for kind, style in _KINDS.items()
+        ),
+        Line2D([], [], color=PURPLE, ls=(0, (4, 1, 1, 1)), label='(b) one-sided force'),
+    ]
+
+
 _FIGURES: dict[str, dict[str, Callable[[BenchTrial], Drawn]]] = {
     'inflation': {'figure_14': figure_14, 'figure_15': figure_15},
     'press': {'figure_16': figure_16, 'figure_17': figure_17, 'figure_18': figure_18},
     'tangential': {'figure_20': figure_20, 'figure_21': figure_21, 'figure_10': figure_10},
+    'foot': {'figure_34': figure_34},
 }
 
 

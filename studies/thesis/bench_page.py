@@ -128,7 +128,7 @@ def cells(row: Row) -> list[str]:
         row.model,
         row.condition,
         ', '.join(at),
-        f'{factor * row.modelled:.4g} {unit}'.replace('-', '−'),
+        f'{factor * row.modelled:.4g} {unit}'.rstrip().replace('-', '−'),
         '' if row.measured is None else f'{factor * row.measured:.4g} {unit}',
         '' if row.error is None else f'{100.0 * row.error:+z.1f} %'.replace('-', '−'),
         row.claimed,

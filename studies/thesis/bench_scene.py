@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bench scene: one pad of a foot, its test, and the measurements to compare with."""
+"""Bench scene: one pad or a foot, its test, and the measurements to compare with."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import largest_tension
 from ros_pad.contact.dome import signed_adhesion
 from ros_pad.contact.film import WATER_VISCOSITY
+from ros_pad.contact.limits import criteria
+from ros_pad.contact.limits import force_limit
 from ros_pad.contact.pad import Pad
 from ros_pad.contact.pad import need_stiffness
 from ros_pad.contact.resistance import Foot
@@ -24,7 +26,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import foot_of
 
-BENCHES = ('inflation', 'press', 'tangential')
+BENCHES = ('inflation', 'press', 'tangential', 'foot')
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,55 @@ class TangentialBench:
     claimed_largest: float
 
 
-Setup: TypeAlias = InflationBench | PressBench | TangentialBench
+@dataclass(frozen=True)
+class FootBench:
+    """Test in which a whole foot is pressed and dragged on four floors (thesis 4.3.1).
+
+    Attributes
+    ----------
+    pressure : float
+        Gauge pressure of the domes, Pa.
+    lowest_load, highest_load : float
+        Normal forces between which the foot is tried, N.
+    speed : float
+        Speed of the stage that drags the foot, m/s.
+    dwell : float
+        Time from touch-down until the stage starts, s.
+    film_thickness : float
+        Depth of the liquid on wet ground, m.
+    viscosity : float
+        Viscosity of the liquid, Pa s.
+    roughness : float
+        Root mean square height of the rough floor, m; the smooth one has none.
+    advancing_angle, receding_angle : float
+        Contact angles at which the edge of the liquid advances and recedes, rad.
+    factor : float
+        Factor by which each assumed number may be too high or too low.
+    samples, seed : int
+        Number of draws of the assumed numbers, and what fixes them.
+    claimed_lowest, claimed_highest : float
+        Relative errors between which the thesis' estimate is claimed to be.
+    """
+
+    kind: ClassVar[str] = 'foot'
+    pressure: float
+    lowest_load: float
+    highest_load: float
+    speed: float
+    dwell: float
+    film_thickness: float
+    viscosity: float
+    roughness: float
+    advancing_angle: float
+    receding_angle: float
+    factor: float
+    samples: int
+    seed: int
+    claimed_lowest: float
+    claimed_highest: float
+
+
+Setup: TypeAlias = InflationBench | PressBench | TangentialBench | FootBench
 
 
 @dataclass(frozen=True)
@@ -117,10 +167,11 @@ class BenchScene:
     name, description : str
         Name without folder, and the text ``description`` of the file.
     foot : Foot
-        Foot whose pad is tested. In the tangential bench it has this one pad, and its whole sole.
+        Foot whose pad is tested. In the tangential bench it has this one pad, and its whole sole;
+        in the bench of a foot all of its pads, and the force limit of the scene.
     measurements : Path
         CSV file with the measured points.
-    setup : InflationBench, PressBench or TangentialBench
+    setup : InflationBench, PressBench, TangentialBench or FootBench
         The test.
     """
 
@@ -170,12 +221,21 @@ class BenchScene:
         foot = foot or own_foot
         measurements = _measurements(table)
         setup: Setup
-        if kind in ('inflation', 'press'):
+        if kind in ('inflation', 'press', 'foot'):
             need_stiffness(f'the bench {kind}', foot.pad)
         if kind == 'inflation':
             setup = _inflation(table, foot.pad)
         elif kind == 'press':
             setup = _press(table, foot.pad)
+        elif kind == 'foot':
+            if foot.capillary_force:
+                raise ConfigError(
+                    f'{table.origin}: foot {foot.source}: capillary_force = '
+                    f'{foot.capillary_force:g} N is not allowed: 0 is needed, for this bench puts '
+                    'bounds of its own on that force'
+                )
+            foot = dataclasses.replace(foot, limit=table.choice('criterion', criteria(foot.pad)))
+            setup = _foot(table, foot)
         else:
             setup = _tangential(table)
             # The sole keeps its size: around the one dome, the other pads stay part of it.
@@ -239,12 +299,54 @@ def _press(table: Table, pad: Pad) -> PressBench:
     )
 
 
+def _liquid(floor: Table) -> dict[str, float]:
+    """Return the numbers of the liquid on a floor, by the names that benches have for them."""
+    advancing = floor.number('advancing_angle', 'rad', 0.0, math.pi)
+    return {
+        'film_thickness': floor.number('film_thickness', 'm', 1e-9, 0.01),
+        'viscosity': floor.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY),
+        'advancing_angle': advancing,
+        'receding_angle': floor.number('receding_angle', 'rad', 0.0, advancing),
+    }
+
+
+def _foot(table: Table, foot: Foot) -> FootBench:
+    with table.table('floor') as part:
+        liquid = _liquid(part)
+        roughness = part.number('roughness', 'm', 0.0, 1e-3)
+    with table.table('doubt') as part:
+        factor = part.number('factor', '(factor)', 1.0, 10.0)
+        samples = part.integer('samples', 20, 100000)
+        seed = part.integer('seed', 0, 2**32 - 1)
+    pressure = table.number('pressure', 'Pa', 1e3, foot.ceiling)
+    carried = foot.pads * float(force_limit(foot.pad, pressure, foot.limit))
+    if not carried:
+        raise ConfigError(
+            f'{table.origin}: criterion = {foot.limit!r}: domes of {pressure:g} Pa carry nothing '
+            'by it: another criterion, or a higher pressure, is needed'
+        )
+    # With the fewest domes that are drawn, too, domes carry all of the load.
+    highest = table.number('highest_load', 'N', 1e-3, carried / factor)
+    lowest_error = table.number('claimed_lowest', '(relative)', 0.0, 1.0)
+    return FootBench(
+        pressure=pressure,
+        lowest_load=table.number('lowest_load', 'N', 1e-4, 0.5 * highest),
+        highest_load=highest,
+        speed=table.number('speed', 'm/s', 1e-6, 1.0),
+        dwell=table.number('dwell', 's', 0.0, 3600.0),
+        **liquid,
+        roughness=roughness,
+        factor=factor,
+        samples=samples,
+        seed=seed,
+        claimed_lowest=lowest_error,
+        claimed_highest=table.number('claimed_highest', '(relative)', lowest_error, 1.0),
+    )
+
+
 def _tangential(table: Table) -> TangentialBench:
     with table.table('floor') as part:
-        film_thickness = part.number('film_thickness', 'm', 1e-9, 0.01)
-        viscosity = part.number('viscosity', 'Pa s', 1e-5, 10.0, default=WATER_VISCOSITY)
-        advancing = part.number('advancing_angle', 'rad', 0.0, math.pi)
-        receding = part.number('receding_angle', 'rad', 0.0, advancing)
+        liquid = _liquid(part)
     with table.table('design') as part:
         smallest = part.number('smallest_radius', 'm', 1e-5, 1e-2)
         largest = part.number('largest_radius', 'm', smallest, 1e-1)
@@ -254,10 +356,7 @@ def _tangential(table: Table) -> TangentialBench:
         highest_load=table.number('highest_load', 'N', 1e-3, 100.0),
         speed=table.number('speed', 'm/s', 1e-6, 1.0),
         dwell=table.number('dwell', 's', 0.0, 3600.0),
-        film_thickness=film_thickness,
-        viscosity=viscosity,
-        advancing_angle=advancing,
-        receding_angle=receding,
+        **liquid,
         smallest_radius=smallest,
         largest_radius=largest,
         claimed_smallest=claimed_smallest,

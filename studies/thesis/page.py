@@ -31,11 +31,12 @@ _BENCHES = {
     'bench_inflation': (14, 15),
     'bench_press': (16, 17, 18),
     'bench_tangential': (20, 21),
+    'bench_foot': (34,),
 }
-NUMBERS = (
-    *(n for numbers in _BENCHES.values() for n in numbers),
-    *liquid.NUMBERS,
-    *walks.NUMBERS,
+NUMBERS = tuple(
+    sorted(
+        [n for numbers in _BENCHES.values() for n in numbers] + [*liquid.NUMBERS, *walks.NUMBERS]
+    )
 )
 
 _COMMON_DOME = (
@@ -85,6 +86,14 @@ _WORDS = {
         'Tensions of water and silicone, or those of the thesis, which are ten times smaller; '
         'advancing and receding angles of 120° and 90° for the bound.',
     ),
+    34: (
+        'Nothing: the thesis prints no number of the figure.',
+        'A whole foot at 50 kPa and flat, as in figure 20; roughness of the floor raises the film '
+        'that keeps contact apart and the pressure at which a sole conforms. Bounds on the force '
+        'of pinned lines, and on suction.',
+        'Number of domes, loads, friction, film, roughness and contact angles; intervals draw '
+        'each of them up to twice and half.',
+    ),
 }
 
 
@@ -125,7 +134,7 @@ def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -
     done += walks.draw(walked, numbers)
     if progress:
         progress(1.0)
-    return done
+    return sorted(done, key=lambda each: each.number)
 
 
 def _of_bench(name: str, numbers: Collection[int]) -> list[Explained]:

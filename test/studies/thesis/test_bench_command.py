@@ -13,7 +13,7 @@ from studies.thesis.bench_scene import BENCHES
 
 pytestmark = pytest.mark.slow
 
-FIGURES = {'inflation': (14, 15), 'press': (16, 17, 18), 'tangential': (20, 21, 10)}
+FIGURES = {'inflation': (14, 15), 'press': (16, 17, 18), 'tangential': (20, 21, 10), 'foot': (34,)}
 
 
 @pytest.mark.parametrize('kind', BENCHES)

@@ -159,6 +159,22 @@ def test_rises_with_their_optima():
     assert sorted(x) == pytest.approx([0.848, 2.327, 2.668], rel=2e-3)
 
 
+def test_forces_of_a_foot_on_two_floors():
+    """Dry slopes are 0.8 (flat, smooth), 0.459 (flat, rough) and 0.444 (domes), by hand."""
+    smooth, rough, less = FIGURES['figure_34'].figure.axes
+    for ax, flat in (
+        (smooth, 0.35 + 4700.0 / 10444.0),
+        (rough, 0.35 + 4700.0 / 10444.0 / 17.0**0.5),
+    ):
+        dry = [line for line in ax.lines if line.get_linestyle() == '--']
+        ends = sorted(line.get_ydata()[-1] / line.get_xdata()[-1] for line in dry)
+        assert ends == pytest.approx([0.444, flat], rel=1e-6)
+        assert len(ax.lines) == 4
+        assert ax.get_ylim() == smooth.get_ylim()
+    without = [line for line in less.lines if len(line.get_xdata()) > 2][:6:3]
+    assert [line.get_ydata().max() < 0.0 for line in without] == [True, True]
+
+
 @pytest.mark.parametrize('kind', ['svg', 'pdf'])
 def test_the_same_bench_gives_the_same_file(kind):
     def file():

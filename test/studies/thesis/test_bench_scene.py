@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
+import dataclasses
 import pathlib
 import re
 import shutil
@@ -56,6 +57,10 @@ def test_values_come_where_they_belong():
     assert (drag.film_thickness, drag.viscosity) == (3e-4, 1e-3)
     assert (drag.advancing_angle, drag.receding_angle) == (2.0944, 1.5708)
     assert (drag.claimed_smallest, drag.claimed_largest) == (3e-4, 8e-4)
+    foot = BenchScene.load('bench_foot')
+    assert (foot.setup.pressure, foot.setup.speed, foot.setup.roughness) == (50e3, 2e-4, 2e-6)
+    assert (foot.setup.claimed_lowest, foot.setup.claimed_highest) == (0.15, 0.25)
+    assert foot.foot.limit == 'flattening' and foot.foot.pads == 19
 
 
 def test_the_dragged_foot_has_one_pad_and_all_of_its_sole():
@@ -97,6 +102,15 @@ BAD = [
     ('tangential', 'floor.kind', 'wet', "floor: unknown key 'kind'"),
     ('tangential', 'design.largest_radius', 1e-4, 'design: largest_radius = 0.0001 is not allo'),
     ('tangential', 'design.claimed_largest', 1e-2, 'design: claimed_largest = 0.01 is not allow'),
+    ('foot', 'criterion', 'measured', "criterion = 'measured': domes of 50000 Pa carry nothing"),
+    ('foot', 'criterion', 'highest', "criterion = 'highest' is not allowed: one of"),
+    ('foot', 'highest_load', 3.4, 'highest_load = 3.4 is not allowed: a number from 0.001 to 3.3'),
+    ('foot', 'lowest_load', 1.6, 'lowest_load = 1.6 is not allowed: a number from 0.0001 to 1.5'),
+    ('foot', 'pressure', 91e3, 'pressure = 91000.0 is not allowed'),
+    ('foot', 'doubt.samples', 3, 'doubt: samples = 3 is not allowed'),
+    ('foot', 'doubt.factor', 0.5, 'doubt: factor = 0.5 is not allowed'),
+    ('foot', 'floor.roughness', -1e-6, 'floor: roughness = -1e-06 is not allowed'),
+    ('foot', 'claimed_highest', 0.1, 'claimed_highest = 0.1 is not allowed'),
 ]
 
 
@@ -133,9 +147,15 @@ def test_files_of_ones_own_lie_beside_the_scene(tmp_path, monkeypatch):
 
 
 def test_benches_of_the_thesis_law_refuse_a_material():
-    for name in ('inflation', 'press'):
+    for name in ('inflation', 'press', 'foot'):
         with pytest.raises(InvalidInput, match=f'the bench {name} needs a pad with a measured'):
             BenchScene.load(f'bench_{name}', Foot.load('small217'))
+
+
+def test_the_bench_of_a_foot_refuses_a_capillary_force():
+    foot = dataclasses.replace(Foot.load('large19'), capillary_force=2e-5)
+    with pytest.raises(ConfigError, match=r'capillary_force = 2e-05 N is not allowed: 0 is'):
+        BenchScene.load('bench_foot', foot)
 
 
 def test_another_foot_in_place_of_the_scenes_own():

@@ -17,7 +17,7 @@ from studies.thesis import page as thesis_page
 
 pytestmark = pytest.mark.slow
 
-CHEAP = (14, 15, 16, 17, 18, 20, 21, 26, 27, 28, 29, 30, 31)
+CHEAP = (14, 15, 16, 17, 18, 20, 21, 26, 27, 28, 29, 30, 31, 34)
 FIGURES = thesis_page.draw(CHEAP)
 
 
