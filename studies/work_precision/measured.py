@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import SubFigure
+from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
 from ros_pad.contact import LARGE_PAD
@@ -19,12 +20,14 @@ from ros_pad.contact import force_limit
 from ros_pad.contact import inflate
 from ros_pad.contact import press
 from ros_pad.contact.laws import Law
+from ros_pad.contact.laws import highest_dome
 from ros_pad.contact.laws import rubber_laws
 from ros_pad.contact.laws import stiffness_law
 from ros_pad.contact.laws import with_constant
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput
+from studies.drawing import BLACK
 from studies.drawing import BLUE
 from studies.drawing import GREEN
 from studies.drawing import ORANGE
@@ -124,8 +127,10 @@ def models() -> tuple[Model, ...]:
 
 
 def _fitted(pad: Pad) -> tuple[Pad, ...]:
+    """Return a pad with its factor fitted to the heights that it can have, and both ends."""
     free = thesis().free
-    factor = rubber_laws(pad, free.pressure, free.height)[0]
+    known = free.height < highest_dome(pad)
+    factor = rubber_laws(pad, free.pressure[known], free.height[known])[0]
     return (with_constant(pad, factor.name, float(factor.values[0])), *_ends(pad, factor))
 
 
@@ -154,10 +159,24 @@ def _row(pad: Pad, model: str, measured: Points) -> Array:
     try:
         states = press(pad, p[gap], force[gap], adhesion='none', model=model)
         found[gap], found[radius] = states.gap, states.contact_radius
-        found[limit] = force_limit(pad, p[limit])
+        found[limit] = _limits(pad, p[limit], model)
     except InvalidInput:  # a pad with an edge is known as a free dome only
         pass
     return found
+
+
+def _limits(pad: Pad, pressure: Array, model: str) -> Array:
+    """Return the forces, N, at which the gap is as high as the sheet is thick."""
+    if pad.material is not None or model == 'thesis':
+        return np.asarray(force_limit(pad, pressure))
+
+    def force(p: float) -> float:
+        def excess(force: float) -> float:
+            return float(press(pad, p, force, adhesion='none', model=model).gap) - THICKNESS
+
+        return float(brentq(excess, 1e-3, 0.9 * p * math.pi * pad.radius**2))
+
+    return np.array([force(p) for p in pressure.tolist()])
 
 
 def problem() -> tuple[Problem, tuple[Method, ...]]:
@@ -192,12 +211,14 @@ def draw(figure: SubFigure) -> None:
     for row, model in enumerate(chosen):
         errors = 100.0 * (predicted(model, measured) / measured.value - 1.0)
         shift = 0.15 * (row - 0.5 * (len(chosen) - 1))
-        low, high = np.nanmin(errors, axis=0), np.nanmax(errors, axis=0)
+        low, high = np.fmin.reduce(errors), np.fmax.reduce(errors)
         panel.vlines(places + shift, low, high, color=model.colour, lw=2.0, alpha=0.5)
+        gone = np.isnan(errors).any(axis=0) & ~np.isnan(errors[0])
+        panel.plot((places + shift)[gone], high[gone] + 4.0, '^', color=model.colour, ms=6)
         panel.plot(
             places + shift, errors[0], 'o', color=model.colour, ms=6, mec='white', label=model.name
         )
-    panel.axhline(0.0, color='black', lw=0.8)
+    panel.axhline(0.0, color=BLACK, lw=0.8)
     labels = [
         f'{pressure / 1e3:.0f} kPa' + ('' if not force > 0.0 else f'\n{force:g} N')
         for pressure, force in zip(measured.pressure, measured.force, strict=True)
@@ -212,7 +233,7 @@ def draw(figure: SubFigure) -> None:
     panel.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8.5)
     figure.supxlabel(
         'Error against each measured point of the thesis. Bars: 95 % interval of the constant that'
-        ' is fitted to the four heights (cap: disc at the 40 N/m of the thesis);'
-        ' force limits by the criterion of the sheet\'s thickness.',
+        ' is fitted to the heights (cap: disc at the 40 N/m of the thesis); triangle: it has no'
+        ' state at one end. Force limits: gap of a sheet.',
         fontsize=8.5,
     )
