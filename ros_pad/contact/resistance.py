@@ -354,6 +354,12 @@ def _pad(table: Table) -> Pad:
     line = _measured_limit(table)
     make: Callable[..., Pad] = Pad
     if 'material' in table:
+        for name in ('stiffness', 'adhesion_energy'):
+            if name in table:
+                raise ConfigError(
+                    f'{table.origin}: {name} is not allowed beside material: its law and the'
+                    ' thickness give the stiffness, and such pads have no adhesion'
+                )
         values = table.values(RUBBER_SETTINGS)
         material, factor = Material.load(values.pop('material')), factor_in(table)
     else:
