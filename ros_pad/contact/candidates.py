@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pads of different materials and thicknesses for one load, with what is unsure of the materials.
 
-Each quantity is computed for the material as it is, and for the lowest and the highest factor on
-its stresses (:attr:`ros_pad.contact.Material.factor_range`). In between it lies between both: a
-factor changes the pressures of all domes in proportion.
+Each quantity is computed for the material as it is, and for factors on its stresses over their
+whole range (:attr:`ros_pad.contact.Material.factor_range`). Its extremes are not always at the
+ends of the range: a stiffer pad stands more pressure before it balloons, but at the pressure of
+the supply its dome is lower and may carry less. Extremes inside the range are within 1 %.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ from ros_pad.contact.pad import MeasuredLimit
 from ros_pad.contact.pad import Pad
 from ros_pad.errors import NoEquilibrium
 from ros_pad.pace import Progress
+
+# Factors over the range of a material.
+_FACTORS = 9
 
 
 class Span(NamedTuple):
@@ -168,13 +172,11 @@ def _candidate(
     criterion: str,
     height: float,
 ) -> Candidate:
-    material = pad.material
-    assert material is not None and material.factor_range is not None
     states = [
         _state(
             with_constant(pad, 'factor', factor), pads, load, ceiling, margin, criterion, height
         )
-        for factor in (material.factor, *material.factor_range)
+        for factor in _factors(pad, load * margin / pads, ceiling, criterion)
     ]
     enough = [state.pressure <= ceiling for state in states]
     spans = _State(*(Span(each[0], min(each), max(each)) for each in zip(*states, strict=True)))
@@ -189,6 +191,23 @@ def _candidate(
         ballooning_margin=spans.ballooning_margin,
         carried='yes' if all(enough) else 'in doubt' if any(enough) else 'no',
     )
+
+
+def _factors(pad: Pad, force: float, ceiling: float, criterion: str) -> list[float]:
+    """Return the factor of a pad's material, and factors over the range of the doubts about it.
+
+    Among them are those at which the largest pressure is the ceiling, and at which the pad just
+    carries the force: there the quantities have kinks.
+    """
+    material = pad.material
+    assert material is not None and material.factor_range is not None
+    end = pressure_end(pad)[0] * (1.0 - 1e-15)
+    strongest = force_limit(pad, end, criterion)
+    kinks = [ceiling / end, force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf]
+    low, high = material.factor_range
+    inside = [material.factor * each for each in kinks if low < material.factor * each < high]
+    spread = np.linspace(low, high, _FACTORS).tolist() if low < high else []
+    return [material.factor, *spread, *inside]
 
 
 def _state(
