@@ -218,9 +218,10 @@ def check_criterion(pad: Pad, criterion: str) -> None:
             ' with an edge; a measured_limit and the criterion measured, or no edge, is needed'
         )
     if criterion == 'measured' and criterion not in criteria(pad):
+        others = f'one of {", ".join(criteria(pad))}' if pad.edge is None else 'no edge,'
         raise InvalidInput(
             f'criterion = {criterion!r} is not allowed for {pad}: no force limit was measured on'
-            f' it; a measured_limit of the pad, or one of {", ".join(criteria(pad))} is needed'
+            f' it; a measured_limit of the pad, or {others} is needed'
         )
     choice('criterion', criterion, criteria(pad))
 

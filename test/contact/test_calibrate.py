@@ -302,6 +302,9 @@ class TestMaterial:
         with pytest.raises(InvalidInput, match=r'the fit is of no pad: thickness = 0\.0129'):
             data = dataclasses.replace(NOTHING, free=low)
             calibrate(data, FOOT, fit='thickness', rubber=self.pad)
+        bonded = dataclasses.replace(self.pad, edge='bonded')
+        with pytest.raises(InvalidInput, match='edge = bonded is not allowed in a calibration'):
+            calibrate(THESIS, FOOT, rubber=bonded)
         unnamed = Pad.of(dataclasses.replace(self.pad.material, name=''), 1.5e-3, 4e-4)
         with pytest.raises(InvalidInput, match='has no name'):
             foot_file(calibrate(THESIS, FOOT, rubber=unnamed))
