@@ -201,14 +201,17 @@ def _compare_materials(options: argparse.Namespace, foot: Foot | None) -> int:
     ceiling = options.pressure
     if ceiling is None:
         ceiling = CEILING if own is None or foot is None else foot.ceiling
+    same = own is not None and (radius, options.thickness) == (own.radius, None)
+    limit = MATERIAL_CRITERION if own is None or foot is None else foot.limit
+    if limit == 'measured' and not same:  # on another pad
+        limit = MATERIAL_CRITERION
     rules: dict[str, Any] = {
         'pads': foot.pads if built and foot is not None else None,
         'ceiling': ceiling,
         'margin': options.margin,
-        'criterion': options.criterion or (foot.limit if own and foot else MATERIAL_CRITERION),
+        'criterion': options.criterion or limit,
         'height': options.height or 0.0,
     }
-    same = own is not None and (radius, options.thickness) == (own.radius, None)
     with bar('candidates', 1.0, 'table', delay=2.0) as progress:
         found = candidates(
             options.load,

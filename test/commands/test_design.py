@@ -234,6 +234,9 @@ class TestMaterials:
         needed = 1e4 + (1.2 / 217 - 0.005) / 1e-6
         assert found['criterion'] == 'measured'
         assert found['candidates'][0]['pressure_pa'] == pytest.approx([needed] * 3, rel=1e-9)
+        # It says nothing of another sheet.
+        thin = of_materials(capsys, '--load', '1', '--foot', str(own), '--thickness', '0.1e-3')
+        assert thin['criterion'] == 'flattening'
 
     @pytest.mark.parametrize(
         ('arguments', 'part'),
