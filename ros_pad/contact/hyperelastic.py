@@ -461,9 +461,9 @@ class Domes:
         place = _finer(np.sqrt(states.contact))
         if not (np.diff(place, axis=1) > 0.0).all():
             raise InvalidInput(
-                f'largest_stretch is too large for pressed domes of the law {self._law[0]}'
-                f' {self._law[1]} (over its shear modulus): their shape depends on the history of'
-                ' the load; a smaller one is needed'
+                f'pressed domes of the law {self._law[0]} {self._law[1]} (over its shear modulus)'
+                ' are not known: at large stretch their shape depends on the history of the load;'
+                ' a smaller largest_stretch may help if it is above 5'
             )
         kept = np.linspace(place[:, 0].max(), place[:, -1].min(), _CONTACTS)
         return given, states, place, kept
