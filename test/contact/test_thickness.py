@@ -150,3 +150,8 @@ class TestRefusals:
     def test_pads_without_a_material(self):
         with pytest.raises(InvalidInput, match=r'edge = bonded .*a pad of a material is needed'):
             Pad(RADIUS, 40.0, edge='bonded')
+
+
+def test_without_a_line_the_criterion_measured_names_what_would_help():
+    with pytest.raises(InvalidInput, match='a measured_limit of the pad, or no edge, is needed'):
+        force_limit(of(RAW, 'bonded'), 30e3, 'measured')
