@@ -173,6 +173,8 @@ def test_contact_of_a_pad_of_a_material(capsys: pytest.CaptureFixture[str]):
     limits = [set(each['force_limit_n']) for each in answers]
     assert limits == [{'thickness', 'wall', 'flattening'}, set(), set()]
     bonded = ['contact', '--pressure', '30e3', '--edge', 'bonded']
+    assert cli.main([*bonded, *sheet]) == 0
+    assert 'none is known for a pad with an edge' in capsys.readouterr().out
     assert cli.main([*bonded, *sheet, '--force', '0.1']) == 2
     assert 'free domes only' in capsys.readouterr().err
     assert cli.main(bonded) == 2
