@@ -210,4 +210,4 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
     if not ends:
-        print('  none is known for a pad with an edge: none was measured, and others need pressed domes')
+        print('  none is known for a pad with an edge: pressed, it has no model')
