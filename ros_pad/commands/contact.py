@@ -207,7 +207,7 @@ def _show(heading: str, values: dict[str, Any], ends: dict[str, float], pad_radi
                 print(f'  {key:18} {value}')
             else:
                 print(f'  {words.replace("_", " "):18} {value:.6g} {_UNITS[unit]}')
-        if part == 'force_limit_n' and not values[part]:
-            print('  not known with an edge')
         if part == 'meniscus' and values[part].get('ring_radius_m', 0.0) > pad_radius:
             print('  (wider than the pad: this balance is not valid there, see docs/errata.md)')
+    if not ends:
+        print('  none is known for a pad with an edge: pressed, it has no model')

@@ -9,6 +9,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -284,6 +285,13 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
     }
 
 
+def _at_most(omission: dict[str, Any]) -> str:
+    """Return a bound, and of what it is a share."""
+    if omission['bound'] is None:
+        return 'no bound known'
+    return f'at most {100.0 * omission["bound"]:.1f} % {re.split("[:;,]", omission["reason"])[0]}'
+
+
 def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
     own = trial.metrics
     assert own is not None
@@ -317,9 +325,7 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
     for fault in fault_lines(own.faults):
         print(f'fault: {fault}')
     for omission in trial.settings['omitted']:
-        bound = omission['bound']
-        most = 'no bound known' if bound is None else f'at most {100.0 * bound:.1f} %'
-        print(f'left out: {omission["term"]} ({most})')
+        print(f'left out: {omission["term"]} ({_at_most(omission)})')
     if bag:
         print(f'bag:      {bag}')
     print(f'report:   {page}')

@@ -248,7 +248,8 @@ def squeeze(
         With status ``no_convergence``, when the time steps fail.
     """
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
-    number('rise', rise, 's')
+    if number('rise', rise, 's') > 0.0 and load is None:
+        raise InvalidInput(f'rise = {rise:g} s is not allowed: it is that of a load')
     return _solve(surface, initial, times, load, velocity, viscosity, rise, rings, tolerance)
 
 
@@ -391,7 +392,7 @@ def _checked(
     integer('rings', rings, 10, 2000)
     number('tolerance', tolerance, '', 1e-10, 1e-2)
     times = np.atleast_1d(np.asarray(quantity('time', time, 's'), dtype=float))
-    if times.ndim > 1 or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
+    if times.ndim > 1 or not times.size or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
         raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
     if (load is None) == (velocity is None):
         raise InvalidInput('load or velocity is needed, and not both')

@@ -495,10 +495,21 @@ def _brief(value: float) -> str:
 def _suction(scene: Scene, policy: str | None) -> Omission:
     """Return the pull of the film at lift-off.
 
+    A policy that adapts has flat feet on wet ground, too: until it has found out.
+    """
+    policy = scene.policy if policy is None else policy
+    domes = {'flat': (False,), 'dome': (True,)}.get(policy, (False, True))
+    terms = [_suction_under(_Stand(scene, dome), scene) for dome in domes]
+    return max(terms, key=lambda term: term.bound or 0.0)
+
+
+def _suction_under(stand: _Stand, scene: Scene) -> Omission:
+    """Return the pull of the film under a foot at lift-off.
+
     Rigid discs that part at a speed V: F = 3 π η a⁴ V/(2 h³), at most the atmosphere on them. A
     swing begins with h = k t²/2, so F falls below that after (12 π η a⁴/(k² F))^(1/5).
     """
-    stand, gait, stance = _on_wet_ground(scene, policy), scene.gait, _stance(scene)
+    gait, stance = scene.gait, _stance(scene)
     swing = gait.swing if isinstance(gait, RailGait) else gait.cycle - stance
     count, radius = stand.discs
     resistance = 1.5 * math.pi * scene.floor.viscosity * count * radius**4

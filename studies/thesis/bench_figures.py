@@ -530,10 +530,10 @@ _KINDS: dict[str, Any] = {NONE: '-', LINES: (0, (4, 2)), SUCTION: (0, (1, 1.2))}
 def _handles_of_34() -> list[Any]:
     return [
         *(
-            Line2D([], [], color=colour, label=f'(a) {shape}')
+            Line2D([], [], color=colour, label=f'(a) {shape}, wet')
             for shape, colour in _OF_FOOT.items()
         ),
-        Line2D([], [], color=BLACK, ls=(0, (4, 2)), label='(a) dry'),
+        Line2D([], [], color=BLACK, ls=(0, (4, 2)), label='(a) the same, dry'),
         *(Line2D([], [], color=colour, label=f'(b) {floor}') for floor, colour in _FLOORS.items()),
         *(
             Line2D([], [], color=BLACK, ls=style, label=f'(b) {kind}')

@@ -82,8 +82,8 @@ def straight(x: Array, y: Array) -> Line:
     """Fit a straight line by least squares."""
     slope, intercept = np.polyfit(x, y, 1)
     deviation = np.max(np.abs(y - slope * x - intercept)) / np.max(np.abs(y))
-    # Nine decimals: what rounding leaves of a zero is not printed.
-    return Line(float(slope), round(float(intercept), 9), round(float(deviation), 9))
+    # Nine decimals: what rounding leaves of a zero is not printed, nor its sign.
+    return Line(float(slope), round(float(intercept), 9) + 0.0, round(float(deviation), 9))
 
 
 def on_floors(foot: Foot, setup: FootBench) -> dict[str, Foot]:

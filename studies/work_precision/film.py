@@ -261,7 +261,7 @@ def draw(results: Sequence[Result]) -> Figure:
         for panel, name in zip(above, names, strict=True):
             _work(panel, [result for result in results if result.problem == name])
         _shapes(below[0], sole(3.95e5, [1e-4, 1e-3, 1e-2, 1.0]), RADIUS, MEAN)
-        below[0].set_title('flat pad of Dragon Skin 10 under 0.3 N')
+        below[0].set_title('flat pad of Dragon Skin 10, times 1.88, under 0.3 N')
         _shapes(below[1], dome(0.19, [1e-3, 1e-2, 0.1, 1.0]), contact(0.19), AIR)
         below[1].set(title='dome of 75 kPa under 0.19 N', ylim=(3e-2, 1e3))
     return figure

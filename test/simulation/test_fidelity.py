@@ -273,6 +273,15 @@ def test_suction_of_domes_acts_on_their_contact_alone():
     assert f'at most {101325.0 * 6.834 / pressure:.3g} N' in reason(scene, 'suction')
 
 
+def test_suction_under_feet_that_adapt_is_that_of_a_flat_one():
+    """They step flat onto wet ground before they know it."""
+    flat = fidelity.omitted(HEXAPOD, policy='flat')
+    for policy in ('adaptive', 'oracle'):
+        assert fidelity.omitted(HEXAPOD, policy=policy)[0] == flat[0]
+    assert flat[0].term.startswith('suction') and flat[0].bound > 0.1
+    assert fidelity.omitted(HEXAPOD, policy='dome')[0].bound < 0.01
+
+
 def test_dimple_under_domes_and_under_a_sole():
     """By hand: the lens of 0.424 · 7.53 kPa · 17 mm/395 kPa = 138 um has 235 um in its middle."""
     flat = Scene.load('hexapod_smooth_wet_flat')

@@ -116,6 +116,11 @@ def test_a_line_by_hand():
     assert line == pytest.approx((1.5, -0.5, 1.0 / 3.0))
 
 
+def test_an_intercept_of_zero_has_no_sign():
+    line = foot_bench.straight(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0 + 1e-12]))
+    assert str(line.intercept) == '0.0'
+
+
 def test_draws_are_within_the_factor_and_fixed_by_the_seed():
     drawn = foot_bench.draws(SCENE.foot, SCENE.setup)
     assert len(drawn) == 200
