@@ -210,20 +210,20 @@ def criteria(pad: Pad) -> tuple[str, ...]:
     return tuple(each for each in CRITERIA[:-1] if each != missing) + measured
 
 
-def check_criterion(pad: Pad, criterion: str) -> None:
+def check_criterion(pad: Pad, criterion: str, name: str = 'criterion') -> None:
     """Raise `InvalidInput` for a criterion that is unknown, or not known for the pad."""
     if pad.edge is not None and criterion in CRITERIA[:-1]:
         raise InvalidInput(
-            f'criterion = {criterion!r} is not allowed for {pad}: shapes under load are not known'
+            f'{name} = {criterion!r} is not allowed for {pad}: shapes under load are not known'
             ' with an edge; a measured_limit and the criterion measured, or no edge, is needed'
         )
     if criterion == 'measured' and criterion not in criteria(pad):
         others = f'one of {", ".join(criteria(pad))}' if pad.edge is None else 'no edge,'
         raise InvalidInput(
-            f'criterion = {criterion!r} is not allowed for {pad}: no force limit was measured on'
+            f'{name} = {criterion!r} is not allowed for {pad}: no force limit was measured on'
             f' it; a measured_limit of the pad, or {others} is needed'
         )
-    choice('criterion', criterion, criteria(pad))
+    choice(name, criterion, criteria(pad))
 
 
 def _is_large_pad(pad: Pad) -> bool:

@@ -196,7 +196,7 @@ class Foot:
                 f' {int((self.sole_radius / self.pad.radius) ** 2)}'
             )
         choice('limit', self.limit, CRITERIA)
-        check_criterion(self.pad, self.limit)
+        check_criterion(self.pad, self.limit, 'force_limit')
         # Every simulated step needs the limit: tabulate it once, in steps of about 0.5 kPa.
         cells = math.ceil(self.ceiling / 500.0)
         try:

@@ -75,6 +75,10 @@ def test_a_foot_of_ones_own(tmp_path, capsys):
     foot.write_text(yaml.safe_dump(values))
     out = str(tmp_path / 'bench')
     words = ['bench_inflation', '--json', '--foot', str(foot), '--out', out]
+    with pytest.raises(ConfigError, match="force_limit = 'measured' is not allowed"):
+        main(words)
+    values['force_limit'] = 'thickness'
+    foot.write_text(yaml.safe_dump(values))
     assert main(words) == 0
     rows = json.loads(capsys.readouterr().out)['rows']
     assert rows[0]['quantity'] == 'height' and rows[0]['error'] < -0.3
