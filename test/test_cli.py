@@ -172,6 +172,10 @@ def test_contact_of_a_pad_of_a_material(capsys: pytest.CaptureFixture[str]):
     assert heights == sorted(heights, reverse=True) and heights[2] < 0.9 * heights[0]
     limits = [set(each['force_limit_n']) for each in answers]
     assert limits == [{'thickness', 'wall', 'flattening'}, set(), set()]
+    assert [answers[0][key] for key in ('adhesion', 'model')] == ['none', 'membrane']
+    for option in (['--adhesion', 'text'], ['--model', 'thesis']):
+        assert cli.main(['contact', '--pressure', '30e3', *sheet, *option]) == 2
+        assert f'{option[0]} is not allowed for a pad of a material' in capsys.readouterr().err
     bonded = ['contact', '--pressure', '30e3', '--edge', 'bonded']
     assert cli.main([*bonded, *sheet]) == 0
     assert 'none is known for a pad with an edge' in capsys.readouterr().out

@@ -79,15 +79,14 @@ def add(commands: Commands) -> None:
     part.add_argument(
         '--adhesion',
         choices=tuple(ADHESION_SIGNS),
-        default='matlab',
-        help='sign of the adhesion between pad and floor (default matlab: the floor attracts)',
+        help='sign of the adhesion between pad and floor (default matlab: the floor attracts); '
+        'pads of a material have none',
     )
     part.add_argument(
         '--model',
         choices=MODELS,
-        default='thesis',
         help='thesis: spherical dome (default); membrane: exact and slower, but the free dome and '
-        'the force limits remain those of the spherical dome',
+        'the force limits remain those of the spherical dome; pads of a material are membranes',
     )
     part.add_argument(
         '--liquid',
@@ -101,6 +100,7 @@ def add(commands: Commands) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print shape, ring of liquid and force limits of the pad; return the exit status."""
     pad, name = _pad(options)
+    _choose_law(pad, options)
     liquid = contact.WATER if options.liquid == 'water' else contact.THESIS_LIQUID
     pressure, force = options.pressure, options.force
     values: dict[str, Any] = {
@@ -147,6 +147,19 @@ def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
         if getattr(options, key) is not None:
             raise InvalidInput(f'--{key} is not allowed without --material')
     return pad, name
+
+
+def _choose_law(pad: contact.Pad, options: argparse.Namespace) -> None:
+    """Set the adhesion and model that were not given; refuse those that the pad does not have."""
+    cap = pad.material is None
+    for key, of_cap, of_rubber in (
+        ('adhesion', 'matlab', 'none'),
+        ('model', 'thesis', 'membrane'),
+    ):
+        if getattr(options, key) is None:
+            setattr(options, key, of_cap if cap else of_rubber)
+        elif not cap:
+            raise InvalidInput(f'--{key} is not allowed for a pad of a material')
 
 
 def _shapes(
