@@ -12,10 +12,12 @@ from ros_pad import contact
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.configuration import number
 from ros_pad.contact.dome import ADHESION_SIGNS
 from ros_pad.contact.dome import MODELS
 from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact.resistance import RUBBER_SETTINGS
 from ros_pad.contact.thickness import HIGHEST
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
@@ -141,8 +143,12 @@ def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
         pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
     if options.material is not None:
         material = contact.Material.load(options.material)
-        name = f'pad of {options.material}'
-        return contact.Pad.of(material, options.radius, options.thickness, edge=options.edge), name
+        radius, thickness = (
+            number(f'--{each.name}', getattr(options, each.name), each.unit, each.low, each.high)
+            for each in (RUBBER_SETTINGS[0], RUBBER_SETTINGS[-1])
+        )
+        made = contact.Pad.of(material, radius, thickness, edge=options.edge)
+        return made, f'pad of {options.material}'
     for key in ('radius', 'thickness', 'edge'):
         if getattr(options, key) is not None:
             raise InvalidInput(f'--{key} is not allowed without --material')

@@ -147,10 +147,22 @@ def candidates(
         for thickness in thicknesses:
             pad = Pad.of(material, radius, thickness, measured_limit)
             count = pads_for(area, pad, pads)
-            found.append(_candidate(pad, count, load, ceiling, margin, criterion, height))
+            asked = _Asked(count, load, ceiling, margin, criterion, height)
+            found.append(_candidate(pad, asked))
             if progress is not None:
                 progress(len(found) / (len(materials) * len(thicknesses)))
     return tuple(found)
+
+
+class _Asked(NamedTuple):
+    """Number of pads, and what is asked of them; see :func:`candidates`."""
+
+    pads: int
+    load: float
+    ceiling: float
+    margin: float
+    criterion: str
+    height: float
 
 
 class _State(NamedTuple):
@@ -163,26 +175,15 @@ class _State(NamedTuple):
     ballooning_margin: Any
 
 
-def _candidate(
-    pad: Pad,
-    pads: int,
-    load: float,
-    ceiling: float,
-    margin: float,
-    criterion: str,
-    height: float,
-) -> Candidate:
+def _candidate(pad: Pad, asked: _Asked) -> Candidate:
     states = [
-        _state(
-            with_constant(pad, 'factor', factor), pads, load, ceiling, margin, criterion, height
-        )
-        for factor in _factors(pad, load * margin / pads, ceiling, criterion)
+        _state(with_constant(pad, 'factor', factor), asked) for factor in _factors(pad, asked)
     ]
-    enough = [state.pressure <= ceiling for state in states]
+    enough = [state.pressure <= asked.ceiling for state in states]
     spans = _State(*(Span(each[0], min(each), max(each)) for each in zip(*states, strict=True)))
     return Candidate(
         pad=pad,
-        pads=pads,
+        pads=asked.pads,
         pressure=spans.pressure,
         height=spans.height,
         load=spans.load,
@@ -193,7 +194,7 @@ def _candidate(
     )
 
 
-def _factors(pad: Pad, force: float, ceiling: float, criterion: str) -> list[float]:
+def _factors(pad: Pad, asked: _Asked) -> list[float]:
     """Return the factor of a pad's material, and factors over the range of the doubts about it.
 
     Among them are those at which the largest pressure is the ceiling, and at which the pad just
@@ -202,26 +203,23 @@ def _factors(pad: Pad, force: float, ceiling: float, criterion: str) -> list[flo
     material = pad.material
     assert material is not None and material.factor_range is not None
     end = pressure_end(pad)[0] * (1.0 - 1e-15)
-    strongest = force_limit(pad, end, criterion)
-    kinks = [ceiling / end, force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf]
+    force = asked.load * asked.margin / asked.pads
+    strongest = force_limit(pad, end, asked.criterion)
+    kinks = [
+        asked.ceiling / end,
+        force / strongest * (1.0 + 1e-9) if strongest > 0.0 else math.inf,
+    ]
     low, high = material.factor_range
     inside = [material.factor * each for each in kinks if low < material.factor * each < high]
     spread = np.linspace(low, high, _FACTORS).tolist() if low < high else []
     return [material.factor, *spread, *inside]
 
 
-def _state(
-    pad: Pad,
-    pads: int,
-    load: float,
-    ceiling: float,
-    margin: float,
-    criterion: str,
-    height: float,
-) -> _State:
+def _state(pad: Pad, asked: _Asked) -> _State:
+    height, margin = asked.height, asked.margin
     end = pressure_end(pad)[0]
     try:
-        pressure = pressure_for(pad, load / pads, criterion, margin)
+        pressure = pressure_for(pad, asked.load / asked.pads, asked.criterion, margin)
     except NoEquilibrium:
         pressure = math.inf
     if height > highest_dome(pad):
@@ -229,11 +227,11 @@ def _state(
     elif height > 0.0:
         pressure = max(pressure, float(pressure_for_height(pad, np.array([height]))[0]))
     # force_limit can refuse the end itself because of rounding.
-    limit = force_limit(pad, min(ceiling, end * (1.0 - 1e-15)), criterion)
+    limit = force_limit(pad, min(asked.ceiling, end * (1.0 - 1e-15)), asked.criterion)
     return _State(
         pressure,
         inflate(pad, min(pressure, end)).height,
-        pads * limit / margin,
+        asked.pads * limit / margin,
         end,
         end / pressure,
     )
