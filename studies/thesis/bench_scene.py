@@ -68,13 +68,11 @@ class PressBench:
 
 
 @dataclass(frozen=True)
-class TangentialBench:
-    """Test in which a pressed pad is dragged until it begins to slip (thesis 3.2.2).
+class DragBench:
+    """Test in which something is pressed and dragged until it begins to slip.
 
     Attributes
     ----------
-    highest_load : float
-        Normal force up to which the flat pad is tried, N.
     speed : float
         Speed of the stage that drags the foot, m/s.
     dwell : float
@@ -85,6 +83,24 @@ class TangentialBench:
         Viscosity of the liquid, Pa s.
     advancing_angle, receding_angle : float
         Contact angles at which the edge of the liquid advances and recedes, rad.
+    """
+
+    speed: float
+    dwell: float
+    film_thickness: float
+    viscosity: float
+    advancing_angle: float
+    receding_angle: float
+
+
+@dataclass(frozen=True)
+class TangentialBench(DragBench):
+    """Test in which a pressed pad is dragged (thesis 3.2.2).
+
+    Attributes
+    ----------
+    highest_load : float
+        Normal force up to which the flat pad is tried, N.
     smallest_radius, largest_radius : float
         Pad radii between which the height of rise is drawn, m.
     claimed_smallest, claimed_largest : float
@@ -93,12 +109,6 @@ class TangentialBench:
 
     kind: ClassVar[str] = 'tangential'
     highest_load: float
-    speed: float
-    dwell: float
-    film_thickness: float
-    viscosity: float
-    advancing_angle: float
-    receding_angle: float
     smallest_radius: float
     largest_radius: float
     claimed_smallest: float
@@ -106,7 +116,7 @@ class TangentialBench:
 
 
 @dataclass(frozen=True)
-class FootBench:
+class FootBench(DragBench):
     """Test in which a whole foot is pressed and dragged on four floors (thesis 4.3.1).
 
     Attributes
@@ -115,18 +125,8 @@ class FootBench:
         Gauge pressure of the domes, Pa.
     lowest_load, highest_load : float
         Normal forces between which the foot is tried, N.
-    speed : float
-        Speed of the stage that drags the foot, m/s.
-    dwell : float
-        Time from touch-down until the stage starts, s.
-    film_thickness : float
-        Depth of the liquid on wet ground, m.
-    viscosity : float
-        Viscosity of the liquid, Pa s.
     roughness : float
         Root mean square height of the rough floor, m; the smooth one has none.
-    advancing_angle, receding_angle : float
-        Contact angles at which the edge of the liquid advances and recedes, rad.
     factor : float
         Factor by which each assumed number may be too high or too low.
     samples, seed : int
@@ -139,13 +139,7 @@ class FootBench:
     pressure: float
     lowest_load: float
     highest_load: float
-    speed: float
-    dwell: float
-    film_thickness: float
-    viscosity: float
     roughness: float
-    advancing_angle: float
-    receding_angle: float
     factor: float
     samples: int
     seed: int
