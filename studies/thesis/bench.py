@@ -64,7 +64,7 @@ NO_ERROR = 'no error stated'
 NOT_CODED = 'no numbers in the thesis'
 _POINTS = 161  # of a curve
 STIFFER = 1.2  # times as stiff as the pad of the bench
-_DRAWS = 100  # of the assumed numbers of a dragged pad
+DRAWS = 100  # of the assumed numbers of a dragged pad
 _STEPS = 200  # of the tangential force from 0 to the dry resistance
 
 
@@ -798,7 +798,7 @@ def _drawn(scene: BenchScene, setup: TangentialBench, pressure: float, load: flo
     doubt = BenchScene.load('bench_foot').setup
     assert isinstance(doubt, FootBench)
     own = dataclasses.replace(
-        doubt, dwell=setup.dwell, film_thickness=setup.film_thickness, samples=_DRAWS
+        doubt, dwell=setup.dwell, film_thickness=setup.film_thickness, samples=DRAWS
     )
     angles = (WATER.surface_tension, setup.advancing_angle, setup.receding_angle)
     lines = float(hysteresis_force(press(scene.pad, pressure, load).contact_radius, *angles))

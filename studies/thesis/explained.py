@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
 from dataclasses import dataclass
 from typing import Any
@@ -82,6 +84,12 @@ class Claim:
     def as_dict(self) -> dict[str, Any]:
         """Return the statement for JSON."""
         return asdict(self) | {'where': self.where, 'verdict': self.verdict}
+
+
+def counted(claims: Sequence[Claim]) -> str:
+    """Return as text how many statements have each verdict."""
+    found = Counter(claim.verdict for claim in claims)
+    return ', '.join(f'{found[verdict]} {verdict}' for verdict in VERDICTS if found[verdict])
 
 
 @dataclass(frozen=True)
