@@ -745,7 +745,7 @@ def _tangential_claims(
             'loaded at '
             'once floats on any sole.',
             tuned=TUNED_FRICTION + ', width of the sole',
-            see='errata.md#wet-ground',
+            see='model/film.md#what-a-flat-sole-does',
         ),
         Claim(
             20,
