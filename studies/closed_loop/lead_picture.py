@@ -30,6 +30,7 @@ from ros_pad.contact import force_limit
 from ros_pad.contact import inflate
 from ros_pad.contact import press
 from ros_pad.contact import squeeze
+from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.reports import path_map
@@ -111,7 +112,7 @@ def figures(trials: Sequence[Trial], processor_s: float) -> dict[str, Any]:
     """Return the figures of the README that no other study has, in SI units."""
     scene = Scene.load(trials[0].scene)
     dry = dataclasses.replace(scene, floor=dataclasses.replace(scene.floor, kind='dry'))
-    dome = mid_stance_grip(scene, dome=True, wet=False)
+    friction = expected_friction(scene.foot, scene.expected_load)
     return {
         'command': 'python -m studies lead_picture',
         'scene': scene.name,
@@ -120,10 +121,10 @@ def figures(trials: Sequence[Trial], processor_s: float) -> dict[str, Any]:
         'walks': {trial.policy: _walk(trial) for trial in trials},
         'run_processor_s': processor_s,
         'over_weight': {
-            'demand, dry': dome / reserve(dry, 'dome'),
-            'dome, dry': dome,
-            'flat, dry': mid_stance_grip(scene, dome=False, wet=False),
-            'flat, wet': mid_stance_grip(scene, dome=False, wet=True),
+            'demand, dry': mid_stance_grip(dry, dome=True, wet=False) / reserve(dry, 'dome'),
+            'dome': friction.dome,
+            'flat, dry': friction.flat_dry,
+            'flat, wet': friction.flat_wet,
         },
         'soft_film': _soft_film(scene),
         'pad': {
@@ -157,7 +158,9 @@ def _soft_film(scene: Scene) -> dict[str, float]:
     contact = math.sqrt(load / (math.pi * pressure))
     sphere = float(press(foot.pad, pressure, load).sphere_radius)
     surface = Membrane(1.51 * contact, 0.5 * pressure * sphere, pressure)
-    soft = squeeze(surface, floor.film_thickness, [time], load=load, rise=RISE, rings=150)
+    soft = squeeze(
+        surface, floor.film_thickness, [time], load=load, rise=RISE, rings=100, tolerance=1e-4
+    )
     inside = soft.radius < contact
     rigid = film_thickness(floor.film_thickness, pressure, contact, time)
 
