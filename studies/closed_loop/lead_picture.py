@@ -159,7 +159,7 @@ def _soft_film(scene: Scene) -> dict[str, float]:
     sphere = float(press(foot.pad, pressure, load).sphere_radius)
     surface = Membrane(1.51 * contact, 0.5 * pressure * sphere, pressure)
     soft = squeeze(
-        surface, floor.film_thickness, [time], load=load, rise=RISE, rings=100, tolerance=1e-4
+        surface, floor.film_thickness, [time], load=load, rise=RISE, rings=150, tolerance=1e-4
     )
     inside = soft.radius < contact
     rigid = film_thickness(floor.film_thickness, pressure, contact, time)

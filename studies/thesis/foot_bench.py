@@ -408,8 +408,9 @@ def _small_claim(rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[P
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
         SECTION,
-        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground; on '
-        'moist ground not at light loads.',
+        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground, '
+        'at any '
+        'contact angles (four times as much at most); on moist ground not at light loads.',
         see=FOOT_OF_43,
     )
 
@@ -470,7 +471,9 @@ def _viscosity_claim(
         share <= STRAIGHT,
         '3.2.2, 4.3.1',
         printed=f'{1e3 * setup.speed:g} mm/s',
-        rule=f'Shear at most {100 * STRAIGHT:g} % of the smallest force.',
+        rule=f'Shear at most {100 * STRAIGHT:g} % of the smallest force, with the thinnest film '
+        'that is '
+        'assumed to lubricate.',
         see=FOOT_OF_43,
     )
 
