@@ -1,15 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw the picture at the top of the README: one walk from above, and the distance by policy."""
+"""Draw the picture at the top of the README, and write figures of the README to readme.json.
+
+The picture has one walk from above, and the distance by policy.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 
+from ros_pad import configuration
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import Membrane
+from ros_pad.contact import film_thickness
+from ros_pad.contact import force_limit
+from ros_pad.contact import inflate
+from ros_pad.contact import press
+from ros_pad.contact import squeeze
+from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.reports import path_map
@@ -19,9 +40,17 @@ from ros_pad.reports.pictures import draw_comparison
 from ros_pad.reports.style import STYLE
 from ros_pad.reports.style import rendered
 from ros_pad.reports.view import view_of
+from ros_pad.simulation import Scene
+from ros_pad.simulation.fidelity import mid_stance_grip
+from ros_pad.simulation.fidelity import omitted
+from ros_pad.simulation.fidelity import reserve
 from ros_pad.trials import Trial
 from ros_pad.trials import run
 from studies import command
+
+SCENE, SEED = 'hexapod_patches', 0
+DOME = 0.185, 70e3, 0.3  # N, Pa and s: a dome of the scene in mid-stance
+RISE = 0.03  # s in which its load comes
 
 
 def lead_picture(
@@ -79,16 +108,88 @@ def lead_picture(
         save(path, rendered(figure, 'png', dpi=100))
 
 
+def figures(trials: Sequence[Trial], processor_s: float) -> dict[str, Any]:
+    """Return the figures of the README that no other study has, in SI units."""
+    scene = Scene.load(trials[0].scene)
+    dry = dataclasses.replace(scene, floor=dataclasses.replace(scene.floor, kind='dry'))
+    friction = expected_friction(scene.foot, scene.expected_load)
+    return {
+        'command': 'python -m studies lead_picture',
+        'scene': scene.name,
+        'seeds': [trials[0].seed],
+        'cycles': scene.cycles,
+        'walks': {trial.policy: _walk(trial) for trial in trials},
+        'run_processor_s': processor_s,
+        'over_weight': {
+            'demand, dry': mid_stance_grip(dry, dome=True, wet=False) / reserve(dry, 'dome'),
+            'dome': friction.dome,
+            'flat, dry': friction.flat_dry,
+            'flat, wet': friction.flat_wet,
+        },
+        'soft_film': _soft_film(scene),
+        'pad': {
+            'height_m': inflate(LARGE_PAD, 75e3).height,
+            'force_limit_n': force_limit(LARGE_PAD, 75e3),
+        },
+    }
+
+
+def _walk(trial: Trial) -> dict[str, Any]:
+    assert trial.metrics is not None
+    return {
+        'mm_a_cycle': 1e3 * trial.metrics.distance_per_cycle_m,
+        'slip_m_a_foot': float(np.mean(trial.metrics.slip_path_m)),
+        'switches': sum(trial.metrics.switches),
+        'times_real_time': trial.real_time_factor,
+    }
+
+
+def _soft_film(scene: Scene) -> dict[str, float]:
+    """Return what a soft film may cost, and the dry shares of a dome whose load comes slowly."""
+    losses = [
+        term.bound or 0.0
+        for name in configuration.names('scenes')
+        if not name.startswith('bench_')
+        for term in omitted(Scene.load(name))
+        if term.term.startswith('dimple')
+    ]
+    load, pressure, time = DOME
+    foot, floor = scene.foot, scene.floor
+    contact = math.sqrt(load / (math.pi * pressure))
+    sphere = float(press(foot.pad, pressure, load).sphere_radius)
+    surface = Membrane(1.51 * contact, 0.5 * pressure * sphere, pressure)
+    soft = squeeze(
+        surface, floor.film_thickness, [time], load=load, rise=RISE, rings=150, tolerance=1e-4
+    )
+    inside = soft.radius < contact
+    rigid = film_thickness(floor.film_thickness, pressure, contact, time)
+
+    def dry(film: Any) -> Any:
+        return np.exp(-((np.asarray(film) / foot.critical_film) ** foot.film_exponent))
+
+    return {
+        'largest_loss': max(losses),
+        'rise_s': RISE,
+        'dry_soft': float(np.average(dry(soft.thickness[0, inside]), weights=soft.area[inside])),
+        'dry_rigid': float(dry(rigid)),
+    }
+
+
 def main(words: Sequence[str]) -> int:
-    """Run the scene under each policy and draw the picture; return the exit status."""
+    """Run the scene under each policy, draw the picture, write the figures; return the status."""
     parser = command.parser('lead_picture', __doc__)
-    parser.add_argument('path', nargs='?', default='docs/charts/hexapod_patches.png')
-    parser.add_argument('--scene', default='hexapod_patches')
-    parser.add_argument('--seed', type=int, default=0, help='seed of floor and noise (default: 0)')
-    parser.add_argument('--force', action='store_true', help='replace an existing file')
+    command.add_out(parser)
+    command.add_count(parser, '--cycles', Scene.load(SCENE).cycles, 'gait cycles of a walk')
     options = parser.parse_args(words)
-    refuse(options.path, options.force)
-    trials = [run(options.scene, policy, options.seed) for policy in POLICIES]
-    lead_picture(trials, options.path, options.force)
-    print(json.dumps({'picture': options.path}) if options.json else options.path)
+    scene = dataclasses.replace(Scene.load(SCENE), cycles=options.cycles)
+    trials = [run(scene, policy, SEED) for policy in POLICIES]
+    with tempfile.TemporaryDirectory() as folder:
+        pad = pathlib.Path(sys.executable).with_name('pad')
+        quiet = subprocess.DEVNULL
+        subprocess.run([pad, 'run', SCENE], cwd=folder, stdout=quiet, stderr=quiet, check=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor_s = used.ru_utime + used.ru_stime
+    lead_picture(trials, options.out / f'{SCENE}.png', force=True)
+    document = command.write(options.out, 'readme', figures(trials, processor_s))
+    command.show(options, document, json.dumps(document, indent=1))
     return 0

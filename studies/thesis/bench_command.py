@@ -26,6 +26,7 @@ from studies.thesis import bench
 from studies.thesis import bench_figures
 from studies.thesis import bench_page
 from studies.thesis.bench_scene import BenchScene
+from studies.thesis.explained import counted
 
 DPI = 200  # of a PNG
 
@@ -96,10 +97,11 @@ def _show(trial: bench.BenchTrial) -> None:
                 for column, (text, width) in enumerate(zip(line, widths, strict=True))
             ).rstrip()
         )
-    print('\n' + bench_page.verdict(trial.claims))
+    print(f'\nStatements of the thesis: {counted(trial.claims)}.')
     for claim in trial.claims:
-        print(f'\nfigure {claim.figure}: {bench_page.VERDICTS[claim.holds]}')
-        for who, text in (('thesis', claim.thesis), ('here', claim.ours)):
+        print(f'\n{claim.where}: {claim.verdict}')
+        said = f'{claim.thesis} {claim.printed and f"({claim.printed})"}'
+        for who, text in (('thesis', said), ('here', claim.ours), ('rule', claim.reason())):
             print(textwrap.fill(text, 99, initial_indent=f'  {who:8}', subsequent_indent=10 * ' '))
     print()
     for note in trial.notes:

@@ -21,8 +21,8 @@ from studies.thesis.bench import FIDELITY
 from studies.thesis.bench import BenchTrial
 from studies.thesis.bench import Row
 from studies.thesis.explained import Claim
+from studies.thesis.explained import counted
 
-VERDICTS = {True: 'holds', False: 'does not hold', None: 'cannot be checked'}
 HEAD = (
     'figure',
     'quantity',
@@ -58,21 +58,9 @@ def write(trial: BenchTrial, drawn: Mapping[str, Drawn], path: str | os.PathLike
     parts = [
         f'<h1>{html.escape(scene.name)}</h1><p class="facts">{html.escape(facts)}</p>',
         f'<p>{html.escape(scene.description)}</p>',
-        f'<p class="result">{html.escape(verdict(trial.claims))}</p>',
-        '<h2>What the thesis claims</h2>',
-        table(
-            ['figure', 'thesis', 'here', ''],
-            [
-                [
-                    str(claim.figure),
-                    html.escape(claim.thesis),
-                    html.escape(claim.ours),
-                    f'<b>{VERDICTS[claim.holds]}</b>',
-                ]
-                for claim in trial.claims
-            ],
-            range(0),
-        ),
+        f'<p class="result">Statements of the thesis: {counted(trial.claims)}.</p>',
+        '<h2>What the thesis states</h2>',
+        statements(trial.claims),
     ]
     with matplotlib.rc_context(PAPER_STYLE):
         for each in drawn.values():
@@ -106,13 +94,17 @@ def write(trial: BenchTrial, drawn: Mapping[str, Drawn], path: str | os.PathLike
     save(path, page(f'{scene.name}: ros_pad', parts).encode())
 
 
-def verdict(claims: Sequence[Claim]) -> str:
-    """Return a sentence with the numbers of claims that hold, do not, and cannot be checked."""
-    good, bad, open_ = (sum(claim.holds is holds for claim in claims) for holds in VERDICTS)
-    return (
-        f'Of {len(claims)} claims of the thesis {good} {"holds" if good == 1 else "hold"} here, '
-        f'{bad} {"does" if bad == 1 else "do"} not, and {open_} cannot be checked.'
-    )
+def statements(claims: Sequence[Claim]) -> str:
+    """Return the table of statements with their verdicts, as HTML."""
+    rows = [
+        [
+            html.escape(claim.where),
+            f'<b>{claim.verdict}</b>',
+            *map(html.escape, (claim.thesis, claim.printed, claim.ours, claim.reason())),
+        ]
+        for claim in claims
+    ]
+    return table(['', '', 'the thesis states', 'its number', 'here', 'rule'], rows, range(0))
 
 
 def cells(row: Row) -> list[str]:

@@ -1,29 +1,52 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the thesis drawn by ros_pad, with its measured, modelled and assumed parts."""
+"""Statement of the thesis with its verdict, and a figure of the thesis drawn by ros_pad."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
 from dataclasses import dataclass
+from typing import Any
 
 from ros_pad.reports.style import Drawn
 
 MINIMAL = 0.10  # relative difference up to which one counts as "minimal"; not from the thesis
 
+REPRODUCED = 'reproduced'
+REFUTED = 'refuted'
+TUNED = 'tuned to agree'
+OPEN = 'underdetermined'
+NOT_MODELLED = 'not modelled'
+VERDICTS = (REPRODUCED, REFUTED, TUNED, OPEN, NOT_MODELLED)
+
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the thesis, and the result of the model.
+    """A statement of the thesis, and the result of the model.
 
     Attributes
     ----------
     figure : int
-        Number of the figure in the thesis.
+        Number of the figure in the thesis; 0 for a statement without one.
     thesis, ours : str
-        The claim, and the result here, with numbers.
+        The statement in our words, and the result here, with sample size.
     numbers : tuple of float
-        Numbers that decide whether the claim holds.
+        Numbers that decide whether the statement holds.
     holds : bool or None
-        None where the thesis does not give enough to decide.
+        None where that cannot be computed.
+    section : str
+        Section of the thesis, and equation.
+    printed : str
+        Number of the thesis.
+    rule : str
+        What counts as agreement, and the condition under which it holds.
+    tuned : str
+        Assumed numbers that were chosen such that the statement holds.
+    missing : str
+        Numbers which the thesis lacks, where that leaves the statement open.
+    see : str
+        Derivation: a page of docs with its anchor.
     """
 
     figure: int
@@ -31,6 +54,42 @@ class Claim:
     ours: str
     numbers: tuple[float, ...]
     holds: bool | None
+    section: str
+    printed: str = ''
+    rule: str = ''
+    tuned: str = ''
+    missing: str = ''
+    see: str = ''
+
+    @property
+    def verdict(self) -> str:
+        """Return one of :data:`VERDICTS`."""
+        if self.holds is None:
+            return OPEN if self.missing else NOT_MODELLED
+        if not self.holds:
+            return REFUTED
+        return TUNED if self.tuned else REPRODUCED
+
+    @property
+    def where(self) -> str:
+        """Return section and figure."""
+        return f'{self.section}, Fig. {self.figure}' if self.figure else self.section
+
+    def reason(self) -> str:
+        """Return rule and condition, what was tuned if it holds, or what is missing."""
+        tuned = f'Tuned: {self.tuned}.' if self.verdict == TUNED else ''
+        missing = f'Missing: {self.missing}.' if self.verdict == OPEN else ''
+        return ' '.join(filter(None, (self.rule, tuned, missing)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the statement for JSON."""
+        return asdict(self) | {'where': self.where, 'verdict': self.verdict}
+
+
+def counted(claims: Sequence[Claim]) -> str:
+    """Return as text how many statements have each verdict."""
+    found = Counter(claim.verdict for claim in claims)
+    return ', '.join(f'{found[verdict]} {verdict}' for verdict in VERDICTS if found[verdict])
 
 
 @dataclass(frozen=True)
@@ -47,7 +106,7 @@ class Explained:
         Texts about the parts that come from the thesis' measurements, from the model, and from
         assumptions.
     claims : tuple of Claim
-        Claims of the thesis about the figure, and the results here.
+        Statements of the thesis about the figure, and the results here.
     """
 
     number: int

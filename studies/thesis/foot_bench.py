@@ -45,6 +45,7 @@ FLAT, DOME = 'flat', 'dome'
 SMOOTH, ROUGH = 'smooth', 'rough'
 CASES = tuple(itertools.product((FLAT, DOME), (SMOOTH, ROUGH)))
 NONE, LINES, SUCTION = 'no capillary force', 'pinned lines', 'pinned lines and suction'
+SECTION, FOOT_OF_43 = '4.3.1', 'model/foot.md#the-foot-of-chapter-43'
 PATTERN = '4.18, gaps full of water'
 STRAIGHT = 0.02  # deviation over the largest force up to which a line is straight; ours
 LOW, HIGH = 0.05, 0.95  # quantiles of an interval
@@ -161,7 +162,7 @@ def compute(scene: BenchScene, setup: FootBench) -> BenchTrial:
     return BenchTrial(
         scene,
         tuple(rows),
-        _claims(setup, rows, found, lines),
+        _claims(scene, setup, rows, found, lines),
         curves,
         _notes(scene, setup),
         _omitted(foot, setup, found),
@@ -299,21 +300,35 @@ def _by_layers(foot: Foot, pressure: float, load: float, liquid: Liquid, balance
 
 
 def _claims(
+    scene: BenchScene,
     setup: FootBench,
     rows: Sequence[Row],
     found: Mapping[tuple[str, str], Sequence[Pulled]],
     lines: Mapping[str, Line],
 ) -> tuple[Claim, ...]:
     return (
-        *(_sign_claim(rows, *case) for case in CASES),
+        Claim(
+            33,
+            'Microscope pictures of a smooth and a rough plastic.',
+            f'The rough one is taken as {1e6 * setup.roughness:g} µm RMS, drawn up to twice and '
+            'half.',
+            (setup.roughness,),
+            None,
+            SECTION,
+            missing='the scale of the pictures, the roughness',
+            see=FOOT_OF_43,
+        ),
+        *(_sign_claim(setup, rows, *case) for case in CASES),
         _linear_claim(setup, lines),
         _small_claim(rows, found),
         _error_claim(setup, rows, found),
+        _viscosity_claim(scene.foot, setup, found),
+        _pressure_claim(scene.foot, setup),
         _title_claim(found),
     )
 
 
-def _sign_claim(rows: Sequence[Row], shape: str, floor: str) -> Claim:
+def _sign_claim(setup: FootBench, rows: Sequence[Row], shape: str, floor: str) -> Claim:
     """Return the verdict on the sign: decided where an interval is on one side of 0."""
     parts, lows, highs = [], [], []
     for kind in _kinds(shape):
@@ -324,20 +339,27 @@ def _sign_claim(rows: Sequence[Row], shape: str, floor: str) -> Claim:
         )
         share = [f'{100 * row.modelled:.0f}' for row in mine if not row.unit]
         parts.append(
-            f'{kind} {_few(here[0])} mN at the lowest and {_few(here[1])} mN at the highest load '
-            f'(draws {_few(low[0])} to {_few(high[0])} and {_few(low[1])} to {_few(high[1])} mN; '
+            f'{kind} {_few(here[0])} and {_few(here[1])} mN '
+            f'(draws {_few(low[0])} to {_few(high[0])} and {_few(low[1])} to {_few(high[1])}; '
             f'above 0 in {share[0]} and {share[1]} %)'
         )
         if kind != NONE:
             lows += low
             highs += high
     decided = True if min(lows) > 0.0 else False if max(highs) < 0.0 else None
+    loads = f'At {setup.lowest_load:g} and {setup.highest_load:g} N: '
     return Claim(
         34,
-        f'F_cap = F_wet − F_dry is what the liquid adds, above 0 ({shape}, {floor}).',
-        '; '.join(parts).replace('-', '−') + '.',
+        f'F_cap = F_wet − F_dry is what the liquid adds ({shape}, {floor}).',
+        loads + '; '.join(parts).replace('-', '−') + f'; {setup.samples} draws.',
         (*lows, *highs),
         decided,
+        SECTION,
+        printed='above 0, no number',
+        rule='Decided if 5 to 95 % of draws are on one side of 0 at both loads, with any bound on '
+        'capillary force.',
+        missing='number of domes, loads, depth of water, contact angles, roughness',
+        see=FOOT_OF_43,
     )
 
 
@@ -351,16 +373,20 @@ def _linear_claim(setup: FootBench, lines: Mapping[str, Line]) -> Claim:
     good = sum(line.deviation <= STRAIGHT for line in lines.values())
     return Claim(
         34,
-        'Friction forces are linear in the contact force.',
-        f'Up to {setup.highest_load:g} N {good} of {len(lines)} lines are straight, within '
-        f'{100 * STRAIGHT:g} % of their largest force; the worst is off by '
-        f'{100 * lines[worst].deviation:.2g} % ({worst}). Of dry forces '
-        'this is no result but an assumption: areas of contact are taken in proportion to the '
-        'load. Slopes: '
+        'Friction is linear in the contact force.',
+        f'Up to {setup.highest_load:g} N {good} of {len(lines)} lines are straight; the worst is '
+        'off '
+        f'by {100 * lines[worst].deviation:.2g} % of its largest force ({worst}). Slopes: '
         + '; '.join(f'{name} {line.slope:.3f}' for name, line in lines.items())
         + '.',
         tuple(line.deviation for line in lines.values()),
-        good == len(lines),
+        True if good == len(lines) else None,
+        SECTION,
+        rule=f'All within {100 * STRAIGHT:g} %. That dry lines are straight is assumed (area in '
+        'proportion to the load).',
+        tuned='contact areas in proportion to the load',
+        missing='points of Fig. 34a, depth of water and roughness, which bend the wet lines',
+        see=FOOT_OF_43,
     )
 
 
@@ -370,17 +396,22 @@ def _small_claim(rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[P
     estimates = [row.modelled for row in rows if row.model == '3.82, corrected, water']
     return Claim(
         34,
-        'The capillary force is much smaller than the tangential force, and not proportional to '
-        'the contact force.',
-        f'On flooded ground pinned lines hold at most {100 * share:.2g} % of the force of domes, '
-        f'and {last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
-        f'where dry friction is {last.dry / first.dry:.1f} times as much. On moist ground suction '
-        f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest and '
-        f"{100 * last.suction / last.dry:.1f} % at the highest load. The thesis' estimate (3.82 "
-        f'corrected, water), which has no net force, is {100 * estimates[0] / first.dry:.0f} and '
-        f'{100 * estimates[1] / last.dry:.1f} %: not small at light loads.',
+        'The capillary force is far below the tangential force, and not in proportion to the '
+        'load.',
+        f'Pinned lines hold at most {100 * share:.2g} % of the force of domes, and '
+        f'{last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
+        f'where dry friction is {last.dry / first.dry:.1f} times as much. Suction on moist ground '
+        f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest load. 3.82 '
+        'corrected, '
+        f'water, would be {100 * estimates[0] / first.dry:.0f} and '
+        f'{100 * estimates[1] / last.dry:.1f} %.',
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
+        SECTION,
+        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground, '
+        'at any '
+        'contact angles (four times as much at most); on moist ground not at light loads.',
+        see=FOOT_OF_43,
     )
 
 
@@ -399,19 +430,71 @@ def _error_claim(
     needed = [middle * force / math.sqrt(2.0) for force in (last.lines, last.suction)]
     return Claim(
         34,
-        'Measured and estimated capillary forces correspond, with errors of '
-        f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %.',
-        'No measured number is printed. The estimates for the foot: '
+        'Measured and estimated capillary forces agree, errors included.',
+        'Estimates for the foot: '
         + '; '.join(
             f'{name} {" to ".join(map(_few, each))} mN' for name, each in estimates.items()
         )
-        + '. To check it, one would need F_wet and F_dry at each load with their scatter, the '
-        'number of domes, depth of water, contact angles, and roughness. F_cap is a '
-        f'difference: to know it to {100 * middle:.0f} %, each force at {setup.highest_load:g} N '
-        f'must be known to {100 * needed[0] / last.dry:.2g} % (if F_cap is that of pinned lines) '
-        f'or {100 * needed[1] / last.dry:.2g} % (if that of suction).',
+        + '.',
         tuple(value for pair in estimates.values() for value in pair),
         None,
+        SECTION,
+        printed=f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %',
+        rule=f'To know F_cap to {100 * middle:.0f} %, each force at {setup.highest_load:g} N '
+        'must be '
+        f'known to {100 * needed[0] / last.dry:.2g} % (if it is that of pinned lines) or '
+        f'{100 * needed[1] / last.dry:.2g} % (if that of suction).',
+        missing='F_wet and F_dry at each load with their scatter, number of domes, depth of '
+        'water, '
+        'contact angles, roughness',
+        see=FOOT_OF_43,
+    )
+
+
+def _shear(foot: Foot, setup: FootBench) -> float:
+    """Return Couette shear, N, of the sole on a film as thin as the roughness of the pad."""
+    return setup.viscosity * setup.speed * foot.sole_area / foot.critical_film
+
+
+def _viscosity_claim(
+    foot: Foot, setup: FootBench, found: Mapping[tuple[str, str], Sequence[Pulled]]
+) -> Claim:
+    shear = _shear(foot, setup)
+    share = shear / min(each.wet for pulled in found.values() for each in pulled)
+    return Claim(
+        34,
+        'The stage is slow enough to keep viscosity out.',
+        f'Shear of the film is at most {1e3 * shear:.1g} mN, {100 * share:.1g} % of the smallest '
+        'force. But films drain during so slow a pull, which moves F_wet more than any capillary '
+        'force.',
+        (share,),
+        share <= STRAIGHT,
+        '3.2.2, 4.3.1',
+        printed=f'{1e3 * setup.speed:g} mm/s',
+        rule=f'Shear at most {100 * STRAIGHT:g} % of the smallest force, with the thinnest film '
+        'that is '
+        'assumed to lubricate.',
+        see=FOOT_OF_43,
+    )
+
+
+def _pressure_claim(foot: Foot, setup: FootBench) -> Claim:
+    each = {
+        name: foot.pads * float(force_limit(foot.pad, setup.pressure, name))
+        for name in ('measured', 'thickness', 'max_depth', 'flattening')
+    }
+    return Claim(
+        34,
+        f'A foot stands on domes of {1e-3 * setup.pressure:g} kPa.',
+        f'{foot.pads} such domes carry '
+        + ', '.join(f'{value:.2f} N by `{name}`' for name, value in each.items())
+        + '. The line through the limits of 3.2.2 is 0 below 52 kPa.',
+        tuple(each.values()),
+        None,
+        SECTION,
+        printed='no load, no number of domes',
+        missing='number of domes, loads, and a measured limit at 50 kPa',
+        see='model/force_limit.md#which-one-and-why',
     )
 
 
@@ -423,14 +506,20 @@ def _title_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
         shares.append((dome.lines + dome.suction) / (dome.wet - flat.wet))
     return Claim(
         34,
-        'Morphologically adaptive contact enhances wet adhesion (title).',
+        'Title: shape enhances wet adhesion.',
         f'On flooded ground domes hold {min(gains):.1f} to {max(gains):.1f} times what the flat '
-        'foot holds: their pressure drains the film, so that they have nearly their dry friction. '
-        'Pinned lines and suction, both upper bounds, are '
-        f'{100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain. Morphology enhances '
-        'wet friction; adhesion by liquid is not needed for it.',
+        'foot holds, for their pressure drains the film. Pinned lines and suction, upper bounds, '
+        'are '
+        f'{100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain: shape enhances wet '
+        'friction.',
         tuple(shares),
         max(shares) > 0.5,
+        'title, 4.3.1',
+        printed='none',
+        rule='Half of the gain or more by liquid. With the assumed friction and film; suction '
+        'under '
+        'a flat sole on moist ground is not modelled.',
+        see=FOOT_OF_43,
     )
 
 
@@ -458,8 +547,7 @@ def _notes(scene: BenchScene, setup: FootBench) -> tuple[str, ...]:
 def _omitted(
     foot: Foot, setup: FootBench, found: Mapping[tuple[str, str], Sequence[Pulled]]
 ) -> tuple[Omission, ...]:
-    # Couette shear of the whole sole on a film as thin as the roughness of the pad.
-    shear = setup.viscosity * setup.speed * foot.sole_area / foot.critical_film
+    shear = _shear(foot, setup)
     gap = press(foot.pad, setup.pressure, setup.lowest_load / foot.pads).gap
     weight = WATER.density * GRAVITY * foot.sole_area * float(gap)
     return (

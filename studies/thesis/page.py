@@ -23,16 +23,18 @@ from studies.thesis import bench
 from studies.thesis import bench_figures as thesis
 from studies.thesis import liquid
 from studies.thesis import walks
-from studies.thesis.bench_page import VERDICTS
-from studies.thesis.bench_page import verdict
+from studies.thesis.bench_page import statements
+from studies.thesis.explained import Claim
 from studies.thesis.explained import Explained
+from studies.thesis.explained import counted
 
 _BENCHES = {
     'bench_inflation': (14, 15),
     'bench_press': (16, 17, 18),
-    'bench_tangential': (20, 21),
+    'bench_tangential': (10, 20, 21),
     'bench_foot': (34,),
 }
+_DRAWN_WITH = {33: 34}  # pictures of the floors of figure 34
 NUMBERS = tuple(
     sorted(
         [n for numbers in _BENCHES.values() for n in numbers] + [*liquid.NUMBERS, *walks.NUMBERS]
@@ -44,6 +46,11 @@ _COMMON_DOME = (
 )
 # Texts about what is measured, modelled and assumed, for each figure of a bench.
 _WORDS = {
+    10: (
+        'Nothing: the thesis computes it.',
+        'Rise of water between the domes of a sole by three readings of 3.101.',
+        'Nothing: water at 60° is from the thesis.',
+    ),
     14: (
         'Heights of four free domes, 55 to 85 kPa, from the program of the thesis. Dashed '
         'profiles are spheres through the rim with these heights: the program has no outlines.',
@@ -98,7 +105,7 @@ _WORDS = {
 
 
 def draw(numbers: Collection[int] = NUMBERS, progress: Progress | None = None) -> list[Explained]:
-    """Compute and draw some of the thesis' figures; return them in the order of the thesis.
+    """Compute and draw some of the thesis' figures; return them by number.
 
     All of them take about 45 s: 15 for figures 26 to 31, the rest for the walks of 41 to 44.
 
@@ -145,13 +152,22 @@ def _of_bench(name: str, numbers: Collection[int]) -> list[Explained]:
             number,
             drawn[f'figure_{number}'],
             *_WORDS[number],
-            claims=tuple(claim for claim in trial.claims if claim.figure == number),
+            claims=tuple(
+                claim
+                for claim in trial.claims
+                if _DRAWN_WITH.get(claim.figure, claim.figure) == number
+            ),
         )
         for number in sorted(numbers)
     ]
 
 
-def write(figures: Sequence[Explained], path: str | os.PathLike[str], force: bool = False) -> None:
+def write(
+    figures: Sequence[Explained],
+    path: str | os.PathLike[str],
+    force: bool = False,
+    text: Sequence[Claim] = (),
+) -> None:
     """Write the page: one HTML file that needs no other file, and no script.
 
     Parameters
@@ -162,6 +178,8 @@ def write(figures: Sequence[Explained], path: str | os.PathLike[str], force: boo
         HTML file to write.
     force : bool
         Replace an existing file.
+    text : sequence of Claim
+        Statements without a figure.
 
     Raises
     ------
@@ -169,21 +187,20 @@ def write(figures: Sequence[Explained], path: str | os.PathLike[str], force: boo
         When the file exists or cannot be written.
     """
     refuse(path, force)
-    claims = [claim for each in figures for claim in each.claims]
+    claims = [*text, *(claim for each in figures for claim in each.claims)]
     parts = [
         "<h1>The thesis' figures, drawn again</h1>",
         f'<p class="facts">{len(figures)} figures · ros_pad {ros_pad.__version__}</p>',
-        f'<p class="result">{html.escape(verdict(claims))}</p>',
-        "<p>Each figure has the thesis' number. Where the thesis gives no number for a word "
-        '(minimal, approximately, straight), the number assumed here is given with the claim.'
-        '</p>',
+        f'<p class="result">Of {len(claims)} statements of the thesis: {counted(claims)}.</p>',
+        "<p>Each figure has the thesis' number. Where the thesis gives no number for a word, the "
+        'number assumed here is in the rule.</p>',
         table(
-            ['figure', 'subject', 'claims'],
+            ['figure', 'subject', 'statements'],
             [
                 [
                     f'<a href="#figure-{each.number}">{each.number}</a>',
                     html.escape(each.drawn.title.partition(': ')[2]),
-                    _counted(each),
+                    counted(each.claims) or 'none of its own',
                 ]
                 for each in figures
             ],
@@ -204,30 +221,7 @@ def write(figures: Sequence[Explained], path: str | os.PathLike[str], force: boo
             rows = [[f'<b>{name}</b>', html.escape(text)] for name, text in words.items()]
             parts.append(table(['', ''], rows, range(0)))
             if each.claims:
-                parts.append(
-                    table(
-                        ['', 'the thesis says', 'here'],
-                        [
-                            [
-                                f'<b>{VERDICTS[claim.holds]}</b>',
-                                html.escape(claim.thesis),
-                                html.escape(claim.ours),
-                            ]
-                            for claim in each.claims
-                        ],
-                        range(0),
-                    )
-                )
+                parts.append(statements(each.claims))
+    if text:
+        parts += ['<h2>Statements without a figure</h2>', statements(text)]
     save(path, page("The thesis' figures: ros_pad", parts).encode())
-
-
-def _counted(figure: Explained) -> str:
-    """Return as text how many claims of a figure hold, do not hold, and cannot be checked."""
-    found = [claim.holds for claim in figure.claims]
-    words = {True: 'hold', False: 'do not hold', None: 'cannot be checked'}
-    counts = [
-        f'{found.count(holds)} {VERDICTS[holds] if found.count(holds) == 1 else text}'
-        for holds, text in words.items()
-        if holds in found
-    ]
-    return ', '.join(counts) or 'none of its own'

@@ -55,6 +55,14 @@ NUMBERS = (38, 39, *FLOOR_OF)
 ABOUT = 0.2  # relative error up to which a ratio is "approximately five times"
 STRAIGHT = 0.02  # "straight": m aside for each metre of distance; "firmly": slip over stroke
 
+_RAIL_SECTION, _RAIL_NUMBERS = '5.2', 'assumptions.md#the-leg-on-its-rail-thesis-52'
+_RAIL_TUNED = 'mass, rolling drag and load of the leg, friction and film of its foot'
+_DEMAND = 'Holds while dry friction is above the demand of the gait, as is assumed.'
+_HEXAPOD_SECTION, _HEXAPOD_NUMBERS = '5.3', 'model/thesis_walks.md'
+_HEXAPOD_TUNED = (
+    'friction and film of the feet, drag of the hoses, share and length of wet patches'
+)
+
 Walks = Mapping[tuple[str, int], Trial]
 
 
@@ -170,26 +178,37 @@ def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
     return (
         Claim(
             38,
-            'Dry, the foot stands firmly, without slip.',
-            f'It slips {dry:.1f} mm a cycle, of a stroke of {stroke:g} mm.',
+            'Dry, the flat foot does not slip.',
+            f'It slips {dry:.1f} mm a cycle, of a stroke of {stroke:g} mm (1 walk, L0).',
             (dry,),
             dry <= STRAIGHT * stroke,
+            _RAIL_SECTION,
+            rule=f'Up to {100.0 * STRAIGHT:g} % of the stroke. {_DEMAND}',
+            see=_RAIL_NUMBERS,
         ),
         Claim(
             38,
-            'Wet, the flat foot slips backward instead of pushing the body ahead.',
-            f'It slips {wet:.1f} of {stroke:g} mm.',
+            'Wet, the flat foot slips back and hardly pushes the body.',
+            f'It slips {wet:.1f} of {stroke:g} mm (1 walk, L0).',
             (wet,),
             wet > 0.5 * stroke,
+            _RAIL_SECTION,
+            rule='More than half of the stroke.',
+            tuned=_RAIL_TUNED,
+            see=_RAIL_NUMBERS,
         ),
         Claim(
             38,
-            'Wet, the domes of high pressure walk as the flat foot does on dry ground, with '
-            'minimal slip.',
-            f'They slip {dome:.1f} of {stroke:g} mm (here minimal is up to '
-            f'{100.0 * MINIMAL:g} %).',
+            'Wet, domes of high pressure hardly slip.',
+            f'They slip {dome:.1f} of {stroke:g} mm (1 walk, L0).',
             (dome,),
             dome <= MINIMAL * stroke,
+            _RAIL_SECTION,
+            rule=f'Up to {100.0 * MINIMAL:g} % of the stroke. Rigid discs of film: soft domes '
+            'need a '
+            'load that comes in 0.1 s.',
+            tuned=_RAIL_TUNED,
+            see='model/film.md#when-a-scene-needs-it',
         ),
     )
 
@@ -241,25 +260,43 @@ def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, .
     return (
         Claim(
             39,
-            'Flat on dry ground and domes of 75 kPa on wet ground move quite alike.',
-            f'The domes go {100.0 * abs(less):.0f} % less far in a cycle, and need '
-            f'{high:.1f} s in place of {dry:.1f} s.',
+            'Domes of 75 kPa on wet ground walk like flat feet on dry ground.',
+            f'They go {100.0 * abs(less):.0f} % less far in a cycle, and need '
+            f'{high:.1f} s in place of {dry:.1f} s (1 walk each, L0).',
             (less,),
             abs(less) <= MINIMAL,
+            _RAIL_SECTION,
+            printed='alike, no number',
+            rule=f'Distance a cycle within {100.0 * MINIMAL:g} %.',
+            tuned=_RAIL_TUNED,
+            see=_RAIL_NUMBERS,
         ),
         Claim(
             39,
-            'Wet, flat feet need approximately five times as long as domes of 75 kPa.',
-            f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s.',
+            'Wet, flat feet need several times as long as domes of 75 kPa.',
+            f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s (1 walk each, L0). With one '
+            'assumed '
+            'number halved or doubled 1.3 to 7.2 times, or the flat foot never arrives.',
             (flat / high,),
             abs(flat / high / 5.0 - 1.0) <= ABOUT,
+            _RAIL_SECTION,
+            printed='5 times, approximately',
+            rule=f'Within {100.0 * ABOUT:g} %. A threshold: 1 % of friction moves it by 4 %.',
+            tuned=_RAIL_TUNED,
+            see=_RAIL_NUMBERS,
         ),
         Claim(
             39,
-            'Higher pressure notably improves the walk.',
-            f'At 40, 60 and 75 kPa: {low:.1f}, {middle:.1f} and {high:.1f} s.',
+            'Of 40, 60 and 75 kPa the higher is the better.',
+            f'{low:.1f}, {middle:.1f} and {high:.1f} s to the goal (1 walk each, L0).',
             (low, middle, high),
             low > middle > high,
+            _RAIL_SECTION,
+            printed='order only',
+            rule='That order. By the measured line domes of 40 kPa are pressed flat; by other '
+            'criteria they stand, and the order is kept by films that drain.',
+            tuned=_RAIL_TUNED + ', criterion of the force limit',
+            see=_RAIL_NUMBERS,
         ),
     )
 
@@ -350,38 +387,54 @@ def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tu
     more = middle['wet_flat'] / middle['dry_flat']
     left = middle['wet_dome'] / middle['wet_flat']
     ratio = middle['wet_flat'] / others['wet_flat']
+    seeds = f'{len(SEEDS)} floors, L2'
     return (
         Claim(
             number,
-            'On dry ground there are no signs of slip.',
+            'Dry, nothing slips.',
             f'Feet slip at most {largest:.0f} mm a cycle, of a stride of {stride:g} mm, when they '
-            f'land (here up to {100.0 * MINIMAL:g} % count as no slip).',
+            f'land ({seeds}).',
             (float(largest),),
             bool(largest <= MINIMAL * stride),
+            _HEXAPOD_SECTION,
+            rule=f'Up to {100.0 * MINIMAL:g} % of the stride. {_DEMAND}',
+            see=_HEXAPOD_NUMBERS,
         ),
         Claim(
             number,
-            'On wet ground flat feet slip backward.',
+            'Wet, flat feet slip.',
             f'Legs 2 and 5 slip {_few(middle["wet_flat"])} mm a cycle, {_few(more, ".1f")} '
-            'times as much as on dry ground.',
+            f'times as much as on dry ground ({seeds}).',
             tuple(more.tolist()),
             bool(np.all(more > 2.0)),
+            _HEXAPOD_SECTION,
+            rule='More than twice as much, each time.',
+            tuned=_HEXAPOD_TUNED,
+            see=_HEXAPOD_NUMBERS,
         ),
         Claim(
             number,
-            'Domes significantly mitigate that.',
-            f'With domes, {_few(100.0 * left)} % of the slip remain: '
-            f'{_few(middle["wet_dome"])} mm.',
+            'Domes take away much of that slip.',
+            f'{_few(100.0 * left)} % of it remain: {_few(middle["wet_dome"])} mm ({seeds}).',
             tuple(left.tolist()),
             bool(np.all(left <= 0.5)),
+            _HEXAPOD_SECTION,
+            rule='At most half remains, each time.',
+            tuned=_HEXAPOD_TUNED,
+            see=_HEXAPOD_NUMBERS,
         ),
         Claim(
             number,
-            'Legs 2 and 5 have a higher risk of slip than the others (F₁ = 2F₂ = 2F₃).',
-            f'On wet ground with flat feet they slip {_few(ratio, ".2f")} times as much as '
-            'the others: a foot that pushes harder also carries more.',
+            'Legs 2 and 5 slip sooner than the others, since F₁ = 2F₂ = 2F₃.',
+            f'Wet and flat they slip {_few(ratio, ".2f")} times as much as the others ({seeds}).',
             tuple(ratio.tolist()),
             bool(np.all(ratio > 1.0 + MINIMAL)),
+            _HEXAPOD_SECTION,
+            printed='twice the force',
+            rule=f'At least {100.0 * MINIMAL:g} % more. A foot that pushes twice as hard carries '
+            'twice '
+            'the load, and by Coulomb is no nearer to slip.',
+            see='model/thesis_walks.md#legs-2-and-5',
         ),
     )
 
@@ -433,27 +486,36 @@ def _paths(walks: Walks, number: int, floor: str) -> Explained:
 
 
 def _path_claims(number: int, drifts: Slips, shares: Slips) -> tuple[Claim, ...]:
+    seeds = f'{len(SEEDS)} floors, L2'
     straight = max(shares['dry_flat'].max(), shares['wet_dome'].max())
     return (
         Claim(
             number,
-            'On wet ground flat feet struggle to keep a straight path.',
+            'Wet, flat feet leave the straight path.',
             f'At the end the body is {_few(drifts["wet_flat"])} mm aside; on dry ground at '
-            f'most {drifts["dry_flat"].max():.0f} mm.',
+            f'most {drifts["dry_flat"].max():.0f} mm ({seeds}).',
             tuple(drifts['wet_flat'].tolist()),
             bool(
                 shares['wet_flat'].min() > STRAIGHT
                 and drifts['wet_flat'].min() > drifts['dry_flat'].max()
             ),
+            _HEXAPOD_SECTION,
+            rule=f'More than {100.0 * STRAIGHT:g} % of the distance, and than on dry ground, each '
+            'time. Wet all over, the walk slows and stays straight.',
+            tuned=_HEXAPOD_TUNED,
+            see=_HEXAPOD_NUMBERS,
         ),
         Claim(
             number,
-            'Domes keep a straight course that closely resembles that on dry ground.',
+            'Wet, domes keep a path as straight as on dry ground.',
             f'At the end the body is {_few(drifts["wet_dome"])} mm aside, at most '
-            f'{100.0 * straight:.1f} % of its distance (here straight is up to '
-            f'{100.0 * STRAIGHT:g} %).',
+            f'{100.0 * straight:.1f} % of its distance ({seeds}).',
             tuple(drifts['wet_dome'].tolist()),
             bool(straight <= STRAIGHT),
+            _HEXAPOD_SECTION,
+            rule=f'Up to {100.0 * STRAIGHT:g} % of the distance.',
+            tuned=_HEXAPOD_TUNED,
+            see=_HEXAPOD_NUMBERS,
         ),
     )
 

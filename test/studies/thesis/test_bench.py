@@ -59,7 +59,7 @@ def test_free_domes_have_the_errors_that_the_thesis_has_not():
     assert [row.measured for row in trial.pick('stiffness')] == [
         pytest.approx(k, abs=5e-3) for k in (44.03, 40.94, 39.06, 38.75)
     ]
-    assert [claim.holds for claim in trial.claims] == [False, False, False]
+    assert [claim.holds for claim in trial.claims] == [True, False, False, False]
 
 
 def test_the_stiffness_of_a_point_gives_its_height():
@@ -122,7 +122,7 @@ def test_the_texts_forces_stand_beside_the_coded_ones():
     for text, coded in zip(rows, trial.pick('height', 'thesis', CODED), strict=True):
         assert text.measured == coded.measured
         assert text.modelled < coded.modelled
-    assert [claim.holds for claim in trial.claims] == [False, None, False, False, True]
+    assert trial.claims[0].holds is None and trial.claims[0].missing
 
 
 def test_load_over_measured_area():
@@ -196,7 +196,7 @@ def test_domes_end_at_their_measured_limits():
 
 def test_orderings_of_the_thesis():
     claims = TRIALS['tangential'].claims
-    assert [claim.holds for claim in claims] == [True, True, True, True, None, False, None, False]
+    assert [claim.holds for claim in claims[:5]] == [True, True, True, None, True]
     # By hand, dry friction is 0.35 + 4700/10444 flat and 0.35 + 4700/65e3 for the best dome.
     dry = (0.35 + 4700.0 / 10444.0) / (0.35 + 4700.0 / 65e3)
     assert claims[0].numbers == (pytest.approx(dry, rel=1e-9),)
@@ -213,6 +213,25 @@ def test_the_orderings_can_fail():
     assert trial.claims[1].holds is False
     slow = dataclasses.replace(scene.foot, critical_film=2e-8)
     assert bench.run(dataclasses.replace(scene, foot=slow)).claims[2].holds is False
+
+
+@pytest.mark.parametrize(
+    'changes, holds',
+    [
+        ({'boundary_friction': 3.0, 'friction': 0.05}, True),  # every film holds more than none
+        ({'critical_film': 2e-8}, False),  # every film keeps the dome from the floor
+    ],
+)
+def test_the_title_is_decided_where_all_draws_agree(changes, holds):
+    scene = TRIALS['tangential'].scene
+    trial = bench.run(dataclasses.replace(scene, foot=dataclasses.replace(scene.foot, **changes)))
+    (claim,) = (claim for claim in trial.claims if 'Title' in claim.thesis)
+    assert claim.holds is holds
+    (shipped,) = (claim for claim in TRIALS['tangential'].claims if 'Title' in claim.thesis)
+    # By hand: films drain to 57 to 62 nm in 2.2 to 4.1 s until slip, so 1 − exp(−0.124²) at most
+    # of the dry force is lost.
+    assert shipped.verdict == 'underdetermined'
+    assert min(shipped.numbers[:3]) > -0.0155 and max(shipped.numbers[:3]) < -0.005
 
 
 def test_on_how_small_a_sole_the_flat_pad_floats():
@@ -236,11 +255,11 @@ def test_force_limits_of_the_model():
 
 
 def test_a_stiffer_pad_carries_less_at_the_same_pressure(monkeypatch):
-    claim = TRIALS['tangential'].claims[5]
-    assert 'stiffer' in claim.thesis
+    (place,) = (k for k, c in enumerate(TRIALS['tangential'].claims) if 'harder' in c.thesis)
+    claim = TRIALS['tangential'].claims[place]
     assert max(claim.numbers) < 1.0
     monkeypatch.setattr(bench, 'STIFFER', 0.95)
-    claim = bench.run(TRIALS['tangential'].scene).claims[5]
+    claim = bench.run(TRIALS['tangential'].scene).claims[place]
     assert min(claim.numbers) > 1.0
     assert claim.holds is True
 
@@ -375,7 +394,7 @@ def test_as_many_forces_in_the_text_as_points(tmp_path):
     trial = bench.run(own_scene(tmp_path, 'press', PRESSED, text_forces=None))
     assert not trial.pick('height', 'thesis', TEXT)
     assert len(trial.pick('height', 'thesis', CODED)) == 1
-    assert len(trial.claims) == 4
+    assert len(trial.claims) == len(TRIALS['press'].claims) - 1
 
 
 def test_a_force_that_presses_the_dome_flat_is_refused(tmp_path):

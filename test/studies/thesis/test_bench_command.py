@@ -41,7 +41,7 @@ def test_table(tmp_path, capsys):
     line = next(line for line in text.splitlines() if '55 kPa' in line and ' height ' in line)
     for part in ('1.375 mm', '1.25 mm', '+10.0 %', '±3 %'):
         assert part in line
-    assert 'figure 15: does not hold' in text
+    assert '3.2.1, Fig. 15: refuted' in text
     assert str(tmp_path / 'bench' / 'report.html') in text
 
 

@@ -170,13 +170,10 @@ def test_estimates_of_the_thesis():
 
 
 def test_verdicts():
-    holds = [claim.holds for claim in TRIAL.claims]
-    # Sign of flat smooth, flat rough, dome smooth, dome rough; linear, small, error, title.
-    assert holds == [False, False, None, None, False, True, None, False]
-    assert all(claim.figure == 34 for claim in TRIAL.claims)
-    title = TRIAL.claims[-1]
-    assert max(title.numbers) < 0.2
-    assert '15 to 25 %' in TRIAL.claims[-2].thesis
+    signs = [claim.holds for claim in TRIAL.claims if 'F_cap' in claim.thesis]
+    assert signs == [False, False, None, None]  # flat smooth, flat rough, dome smooth, dome rough
+    assert max(TRIAL.claims[-1].numbers) < 0.2  # of the title
+    assert [c.printed for c in TRIAL.claims if 'estimated' in c.thesis] == ['15 to 25 %']
 
 
 def test_a_film_that_rubs_enough_settles_the_sign():
@@ -185,7 +182,7 @@ def test_a_film_that_rubs_enough_settles_the_sign():
     trial = bench.run(dataclasses.replace(SCENE, foot=foot))
     shares = trial.pick('share of draws above 0', condition='flat, smooth')
     assert [row.modelled for row in shares] == [1.0] * 4
-    assert trial.claims[0].holds is True
+    assert trial.claims[1].holds is True
 
 
 def test_domes_of_one_criterion_or_another_hold_the_same():

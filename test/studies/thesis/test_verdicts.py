@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every statement of the thesis has a verdict, and docs show the ones that were computed."""
+
+import dataclasses
+import math
+
+import pytest
+
+from studies.thesis import statements
+from studies.thesis import verdicts
+from studies.thesis.explained import NOT_MODELLED
+from studies.thesis.explained import OPEN
+from studies.thesis.explained import REFUTED
+from studies.thesis.explained import REPRODUCED
+from studies.thesis.explained import TUNED
+from studies.thesis.explained import VERDICTS
+from studies.thesis.explained import Claim
+from studies.thesis.explained import counted
+
+CLAIMS = statements.claims()
+CLAIM = Claim(20, 'more', 'less', (1.0,), True, '3.2.2')
+
+
+@pytest.mark.parametrize(
+    'changes, verdict',
+    [
+        ({}, REPRODUCED),
+        ({'tuned': 'friction'}, TUNED),
+        ({'tuned': 'friction', 'holds': False}, REFUTED),
+        ({'holds': None, 'missing': 'loads'}, OPEN),
+        ({'holds': None}, NOT_MODELLED),
+    ],
+)
+def test_verdict(changes, verdict):
+    assert dataclasses.replace(CLAIM, **changes).verdict == verdict
+
+
+def test_verdicts_are_counted_and_explained():
+    tuned = dataclasses.replace(CLAIM, tuned='friction', missing='loads', rule='Above 1.')
+    assert counted([CLAIM, tuned, CLAIM]) == '2 reproduced, 1 tuned to agree'
+    assert tuned.reason() == 'Above 1. Tuned: friction.'
+    assert dataclasses.replace(tuned, holds=None).reason() == 'Above 1. Missing: loads.'
+    assert dataclasses.replace(tuned, holds=False).reason() == 'Above 1.'
+
+
+def test_the_page_shows_what_the_study_wrote(kept):
+    text = verdicts.PAGE.read_text(encoding='utf-8')
+    assert text.partition(verdicts.MARK)[2] == '\n' + verdicts.markdown(kept)
+
+
+def test_every_figure_is_judged_and_every_verdict_has_its_reason(kept):
+    claims = kept['claims']
+    needed = {10, *range(14, 19), 20, 21, *range(26, 32), 33, 34, 38, 39, *range(41, 45)}
+    assert {claim['figure'] for claim in claims} == needed | {0}
+    assert len(claims) == len({(claim['where'], claim['thesis']) for claim in claims})
+    for claim in claims:
+        assert claim['verdict'] in VERDICTS and claim['thesis'] and claim['ours']
+        assert '|' not in claim['thesis'] + claim['ours'] + claim['reason']
+        if claim['verdict'] == REFUTED:
+            assert claim['see'] and claim['rule']
+        if claim['verdict'] == REPRODUCED:
+            assert claim['rule']
+
+
+def test_statements_without_a_figure_have_the_verdicts_of_the_docs(agree, kept):
+    agree(CLAIMS)
+    assert len(CLAIMS) == sum(claim['figure'] == 0 for claim in kept['claims'])
+
+
+def named(words):
+    (claim,) = (claim for claim in CLAIMS if words in claim.thesis)
+    return claim
+
+
+def test_numbers_of_statements_by_hand():
+    """Height to 30 digits elsewhere; P = 4 sin t − 2 sin 2t is 2.8125; the rest is geometry."""
+    right, height = named('tension times its area').numbers
+    assert height == pytest.approx(1.9412681941617884e-3, rel=1e-12)
+    t = math.atan(right / 1.5e-3)
+    assert 4.0 * math.sin(t) - 2.0 * math.sin(2.0 * t) == pytest.approx(2.8125, rel=1e-12)
+    assert named('Number of pads').numbers[0] == pytest.approx(
+        4.5 * math.sqrt(3.0) / (math.pi / 3.0 + math.sqrt(3.0))
+    )
+    assert named('Pressure for R').numbers[0] == pytest.approx(
+        4.3 / (math.sqrt(18.0 + 6.0 * math.sqrt(5.0)) - 4.0 / 3.0)
+    )
+    assert named('Strain stays').numbers[0] == pytest.approx(math.sqrt(6.25 / 2.25))
