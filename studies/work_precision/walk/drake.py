@@ -66,7 +66,7 @@ class Contact:
     kind: str = 'bristles'
     stiffness: float = 1e5
     damping: float = 200.0
-    relaxation: float = 2e-3
+    relaxation: float = 1e-4
     turning: float = 1.0
 
 
@@ -198,23 +198,41 @@ class DrakeRobot:
         plant.set_discrete_contact_approximation(
             plants.DiscreteContactApproximation.__members__[name]
         )
-        plant.RegisterCollisionGeometry(
-            plant.world_body(), self._math.RigidTransform(), self._geometry.HalfSpace(), 'ground',
-            self._material(_GROUND, 1e12),
-        )  # fmt: skip
+        frames = [*self._tips, *([self._sled.body_frame()] if self._scene.tow.weight else [])]
         self._shapes = [
             plant.RegisterCollisionGeometry(
-                tip.body(), self._math.RigidTransform(tip.GetFixedPoseInBodyFrame()),
-                self._geometry.Sphere(1e-4), f'foot_{leg}', self._material(0.5),
+                frame.body(), frame.GetFixedPoseInBodyFrame(), self._geometry.Sphere(1e-4),
+                f'contact_{number}', self._material(0.5),
             )
-            for leg, tip in enumerate(self._tips)
+            for number, frame in enumerate(frames)
         ]  # fmt: skip
-        if self._scene.tow.weight:
-            self._shapes.append(
-                plant.RegisterCollisionGeometry(
-                    self._sled, self._math.RigidTransform(), self._geometry.Sphere(1e-4), 'sled',
-                    self._material(0.5),
+        # Each contact has a ground of its own, whose height follows the floor.
+        self._grounds = [
+            plant.RegisterCollisionGeometry(
+                plant.world_body(), self._math.RigidTransform(), self._geometry.HalfSpace(),
+                f'ground_{number}', self._material(_GROUND, 1e12),
+            )
+            for number in range(len(frames) if self._floor.heights is not None else 1)
+        ]  # fmt: skip
+        several = len(self._grounds) > 1
+        sets, manager = self._geometry.GeometrySet, self._world.collision_filter_manager()
+        for number, shape in enumerate(self._shapes):
+            others = set(self._grounds) - {self._grounds[number * several]}
+            others |= set(self._shapes) - {shape}
+            manager.Apply(
+                self._geometry.CollisionFilterDeclaration().ExcludeBetween(
+                    sets(shape), sets(list(others))
                 )
+            )
+
+    def _level(self) -> None:
+        """Move the grounds of Drake's contact to their heights."""
+        world = self._world
+        for ground, height in zip(self._grounds, self._ground, strict=False):
+            world.ChangeShape(
+                world.GetMyMutableContextFromRoot(self._root), self._plant.get_source_id(),
+                ground, self._geometry.HalfSpace(),
+                self._math.RigidTransform([0.0, 0.0, height]),
             )  # fmt: skip
 
     def _material(self, friction: float, stiffness: float | None = None) -> Any:
@@ -264,8 +282,8 @@ class DrakeRobot:
         feet = self._path.feet
         self._targets = self._solver.angles([(x, y, low) for x, y, _ in feet])
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
-        if self._contact.kind != 'bristles' and self._ground.any():
-            raise ConfigError(f'{scene.source}: uneven floors are walked on with bristles only')
+        if self._contact.kind != 'bristles':
+            self._level()
         plant.SetFreeBodyPose(
             context, self._trunk, self._math.RigidTransform([0.0, 0.0, self._ground.max() - low])
         )
@@ -435,18 +453,20 @@ class DrakeRobot:
         count = len(self._tips)
         places = self._tip_places() - self._shear[:count, :2]  # bristles lag behind the foot
         moved = np.linalg.norm(places - self._last, axis=1)
-        self._last = places
+        self._last, moved_ground = places, False
         for index, state in enumerate(self.feet):
             x, y = places[index]
             state.wet = self._floor.wet(x, y)
             above = self._heights[index] - self._ground[index]
             if self._loads[index] <= LIGHT:
-                if above > _SHALLOW:
-                    self._ground[index] = self._floor.height(x, y)
+                if above > _SHALLOW and self._ground[index] != self._floor.height(x, y):
+                    self._ground[index], moved_ground = self._floor.height(x, y), True
                 if above > CLEAR:
                     self._films[index].touch_down(self._floor.depth(x, y))
             elif self._loads[index] > SLIP_LOAD and moved[index] > SLIP_SPEED * self.period:
                 state.slip_path += float(moved[index])
+        if moved_ground and self._contact.kind != 'bristles':
+            self._level()
         angles = self._plant.GetPositions(self._context)[self._places]
         up = self._trunk.EvalPoseInWorld(self._context).rotation().matrix()[2, 2]
         if not up > math.cos(TIPPED):
