@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot of L2 in Drake, an engine that shares no code with MuJoCo or with ros_pad's solvers.
 
-Links, masses, servos, gait, floor, films and the law of resistance are the same; Drake has its own
-rigid-body dynamics and contact. Drake's friction is that of a point, without a yaw moment, so there
-are two ways to bring in the feet:
+Links, masses, servos, gait, floor, films and the law of resistance are the same; rigid-body
+dynamics and contact are Drake's. Drake's friction is that of a point and has no yaw moment, so
+there are two ways to bring in the feet:
 
-- ``sap``, ``lagged``, ``tamsi``: Drake finds the forces; the coefficient of each foot is set before
-  each step from its load in the last one. Soles do not resist turning.
-- ``bristles``: force elements. The ground is a stiff damped spring; tangentially a foot shears
-  elastically up to its cap, with sliding and turning sharing the cap, as on L1 and L2.
+- ``sap``, ``similar``, ``lagged``, ``tamsi``: Drake finds the forces; before each step the
+  coefficient of a foot is set from its load in the last one. Soles do not resist turning.
+- ``bristles``: force elements. The ground is a stiff damped spring; along it a foot shears
+  elastically up to its cap, which sliding and turning share, as on L1 and L2.
 """
 
 from __future__ import annotations
@@ -94,8 +94,10 @@ class DrakeRobot:
     def __init__(
         self, scene: Scene, floor: Floor, period: float, step: float, contact: Contact
     ) -> None:
-        body: Any = scene.body
-        self.legs, self.period, self.time, self.verdict = scene.legs, period, 0.0, None
+        self._body: Any = scene.body
+        body = self._body
+        self.legs, self.period, self.time = scene.legs, period, 0.0
+        self.verdict: str | None = None
         self.feet = [FootState() for _ in self.legs]
         self._scene, self._floor, self._contact = scene, floor, contact
         self._robot, self._servo = body.robot, body.robot.servo
@@ -127,7 +129,9 @@ class DrakeRobot:
         plant.mutable_gravity_field().set_gravity_vector(
             [-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)]
         )
-        self._trunk = plant.AddRigidBody('trunk', tree.SpatialInertia.SolidBoxWithMass(1.0, 0.1, 0.1, 0.1))
+        self._trunk = plant.AddRigidBody(
+            'trunk', tree.SpatialInertia.SolidBoxWithMass(1.0, 0.1, 0.1, 0.1)
+        )
         self._joints: list[Any] = []
         self._tips = [self._add_leg(leg) for leg in range(len(self.legs))]
         if scene.tow.weight:
@@ -150,7 +154,7 @@ class DrakeRobot:
         """Add links, joints and motors of a leg; return the frame of its foot."""
         plant, tree, robot, servo = self._plant, self._tree, self._robot, self._servo
         joints, tip = robot.chains.legs[leg], robot.chains.feet[leg]
-        scale, parent = self._scene.body.mass / robot.mass, self._trunk
+        scale, parent = self._body.mass / robot.mass, self._trunk
         for place, joint in enumerate(joints):
             end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else tip[:3, 3]
             length = float(np.linalg.norm(end))
@@ -180,9 +184,7 @@ class DrakeRobot:
         tow, tree, parent = self._scene.tow, self._tree, self._plant.world_body()
         for axis, mass in ((0, 0.0), (1, 0.0), (2, tow.weight / GRAVITY)):
             cube = tree.SpatialInertia.SolidBoxWithMass(mass, 0.05, 0.05, 0.05) if mass else None
-            link = self._plant.AddRigidBody(
-                f'sled_{axis}', cube or tree.SpatialInertia.Zero()
-            )
+            link = self._plant.AddRigidBody(f'sled_{axis}', cube or tree.SpatialInertia.Zero())
             self._plant.AddJoint(
                 tree.PrismaticJoint(
                     f'sled_{axis}', parent.body_frame(), link.body_frame(), np.eye(3)[axis]
@@ -249,7 +251,7 @@ class DrakeRobot:
 
     def _weigh_trunk(self) -> None:
         """Give the trunk what the scene's robot has more than the legs: mass, place, inertia."""
-        plant, context, tree, body = self._plant, self._context, self._tree, self._scene.body
+        plant, context, tree, body = self._plant, self._context, self._tree, self._body
         self._set_joints(self._robot.home.ravel())
         plant.SetFreeBodyPose(context, self._trunk, self._math.RigidTransform())
         links = [joint.child_body().index() for joint in self._joints]
@@ -278,9 +280,14 @@ class DrakeRobot:
 
     def _place(self) -> None:
         """Place the robot at rest on its planned feet, and the load behind it."""
-        plant, context, scene, low = self._plant, self._context, self._scene, self._scene.body.ground
+        plant, context, scene, low = (
+            self._plant,
+            self._context,
+            self._scene,
+            self._scene.body.ground,
+        )
         feet = self._path.feet
-        self._targets = self._solver.angles([(x, y, low) for x, y, _ in feet])
+        self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
         if self._contact.kind != 'bristles':
             self._level()
@@ -382,7 +389,7 @@ class DrakeRobot:
     def _pull(self, force: Array) -> None:
         """Add the force of the line, which only pulls."""
         tow, plant, context = self._scene.tow, self._plant, self._context
-        hook = (0.0, 0.0, tow.height + self._scene.body.ground)
+        hook = (0.0, 0.0, tow.height + self._body.ground)
         ends = (self._trunk.body_frame(), hook), (self._sled.body_frame(), (0.0, 0.0, tow.height))
         world = plant.world_frame()
         a, b = (plant.CalcPointsPositions(context, frame, at, world)[:, 0] for frame, at in ends)
@@ -411,7 +418,7 @@ class DrakeRobot:
         slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])
         self._shear += self._dt * slides
         push = -contact.stiffness * self._shear - contact.damping * slides
-        for index in np.flatnonzero(loads):
+        for index in np.flatnonzero(loads).tolist():
             self._mates[index] = (
                 self._coefficient(index, loads[index], self._dt)
                 if index < count
