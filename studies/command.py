@@ -84,7 +84,7 @@ def add_count(
         type=number,
         default=default,
         metavar='N',
-        help=f'{text} (default: {"all" if default is None else default})',
+        help=text if default is None else f'{text} (default: {default})',
     )
 
 
@@ -171,11 +171,11 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     """
     part = parser(name, study.__doc__)
     add_out(part, None)
-    brief = 'walks' in inspect.signature(study.measure).parameters
+    brief = 'cycles' in inspect.signature(study.measure).parameters
     if brief:
-        add_count(part, '--walks', None, 'only the first N walks of each robot')
+        add_count(part, '--cycles', None, 'gait cycles of each walk, for a short run')
     options = part.parse_args(words)
-    chosen = {'walks': options.walks} if brief else {}
+    chosen = {'cycles': options.cycles} if brief else {}
     folder = options.out or new_folder(None, f'chart_{name}')
     with bar(f'{name}: measuring', 100.0, '%') as reach:
         results = study.measure(lambda share: reach(100.0 * share), **chosen)

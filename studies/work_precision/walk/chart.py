@@ -30,7 +30,6 @@ from studies.work_precision.walk.hexapod import TOP
 from studies.work_precision.walk.rail import LEGS
 from studies.work_precision.walk.results import FAILED
 from studies.work_precision.walk.results import WalkResult
-from studies.work_precision.walk.walkers import CYCLES
 from studies.work_precision.walk.walkers import HEXAPOD
 from studies.work_precision.walk.walkers import RAIL
 from studies.work_precision.walk.walkers import TOWING
@@ -77,7 +76,7 @@ def _block(robot: str, part: Sequence[WalkResult]) -> list[str]:
     first, width = part[0], max(len(result.method) for result in part)
     heads = ''.join(f'{_UNITS[name][0]:>18}' for name in first.errors)
     lines = [
-        f'{robot} ({first.cases} walks of {CYCLES[robot]} cycles; median and worst errors against'
+        f'{robot} ({first.cases} walks of {first.cycles} cycles; median and worst errors against'
         f' {first.top}; times against {first.baseline})',
         f'  {"method":{width}}      ms/s  us/step    ratio{heads}  distance fails  slip fails'
         '  refused',
@@ -136,7 +135,8 @@ def _walk_by_walk(part: Sequence[WalkResult]) -> list[str]:
             off += f'  {text:>{len(result.method)}}'
         lines.append(
             f'  {walks[0]["walk"]:{width}}  {1e3 * true["distance"]:12.1f}'
-            f'  {1e3 * true["slip"]:8.1f}  {1e3 * true["lateral"]:+9.2f}  {1e3 * true["yaw"]:+9.2f}{off}'
+            f'  {1e3 * true["slip"]:8.1f}'
+            f'  {1e3 * true["lateral"]:+9.2f}  {1e3 * true["yaw"]:+9.2f}{off}'
         )
     return lines
 

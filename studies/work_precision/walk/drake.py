@@ -94,8 +94,8 @@ class DrakeRobot:
     def __init__(
         self, scene: Scene, floor: Floor, period: float, step: float, contact: Contact
     ) -> None:
-        self._body: Any = scene.body
-        body = self._body
+        body: Any = scene.body
+        self._body = body
         self.legs, self.period, self.time = scene.legs, period, 0.0
         self.verdict: str | None = None
         self.feet = [FootState() for _ in self.legs]
@@ -273,7 +273,7 @@ class DrakeRobot:
 
     # --- state --------------------------------------------------------------------------------
 
-    def _set_joints(self, angles: Sequence[float]) -> None:
+    def _set_joints(self, angles: Array) -> None:
         positions = self._plant.GetPositions(self._context)
         positions[self._places] = angles
         self._plant.SetPositions(self._context, positions)
@@ -284,7 +284,7 @@ class DrakeRobot:
             self._plant,
             self._context,
             self._scene,
-            self._scene.body.ground,
+            self._body.ground,
         )
         feet = self._path.feet
         self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))

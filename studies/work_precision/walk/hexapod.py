@@ -127,13 +127,13 @@ def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bo
         floor = case.scene.floor.build(case.seed)
         robot = PlanarRobot(case.scene, floor, step, compiled, turning)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
-        start = time.perf_counter()
+        start = time.process_time()
         if at_once:
             count = robot.walk(pressures, count)
         else:
             for _ in range(count):
                 robot.step(pressures)
-        return walked(robot, case.scene, count, time.perf_counter() - start)
+        return walked(robot, case.scene, count, time.process_time() - start)
 
     return Walker(family, named(family, step), step, walk)
 
@@ -166,10 +166,10 @@ def _sampled(family: str, step: float, make: Callable[[Walk], Any], ours: bool) 
     def walk(case: Walk) -> Walked:
         robot = make(case)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / SAMPLE)
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(count):
             robot.step(pressures)
-        taken = time.perf_counter() - start
+        taken = time.process_time() - start
         return walked(robot, case.scene, count * round(SAMPLE / step), taken)
 
     return Walker(family, named(family, step), step, walk, ours)

@@ -55,7 +55,8 @@ class WalkResult:
         The same for the slip path.
     refused : int
         Number of walks without a valid result: they ended with a verdict or an error.
-    cases : int
+    cases, cycles : int
+        Number of walks, and of gait cycles of each.
     walks : list of dict
         Each walk, with its results and the relative error of its distance.
     ours : bool
@@ -77,6 +78,7 @@ class WalkResult:
     slip_failures: int
     refused: int
     cases: int
+    cycles: int
     walks: list[dict[str, Any]]
     ours: bool
 
@@ -92,12 +94,16 @@ def run(
     tops: Sequence[str],
     baseline: str,
     progress: Progress,
+    cycles: int | None = None,
 ) -> list[WalkResult]:
     """Measure each walker; ``tops``, one or two, and ``baseline`` are names of walkers.
 
     Walkers take turns on each walk, so that other load of the machine affects all of them.
-    Progress, 0 to 1, is reported to ``progress``.
+    Progress, 0 to 1, is reported to ``progress``. ``cycles`` is the length of the walks, if it is
+    not theirs.
     """
+    if cycles:
+        walks = [replace(walk, scene=replace(walk.scene, cycles=cycles)) for walk in walks]
     went: dict[str, list[Walked]] = {walker.name: [] for walker in walkers}
     for number, walk in enumerate(walks):
         for turn, walker in enumerate(walkers):
@@ -164,6 +170,7 @@ def _result(
         slip_failures=int((~(off['slip'] <= FAILED)).sum()),
         refused=valid.count(False),
         cases=len(walks),
+        cycles=walks[0].scene.cycles,
         walks=[
             {'walk': walk.name}
             | asdict(each)

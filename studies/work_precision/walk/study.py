@@ -7,10 +7,10 @@ Drake with force elements for feet; half of their difference is drawn as a band.
 shows where the engines part: loads in tow, and the effect of line, servos and soles. Drake is
 needed for both (pip install drake, which is BSD-3-Clause).
 
-Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step shows
-the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with steps of 0.25 ms,
-which does not show the effect of what L1 leaves out. The rail leg is compared with an event-driven
-integration of its equations of motion, phase by phase, to 1e-11.
+Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step
+shows the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with steps of
+0.25 ms, which does not show the effect of what L1 leaves out. The rail leg is compared with an
+event-driven integration of its equations of motion, phase by phase, to 1e-11.
 
 Times are those of the steps alone: making the robot is not timed, nor are requests for the state
 of the feet (L2 computes this state in every step, L1 only on request). Drake is stepped from
@@ -21,8 +21,6 @@ study stability compares the others.
 """
 
 from __future__ import annotations
-
-import importlib.util
 
 from ros_pad.pace import Progress
 from studies.work_precision.walk.chart import figures
@@ -44,21 +42,24 @@ from studies.work_precision.walk.walkers import TOWING
 __all__ = ['figures', 'measure', 'table']
 
 
-def measure(progress: Progress, walks: int | None = None) -> list[WalkResult]:
+def measure(progress: Progress, cycles: int | None = None) -> list[WalkResult]:
     """Walk every scene with every method; report progress, 0 to 1, to ``progress``.
 
-    ``walks`` is the number of walks of each robot, all by default.
+    ``cycles`` is the number of gait cycles of a walk, that of ``CYCLES`` by default.
     """
     walkers, tops, baseline = hexapod_walkers()
-    cases = hexapod_walks()[:walks]
-    results = run(HEXAPOD, cases, walkers, tops, baseline, lambda done: progress(0.7 * done))
-    if importlib.util.find_spec('mujoco') and importlib.util.find_spec('pydrake'):
+    results = run(
+        HEXAPOD, hexapod_walks(), walkers, tops, baseline, lambda done: progress(0.7 * done),
+        cycles,
+    )  # fmt: skip
+    if len(tops) > 1:  # there is Drake
         towers = towing_walkers()
+        two = towers[2].name, towers[4].name
         results += run(
-            TOWING, towing_walks()[:walks], towers, (towers[2].name, towers[4].name),
-            towers[2].name, lambda done: progress(0.7 + 0.2 * done),
+            TOWING, towing_walks(), towers, two, two[0], lambda done: progress(0.7 + 0.2 * done),
+            cycles,
         )  # fmt: skip
     return results + run(
-        RAIL, rail_walks()[:walks], rail_walkers(), (EVENTS,), LEG,
-        lambda done: progress(0.9 + 0.1 * done),
+        RAIL, rail_walks(), rail_walkers(), (EVENTS,), LEG,
+        lambda done: progress(0.9 + 0.1 * done), cycles,
     )  # fmt: skip
