@@ -52,7 +52,7 @@ class Contact:
     Attributes
     ----------
     kind : str
-        ``bristles``, ``sap``, ``lagged``, ``similar`` or ``tamsi``.
+        ``bristles``, ``sap``, ``lagged``, ``similar`` or ``tamsi``, see above.
     stiffness : float
         Of the ground, and of bristles in shear, N/m.
     damping : float
@@ -83,12 +83,18 @@ class DrakeRobot:
     Parameters
     ----------
     scene : Scene
+        A scene with a legged robot that has servos.
     floor : Floor
     period : float
         Time between set-points, s.
     step : float
         Step of Drake, s; a period is a whole number of steps.
     contact : Contact
+
+    Raises
+    ------
+    ConfigError
+        When Drake is missing.
     """
 
     def __init__(
@@ -158,11 +164,9 @@ class DrakeRobot:
         for place, joint in enumerate(joints):
             end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else tip[:3, 3]
             length = float(np.linalg.norm(end))
-            rod = tree.SpatialInertia.MakeFromCentralInertia(
-                scale * joint.mass,
-                joint.centre,
-                scale * joint.mass * length**2 / 12.0 * _rod(end / length, tree),
-            )
+            mass = scale * joint.mass
+            inertia = mass * length**2 / 12.0 * _rod(end / length, tree)
+            rod = tree.SpatialInertia.MakeFromCentralInertia(mass, joint.centre, inertia)
             link = plant.AddRigidBody(f'{joint.name}_body', rod)
             base = tree.FixedOffsetFrame(f'{joint.name}_base', parent, self._transform(joint.at))
             kind = tree.PrismaticJoint if joint.slides else tree.RevoluteJoint
@@ -185,11 +189,8 @@ class DrakeRobot:
         for axis, mass in ((0, 0.0), (1, 0.0), (2, tow.weight / GRAVITY)):
             cube = tree.SpatialInertia.SolidBoxWithMass(mass, 0.05, 0.05, 0.05) if mass else None
             link = self._plant.AddRigidBody(f'sled_{axis}', cube or tree.SpatialInertia.Zero())
-            self._plant.AddJoint(
-                tree.PrismaticJoint(
-                    f'sled_{axis}', parent.body_frame(), link.body_frame(), np.eye(3)[axis]
-                )
-            )
+            frames = parent.body_frame(), link.body_frame()
+            self._plant.AddJoint(tree.PrismaticJoint(f'sled_{axis}', *frames, np.eye(3)[axis]))
             parent = link
         self._sled = parent
 
@@ -263,13 +264,9 @@ class DrakeRobot:
         about = legs.Shift(centre).CalcRotationalInertia().get_moments()[2]
         away = at - centre
         yaw = body.inertia - about - mass * float(away[:2] @ away[:2])
-        roll = ROLL_SHARE * yaw
-        self._trunk.SetSpatialInertiaInBodyFrame(
-            context,
-            tree.SpatialInertia.MakeFromCentralInertia(
-                mass, at, tree.RotationalInertia(roll, roll, yaw)
-            ),
-        )
+        moments = tree.RotationalInertia(ROLL_SHARE * yaw, ROLL_SHARE * yaw, yaw)
+        trunk = tree.SpatialInertia.MakeFromCentralInertia(mass, at, moments)
+        self._trunk.SetSpatialInertiaInBodyFrame(context, trunk)
 
     # --- state --------------------------------------------------------------------------------
 
@@ -280,12 +277,8 @@ class DrakeRobot:
 
     def _place(self) -> None:
         """Place the robot at rest on its planned feet, and the load behind it."""
-        plant, context, scene, low = (
-            self._plant,
-            self._context,
-            self._scene,
-            self._body.ground,
-        )
+        plant, context, scene = self._plant, self._context, self._scene
+        low = self._body.ground
         feet = self._path.feet
         self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))
         self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
@@ -298,7 +291,7 @@ class DrakeRobot:
         count = len(feet) + bool(scene.tow.weight)
         self._shear = np.zeros((count, 3))
         self._loads = np.zeros(count)
-        self._mates = np.zeros(count)  # coefficients of friction
+        self._ratios = np.zeros(count)  # coefficients of friction
         if scene.tow.weight:
             plant.GetJointByName('sled_0').set_translation(context, -scene.tow.distance)
         for film, state, (x, y, _) in zip(self._films, self.feet, feet, strict=True):
@@ -419,12 +412,12 @@ class DrakeRobot:
         self._shear += self._dt * slides
         push = -contact.stiffness * self._shear - contact.damping * slides
         for index in np.flatnonzero(loads).tolist():
-            self._mates[index] = (
+            self._ratios[index] = (
                 self._coefficient(index, loads[index], self._dt)
                 if index < count
                 else self._sled_friction(places[index])
             )
-        caps = self._mates * loads
+        caps = self._ratios * loads
         size = np.linalg.norm(push, axis=1)
         slips = size > caps
         push[slips] *= (caps[slips] / np.maximum(size[slips], 1e-30))[:, None]
@@ -444,14 +437,16 @@ class DrakeRobot:
         self._loads = np.array(list(loads.values()))
         for index, (shape, load) in enumerate(loads.items()):
             if index < len(self._tips):
-                mate = self._coefficient(index, load, self._dt if load > LIGHT else 0.0)
+                ratio = self._coefficient(index, load, self._dt if load > LIGHT else 0.0)
             else:
-                mate = self._sled_friction(self._sled.EvalPoseInWorld(self._context).translation())
-            if mate != self._mates[index]:
-                self._mates[index] = mate
+                ratio = self._sled_friction(
+                    self._sled.EvalPoseInWorld(self._context).translation()
+                )
+            if ratio != self._ratios[index]:
+                self._ratios[index] = ratio
                 self._world.AssignRole(
                     self._world.GetMyMutableContextFromRoot(self._root),
-                    self._plant.get_source_id(), shape, self._material(mate),
+                    self._plant.get_source_id(), shape, self._material(ratio),
                     self._geometry.RoleAssign.kReplace,
                 )  # fmt: skip
 
