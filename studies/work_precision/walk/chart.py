@@ -97,19 +97,18 @@ def _block(robot: str, part: Sequence[WalkResult]) -> list[str]:
 
 
 def _matrix(part: Sequence[WalkResult]) -> list[str]:
-    """Return the distance and the mean slip of each walk by each method."""
-    width = max(len(walk['walk']) for walk in part[0].walks)
+    """Return distance and mean slip of each walk by each method, as a table in Markdown."""
     lines = [
-        'distance, and mean slip path of a foot, mm a cycle',
-        f'  {"":{width}}' + ''.join(f'  {result.method}' for result in part),
+        'distance (slip path of a foot, mean), mm a cycle',
+        '| | ' + ' | '.join(result.method for result in part) + ' |',
+        '|---' * (len(part) + 1) + '|',
     ]
     for row, walk in enumerate(part[0].walks):
-        text = ''
-        for result in part:
-            here = result.walks[row]
-            both = f'{1e3 * here["distance"]:.1f} {1e3 * here["slip"]:5.1f}'
-            text += f'  {"verdict" if here["verdict"] else both:>{len(result.method)}}'
-        lines.append(f'  {walk["walk"]:{width}}{text}')
+        cells = [walk['walk']]
+        for here in (result.walks[row] for result in part):
+            went = f'{1e3 * here["distance"]:.1f} ({1e3 * here["slip"]:.1f})'
+            cells.append('verdict' if here['verdict'] else went)
+        lines.append('| ' + ' | '.join(cells) + ' |')
     return lines
 
 
@@ -121,7 +120,7 @@ def _walk_by_walk(part: Sequence[WalkResult]) -> list[str]:
     heads = ''.join(f'  {result.method}' for result in shown)
     lines = [
         f'{part[0].top}, a cycle, and by how much others are off in distance, %',
-        f'  {"walk":{width}}  distance, mm  slip, mm  aside, mm  yaw, mrad{heads}',
+        f'  {"walk":{width}}  distance, mm   +-, mm  slip, mm  aside, mm  yaw, mrad{heads}',
     ]
     for row, walks in enumerate(zip(*tops, strict=True)):
         true = {
@@ -135,6 +134,7 @@ def _walk_by_walk(part: Sequence[WalkResult]) -> list[str]:
             off += f'  {text:>{len(result.method)}}'
         lines.append(
             f'  {walks[0]["walk"]:{width}}  {1e3 * true["distance"]:12.1f}'
+            f'  {1e3 * abs(walks[0]["distance"] - true["distance"]):7.2f}'
             f'  {1e3 * true["slip"]:8.1f}'
             f'  {1e3 * true["lateral"]:+9.2f}  {1e3 * true["yaw"]:+9.2f}{off}'
         )
