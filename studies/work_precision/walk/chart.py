@@ -184,6 +184,10 @@ _STEP_PLACES = {
     'L2': (-9, -3),
     STIFF: (9, -4),
     'MuJoCo defaults': (9, 3),
+    DRAKE['bristles']: (2, -12),
+    DRAKE['lagged']: (10, -3),
+    DRAKE['sap']: (-9, -3),
+    DRAKE['tamsi']: (0, 7),
 }
 _LEGEND = {STIFF: 'L2, impratio 10 and noslip 5'}
 _PANELS = {
@@ -248,6 +252,7 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
     panel.set_xlabel('time for a simulated second, ms')
     for family, look in _LOOKS.items():
         mine = [result for result in part if result.family == family]
+        mine.sort(key=lambda result: result.step_s or 0.0)
         x = [result.ms_per_second for result in mine]
         y = [scale * result.errors[name] for result in mine]
         panel.plot(x, y, ls='-', lw=1.0, ms=6, zorder=3, **look)

@@ -5,7 +5,7 @@ The hexapod walks open loop, its pads at the pressure that a controller would be
 floors of the shipped scenes. Errors are relative to the mean of two engines at 0.1 ms, L2 and
 Drake with force elements for feet; half of their difference is drawn as a band. A second table
 shows where the engines part: loads in tow, and the effect of line, servos and soles. Drake is
-needed for both (pip install drake, which is BSD-3-Clause).
+needed for both (pip install drake, mainly BSD-3-Clause).
 
 Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step
 shows the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with steps of
