@@ -68,7 +68,7 @@ def add_out(part: argparse.ArgumentParser, folder: pathlib.Path | None = CHARTS)
 
 
 def add_count(
-    part: argparse.ArgumentParser, name: str, default: int, text: str, least: int = 1
+    part: argparse.ArgumentParser, name: str, default: int | None, text: str, least: int = 1
 ) -> None:
     """Add an option whose value is a whole number of at least ``least``."""
 
@@ -80,7 +80,11 @@ def add_count(
         return int(word)
 
     part.add_argument(
-        name, type=number, default=default, metavar='N', help=f'{text} (default: {default})'
+        name,
+        type=number,
+        default=default,
+        metavar='N',
+        help=text if default is None else f'{text} (default: {default})',
     )
 
 
@@ -167,10 +171,14 @@ def compare_methods(name: str, study: ModuleType, words: Sequence[str]) -> int:
     """
     part = parser(name, study.__doc__)
     add_out(part, None)
+    brief = 'cycles' in inspect.signature(study.measure).parameters
+    if brief:
+        add_count(part, '--cycles', None, 'gait cycles of each walk, for a short run')
     options = part.parse_args(words)
+    chosen = {'cycles': options.cycles} if brief else {}
     folder = options.out or new_folder(None, f'chart_{name}')
     with bar(f'{name}: measuring', 100.0, '%') as reach:
-        results = study.measure(lambda share: reach(100.0 * share))
+        results = study.measure(lambda share: reach(100.0 * share), **chosen)
     with bar(f'{name}: drawing', 100.0, '%') as reach:
         pictures = study.figures(results, lambda share: reach(100.0 * share))
     rows = [asdict(result) for result in results]

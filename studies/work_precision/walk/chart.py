@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from statistics import fmean
 from typing import Any
 
 import matplotlib
@@ -22,14 +23,16 @@ from studies.drawing import PURPLE
 from studies.drawing import SKY
 from studies.drawing import STYLE
 from studies.drawing import VERMILION
+from studies.work_precision.walk.hexapod import DRAKE
+from studies.work_precision.walk.hexapod import FREE
 from studies.work_precision.walk.hexapod import STIFF
 from studies.work_precision.walk.hexapod import TOP
 from studies.work_precision.walk.rail import LEGS
 from studies.work_precision.walk.results import FAILED
 from studies.work_precision.walk.results import WalkResult
-from studies.work_precision.walk.walkers import CYCLES
 from studies.work_precision.walk.walkers import HEXAPOD
 from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import TOWING
 from studies.work_precision.walk.walkers import named
 
 # Methods that are shown walk by walk.
@@ -41,6 +44,7 @@ SHOWN = tuple(
         ('L2', 2e-3),
         (STIFF, 2e-3),
         ('MuJoCo defaults', 2e-3),
+        (DRAKE['lagged'], 1e-3),
     )
 )
 _UNITS = {
@@ -57,6 +61,8 @@ def table(results: Sequence[WalkResult]) -> str:
     for robot in dict.fromkeys(result.robot for result in results):
         part = [result for result in results if result.robot == robot]
         lines += [*_block(robot, part), '']
+        if robot == TOWING:
+            lines += [*_matrix(part), '']
         if robot == HEXAPOD:
             lines += [*_walk_by_walk(part), '']
             if any(result.family == STIFF for result in part):
@@ -70,7 +76,7 @@ def _block(robot: str, part: Sequence[WalkResult]) -> list[str]:
     first, width = part[0], max(len(result.method) for result in part)
     heads = ''.join(f'{_UNITS[name][0]:>18}' for name in first.errors)
     lines = [
-        f'{robot} ({first.cases} walks of {CYCLES[robot]} cycles; median and worst errors against'
+        f'{robot} ({first.cases} walks of {first.cycles} cycles; median and worst errors against'
         f' {first.top}; times against {first.baseline})',
         f'  {"method":{width}}      ms/s  us/step    ratio{heads}  distance fails  slip fails'
         '  refused',
@@ -90,23 +96,46 @@ def _block(robot: str, part: Sequence[WalkResult]) -> list[str]:
     return lines
 
 
+def _matrix(part: Sequence[WalkResult]) -> list[str]:
+    """Return distance and mean slip of each walk by each method, as a table in Markdown."""
+    lines = [
+        'distance (slip path of a foot, mean), mm a cycle',
+        '| | ' + ' | '.join(result.method for result in part) + ' |',
+        '|---' * (len(part) + 1) + '|',
+    ]
+    for row, walk in enumerate(part[0].walks):
+        cells = [walk['walk']]
+        for here in (result.walks[row] for result in part):
+            went = f'{1e3 * here["distance"]:.1f} ({1e3 * here["slip"]:.1f})'
+            cells.append('verdict' if here['verdict'] else went)
+        lines.append('| ' + ' | '.join(cells) + ' |')
+    return lines
+
+
 def _walk_by_walk(part: Sequence[WalkResult]) -> list[str]:
     named = {result.method: result for result in part}
-    top, shown = named[part[0].top], [named[name] for name in SHOWN if name in named]
-    width = max(len(walk['walk']) for walk in top.walks)
+    tops = [named[name].walks for name in part[0].top.split(' and ')]
+    shown = [named[name] for name in SHOWN if name in named]
+    width = max(len(walk['walk']) for walk in tops[0])
     heads = ''.join(f'  {result.method}' for result in shown)
     lines = [
-        f'{top.method}, a cycle, and by how much others are off in distance, %',
-        f'  {"walk":{width}}  distance, mm  slip, mm  aside, mm  yaw, mrad{heads}',
+        f'{part[0].top}, a cycle, and by how much others are off in distance, %',
+        f'  {"walk":{width}}  distance, mm   +-, mm  slip, mm  aside, mm  yaw, mrad{heads}',
     ]
-    for row, true in enumerate(top.walks):
+    for row, walks in enumerate(zip(*tops, strict=True)):
+        true = {
+            name: fmean(walk[name] for walk in walks)
+            for name in ('distance', 'slip', 'lateral', 'yaw')
+        }
         off = ''
         for result in shown:
             walk = result.walks[row]
             text = 'verdict' if walk['verdict'] else f'{1e2 * walk["distance_error"]:+.1f}'
             off += f'  {text:>{len(result.method)}}'
         lines.append(
-            f'  {true["walk"]:{width}}  {1e3 * true["distance"]:12.1f}  {1e3 * true["slip"]:8.1f}'
+            f'  {walks[0]["walk"]:{width}}  {1e3 * true["distance"]:12.1f}'
+            f'  {1e3 * abs(walks[0]["distance"] - true["distance"]):7.2f}'
+            f'  {1e3 * true["slip"]:8.1f}'
             f'  {1e3 * true["lateral"]:+9.2f}  {1e3 * true["yaw"]:+9.2f}{off}'
         )
     return lines
@@ -117,6 +146,8 @@ def _missing(part: Sequence[WalkResult]) -> list[str]:
     why = ['laws of friction that the hexapod does not walk with: pad chart stability']
     if 'L1, compiled' not in families:
         why.append('L1, compiled: pip install "ros_pad[fast]"')
+    if 'Drake, SAP' not in families:
+        why.append('Drake, and with it a reference of two engines: pip install drake')
     if 'L2' not in families:
         why.append('L2, and with it the true errors of L1: pip install "ros_pad[mujoco]"')
     return why
@@ -135,6 +166,10 @@ _LOOKS: dict[str, dict[str, Any]] = {
     'L2': {'color': GREEN, 'marker': 'D'},
     STIFF: {'color': ORANGE, 'marker': 'P'},
     'MuJoCo defaults': {'color': VERMILION, 'marker': 'X'},
+    DRAKE['bristles']: {'color': BLACK, 'marker': '^'},
+    DRAKE['lagged']: {'color': BLACK, 'marker': '<'},
+    DRAKE['sap']: {'color': PALE, 'marker': '>'},
+    DRAKE['tamsi']: {'color': PALE, 'marker': 'v'},
     'RailLeg': {'color': GREEN, 'marker': 'o'},
     f'walk_many, {LEGS} legs': {'color': GREEN, 'marker': 's'},
     'solve_ivp, events, 1e-6': {'color': BLUE, 'marker': 'D'},
@@ -149,6 +184,10 @@ _STEP_PLACES = {
     'L2': (-9, -3),
     STIFF: (9, -4),
     'MuJoCo defaults': (9, 3),
+    DRAKE['bristles']: (2, -12),
+    DRAKE['lagged']: (10, -3),
+    DRAKE['sap']: (-9, -3),
+    DRAKE['tamsi']: (0, 7),
 }
 _LEGEND = {STIFF: 'L2, impratio 10 and noslip 5'}
 _PANELS = {
@@ -167,9 +206,13 @@ def draw(results: Sequence[WalkResult]) -> Figure:
         figure = Figure(figsize=(11.5, 8.0))
         figure.set_layout_engine('constrained', w_pad=0.08, h_pad=0.08)
         panels = figure.subplots(2, 3).ravel()
-        places = zip('abce', (0, 1, 2, 4), _PANELS, strict=True)
+        towing = [result for result in results if result.robot == TOWING]
+        # Without Drake there is no towing; the heading is then drawn in its place.
+        places = zip('abce', (0, 1, 2, 4)[: 3 if towing else 4], _PANELS, strict=False)
         for letter, place, name in places:
             _errors(panels[place], hexapod, name, f'{letter}  hexapod: {_PANELS[name][0]}')
+        if towing:
+            _tows(panels[4], towing, 'e  hexapod: dry, flat, with a load in tow')
         _strips(panels[3], hexapod, 'd  hexapod: distance, walk by walk')
         _errors(panels[5], rail, 'distance', 'f  rail leg: distance')
         _write_names(panels[5], rail)
@@ -179,15 +222,25 @@ def draw(results: Sequence[WalkResult]) -> Figure:
             for family, look in _LOOKS.items()
             if family in families
         ]
+        double = bool(hexapod) and ' and ' in hexapod[0].top
+        doubt = (
+            'half of the difference of the two references'
+            if double
+            else 'top level against half its step'
+        )
+        width = 7.0 if double else 0.9
         handles.append(
-            Line2D([], [], color=PALE, ls='--', lw=0.9, label='top level against half its step')
+            Line2D(
+                [], [], color=PALE, alpha=0.5, ls='-' if double else '--', lw=width, label=doubt
+            )
         )
         figure.legend(
             handles=handles,
             loc='outside lower center',
             ncol=4,
             title='Mark: median of the walks; whisker: the worst; number: step, ms.'
-            ' In f, events and smoothed friction are those of solve_ivp.',
+            ' Dashed in e: soles free to turn. In f, events and'
+            ' smoothed friction are those of solve_ivp.',
         )
     return figure
 
@@ -199,6 +252,7 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
     panel.set_xlabel('time for a simulated second, ms')
     for family, look in _LOOKS.items():
         mine = [result for result in part if result.family == family]
+        mine.sort(key=lambda result: result.step_s or 0.0)
         x = [result.ms_per_second for result in mine]
         y = [scale * result.errors[name] for result in mine]
         panel.plot(x, y, ls='-', lw=1.0, ms=6, zorder=3, **look)
@@ -217,14 +271,29 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
                     fontsize=7,
                     color=look['color'],
                 )
+    if part and (band := scale * part[0].band[name]):
+        panel.axhspan(1e-9, band, color=PALE, alpha=0.35, lw=0, zorder=0)
+        panel.set_ylim(bottom=0.3 * band)
     for result in part:
-        if result.family == TOP and result.method != result.top:
+        if result.family == TOP and not band and result.method != result.top:
             own = scale * result.errors[name]
             panel.axhline(own, color=PALE, ls='--', lw=0.9, zorder=1)
             # Smaller errors are not meaningful.
             panel.set_ylim(bottom=0.6 * own)
     panel.xaxis.set_major_formatter('{x:g}')
     panel.yaxis.set_major_formatter('{x:g}')
+    panel.grid(color=PALE, alpha=0.25, lw=0.5)
+
+
+def _tows(panel: Axes, part: Sequence[WalkResult], title: str) -> None:
+    """Draw the distance over the weight in tow, with soles that resist turning, and without."""
+    for result in part:
+        family, free = result.family.removesuffix(f', {FREE}'), FREE in result.family
+        loads = [walk for walk in result.walks if walk['walk'].endswith(' N')]
+        x = [float(walk['walk'].removesuffix(' N')) for walk in loads]
+        y = [1e3 * walk['distance'] for walk in loads]
+        panel.plot(x, y, ls='--' if free else '-', lw=1.0, ms=5, **_LOOKS[family])
+    panel.set(title=title, xlabel='towed, N', ylabel='distance, mm a cycle')
     panel.grid(color=PALE, alpha=0.25, lw=0.5)
 
 

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
@@ -15,9 +18,13 @@ from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import RECOMMENDED
 from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
+from studies.work_precision.walk.drake import Contact
+from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import CYCLES
 from studies.work_precision.walk.walkers import HEXAPOD
+from studies.work_precision.walk.walkers import TOWING
 from studies.work_precision.walk.walkers import Walk
 from studies.work_precision.walk.walkers import Walked
 from studies.work_precision.walk.walkers import Walker
@@ -65,8 +72,8 @@ def _hexapod_walk(name: str, scene: Scene, shape: str, seed: int) -> Walk:
     return Walk(name, scene, controller.setpoint(1), seed)
 
 
-def hexapod_walkers() -> tuple[list[Walker], str, str]:
-    """Return the available walkers, and the names of the reference and the baseline of times."""
+def hexapod_walkers() -> tuple[list[Walker], tuple[str, ...], str]:
+    """Return the available walkers, and the names of the references and the baseline of times."""
     walkers = []
     forms = {'L1': (False, False, False), 'L1, soles turn': (False, True, False)}
     if importlib.util.find_spec('numba'):
@@ -77,7 +84,7 @@ def hexapod_walkers() -> tuple[list[Walker], str, str]:
             walkers.append(_planar(family, step, compiled, turning, at_once))
     if not importlib.util.find_spec('mujoco'):
         top = _planar('L1', TOP_STEP, False, False, False)
-        return [*walkers, top], top.name, named('L1', SAMPLE)
+        return [*walkers, top], (top.name,), named('L1', SAMPLE)
     steps = (5e-4, 1e-3, 2e-3, 4e-3)
     walkers += [_full('L2', replace(RECOMMENDED, timestep=step)) for step in steps]
     stiff = replace(RECOMMENDED, impratio=10.0, noslip_iterations=5)
@@ -86,13 +93,33 @@ def hexapod_walkers() -> tuple[list[Walker], str, str]:
         _full('MuJoCo defaults', replace(MUJOCO_DEFAULTS, timestep=step), ours=False)
         for step in (5e-4, 2e-3)
     ]
-    walkers += [
-        _full(TOP, replace(RECOMMENDED, timestep=step)) for step in (TOP_STEP, TOP_STEP / 2.0)
-    ]
-    return walkers, named(TOP, TOP_STEP), named('L2', RECOMMENDED.timestep)
+    baseline = named('L2', RECOMMENDED.timestep)
+    if importlib.util.find_spec('pydrake'):
+        tops: tuple[Walker, ...] = (
+            _full(TOP, replace(RECOMMENDED, timestep=1e-4)),
+            _drake('bristles', 1e-4),
+        )
+        walkers += [_drake(kind, step) for kind, steps in DRAKE_STEPS.items() for step in steps]
+    else:
+        # The finer one shows the uncertainty of the reference.
+        walkers.append(_full(TOP, replace(RECOMMENDED, timestep=TOP_STEP / 2.0)))
+        tops = (_full(TOP, replace(RECOMMENDED, timestep=TOP_STEP)),)
+    return [*walkers, *tops], tuple(top.name for top in tops), baseline
 
 
 TOP, STIFF = 'L2, top', 'L2, noslip'
+DRAKE = {
+    'bristles': 'Drake, force elements',
+    'sap': 'Drake, SAP',
+    'lagged': 'Drake, lagged',
+    'tamsi': 'Drake, TAMSI',
+}
+DRAKE_STEPS = {
+    'bristles': (2e-4, 4e-4),
+    'sap': (1e-3, 2e-3),
+    'lagged': (5e-4, 1e-3, 2e-3),
+    'tamsi': (1e-3, 2e-3),
+}
 
 
 def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bool) -> Walker:
@@ -100,25 +127,99 @@ def _planar(family: str, step: float, compiled: bool, turning: bool, at_once: bo
         floor = case.scene.floor.build(case.seed)
         robot = PlanarRobot(case.scene, floor, step, compiled, turning)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / step)
-        start = time.perf_counter()
+        start = time.process_time()
         if at_once:
             count = robot.walk(pressures, count)
         else:
             for _ in range(count):
                 robot.step(pressures)
-        return walked(robot, case.scene, count, time.perf_counter() - start)
+        return walked(robot, case.scene, count, time.process_time() - start)
 
     return Walker(family, named(family, step), step, walk)
 
 
-def _full(family: str, settings: SolverSettings, ours: bool = True) -> Walker:
-    def walk(case: Walk) -> Walked:
+def _full(
+    family: str, settings: SolverSettings, ours: bool = True, turning: bool = True
+) -> Walker:
+    """Return a walker of L2; without ``turning`` soles do not resist turning."""
+
+    def make(case: Walk) -> FullRobot:
         robot = FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
+        robot._lever *= turning
+        return robot
+
+    return _sampled(family, settings.timestep, make, ours)
+
+
+def _drake(kind: str, step: float, turning: bool = True) -> Walker:
+    def make(case: Walk) -> DrakeRobot:
+        floor, contact = case.scene.floor.build(case.seed), Contact(kind, turning=turning)
+        return DrakeRobot(case.scene, floor, SAMPLE, step, contact)
+
+    family = DRAKE[kind] if turning else f'{DRAKE[kind]}, {FREE}'
+    return _sampled(family, step, make, False)
+
+
+def _sampled(family: str, step: float, make: Callable[[Walk], Any], ours: bool) -> Walker:
+    """Return a walker with servos, which get a set-point in each sample."""
+
+    def walk(case: Walk) -> Walked:
+        robot = make(case)
         pressures, count = [case.pressure] * len(robot.legs), round(case.scene.duration / SAMPLE)
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(count):
             robot.step(pressures)
-        taken = time.perf_counter() - start
-        return walked(robot, case.scene, count * round(SAMPLE / settings.timestep), taken)
+        taken = time.process_time() - start
+        return walked(robot, case.scene, count * round(SAMPLE / step), taken)
 
-    return Walker(family, named(family, settings.timestep), settings.timestep, walk, ours)
+    return Walker(family, named(family, step), step, walk, ours)
+
+
+# --- a load in tow ------------------------------------------------------------------------------
+
+FREE = 'soles free'  # to turn: nothing resists
+WEIGHTS = (0.0, 3.0, 6.0, 9.0, 12.0)  # N
+SWITCHES = {'soft line': 0.25, 'servos 3 times as stiff': 3.0, 'servos 10 times as stiff': 10.0}
+
+
+def towing_walks() -> list[Walk]:
+    """Return walks on dry flat ground with loads in tow, and with the effect of each part less."""
+    scene = replace(Scene.load('hexapod_patches'), settle=SETTLE, cycles=CYCLES[TOWING])
+    scene = replace(scene, floor=replace(scene.floor, kind='dry'))
+    loads = [replace(scene, tow=replace(scene.tow, weight=weight)) for weight in WEIGHTS]
+    walks = [Walk(f'{weight:g} N', load, 0.0) for weight, load in zip(WEIGHTS, loads, strict=True)]
+    heavy = loads[-1]
+    for name, factor in SWITCHES.items():
+        scene = _stiffer(heavy, factor)
+        if name == 'soft line':
+            tow = replace(heavy.tow, stiffness=factor * heavy.tow.stiffness)
+            scene = replace(heavy, tow=tow)
+        walks.append(Walk(f'{WEIGHTS[-1]:g} N, {name}', scene, 0.0))
+    return walks
+
+
+def _stiffer(scene: Scene, factor: float) -> Scene:
+    """Return a scene whose servos are stiffer, and damped alike."""
+    assert isinstance(scene.body, LeggedBody) and scene.body.robot.servo is not None
+    servo = scene.body.robot.servo
+    servo = replace(
+        servo,
+        stiffness=factor * servo.stiffness,
+        torque=factor * servo.torque,
+        damping=math.sqrt(factor) * servo.damping,
+    )
+    robot = replace(scene.body.robot, servo=servo)
+    return replace(scene, body=replace(scene.body, robot=robot))
+
+
+def towing_walkers() -> list[Walker]:
+    """Return L1, L2 and Drake, with soles that resist turning and with those that do not."""
+    fine = replace(RECOMMENDED, timestep=TOP_STEP)
+    return [
+        *(_planar(family, SAMPLE, False, turns, False)
+          for family, turns in (('L1', False), ('L1, soles turn', True))),
+        _full('L2', fine),
+        _full(f'L2, {FREE}', fine, turning=False),
+        _drake('bristles', 2e-4),
+        _drake('bristles', 2e-4, turning=False),
+    ]  # fmt: skip

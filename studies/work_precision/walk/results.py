@@ -8,6 +8,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
 from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ros_pad.errors import PadError
 from ros_pad.pace import Progress
 from studies.work_precision.walk.walkers import HEXAPOD
 from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import TOWING
 from studies.work_precision.walk.walkers import Walk
 from studies.work_precision.walk.walkers import Walked
 from studies.work_precision.walk.walkers import Walker
@@ -40,7 +42,10 @@ class WalkResult:
     versus : float
         Time of a simulated second over that of the baseline, median over walks of the ratio.
     baseline, top : str
-        Names of the walkers that times (``baseline``) and errors (``top``) are relative to.
+        Names of the walkers that times (``baseline``) and errors (``top``) are relative to; errors
+        may be relative to the mean of two.
+    band : dict of float
+        Half of the difference of these two, median over walks, in the units of ``errors``.
     errors, worst : dict of float
         Median and largest error of ``distance`` and ``slip`` (relative), ``lateral`` (m a cycle)
         and ``yaw`` (rad a cycle), of walks without a verdict; NaN where there are none.
@@ -50,7 +55,8 @@ class WalkResult:
         The same for the slip path.
     refused : int
         Number of walks without a valid result: they ended with a verdict or an error.
-    cases : int
+    cases, cycles : int
+        Number of walks, and of gait cycles of each.
     walks : list of dict
         Each walk, with its results and the relative error of its distance.
     ours : bool
@@ -65,39 +71,45 @@ class WalkResult:
     versus: float
     baseline: str
     top: str
+    band: dict[str, float]
     errors: dict[str, float]
     worst: dict[str, float]
     failures: int
     slip_failures: int
     refused: int
     cases: int
+    cycles: int
     walks: list[dict[str, Any]]
     ours: bool
 
 
 RELATIVE = ('distance', 'slip')
-MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), RAIL: RELATIVE}
+MEASURES = {HEXAPOD: (*RELATIVE, 'lateral', 'yaw'), TOWING: RELATIVE, RAIL: RELATIVE}
 
 
 def run(
     robot: str,
     walks: Sequence[Walk],
     walkers: Sequence[Walker],
-    top: str,
+    tops: Sequence[str],
     baseline: str,
     progress: Progress,
+    cycles: int | None = None,
 ) -> list[WalkResult]:
-    """Measure each walker; ``top`` and ``baseline`` are names of walkers.
+    """Measure each walker; ``tops``, one or two, and ``baseline`` are names of walkers.
 
     Walkers take turns on each walk, so that other load of the machine affects all of them.
-    Progress, 0 to 1, is reported to ``progress``.
+    Progress, 0 to 1, is reported to ``progress``. ``cycles`` is the length of the walks, if it is
+    not theirs.
     """
+    if cycles:
+        walks = [replace(walk, scene=replace(walk.scene, cycles=cycles)) for walk in walks]
     went: dict[str, list[Walked]] = {walker.name: [] for walker in walkers}
     for number, walk in enumerate(walks):
         for turn, walker in enumerate(walkers):
             went[walker.name].append(_attempt(walker, walk))
             progress((number + (turn + 1) / len(walkers)) / len(walks))
-    return [_result(robot, walker, walks, went, top, baseline) for walker in walkers]
+    return [_result(robot, walker, walks, went, tops, baseline) for walker in walkers]
 
 
 def _attempt(walker: Walker, walk: Walk) -> Walked:
@@ -112,22 +124,27 @@ def _result(
     walker: Walker,
     walks: Sequence[Walk],
     went: dict[str, list[Walked]],
-    top: str,
+    tops: Sequence[str],
     baseline: str,
 ) -> WalkResult:
-    here, truth = went[walker.name], went[top]
+    here = went[walker.name]
+    truth = [_between(*pair) for pair in zip(went[tops[0]], went[tops[-1]], strict=True)]
     durations = [walk.scene.duration for walk in walks]
     least = [LEAST * walk.scene.stride for walk in walks]
     valid = [not each.verdict and math.isfinite(each.distance) for each in here]
     off = {
         measure: np.array(
             [
-                abs(getattr(each, measure) - getattr(true, measure))
-                / (max(abs(getattr(true, measure)), floor) if measure in RELATIVE else 1.0)
-                if good
-                else math.nan
+                _off(measure, each, true, floor) if good else math.nan
                 for each, true, good, floor in zip(here, truth, valid, least, strict=True)
             ]
+        )
+        for measure in MEASURES[robot]
+    }
+    band = {
+        measure: median(
+            _off(measure, each, true, floor)
+            for each, true, floor in zip(went[tops[0]], truth, least, strict=True)
         )
         for measure in MEASURES[robot]
     }
@@ -144,7 +161,8 @@ def _result(
             each.seconds / base.seconds for each, base in zip(here, went[baseline], strict=True)
         ),
         baseline=baseline,
-        top=top,
+        top=' and '.join(tops),
+        band=band,
         errors={name: median(errors) for name, errors in found.items()},
         worst={name: max(errors, default=math.nan) for name, errors in found.items()},
         # NaN counts as an error above the limit.
@@ -152,6 +170,7 @@ def _result(
         slip_failures=int((~(off['slip'] <= FAILED)).sum()),
         refused=valid.count(False),
         cases=len(walks),
+        cycles=walks[0].scene.cycles,
         walks=[
             {'walk': walk.name}
             | asdict(each)
@@ -160,6 +179,20 @@ def _result(
         ],
         ours=walker.ours,
     )
+
+
+def _between(one: Walked, other: Walked) -> Walked:
+    """Return the mean of two results of one walk."""
+    means = {
+        measure: 0.5 * (getattr(one, measure) + getattr(other, measure))
+        for measure in ('distance', 'slip', 'lateral', 'yaw')
+    }
+    return replace(one, **means)
+
+
+def _off(measure: str, each: Walked, true: Walked, floor: float) -> float:
+    found, wanted = getattr(each, measure), getattr(true, measure)
+    return float(abs(found - wanted) / (max(abs(wanted), floor) if measure in RELATIVE else 1.0))
 
 
 def median(values: Any) -> float:

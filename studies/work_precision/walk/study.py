@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work-precision study of a walk: every fidelity level, against the finest.
+"""Work-precision study of a walk: every fidelity level, MuJoCo's defaults, and Drake.
 
 The hexapod walks open loop, its pads at the pressure that a controller would begin with, on the
-floors of the shipped scenes. Errors are relative to L2 with steps of 0.25 ms; the row with half of
-this step shows the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with
-steps of 0.25 ms, which does not show the effect of what L1 leaves out. The rail leg is compared
-with an event-driven integration of its equations of motion, phase by phase, to 1e-11.
+floors of the shipped scenes. Errors are relative to the mean of two engines at 0.1 ms, L2 and
+Drake with force elements for feet; half of their difference is drawn as a band. A second table
+shows where the engines part: loads in tow, and the effect of line, servos and soles. Drake is
+needed for both (pip install drake, mainly BSD-3-Clause).
+
+Without Drake, errors are relative to L2 with steps of 0.25 ms; the row with half of this step
+shows the uncertainty of this reference. Without MuJoCo, errors are relative to L1 with steps of
+0.25 ms, which does not show the effect of what L1 leaves out. The rail leg is compared with an
+event-driven integration of its equations of motion, phase by phase, to 1e-11.
 
 Times are those of the steps alone: making the robot is not timed, nor are requests for the state
-of the feet (L2 computes this state in every step, L1 only on request).
+of the feet (L2 computes this state in every step, L1 only on request). Drake is stepped from
+Python, which writes forces or coefficients of friction before each step.
 
 Of the laws in studies.work_precision.friction, the hexapod walks only with the elastic one. The
 study stability compares the others.
@@ -21,6 +27,8 @@ from studies.work_precision.walk.chart import figures
 from studies.work_precision.walk.chart import table
 from studies.work_precision.walk.hexapod import hexapod_walkers
 from studies.work_precision.walk.hexapod import hexapod_walks
+from studies.work_precision.walk.hexapod import towing_walkers
+from studies.work_precision.walk.hexapod import towing_walks
 from studies.work_precision.walk.rail import EVENTS
 from studies.work_precision.walk.rail import LEG
 from studies.work_precision.walk.rail import rail_walkers
@@ -29,17 +37,29 @@ from studies.work_precision.walk.results import WalkResult
 from studies.work_precision.walk.results import run
 from studies.work_precision.walk.walkers import HEXAPOD
 from studies.work_precision.walk.walkers import RAIL
+from studies.work_precision.walk.walkers import TOWING
 
 __all__ = ['figures', 'measure', 'table']
 
 
-def measure(progress: Progress) -> list[WalkResult]:
-    """Walk every scene at every fidelity level; report progress, 0 to 1, to ``progress``."""
-    walkers, top, baseline = hexapod_walkers()
-    hexapod = run(
-        HEXAPOD, hexapod_walks(), walkers, top, baseline, lambda done: progress(0.85 * done)
-    )
-    rail = run(
-        RAIL, rail_walks(), rail_walkers(), EVENTS, LEG, lambda done: progress(0.85 + 0.15 * done)
-    )
-    return hexapod + rail
+def measure(progress: Progress, cycles: int | None = None) -> list[WalkResult]:
+    """Walk every scene with every method; report progress, 0 to 1, to ``progress``.
+
+    ``cycles`` is the number of gait cycles of a walk, that of ``CYCLES`` by default.
+    """
+    walkers, tops, baseline = hexapod_walkers()
+    results = run(
+        HEXAPOD, hexapod_walks(), walkers, tops, baseline, lambda done: progress(0.7 * done),
+        cycles,
+    )  # fmt: skip
+    if len(tops) > 1:  # there is Drake
+        towers = towing_walkers()
+        two = towers[2].name, towers[4].name
+        results += run(
+            TOWING, towing_walks(), towers, two, two[0], lambda done: progress(0.7 + 0.2 * done),
+            cycles,
+        )  # fmt: skip
+    return results + run(
+        RAIL, rail_walks(), rail_walkers(), (EVENTS,), LEG,
+        lambda done: progress(0.9 + 0.1 * done), cycles,
+    )  # fmt: skip

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 import importlib.util
 import math
+import sys
 from dataclasses import replace
 
 import mpmath
+import numpy as np
 import pytest
 
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import RailLeg
 from ros_pad.simulation import Scene
+from ros_pad.simulation.full_robot import FullRobot
 from studies.work_precision.walk import chart
 from studies.work_precision.walk import hexapod
 from studies.work_precision.walk import rail
 from studies.work_precision.walk import results
 from studies.work_precision.walk import study
-from studies.work_precision.walk import walkers
+from studies.work_precision.walk.drake import Contact
+from studies.work_precision.walk.drake import DrakeRobot
 from studies.work_precision.walk.walkers import HEXAPOD
 from studies.work_precision.walk.walkers import RAIL
 from studies.work_precision.walk.walkers import Walk
@@ -126,7 +131,7 @@ def test_errors_failures_and_ratios():
         ArithmeticError('diverged'), InvalidInput('no'), went(math.nan, 0.0, 1.0), went(0, 0, 1.0),
     ])  # fmt: skip
     shares = []
-    found = results.run(HEXAPOD, walks, [top, other, lost], 'top', 'top', shares.append)
+    found = results.run(HEXAPOD, walks, [top, other, lost], ('top',), 'top', shares.append)
     assert shares == sorted(shares)
     assert len(shares) == 12 and shares[-1] == 1.0
     top, other, lost = found
@@ -148,12 +153,111 @@ def test_errors_failures_and_ratios():
     assert lost.errors['distance'] == lost.worst['distance'] == 1.0
     assert lost.walks[0]['verdict'] == 'ArithmeticError: diverged'
     text = chart.table(found)
-    assert 'hexapod (4 walks of 6 cycles' in text
+    assert 'hexapod (4 walks of 5 cycles' in text
     (line,) = [line for line in text.splitlines() if line.startswith('  other ')]
     assert line.split() == [
         *('other', '200', '1e+03', '0.25', '2', '20', '50', '50', '1', '2', '1', '4'),
         *('2', '3', '1'),
     ]  # fmt: skip
+
+
+def test_two_references_leave_a_band():
+    scene = replace(Scene.load('hexapod_smooth_dry_flat'), cycles=5)
+    ways = [
+        fake('one', [went(0.10, 0.02, 1.0, 3e-3)]),
+        fake('two', [went(0.12, 0.04, 1.0, 1e-3)]),
+        fake('third', [went(0.11, 0.06, 1.0, 2e-3)]),
+    ]
+    tops = 'one', 'two'
+    found = results.run(HEXAPOD, [Walk('a', scene, 0.0)], ways, tops, 'one', lambda _: None)
+    one, two, third = found
+    assert {result.top for result in found} == {'one and two'}
+    # The truth is in the middle: 0.11 m, 0.03 m, 2 mm aside.
+    assert one.band == pytest.approx(
+        {'distance': 0.01 / 0.11, 'slip': 1.0 / 3.0, 'lateral': 1e-3, 'yaw': 0.0}
+    )
+    assert one.errors == pytest.approx(one.band)
+    assert two.errors == pytest.approx(one.band)
+    assert third.errors == pytest.approx(
+        {'distance': 0.0, 'slip': 1.0, 'lateral': 0.0, 'yaw': 0.0}
+    )
+
+
+# --- Drake --------------------------------------------------------------------------------------
+
+
+def test_without_drake_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pydrake', None)
+    case = hexapod.towing_walks()[0]
+    with pytest.raises(ConfigError, match='pip install drake'):
+        DrakeRobot(case.scene, case.scene.floor.build(0), 4e-3, 4e-4, Contact())
+
+
+def test_each_switch_changes_one_part():
+    walks = {case.name: case.scene for case in hexapod.towing_walks()}
+    heavy = walks['12 N']
+    assert walks['0 N'].tow.weight == 0.0 and heavy.tow.weight == 12.0
+    soft = walks['12 N, soft line']
+    assert soft.tow.stiffness == 500.0
+    assert replace(soft, tow=heavy.tow) == heavy
+    stiff = walks['12 N, servos 10 times as stiff'].body.robot.servo
+    assert stiff.stiffness == pytest.approx(188.0)
+    assert stiff.torque == pytest.approx(9.4)
+    # The share of critical damping stays.
+    before = heavy.body.robot.servo
+    assert stiff.damping**2 / stiff.stiffness == pytest.approx(
+        before.damping**2 / before.stiffness
+    )
+
+
+@pytest.fixture
+def drakes():
+    pytest.importorskip('pydrake')
+    scene = replace(hexapod.towing_walks()[3].scene, settle=1.0)
+    floor = scene.floor.build(0)
+    return lambda kind='bristles': DrakeRobot(scene, floor, 4e-3, 5e-4, Contact(kind))
+
+
+def test_drake_has_the_masses_of_mujoco(drakes):
+    mujoco = pytest.importorskip('mujoco')
+    ours = drakes()
+    case = hexapod.towing_walks()[3]
+    theirs = FullRobot(case.scene, case.scene.floor.build(0), 4e-3)
+    mujoco.mj_forward(theirs.model, theirs.data)
+    wanted = np.zeros((theirs.model.nv, theirs.model.nv))
+    mujoco.mj_fullM(theirs.model, theirs.data, wanted)
+    found = ours._plant.CalcMassMatrix(ours._context)
+    # Drake has angles before places.
+    trunk = ours._trunk.floating_velocities_start_in_v()
+    sled = [ours._plant.GetJointByName(f'sled_{axis}').velocity_start() for axis in range(3)]
+    order = [trunk + place for place in (3, 4, 5, 0, 1, 2)] + [*ours._speeds, *sled]
+    # L2 places the trunk as if the rods were infinitely thin.
+    assert np.abs(found[np.ix_(order, order)] - wanted).max() < 1e-5
+
+
+@pytest.mark.parametrize('kind', ['bristles', 'lagged', 'tamsi'])
+def test_drake_stands_on_the_weight(drakes, kind):
+    robot = drakes(kind)
+    for _ in range(90):
+        robot.step([0.0] * 6)
+    assert robot.verdict is None
+    assert robot._loads[:6].sum() == pytest.approx(2.09 * 9.80665, rel=2e-3)
+    assert robot._loads[6] == pytest.approx(9.0, rel=2e-3)
+    assert math.hypot(*robot.body[:2]) < 1e-3
+
+
+def test_sliding_and_turning_of_bristles_share_the_cap(drakes):
+    robot = drakes()
+    robot.step([0.0] * 6)
+    robot._shear[:] = [1e-2, -2e-2, 2e-2]  # far beyond the cap
+    robot._press(np.zeros(robot._plant.num_velocities()))
+    caps = robot._ratios * robot._loads
+    assert caps[:6].min() > 1.0
+    assert 1e5 * robot._shear[:6] == pytest.approx(
+        np.outer(caps[:6], [1.0, -2.0, 2.0]) / 3.0, rel=0.01, abs=0.01
+    )
+    # The load in tow slides without turning.
+    assert 1e5 * np.linalg.norm(robot._shear[6]) == pytest.approx(0.5 * robot._loads[6])
 
 
 # --- the study ----------------------------------------------------------------------------------
@@ -164,13 +268,16 @@ def measured_walks():
     pytest.importorskip('mujoco')
     pytest.importorskip('numba')
     with pytest.MonkeyPatch.context() as patch:
-        for robot in walkers.CYCLES:
-            patch.setitem(walkers.CYCLES, robot, 2)
+        # With Drake the study would take minutes.
+        find = importlib.util.find_spec
+        patch.setattr(
+            importlib.util, 'find_spec', lambda name: None if name == 'pydrake' else find(name)
+        )
         every = {case.name: case for case in hexapod.hexapod_walks()}
         walks = [every[name] for name in ('wet, dome', 'wet, flat')]
         patch.setattr(study, 'hexapod_walks', lambda: walks)
         shares = []
-        measured = study.measure(shares.append)
+        measured = study.measure(shares.append, 2)
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
     return measured
@@ -216,7 +323,8 @@ def test_integrators_step_over_stances_in_silence(measured_walks):
 def test_table_and_picture(measured_walks, tmp_path):
     text = chart.table(measured_walks)
     assert 'against L2, top, 0.25 ms' in text
-    assert 'pip install' not in text
+    assert 'pip install "' not in text
+    assert 'pip install drake' in text
     assert 'wet, dome' in text
     pictures = chart.figures(measured_walks)
     assert set(pictures) == {'walk'}
@@ -226,18 +334,18 @@ def test_table_and_picture(measured_walks, tmp_path):
 
 def test_without_extras(monkeypatch):
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    ways, top, baseline = hexapod.hexapod_walkers()
+    ways, tops, baseline = hexapod.hexapod_walkers()
     names = {walker.name for walker in ways}
-    assert {top, baseline} <= names
-    assert top == 'L1, 0.25 ms'
+    assert {*tops, baseline} <= names
+    assert tops == ('L1, 0.25 ms',)
     assert not any('L2' in name or 'MuJoCo' in name or 'compiled' in name for name in names)
     case = hexapod.hexapod_walks()[0]
     case = replace(case, scene=replace(case.scene, cycles=1))
-    few = [walker for walker in ways if walker.name in (top, baseline)]
-    found = results.run(HEXAPOD, [case], few, top, baseline, lambda _: None)
+    few = [walker for walker in ways if walker.name in (*tops, baseline)]
+    found = results.run(HEXAPOD, [case], few, tops, baseline, lambda _: None)
     text = chart.table(found)
     assert 'L1, compiled: pip install "ros_pad[fast]"' in text
     assert 'pip install "ros_pad[mujoco]"' in text
     legs = [each for each in rail.rail_walkers() if each.name in (rail.EVENTS, rail.LEG)]
-    found += results.run(RAIL, [rail_walk(0.5)], legs, rail.EVENTS, rail.LEG, lambda _: None)
+    found += results.run(RAIL, [rail_walk(0.5)], legs, (rail.EVENTS,), rail.LEG, lambda _: None)
     assert len(chart.figures(found)['walk'].axes) == 6

@@ -1,0 +1,488 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robot of L2 in Drake, an engine that shares no code with MuJoCo or with ros_pad's solvers.
+
+Links, masses, servos, gait, floor, films and the law of resistance are the same; rigid-body
+dynamics and contact are Drake's. Drake's friction is that of a point and has no yaw moment, so
+there are two ways to bring in the feet:
+
+- ``sap``, ``similar``, ``lagged``, ``tamsi``: Drake finds the forces; before each step the
+  coefficient of a foot is set from its load in the last one. Soles do not resist turning.
+- ``bristles``: force elements. The ground is a stiff damped spring; along it a foot shears
+  elastically up to its cap, which sliding and turning share, as on L1 and L2.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ros_pad.contact.film import Film
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.robots.inverse import FeetSolver
+from ros_pad.robots.rotation import Array
+from ros_pad.simulation.full_robot import CLEAR
+from ros_pad.simulation.full_robot import LIGHT
+from ros_pad.simulation.full_robot import LOST
+from ros_pad.simulation.full_robot import SLIP_LOAD
+from ros_pad.simulation.full_robot import SLIP_SPEED
+from ros_pad.simulation.full_robot import TIPPED
+from ros_pad.simulation.full_robot import FootPath
+from ros_pad.simulation.mujoco_model import ROLL_SHARE
+from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terrain import Floor
+
+_SHALLOW = 5e-3  # m above the ground: below it the height of the ground under a foot stays
+_THIN = 0.02  # inertia of a rod about its own axis, over that across it, as on L2
+_GROUND = 1e3  # Drake combines two coefficients by their harmonic mean; that of the ground
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How feet touch the ground.
+
+    Attributes
+    ----------
+    kind : str
+        ``bristles``, ``sap``, ``lagged``, ``similar`` or ``tamsi``, see above.
+    stiffness : float
+        Of the ground, and of bristles in shear, N/m.
+    damping : float
+        Of the ground, and of bristles, N s/m.
+    relaxation : float
+        Relaxation time of Drake's contact, s.
+    turning : float
+        Factor on the lever arm of a sole that turns; 0: it does not resist.
+    """
+
+    kind: str = 'bristles'
+    stiffness: float = 1e5
+    damping: float = 200.0
+    relaxation: float = 1e-4
+    turning: float = 1.0
+
+
+def _drake(module: str) -> Any:
+    try:
+        return importlib.import_module(f'pydrake.{module}')
+    except ImportError as error:
+        raise ConfigError(f'this walk needs Drake ({error}): pip install drake') from error
+
+
+class DrakeRobot:
+    """A robot on a floor, towing a load, as :class:`ros_pad.simulation.full_robot.FullRobot`.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a legged robot that has servos.
+    floor : Floor
+    period : float
+        Time between set-points, s.
+    step : float
+        Step of Drake, s; a period is a whole number of steps.
+    contact : Contact
+
+    Raises
+    ------
+    ConfigError
+        When Drake is missing.
+    """
+
+    def __init__(
+        self, scene: Scene, floor: Floor, period: float, step: float, contact: Contact
+    ) -> None:
+        body: Any = scene.body
+        self._body = body
+        self.legs, self.period, self.time = scene.legs, period, 0.0
+        self.verdict: str | None = None
+        self.feet = [FootState() for _ in self.legs]
+        self._scene, self._floor, self._contact = scene, floor, contact
+        self._robot, self._servo = body.robot, body.robot.servo
+        self._substeps = round(period / step)
+        self._dt = period / self._substeps
+        self._steps = 0
+        self._foot = scene.foot.on_rough(scene.floor.roughness)
+        self._lever = contact.turning * self._foot.turning_radius
+        self._films = [Film(self._foot, scene.floor.viscosity) for _ in self.legs]
+        self._solver = FeetSolver(body.robot)
+        gait: Any = scene.gait
+        self._path = FootPath(gait, [(x, y, body.ground) for x, y in body.homes])
+        self._tools()
+        self._build()
+        self._place()
+
+    def _tools(self) -> None:
+        self._math, self._tree = _drake('math'), _drake('multibody.tree')
+        self._geometry, self._plants = _drake('geometry'), _drake('multibody.plant')
+        self._framework = _drake('systems.framework')
+
+    # --- model --------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        scene, tree = self._scene, self._tree
+        builder = self._framework.DiagramBuilder()
+        self._plant, self._world = self._plants.AddMultibodyPlantSceneGraph(builder, self._dt)
+        plant, slope = self._plant, scene.floor.slope
+        plant.mutable_gravity_field().set_gravity_vector(
+            [-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)]
+        )
+        self._trunk = plant.AddRigidBody(
+            'trunk', tree.SpatialInertia.SolidBoxWithMass(1.0, 0.1, 0.1, 0.1)
+        )
+        self._joints: list[Any] = []
+        self._tips = [self._add_leg(leg) for leg in range(len(self.legs))]
+        if scene.tow.weight:
+            self._add_sled()
+        if self._contact.kind != 'bristles':
+            self._add_contacts()
+        plant.Finalize()
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._context = plant.GetMyMutableContextFromRoot(self._root)
+        self._places = np.array([joint.position_start() for joint in self._joints])
+        self._speeds = np.array([joint.velocity_start() for joint in self._joints])
+        self._weigh_trunk()
+
+    def _transform(self, frame: Array) -> Any:
+        turn = self._math.RotationMatrix.ProjectToRotationMatrix(frame[:3, :3])
+        return self._math.RigidTransform(turn, frame[:3, 3])
+
+    def _add_leg(self, leg: int) -> Any:
+        """Add links, joints and motors of a leg; return the frame of its foot."""
+        plant, tree, robot, servo = self._plant, self._tree, self._robot, self._servo
+        joints, tip = robot.chains.legs[leg], robot.chains.feet[leg]
+        scale, parent = self._body.mass / robot.mass, self._trunk
+        for place, joint in enumerate(joints):
+            end = joints[place + 1].at[:3, 3] if place + 1 < len(joints) else tip[:3, 3]
+            length = float(np.linalg.norm(end))
+            mass = scale * joint.mass
+            inertia = mass * length**2 / 12.0 * _rod(end / length, tree)
+            rod = tree.SpatialInertia.MakeFromCentralInertia(mass, joint.centre, inertia)
+            link = plant.AddRigidBody(f'{joint.name}_body', rod)
+            base = tree.FixedOffsetFrame(f'{joint.name}_base', parent, self._transform(joint.at))
+            kind = tree.PrismaticJoint if joint.slides else tree.RevoluteJoint
+            added = plant.AddJoint(
+                kind(
+                    joint.name, plant.AddFrame(base), link.body_frame(), joint.axis,
+                    damping=servo.damping,
+                )
+            )  # fmt: skip
+            motor = plant.AddJointActuator(f'{joint.name}_motor', added)
+            motor.set_default_rotor_inertia(servo.rotor_inertia)
+            motor.set_default_gear_ratio(1.0)
+            self._joints.append(added)
+            parent = link
+        return plant.AddFrame(tree.FixedOffsetFrame(f'foot_{leg}', parent, self._transform(tip)))
+
+    def _add_sled(self) -> None:
+        """Add the towed load: a point that does not turn."""
+        tow, tree, parent = self._scene.tow, self._tree, self._plant.world_body()
+        for axis, mass in ((0, 0.0), (1, 0.0), (2, tow.weight / GRAVITY)):
+            cube = tree.SpatialInertia.SolidBoxWithMass(mass, 0.05, 0.05, 0.05) if mass else None
+            link = self._plant.AddRigidBody(f'sled_{axis}', cube or tree.SpatialInertia.Zero())
+            frames = parent.body_frame(), link.body_frame()
+            self._plant.AddJoint(tree.PrismaticJoint(f'sled_{axis}', *frames, np.eye(3)[axis]))
+            parent = link
+        self._sled = parent
+
+    def _add_contacts(self) -> None:
+        """Give feet, load and ground shapes that Drake's own contact sees."""
+        plants, contact, plant = self._plants, self._contact, self._plant
+        name = f'k{contact.kind.capitalize()}'
+        plant.set_discrete_contact_approximation(
+            plants.DiscreteContactApproximation.__members__[name]
+        )
+        frames = [*self._tips, *([self._sled.body_frame()] if self._scene.tow.weight else [])]
+        self._shapes = [
+            plant.RegisterCollisionGeometry(
+                frame.body(), frame.GetFixedPoseInBodyFrame(), self._geometry.Sphere(1e-4),
+                f'contact_{number}', self._material(0.5),
+            )
+            for number, frame in enumerate(frames)
+        ]  # fmt: skip
+        # Each contact has a ground of its own, whose height follows the floor.
+        self._grounds = [
+            plant.RegisterCollisionGeometry(
+                plant.world_body(), self._math.RigidTransform(), self._geometry.HalfSpace(),
+                f'ground_{number}', self._material(_GROUND, 1e12),
+            )
+            for number in range(len(frames) if self._floor.heights is not None else 1)
+        ]  # fmt: skip
+        several = len(self._grounds) > 1
+        sets, manager = self._geometry.GeometrySet, self._world.collision_filter_manager()
+        for number, shape in enumerate(self._shapes):
+            others = set(self._grounds) - {self._grounds[number * several]}
+            others |= set(self._shapes) - {shape}
+            manager.Apply(
+                self._geometry.CollisionFilterDeclaration().ExcludeBetween(
+                    sets(shape), sets(list(others))
+                )
+            )
+
+    def _level(self) -> None:
+        """Move the grounds of Drake's contact to their heights."""
+        world = self._world
+        for ground, height in zip(self._grounds, self._ground, strict=False):
+            world.ChangeShape(
+                world.GetMyMutableContextFromRoot(self._root), self._plant.get_source_id(),
+                ground, self._geometry.HalfSpace(),
+                self._math.RigidTransform([0.0, 0.0, height]),
+            )  # fmt: skip
+
+    def _material(self, friction: float, stiffness: float | None = None) -> Any:
+        properties = self._geometry.ProximityProperties()
+        own = friction if friction == _GROUND else friction * _GROUND / (2.0 * _GROUND - friction)
+        self._geometry.AddContactMaterial(
+            dissipation=0.0,
+            point_stiffness=stiffness or self._contact.stiffness,
+            friction=self._plants.CoulombFriction(own, own),
+            properties=properties,
+        )
+        properties.AddProperty('material', 'relaxation_time', self._contact.relaxation)
+        return properties
+
+    def _weigh_trunk(self) -> None:
+        """Give the trunk what the scene's robot has more than the legs: mass, place, inertia."""
+        plant, context, tree, body = self._plant, self._context, self._tree, self._body
+        self._set_joints(self._robot.home.ravel())
+        plant.SetFreeBodyPose(context, self._trunk, self._math.RigidTransform())
+        links = [joint.child_body().index() for joint in self._joints]
+        frame = plant.world_frame()
+        legs = plant.CalcSpatialInertia(context, frame, links)
+        centre = np.array([*self._robot.centre, body.height + body.ground])
+        mass = body.mass - legs.get_mass()
+        at = (body.mass * centre - legs.get_mass() * legs.get_com()) / mass
+        about = legs.Shift(centre).CalcRotationalInertia().get_moments()[2]
+        away = at - centre
+        yaw = body.inertia - about - mass * float(away[:2] @ away[:2])
+        moments = tree.RotationalInertia(ROLL_SHARE * yaw, ROLL_SHARE * yaw, yaw)
+        trunk = tree.SpatialInertia.MakeFromCentralInertia(mass, at, moments)
+        self._trunk.SetSpatialInertiaInBodyFrame(context, trunk)
+
+    # --- state --------------------------------------------------------------------------------
+
+    def _set_joints(self, angles: Array) -> None:
+        positions = self._plant.GetPositions(self._context)
+        positions[self._places] = angles
+        self._plant.SetPositions(self._context, positions)
+
+    def _place(self) -> None:
+        """Place the robot at rest on its planned feet, and the load behind it."""
+        plant, context, scene = self._plant, self._context, self._scene
+        low = self._body.ground
+        feet = self._path.feet
+        self._targets = np.array(self._solver.angles([(x, y, low) for x, y, _ in feet]))
+        self._ground = np.array([self._floor.height(x, y) for x, y, _ in feet])
+        if self._contact.kind != 'bristles':
+            self._level()
+        plant.SetFreeBodyPose(
+            context, self._trunk, self._math.RigidTransform([0.0, 0.0, self._ground.max() - low])
+        )
+        self._set_joints(self._targets)
+        count = len(feet) + bool(scene.tow.weight)
+        self._shear = np.zeros((count, 3))
+        self._loads = np.zeros(count)
+        self._ratios = np.zeros(count)  # coefficients of friction
+        if scene.tow.weight:
+            plant.GetJointByName('sled_0').set_translation(context, -scene.tow.distance)
+        for film, state, (x, y, _) in zip(self._films, self.feet, feet, strict=True):
+            film.touch_down(self._floor.depth(x, y))
+            state.wet = self._floor.wet(x, y)
+        self._motors = plant.get_actuation_input_port().FixValue(
+            context, np.zeros(len(self._targets))
+        )
+        self._forces = plant.get_applied_generalized_force_input_port().FixValue(
+            context, np.zeros(plant.num_velocities())
+        )
+        self._contacts = plant.get_contact_results_output_port()
+        self._simulator = _drake('systems.analysis').Simulator(self._diagram, self._root)
+        self._simulator.Initialize()
+        self._last = self._tip_places() - self._shear[: len(feet), :2]
+
+    def _tip_places(self) -> Array:
+        places = [tip.CalcPoseInWorld(self._context).translation() for tip in self._tips]
+        self._heights = np.array([place[2] for place in places])
+        return np.array(places)[:, :2]
+
+    @property
+    def body(self) -> Vector:
+        """Position x, y, m, and heading, rad, of the body in the world."""
+        pose = self._trunk.EvalPoseInWorld(self._context)
+        turn = pose.rotation().matrix()
+        x, y, _ = pose.translation()
+        return float(x), float(y), math.atan2(turn[1, 0], turn[0, 0])
+
+    # --- step ---------------------------------------------------------------------------------
+
+    def step(self, pressures: Sequence[float]) -> None:
+        """Advance by ``period`` with these gauge pressures, Pa, one for each leg."""
+        self._steps += 1
+        self.time = self._steps * self.period
+        self._limits = [self._foot.dome_load(math.inf, each) for each in pressures]
+        self._pressures = pressures
+        self._aim()
+        context, plant, servo = self._context, self._plant, self._servo
+        start = (self._steps - 1) * self.period
+        for number in range(1, self._substeps + 1):
+            angles = plant.GetPositions(context)[self._places]
+            torque = servo.stiffness * (self._targets - angles)
+            self._motors.GetMutableData().get_mutable_value().SetFromVector(
+                np.clip(torque, -servo.torque, servo.torque)
+            )
+            self._push()
+            self._simulator.AdvanceTo(start + number * self._dt)
+        self._update_feet()
+
+    def _aim(self) -> None:
+        scene = self._scene
+        turn = -scene.heading_gain * self.body[2] * self.period
+        self._path.move(max(0.0, self.time - scene.settle), turn)
+        try:
+            self._targets = np.array(self._solver.angles(self._path.feet))
+        except InvalidInput as error:
+            self._end(str(error))
+
+    def _coefficient(self, index: int, load: float, drained: float) -> float:
+        """Return the coefficient of a foot whose film has drained for a time, s."""
+        load, limit, pressure = max(load, LIGHT), self._limits[index], self._pressures[index]
+        on_domes = min(load, limit)
+        films = (0.0, 0.0)
+        if self.feet[index].wet:
+            films = self._films[index].drain(on_domes, load - on_domes, pressure, drained)
+        return self._foot.resistance_of(on_domes, load - on_domes, pressure, *films) / load
+
+    def _push(self) -> None:
+        """Set the forces of line and bristles, and Drake's coefficients, for the next step."""
+        force = np.zeros(self._plant.num_velocities())
+        if self._scene.tow.weight:
+            self._pull(force)
+        if self._contact.kind == 'bristles':
+            self._press(force)
+        else:
+            self._rub()
+        self._forces.GetMutableData().get_mutable_value().SetFromVector(force)
+
+    def _jacobian(self, frame: Any, at: Vector = (0.0, 0.0, 0.0)) -> Array:
+        world = self._plant.world_frame()
+        return np.asarray(
+            self._plant.CalcJacobianSpatialVelocity(
+                self._context, self._tree.JacobianWrtVariable.kV, frame, at, world, world
+            )
+        )
+
+    def _pull(self, force: Array) -> None:
+        """Add the force of the line, which only pulls."""
+        tow, plant, context = self._scene.tow, self._plant, self._context
+        hook = (0.0, 0.0, tow.height + self._body.ground)
+        ends = (self._trunk.body_frame(), hook), (self._sled.body_frame(), (0.0, 0.0, tow.height))
+        world = plant.world_frame()
+        a, b = (plant.CalcPointsPositions(context, frame, at, world)[:, 0] for frame, at in ends)
+        length = float(np.linalg.norm(b - a))
+        if length > tow.distance:
+            pull = tow.stiffness * (length - tow.distance) / length * (b - a)
+            force += self._jacobian(*ends[0])[3:].T @ pull - self._jacobian(*ends[1])[3:].T @ pull
+
+    def _sled_friction(self, place: Array) -> float:
+        tow = self._scene.tow
+        return tow.friction_wet if self._floor.wet(place[0], place[1]) else tow.friction_dry
+
+    def _press(self, force: Array) -> None:
+        """Add the forces of the ground: springs that press, and bristles up to the cap."""
+        contact, plant, context, count = self._contact, self._plant, self._context, len(self._tips)
+        frames = [*self._tips, *([self._sled.body_frame()] if len(self._loads) > count else [])]
+        jacobians = np.array([self._jacobian(frame)[2:] for frame in frames])  # yaw, x, y, z
+        speeds = jacobians @ plant.GetVelocities(context)
+        places = np.array([frame.CalcPoseInWorld(context).translation() for frame in frames])
+        deep = -places[:, 2]
+        deep[:count] += self._ground
+        loads = contact.stiffness * deep - contact.damping * speeds[:, 3]
+        loads = np.where(deep > 0.0, np.maximum(loads, 0.0), 0.0)
+        levers = np.full(len(frames), self._lever)
+        levers[count:] = 0.0
+        slides = np.column_stack([speeds[:, 1:3], levers * speeds[:, 0]])
+        self._shear += self._dt * slides
+        push = -contact.stiffness * self._shear - contact.damping * slides
+        for index in np.flatnonzero(loads).tolist():
+            self._ratios[index] = (
+                self._coefficient(index, loads[index], self._dt)
+                if index < count
+                else self._sled_friction(places[index])
+            )
+        caps = self._ratios * loads
+        size = np.linalg.norm(push, axis=1)
+        slips = size > caps
+        push[slips] *= (caps[slips] / np.maximum(size[slips], 1e-30))[:, None]
+        self._shear[slips] = -push[slips] / contact.stiffness
+        wrench = np.column_stack([levers * push[:, 2], push[:, :2], loads])
+        force += np.einsum('ijk,ij->k', jacobians, wrench)
+        self._loads = loads
+
+    def _rub(self) -> None:
+        """Set Drake's coefficients from the loads of the last step."""
+        results = self._contacts.Eval(self._context)
+        loads = dict.fromkeys(self._shapes, 0.0)
+        for number in range(results.num_point_pair_contacts()):
+            info = results.point_pair_contact_info(number)
+            pair = info.point_pair()
+            loads[pair.id_A if pair.id_A in loads else pair.id_B] = abs(info.contact_force()[2])
+        self._loads = np.array(list(loads.values()))
+        for index, (shape, load) in enumerate(loads.items()):
+            if index < len(self._tips):
+                ratio = self._coefficient(index, load, self._dt if load > LIGHT else 0.0)
+            else:
+                ratio = self._sled_friction(
+                    self._sled.EvalPoseInWorld(self._context).translation()
+                )
+            if ratio != self._ratios[index]:
+                self._ratios[index] = ratio
+                self._world.AssignRole(
+                    self._world.GetMyMutableContextFromRoot(self._root),
+                    self._plant.get_source_id(), shape, self._material(ratio),
+                    self._geometry.RoleAssign.kReplace,
+                )  # fmt: skip
+
+    def _update_feet(self) -> None:
+        """Count slip as L2 does, and prepare film and ground below feet in the air."""
+        count = len(self._tips)
+        places = self._tip_places() - self._shear[:count, :2]  # bristles lag behind the foot
+        moved = np.linalg.norm(places - self._last, axis=1)
+        self._last, moved_ground = places, False
+        for index, state in enumerate(self.feet):
+            x, y = places[index]
+            state.wet = self._floor.wet(x, y)
+            above = self._heights[index] - self._ground[index]
+            if self._loads[index] <= LIGHT:
+                if above > _SHALLOW and self._ground[index] != self._floor.height(x, y):
+                    self._ground[index], moved_ground = self._floor.height(x, y), True
+                if above > CLEAR:
+                    self._films[index].touch_down(self._floor.depth(x, y))
+            elif self._loads[index] > SLIP_LOAD and moved[index] > SLIP_SPEED * self.period:
+                state.slip_path += float(moved[index])
+        if moved_ground and self._contact.kind != 'bristles':
+            self._level()
+        angles = self._plant.GetPositions(self._context)[self._places]
+        up = self._trunk.EvalPoseInWorld(self._context).rotation().matrix()[2, 2]
+        if not up > math.cos(TIPPED):
+            self._end('tip-over')
+        elif np.abs(self._targets - angles).max() > LOST:
+            self._end('a servo is far off its set-point')
+
+    def _end(self, why: str) -> None:
+        if self.verdict is None:
+            self.verdict = f'{why}, at {self.time:.3f} s'
+
+
+def _rod(along: Array, tree: Any) -> Any:
+    """Return the inertia of a rod along a unit vector, over that across it."""
+    about = np.eye(3) - (1.0 - _THIN) * np.outer(along, along)
+    a, b, c, d, e, f = about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return tree.RotationalInertia(a, b, c, d, e, f)
