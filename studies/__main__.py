@@ -15,6 +15,10 @@ STUDIES = {
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
     'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
     'walk': ('work_precision.walk.study', 'every fidelity level of a walk (1 min)'),
+    'friction_problems': (
+        'work_precision.friction_problems',
+        'contact problems of other groups (1 min)',
+    ),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),

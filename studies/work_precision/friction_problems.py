@@ -1,0 +1,500 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Solve contact problems of other groups by exact_stick in an outer loop, and by siconos.
+
+Give folders or files of:
+
+- siconos/siconos (Apache-2.0), numerics/src/FrictionContact/test/data: Rover*.dat, and
+  Capsules-i125-1213.hdf5, which needs h5py
+- Simple-Robotics/ContactBench (BSD-2), tests/python/data: sliding_cube.npz, 2cubes_t0.npz
+
+Other files of a folder are left out. Problems of the legged bodies of ros_pad's scenes are always
+added. With ``--siconos PYTHON``, a Python that has siconos (Debian: python3-siconos, then
+/usr/bin/python3) solves the same problems by published methods. Writes friction_problems.json.
+
+A problem is: find impulses r and velocities u = W r + q such that each contact sticks, slides
+against its friction, or opens. W is divided by its mean diagonal, so that impulses are in m/s. The
+residual is the natural map |r - P(r - u - μ|u_t| n)|/|q|, P the projection on the friction cones
+(De Saxcé and Feng 1998; the measure of siconos).
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import itertools
+import math
+import pathlib
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation.planar_robot import GRAVITY
+from ros_pad.simulation.scene import LeggedBody
+from ros_pad.simulation.scene import Scene
+from studies import command
+from studies.work_precision.friction import RigidStep
+from studies.work_precision.friction import least_energy
+from studies.work_precision.friction import least_in_ball
+
+SOLVED = 1e-6
+"""Residual up to which a problem counts as solved."""
+
+OUTER, SWEEPS, MEMORY = 200, 20000, 5
+"""Most steps of the outer loop, most sweeps of exact_stick in each, and steps that mixing uses."""
+
+SOFT = 1e-12
+"""Compliance added to normal directions, over the mean, where contacts share a load at will."""
+
+FILES = ('Rover*.dat', 'Capsules*.hdf5', 'sliding_cube.npz', '2cubes_t0.npz')
+SCENES = ('hexapod_patches', 'quadruped_patches')
+PLAIN, MIXED = 'exact_stick, plain outer loop', 'exact_stick, mixed outer loop'
+RIVALS = {
+    'siconos NSGS': 'block Gauss-Seidel on cones',
+    'siconos NSN_AC': 'Newton of Alart and Curnier',
+    'siconos ADMM': 'alternating directions',
+    'siconos TFP': 'fixed point on caps, contacts pressed and pulled at once',
+}
+
+
+# --- problems ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Contacts in one step; each has three rows: normal, then two tangents.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file without its ending, or of the scene with a number.
+    compliance : ndarray, shape (3 n, 3 n)
+        Velocity for each impulse, with a mean diagonal of 1.
+    free : ndarray, shape (3 n,)
+        Velocity without impulses, m/s.
+    friction : ndarray, shape (n,)
+        Coefficients of friction.
+    """
+
+    name: str
+    compliance: np.ndarray
+    free: np.ndarray
+    friction: np.ndarray
+
+    @classmethod
+    def of(cls, name: str, compliance: Any, free: Any, friction: Any) -> Problem:
+        """Return a problem with its compliance divided by the mean diagonal."""
+        friction, free = np.asarray(friction, float).ravel(), np.asarray(free, float).ravel()
+        size = 3 * len(friction)
+        matrix = np.asarray(compliance, float)
+        if matrix.shape != (size, size) or free.shape != (size,):
+            raise InvalidInput(
+                f'{name} has a matrix of {matrix.shape}, {free.size} velocities and'
+                f' {friction.size} coefficients of friction: {size} rows and columns are needed'
+            )
+        return cls(name, matrix / np.mean(np.diag(matrix)), free, friction)
+
+    @cached_property
+    def symmetric(self) -> np.ndarray:
+        """Symmetric part of the compliance."""
+        return 0.5 * (self.compliance + self.compliance.T)
+
+    def residual(self, impulses: np.ndarray) -> float:
+        """Return the residual of impulses: 0 at a solution, 1 or less without impulses."""
+        velocity = self.compliance @ impulses + self.free
+        r, u = impulses.reshape(-1, 3), velocity.reshape(-1, 3).copy()
+        u[:, 0] += self.friction * np.hypot(u[:, 1], u[:, 2])
+        miss = r - in_cones(r - u, self.friction)
+        return float(np.linalg.norm(miss) / np.linalg.norm(self.free))
+
+
+def in_cones(points: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """Return the nearest points, shape (n, 3), inside the friction cones."""
+    normal, size = points[:, 0], np.hypot(points[:, 1], points[:, 2])
+    on = np.maximum((normal + friction * size) / (1.0 + friction**2), 0.0)
+    share = friction * on / np.where(size > 0.0, size, 1.0)
+    inside = (size <= friction * normal)[:, None]
+    return np.where(inside, points, np.column_stack([on, share[:, None] * points[:, 1:]]))
+
+
+def read(path: pathlib.Path) -> Problem:
+    """Return the problem of a file.
+
+    Raises
+    ------
+    InvalidInput
+        When the file cannot be read as its ending says.
+    """
+    readers = {'.dat': _read_dat, '.hdf5': _read_hdf5, '.npz': _read_npz}
+    if path.suffix not in readers:
+        raise InvalidInput(f'{path}: its ending must be one of {", ".join(readers)}')
+    try:
+        return Problem.of(path.stem, *readers[path.suffix](path))
+    except (OSError, ValueError, IndexError, KeyError) as error:
+        raise InvalidInput(f'{path} is no contact problem: {error}') from error
+
+
+def _read_dat(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read siconos' text: dimension, contacts, storage, matrix by columns, velocity, friction."""
+    words = path.read_text(encoding='utf-8').split()
+    dimension, count, storage, size = (int(word) for word in words[:4])
+    if dimension != 3 or storage != 0:
+        raise ValueError(f'dimension {dimension}, storage {storage}: 3 and 0 are needed')
+    values = np.array(words[7 : 7 + size * size + size + count], float)
+    matrix, free, friction = np.split(values, [size * size, size * size + size])
+    return matrix.reshape(size, size, order='F'), free, friction
+
+
+def _read_hdf5(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read an FCLIB file: a compressed matrix by columns, velocity and friction."""
+    try:
+        h5py = importlib.import_module('h5py')
+    except ImportError as error:
+        raise InvalidInput(f'{path}: h5py is needed to read it (pip install h5py)') from error
+    with h5py.File(path) as file:
+        local = file['fclib_local']
+        starts, rows, values = (local['W'][key][()] for key in 'pix')
+        matrix = np.zeros((len(starts) - 1, len(starts) - 1))
+        columns = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        matrix[rows, columns] = values
+        return matrix, local['vectors/q'][()], local['vectors/mu'][()]
+
+
+def _read_npz(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read ContactBench's arrays, where the normal is the last of three rows."""
+    with np.load(path) as file:
+        matrix, free, friction = file['G'], file['g'], file['mus']
+    order = np.arange(len(matrix)).reshape(-1, 3)[:, [2, 0, 1]].ravel()
+    return matrix[np.ix_(order, order)], free.ravel()[order], friction
+
+
+def found(paths: Sequence[pathlib.Path]) -> list[Problem]:
+    """Return the problems of files, and of the :data:`FILES` in folders."""
+    files = []
+    for path in paths:
+        inside = [sorted(path.glob(pattern)) for pattern in FILES] if path.is_dir() else [[path]]
+        if not any(inside):
+            raise InvalidInput(f'{path} has none of the files {", ".join(FILES)}')
+        files += list(itertools.chain(*inside))
+    return [read(file) for file in files]
+
+
+def standing(
+    name: str,
+    body: LeggedBody,
+    feet: Sequence[int],
+    friction: Sequence[float],
+    rng: np.random.Generator,
+) -> Problem:
+    """Return a step of 4 ms of a legged body on rigid feet whose legs work against each other.
+
+    A flat body has half of its moment of inertia about either horizontal axis. It moves forward at
+    up to 0.1 m/s, and the feet move against it at up to 0.1 m/s by their gait.
+    """
+    dt, rows, free = 0.004, [], []
+    weight = np.r_[np.full(3, 1.0 / body.mass), 2.0 / body.inertia, 2.0 / body.inertia,
+                   1.0 / body.inertia]  # fmt: skip
+    twist = np.array([rng.uniform(0.0, 0.1), 0.0, -GRAVITY * dt, 0.0, 0.0, 0.0])
+    for foot in feet:
+        arm = np.array([*body.homes[foot], -body.height])
+        imposed = np.array([0.0, *rng.uniform(-0.1, 0.1, 2)])
+        for axis, motion in zip(np.roll(np.eye(3), 1, axis=0), imposed, strict=True):
+            row = np.r_[axis, np.cross(arm, axis)]
+            rows.append(row)
+            free.append(row @ twist + motion)
+    arms = np.array(rows)
+    return Problem.of(name, arms * weight @ arms.T, free, friction)
+
+
+def own(count: int, seed: int) -> list[Problem]:
+    """Return problems of the :data:`SCENES`: dry, wet and mixed feet, on a tripod and on all."""
+    rng, problems = np.random.default_rng(seed), []
+    for name in SCENES:
+        scene = Scene.load(name)
+        assert isinstance(scene.body, LeggedBody)
+        foot, legs = scene.foot, len(scene.body.homes)
+        area = min(foot.sole_area, scene.expected_load / foot.conforming_pressure)
+        dry = foot.friction + foot.shear_strength * area / scene.expected_load
+        for number in range(count):
+            feet = range(0, legs, 2) if legs == 6 and number % 2 else range(legs)
+            friction = rng.choice([dry, foot.boundary_friction], len(feet))
+            title = f'{name} {number}'
+            problems.append(standing(title, scene.body, feet, friction, rng))
+    return problems
+
+
+# --- exact_stick in an outer loop ----------------------------------------------------------------
+
+
+class _CappedStep(RigidStep):
+    """Contacts with given caps and any symmetric compliance, as a step of exact_stick.
+
+    Every contact has a third row that nothing moves, as a foot without a turning radius has.
+    """
+
+    def __init__(
+        self, compliance: np.ndarray, free: np.ndarray, caps: np.ndarray, tolerance: float
+    ) -> None:
+        self._limits = caps.tolist()
+        self.mass = 1.0  # of the mean compliance
+        count = len(caps)
+        self._matrix, self._at_first = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
+        self._turns, places = [], np.arange(3 * count).reshape(-1, 3)[:, :2]
+        for first, (one, two) in enumerate(places):
+            # In the main directions of its own compliance an impulse moves a contact along itself.
+            block = slice(2 * first, 2 * first + 2)
+            self._turns.append(np.linalg.eigh(compliance[block, block])[1])
+            self._at_first[one : two + 1] = self._turns[-1].T @ free[block]
+        turn = np.zeros((2 * count, 2 * count))
+        for first, each in enumerate(self._turns):
+            turn[2 * first : 2 * first + 2, 2 * first : 2 * first + 2] = each
+        flat = places.ravel()
+        self._matrix[np.ix_(flat, flat)] = turn.T @ compliance @ turn
+        self._stiff = np.where(np.diag(self._matrix) > 0.0, np.diag(self._matrix), 1.0)
+        self.rows = list(range(3 * count))  # type: ignore[assignment]
+        self._rate = float(np.linalg.eigvalsh(self._matrix)[-1])
+        self._allowed = 0.5 * tolerance**2 + 1e-16 * float(caps.sum()) ** 2
+        self.gap = 0.0
+
+    @property
+    def rate(self) -> float:
+        return self._rate
+
+    def slips(self, impulses: Sequence[float]) -> list[float]:
+        return (self._matrix @ np.asarray(impulses) + self._at_first).tolist()  # type: ignore
+
+    def sweep(self, impulses: Sequence[float]) -> list[float]:
+        after = np.array(impulses)
+        slip = self._matrix @ after + self._at_first
+        for place, limit in self.blocks():
+            block = slice(place, place + 3)
+            stiff = self._stiff[block]
+            pulls = list(zip(slip[block] - stiff * after[block], stiff, strict=True))
+            better = np.array(least_in_ball(pulls, limit))
+            slip += self._matrix[:, block] @ (better - after[block])
+            after[block] = better
+        return after.tolist()  # type: ignore[no-any-return]
+
+    def turned(self, tangents: np.ndarray) -> list[float]:
+        """Return rows of impulses for tangents, shape (n, 2)."""
+        rows = [[*(turn.T @ each), 0.0] for turn, each in zip(self._turns, tangents, strict=True)]
+        return list(itertools.chain(*rows))
+
+    def tangents(self, impulses: Sequence[float]) -> np.ndarray:
+        """Return tangents, shape (n, 2), of rows of impulses."""
+        rows = np.reshape(impulses, (-1, 3))[:, :2]
+        return np.array([turn @ row for turn, row in zip(self._turns, rows, strict=True)])
+
+
+@dataclass
+class Answer:
+    """What a method found.
+
+    Attributes
+    ----------
+    impulses : ndarray
+        Impulses, m/s.
+    steps, sweeps : int
+        Iterations of the method, and sweeps of exact_stick in them.
+    why : str
+        Why it stopped before the problem was solved; empty if it did not.
+    """
+
+    impulses: np.ndarray
+    steps: int
+    sweeps: int
+    why: str
+
+
+class _Loop:
+    """The two halves of the outer loop: tangents by exact_stick, normals by least squares."""
+
+    def __init__(self, problem: Problem, method: str) -> None:
+        self.problem, self.method, self.sweeps = problem, method, 0
+        size = len(problem.free)
+        self.normal = np.arange(0, size, 3)
+        self.tangent = np.arange(size).reshape(-1, 3)[:, 1:]
+        inside = problem.symmetric[np.ix_(self.normal, self.normal)]
+        values, vectors = np.linalg.eigh(inside)
+        root = np.sqrt(np.maximum(values, 0.0) + SOFT * values[-1])
+        self._root, self._inverse = root[:, None] * vectors.T, vectors.T / root[:, None]
+
+    def press(self, impulses: np.ndarray) -> np.ndarray:
+        """Return normal impulses of contacts that press and do not pull, with given tangents."""
+        lagged, normal = impulses.copy(), self.normal
+        lagged[normal] = 0.0
+        push = self._free(impulses)[normal] + self.problem.symmetric[normal] @ lagged
+        return np.asarray(nnls(self._root, -self._inverse @ push, maxiter=50 * len(normal))[0])
+
+    def pull(self, normals: np.ndarray, impulses: np.ndarray) -> np.ndarray:
+        """Return all impulses, with tangents by exact_stick for caps of given normals."""
+        after, caps = np.zeros(len(impulses)), self.problem.friction * normals
+        after[self.normal] = normals
+        holding = caps > 0.0
+        if holding.any():
+            flat = self.tangent[holding].ravel()
+            matrix = self.problem.symmetric
+            free = (self._free(impulses) + matrix @ after)[flat]
+            tolerance = 1e-2 * SOLVED * float(np.linalg.norm(self.problem.free))
+            step = _CappedStep(matrix[np.ix_(flat, flat)], free, caps[holding], tolerance)
+            first = step.in_balls(step.turned(impulses[flat].reshape(-1, 2)))
+            rows, sweeps = least_energy(step, first, SWEEPS, self.method)
+            self.sweeps += sweeps
+            after[flat] = step.tangents(rows).ravel()
+        return after
+
+    def _free(self, impulses: np.ndarray) -> np.ndarray:
+        """Return free velocities, with what is not symmetric at the impulses of the step before."""
+        uneven = self.problem.compliance - self.problem.symmetric
+        return np.asarray(self.problem.free + uneven @ impulses)
+
+
+def outer_loop(
+    problem: Problem, mixed: bool = False, method: str = 'gauss_seidel', solved: float = SOLVED
+) -> Answer:
+    """Solve a problem by exact_stick with the caps of given normals, and normals in turn.
+
+    Plain, each step begins with the normals of the last, as L1 takes the loads of a step from the
+    horizontal forces of the one before. Mixed, it begins with normals from the last few steps, such
+    that their changes would cancel (Anderson 1965), and never below 0.
+    """
+    loop, impulses = _Loop(problem, method), np.zeros(len(problem.free))
+    normals = loop.press(impulses)
+    tried: list[np.ndarray] = []
+    became: list[np.ndarray] = []
+    best, least = impulses, problem.residual(impulses)
+    for step in range(1, OUTER + 1):
+        try:
+            impulses = loop.pull(normals, impulses)
+            after = loop.press(impulses)
+        except (ArithmeticError, RuntimeError) as error:
+            return Answer(best, step, loop.sweeps, f'inner: {error}')
+        residual = problem.residual(impulses)
+        if residual < least:
+            best, least = impulses, residual
+        if residual <= solved:
+            return Answer(impulses, step, loop.sweeps, '')
+        tried, became = [*tried[-MEMORY:], normals], [*became[-MEMORY:], after]
+        normals = _mix(tried, became) if mixed else after
+    return Answer(best, OUTER, loop.sweeps, f'residual still {least:.1e} after {OUTER} steps')
+
+
+def _mix(tried: Sequence[np.ndarray], became: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the next normals by Anderson's mixing."""
+    change = np.array(became) - np.array(tried)
+    if len(change) == 1:
+        return became[-1]
+    shares = np.linalg.lstsq(np.diff(change, axis=0).T, change[-1], rcond=1e-10)[0]
+    return np.maximum(became[-1] - shares @ np.diff(np.array(became), axis=0), 0.0)
+
+
+# --- the study -----------------------------------------------------------------------------------
+
+
+def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[str, list[Any]]:
+    """Return, by method, impulses, steps and time, s, of siconos in a process of its own."""
+    script = pathlib.Path(__file__).with_name('siconos_solvers.py')
+    with tempfile.TemporaryDirectory() as folder:
+        given, answers = pathlib.Path(folder) / 'given.npz', pathlib.Path(folder) / 'answers.npz'
+        arrays = {}
+        for index, each in enumerate(problems):
+            arrays |= {
+                f'{index} {key}': getattr(each, key) for key in ('compliance', 'free', 'friction')
+            }
+        np.savez(given, **arrays)
+        words = [python, str(script), str(given), str(answers), str(SOLVED), str(repeats)]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise InvalidInput(
+                f'{python} cannot run siconos.numerics: {done.stderr.strip().splitlines()[-1:]};'
+                ' install python3-siconos (Debian) and give its interpreter, or leave --siconos out'
+            )
+        with np.load(answers) as file:
+            return {
+                name: [
+                    (file[f'{index} {name} r'], *file[f'{index} {name} s'].tolist())
+                    for index in range(len(problems))
+                ]
+                for name in RIVALS
+            }
+
+
+def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[str, Any]:
+    """Return the document: for each problem its size, and what each method found."""
+    rows = []
+    for problem in command.each(problems, 'friction_problems', 'problem'):
+        methods = {}
+        for name, mixed in ((PLAIN, False), (MIXED, True)):
+            times = []
+            for _ in range(repeats if len(problem.friction) < 50 else 1):
+                start = time.perf_counter()
+                answer = outer_loop(problem, mixed)
+                times.append(time.perf_counter() - start)
+            methods[name] = _found(problem, answer.impulses, answer.steps, float(np.median(times)))
+            methods[name] |= {'sweeps': answer.sweeps, 'why': answer.why}
+        rows.append({
+            'name': problem.name,
+            'contacts': len(problem.friction),
+            'friction': [float(problem.friction.min()), float(problem.friction.max())],
+            'asymmetry': float(abs(problem.compliance - problem.symmetric).max()),
+            'methods': methods,
+        })  # fmt: skip
+    if python:
+        for name, answers in by_siconos(problems, python, repeats).items():
+            for row, problem, (impulses, steps, seconds) in zip(
+                rows, problems, answers, strict=True
+            ):
+                row['methods'][name] = _found(problem, impulses, int(steps), seconds)
+    return {'solved': SOLVED, 'repeats': repeats, 'rows': rows}
+
+
+def _found(problem: Problem, impulses: np.ndarray, steps: int, seconds: float) -> dict[str, Any]:
+    residual = problem.residual(impulses) if np.isfinite(impulses).all() else math.inf
+    return {'residual': residual, 'steps': steps, 'seconds': seconds, 'solved': residual <= SOLVED}
+
+
+def table(document: dict[str, Any]) -> str:
+    """Return the table of the documentation: methods by group of problems."""
+    groups: dict[str, list[Any]] = {}
+    for row in document['rows']:
+        name = row['name']
+        groups.setdefault('Rover' if name.startswith('Rover') else name.split()[0], []).append(row)
+    lines = ['| problems | contacts | method | solved | steps | largest residual | time, ms |',
+             '|---|---|---|---|---|---|---|']  # fmt: skip
+    for group, rows in groups.items():
+        counts = sorted({row['contacts'] for row in rows})
+        size = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
+        for method in rows[0]['methods']:
+            each = [row['methods'][method] for row in rows]
+            steps = sorted(one['steps'] for one in each)
+            lines.append(
+                f'| {group} | {size} | {method} | {sum(one["solved"] for one in each)} of'
+                f' {len(each)} | {steps[len(steps) // 2]}, at most {steps[-1]} |'
+                f' {max(one["residual"] for one in each):.0e} |'
+                f' {1e3 * float(np.median([one["seconds"] for one in each])):.2g} |'
+            )
+    return '\n'.join(lines)
+
+
+def main(words: Sequence[str]) -> int:
+    """Solve, print and write."""
+    parser = command.parser('friction_problems', __doc__)
+    parser.add_argument('paths', type=pathlib.Path, nargs='*', metavar='PATH')
+    parser.add_argument('--siconos', metavar='PYTHON', help='an interpreter that has siconos')
+    command.add_count(parser, '--own', 100, 'problems of each scene of ros_pad')
+    command.add_count(parser, '--repeats', 3, 'how often each is timed; the median counts')
+    command.add_count(parser, '--seed', 0, 'seed of the problems of scenes', least=0)
+    command.add_out(parser)
+    options: argparse.Namespace = parser.parse_args(words)
+    problems = [*found(options.paths), *own(options.own, options.seed)]
+    document = {'seed': options.seed, **run(problems, options.siconos, options.repeats)}
+    kept = command.write(options.out, 'friction_problems', document)
+    command.show(options, kept, table(document))
+    return 0
