@@ -39,6 +39,7 @@ STUDIES = {
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
     'turning_feet': ('closed_loop.turning_feet', 'slip alarm from the rate of shanks (2 min)'),
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
+    'labelled_pce': ('closed_loop.labelled_pce', 'ATLAS on a slippery patch, a Go1 on grease'),
     'lead_picture': ('closed_loop.lead_picture', 'the picture of the README (1 min)'),
     'real_time': ('nodes.real_time', 'speed of a trial without ROS and on nodes (1 min)'),
     'nodes': ('nodes.cost', 'processor time of the nodes, beside another checkout (20 min)'),

@@ -315,7 +315,7 @@ class RigidStep:
 
     def blocks(self) -> Iterator[tuple[int, float]]:
         """Yield for each contact its first row and the radius of its ball, N s."""
-        return zip(range(0, len(self.rows), 3), self._limits, strict=True)
+        return zip(range(0, 3 * len(self._limits), 3), self._limits, strict=True)
 
     def twist(self, impulses: Sequence[float]) -> Twist:
         """Return the twist after impulses, N s."""
@@ -370,9 +370,7 @@ class RigidStep:
         return after
 
 
-def _gauss_seidel(
-    step: RigidStep, impulses: list[float], most: int
-) -> tuple[list[float], int]:
+def _gauss_seidel(step: RigidStep, impulses: list[float], most: int) -> tuple[list[float], int]:
     """Return impulses and number of sweeps, until they converge or converge too slowly."""
     swept, change = impulses, impulses
     count = 0

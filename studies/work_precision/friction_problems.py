@@ -47,10 +47,13 @@ from studies.work_precision.friction import least_in_ball
 SOLVED = 1e-6
 """Residual up to which a problem counts as solved."""
 
-OUTER, SWEEPS, MEMORY = 200, 20000, 5
+OUTER, SWEEPS, MEMORY = 200, 500, 5
 """Most steps of the outer loop, most sweeps of exact_stick in each, and steps that mixing uses."""
 
-SOFT = 1e-12
+INEXACT = 1e-2
+"""Error that exact_stick may leave in a step, over the residual of the step before."""
+
+SOFT = 1e-14
 """Compliance added to normal directions, over the mean, where contacts share a load at will."""
 
 FILES = ('Rover*.dat', 'Capsules*.hdf5', 'sliding_cube.npz', '2cubes_t0.npz')
@@ -153,7 +156,7 @@ def _read_dat(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _read_hdf5(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Read an FCLIB file: a compressed matrix by columns, velocity and friction."""
+    """Read an FCLIB file: a matrix compressed by columns (-1) or rows (-2), velocity, friction."""
     try:
         h5py = importlib.import_module('h5py')
     except ImportError as error:
@@ -164,7 +167,9 @@ def _read_hdf5(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         matrix = np.zeros((len(starts) - 1, len(starts) - 1))
         columns = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         matrix[rows, columns] = values
-        return matrix, local['vectors/q'][()], local['vectors/mu'][()]
+        by_rows = int(local['W/nz'][()][0]) == -2
+        free, friction = local['vectors/q'][()], local['vectors/mu'][()]
+        return matrix.T if by_rows else matrix, free, friction
 
 
 def _read_npz(path: pathlib.Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -190,7 +195,7 @@ def standing(
     name: str,
     body: LeggedBody,
     feet: Sequence[int],
-    friction: Sequence[float],
+    friction: np.ndarray,
     rng: np.random.Generator,
 ) -> Problem:
     """Return a step of 4 ms of a legged body on rigid feet whose legs work against each other.
@@ -244,21 +249,22 @@ class _CappedStep(RigidStep):
     ) -> None:
         self._limits = caps.tolist()
         self.mass = 1.0  # of the mean compliance
+        self._left = SWEEPS
         count = len(caps)
-        self._matrix, self._at_first = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
+        self._matrix, self._free_slip = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
         self._turns, places = [], np.arange(3 * count).reshape(-1, 3)[:, :2]
         for first, (one, two) in enumerate(places):
             # In the main directions of its own compliance an impulse moves a contact along itself.
             block = slice(2 * first, 2 * first + 2)
             self._turns.append(np.linalg.eigh(compliance[block, block])[1])
-            self._at_first[one : two + 1] = self._turns[-1].T @ free[block]
+            self._free_slip[one : two + 1] = self._turns[-1].T @ free[block]
         turn = np.zeros((2 * count, 2 * count))
         for first, each in enumerate(self._turns):
             turn[2 * first : 2 * first + 2, 2 * first : 2 * first + 2] = each
         flat = places.ravel()
         self._matrix[np.ix_(flat, flat)] = turn.T @ compliance @ turn
+        self._at_first = self._free_slip.tolist()
         self._stiff = np.where(np.diag(self._matrix) > 0.0, np.diag(self._matrix), 1.0)
-        self.rows = list(range(3 * count))  # type: ignore[assignment]
         self._rate = float(np.linalg.eigvalsh(self._matrix)[-1])
         self._allowed = 0.5 * tolerance**2 + 1e-16 * float(caps.sum()) ** 2
         self.gap = 0.0
@@ -267,12 +273,20 @@ class _CappedStep(RigidStep):
     def rate(self) -> float:
         return self._rate
 
+    def settled(self, impulses: Sequence[float]) -> bool:
+        """Return whether the gap is small enough, or :data:`SWEEPS` are used up.
+
+        The next step of the outer loop goes on from there.
+        """
+        self._left -= 1
+        return super().settled(impulses) or self._left < 0
+
     def slips(self, impulses: Sequence[float]) -> list[float]:
-        return (self._matrix @ np.asarray(impulses) + self._at_first).tolist()  # type: ignore
+        return (self._matrix @ np.asarray(impulses) + self._free_slip).tolist()
 
     def sweep(self, impulses: Sequence[float]) -> list[float]:
         after = np.array(impulses)
-        slip = self._matrix @ after + self._at_first
+        slip = self._matrix @ after + self._free_slip
         for place, limit in self.blocks():
             block = slice(place, place + 3)
             stiff = self._stiff[block]
@@ -280,7 +294,7 @@ class _CappedStep(RigidStep):
             better = np.array(least_in_ball(pulls, limit))
             slip += self._matrix[:, block] @ (better - after[block])
             after[block] = better
-        return after.tolist()  # type: ignore[no-any-return]
+        return after.tolist()
 
     def turned(self, tangents: np.ndarray) -> list[float]:
         """Return rows of impulses for tangents, shape (n, 2)."""
@@ -327,14 +341,17 @@ class _Loop:
         self._root, self._inverse = root[:, None] * vectors.T, vectors.T / root[:, None]
 
     def press(self, impulses: np.ndarray) -> np.ndarray:
-        """Return normal impulses of contacts that press and do not pull, with given tangents."""
+        """Return normal impulses of contacts that can only press, with given tangents."""
         lagged, normal = impulses.copy(), self.normal
         lagged[normal] = 0.0
         push = self._free(impulses)[normal] + self.problem.symmetric[normal] @ lagged
         return np.asarray(nnls(self._root, -self._inverse @ push, maxiter=50 * len(normal))[0])
 
-    def pull(self, normals: np.ndarray, impulses: np.ndarray) -> np.ndarray:
-        """Return all impulses, with tangents by exact_stick for caps of given normals."""
+    def pull(self, normals: np.ndarray, impulses: np.ndarray, error: float) -> np.ndarray:
+        """Return all impulses, with tangents by exact_stick for caps of given normals, to an error.
+
+        The error is that of the velocities, over the norm of those without impulses.
+        """
         after, caps = np.zeros(len(impulses)), self.problem.friction * normals
         after[self.normal] = normals
         holding = caps > 0.0
@@ -342,16 +359,16 @@ class _Loop:
             flat = self.tangent[holding].ravel()
             matrix = self.problem.symmetric
             free = (self._free(impulses) + matrix @ after)[flat]
-            tolerance = 1e-2 * SOLVED * float(np.linalg.norm(self.problem.free))
+            tolerance = error * float(np.linalg.norm(self.problem.free))
             step = _CappedStep(matrix[np.ix_(flat, flat)], free, caps[holding], tolerance)
             first = step.in_balls(step.turned(impulses[flat].reshape(-1, 2)))
-            rows, sweeps = least_energy(step, first, SWEEPS, self.method)
+            rows, sweeps = least_energy(step, first, 2 * SWEEPS, self.method)
             self.sweeps += sweeps
             after[flat] = step.tangents(rows).ravel()
         return after
 
     def _free(self, impulses: np.ndarray) -> np.ndarray:
-        """Return free velocities, with what is not symmetric at the impulses of the step before."""
+        """Return free velocities, with the part of W that is not symmetric times impulses."""
         uneven = self.problem.compliance - self.problem.symmetric
         return np.asarray(self.problem.free + uneven @ impulses)
 
@@ -362,20 +379,21 @@ def outer_loop(
     """Solve a problem by exact_stick with the caps of given normals, and normals in turn.
 
     Plain, each step begins with the normals of the last, as L1 takes the loads of a step from the
-    horizontal forces of the one before. Mixed, it begins with normals from the last few steps, such
-    that their changes would cancel (Anderson 1965), and never below 0.
+    horizontal forces of the one before. Mixed, it begins with normals from the last few steps,
+    such that their changes would cancel (Anderson 1965), and never below 0.
     """
     loop, impulses = _Loop(problem, method), np.zeros(len(problem.free))
     normals = loop.press(impulses)
     tried: list[np.ndarray] = []
     became: list[np.ndarray] = []
     best, least = impulses, problem.residual(impulses)
+    residual = least
     for step in range(1, OUTER + 1):
         try:
-            impulses = loop.pull(normals, impulses)
+            impulses = loop.pull(normals, impulses, INEXACT * max(residual, solved))
             after = loop.press(impulses)
-        except (ArithmeticError, RuntimeError) as error:
-            return Answer(best, step, loop.sweeps, f'inner: {error}')
+        except RuntimeError as error:
+            return Answer(best, step, loop.sweeps, f'normals: {error}')
         residual = problem.residual(impulses)
         if residual < least:
             best, least = impulses, residual
@@ -403,7 +421,7 @@ def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[s
     script = pathlib.Path(__file__).with_name('siconos_solvers.py')
     with tempfile.TemporaryDirectory() as folder:
         given, answers = pathlib.Path(folder) / 'given.npz', pathlib.Path(folder) / 'answers.npz'
-        arrays = {}
+        arrays: dict[str, Any] = {}
         for index, each in enumerate(problems):
             arrays |= {
                 f'{index} {key}': getattr(each, key) for key in ('compliance', 'free', 'friction')
@@ -414,7 +432,7 @@ def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[s
         if done.returncode:
             raise InvalidInput(
                 f'{python} cannot run siconos.numerics: {done.stderr.strip().splitlines()[-1:]};'
-                ' install python3-siconos (Debian) and give its interpreter, or leave --siconos out'
+                ' install python3-siconos (Debian) and give its Python, or leave --siconos out'
             )
         with np.load(answers) as file:
             return {
@@ -428,9 +446,9 @@ def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[s
 
 def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[str, Any]:
     """Return the document: for each problem its size, and what each method found."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for problem in command.each(problems, 'friction_problems', 'problem'):
-        methods = {}
+        methods: dict[str, Any] = {}
         for name, mixed in ((PLAIN, False), (MIXED, True)):
             times = []
             for _ in range(repeats if len(problem.friction) < 50 else 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solve contact problems by siconos: a script for a Python that has it; imports nothing of ros_pad.
+"""Solve contact problems by siconos: a script for a Python that has it, without ros_pad.
 
 python siconos_solvers.py GIVEN.npz ANSWERS.npz TOLERANCE REPEATS; the study friction_problems
 calls it.
@@ -41,7 +41,7 @@ def solve(
 
 def main(given: str, answers: str, tolerance: str, repeats: str) -> None:
     """Solve all problems of a file by all solvers."""
-    found = {}
+    found: dict[str, np.ndarray] = {}
     with np.load(given) as file:
         for index in range(len(file.files) // 3):
             parts = [file[f'{index} {key}'] for key in ('compliance', 'free', 'friction')]
@@ -53,7 +53,7 @@ def main(given: str, answers: str, tolerance: str, repeats: str) -> None:
                 seconds = statistics.median(each[2] for each in runs)
                 found[f'{index} {name} r'] = runs[0][0]
                 found[f'{index} {name} s'] = np.array([runs[0][1], seconds])
-    np.savez(answers, **found)
+    np.savez(answers, **found)  # type: ignore[arg-type]
 
 
 if __name__ == '__main__':
