@@ -335,10 +335,10 @@ def _ranked(each: dict[str, Any]) -> str:
 
 
 def _alarmed(each: dict[str, Any]) -> str:
-    low, high = each['missed_interval']
+    missed, low, high = (100.0 * share for share in (each['missed'], *each['missed_interval']))
     delay = '-' if each['delay_s'] is None else f'{1e3 * each["delay_s"]:.0f} ms'
     return (
-        f'{100 * each["missed"]:.0f} % of {each["events"]} ({100 * low:.0f} to {100 * high:.0f} %); {delay};'
+        f'{missed:.0f} % of {each["events"]} ({low:.0f} to {high:.0f} %); {delay};'
         f' {each["false_per_minute"]:.0f}'
     )
 

@@ -29,6 +29,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -47,18 +48,28 @@ from studies.work_precision.friction import least_in_ball
 SOLVED = 1e-6
 """Residual up to which a problem counts as solved."""
 
-OUTER, SWEEPS, MEMORY = 200, 500, 5
+OUTER, SWEEPS, MEMORY = 200, 200, 5
 """Most steps of the outer loop, most sweeps of exact_stick in each, and steps that mixing uses."""
 
 INEXACT = 1e-2
-"""Error that exact_stick may leave in a step, over the residual of the step before."""
+"""Error of velocity that exact_stick may leave in a step, over the residual sought."""
 
-SOFT = 1e-14
-"""Compliance added to normal directions, over the mean, where contacts share a load at will."""
+FREE, NEAR = 1e-14, 1e-6
+"""Weight, over the largest compliance, of a change of the normals from those of the last step.
+Where contacts may share a load in several ways, only the second keeps them from jumping."""
 
 FILES = ('Rover*.dat', 'Capsules*.hdf5', 'sliding_cube.npz', '2cubes_t0.npz')
+LEVERS = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""μ h/a to which the body of the first of :data:`SCENES` is raised; see :func:`lever`."""
+
 SCENES = ('hexapod_patches', 'quadruped_patches')
-PLAIN, MIXED = 'exact_stick, plain outer loop', 'exact_stick, mixed outer loop'
+LOOPS = {
+    'exact_stick, any loads': (FREE, False),
+    'exact_stick, loads near the last': (NEAR, False),
+    'exact_stick, the same, mixed': (NEAR, True),
+}
+"""Weight of a change of the normals, and whether steps are mixed, of each outer loop."""
+
 RIVALS = {
     'siconos NSGS': 'block Gauss-Seidel on cones',
     'siconos NSN_AC': 'Newton of Alart and Curnier',
@@ -218,21 +229,49 @@ def standing(
     return Problem.of(name, arms * weight @ arms.T, free, friction)
 
 
+def lever(body: LeggedBody, friction: float) -> float:
+    """Return how far friction tilts a body: μ h/a, with a the mean distance of its feet."""
+    return friction * body.height / float(np.mean(np.hypot(*np.transpose(body.homes))))
+
+
+def tall(count: int, seed: int) -> list[Problem]:
+    """Return problems of the first scene with its body raised to each of :data:`LEVERS`."""
+    rng, problems = np.random.default_rng(seed), []
+    body = Scene.load(SCENES[0]).body
+    assert isinstance(body, LeggedBody)
+    for ratio in LEVERS:
+        raised = replace(body, height=body.height * ratio / lever(body, 0.8))
+        for number in range(count):
+            name = f'lever_{ratio:g} {number}'
+            friction = rng.choice([0.8, 0.12], 3)
+            problems.append(standing(name, raised, (0, 2, 4), friction, rng))
+    return problems
+
+
 def own(count: int, seed: int) -> list[Problem]:
     """Return problems of the :data:`SCENES`: dry, wet and mixed feet, on a tripod and on all."""
     rng, problems = np.random.default_rng(seed), []
     for name in SCENES:
         scene = Scene.load(name)
         assert isinstance(scene.body, LeggedBody)
-        foot, legs = scene.foot, len(scene.body.homes)
-        area = min(foot.sole_area, scene.expected_load / foot.conforming_pressure)
-        dry = foot.friction + foot.shear_strength * area / scene.expected_load
+        foot, legs, dry = scene.foot, len(scene.body.homes), _dry(scene)
         for number in range(count):
             feet = range(0, legs, 2) if legs == 6 and number % 2 else range(legs)
             friction = rng.choice([dry, foot.boundary_friction], len(feet))
             title = f'{name} {number}'
             problems.append(standing(title, scene.body, feet, friction, rng))
     return problems
+
+
+def _dry(scene: Scene) -> float:
+    """Return the friction of a flat foot on dry ground at the expected load."""
+    load = scene.expected_load
+    return scene.foot.resistance_of(0.0, load, 0.0, 0.0, 0.0) / load
+
+
+def _largest_lever(scene: Scene) -> float:
+    assert isinstance(scene.body, LeggedBody)
+    return lever(scene.body, _dry(scene))
 
 
 # --- exact_stick in an outer loop ----------------------------------------------------------------
@@ -330,14 +369,15 @@ class Answer:
 class _Loop:
     """The two halves of the outer loop: tangents by exact_stick, normals by least squares."""
 
-    def __init__(self, problem: Problem, method: str) -> None:
+    def __init__(self, problem: Problem, near: float, method: str) -> None:
         self.problem, self.method, self.sweeps = problem, method, 0
         size = len(problem.free)
         self.normal = np.arange(0, size, 3)
         self.tangent = np.arange(size).reshape(-1, 3)[:, 1:]
         inside = problem.symmetric[np.ix_(self.normal, self.normal)]
         values, vectors = np.linalg.eigh(inside)
-        root = np.sqrt(np.maximum(values, 0.0) + SOFT * values[-1])
+        self._near = near * values[-1]
+        root = np.sqrt(np.maximum(values, 0.0) + self._near)
         self._root, self._inverse = root[:, None] * vectors.T, vectors.T / root[:, None]
 
     def press(self, impulses: np.ndarray) -> np.ndarray:
@@ -345,12 +385,13 @@ class _Loop:
         lagged, normal = impulses.copy(), self.normal
         lagged[normal] = 0.0
         push = self._free(impulses)[normal] + self.problem.symmetric[normal] @ lagged
+        push -= self._near * impulses[normal]
         return np.asarray(nnls(self._root, -self._inverse @ push, maxiter=50 * len(normal))[0])
 
     def pull(self, normals: np.ndarray, impulses: np.ndarray, error: float) -> np.ndarray:
-        """Return all impulses, with tangents by exact_stick for caps of given normals, to an error.
+        """Return all impulses, with tangents by exact_stick for the caps of given normals.
 
-        The error is that of the velocities, over the norm of those without impulses.
+        The error allowed is that of the velocities, over the norm of those without impulses.
         """
         after, caps = np.zeros(len(impulses)), self.problem.friction * normals
         after[self.normal] = normals
@@ -368,36 +409,36 @@ class _Loop:
         return after
 
     def _free(self, impulses: np.ndarray) -> np.ndarray:
-        """Return free velocities, with the part of W that is not symmetric times impulses."""
+        """Return free velocities, and what is not symmetric in W times impulses."""
         uneven = self.problem.compliance - self.problem.symmetric
         return np.asarray(self.problem.free + uneven @ impulses)
 
 
 def outer_loop(
-    problem: Problem, mixed: bool = False, method: str = 'gauss_seidel', solved: float = SOLVED
+    problem: Problem, near: float = NEAR, mixed: bool = False, method: str = 'gauss_seidel'
 ) -> Answer:
     """Solve a problem by exact_stick with the caps of given normals, and normals in turn.
 
-    Plain, each step begins with the normals of the last, as L1 takes the loads of a step from the
-    horizontal forces of the one before. Mixed, it begins with normals from the last few steps,
-    such that their changes would cancel (Anderson 1965), and never below 0.
+    Each step begins with the normals of the last, as L1 takes the loads of a step from the
+    horizontal forces of the one before; mixed, it begins with normals from the last few steps,
+    such that their changes would cancel (Anderson 1965), and never below 0. The weight ``near``
+    of a change of the normals does not move the solution (Rockafellar 1976).
     """
-    loop, impulses = _Loop(problem, method), np.zeros(len(problem.free))
+    loop, impulses = _Loop(problem, near, method), np.zeros(len(problem.free))
     normals = loop.press(impulses)
     tried: list[np.ndarray] = []
     became: list[np.ndarray] = []
     best, least = impulses, problem.residual(impulses)
-    residual = least
     for step in range(1, OUTER + 1):
         try:
-            impulses = loop.pull(normals, impulses, INEXACT * max(residual, solved))
+            impulses = loop.pull(normals, impulses, INEXACT * SOLVED)
             after = loop.press(impulses)
         except RuntimeError as error:
             return Answer(best, step, loop.sweeps, f'normals: {error}')
         residual = problem.residual(impulses)
         if residual < least:
             best, least = impulses, residual
-        if residual <= solved:
+        if residual <= SOLVED:
             return Answer(impulses, step, loop.sweeps, '')
         tried, became = [*tried[-MEMORY:], normals], [*became[-MEMORY:], after]
         normals = _mix(tried, became) if mixed else after
@@ -449,11 +490,11 @@ def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[s
     rows: list[dict[str, Any]] = []
     for problem in command.each(problems, 'friction_problems', 'problem'):
         methods: dict[str, Any] = {}
-        for name, mixed in ((PLAIN, False), (MIXED, True)):
+        for name, (near, mixed) in LOOPS.items():
             times = []
             for _ in range(repeats if len(problem.friction) < 50 else 1):
                 start = time.perf_counter()
-                answer = outer_loop(problem, mixed)
+                answer = outer_loop(problem, near, mixed)
                 times.append(time.perf_counter() - start)
             methods[name] = _found(problem, answer.impulses, answer.steps, float(np.median(times)))
             methods[name] |= {'sweeps': answer.sweeps, 'why': answer.why}
@@ -511,8 +552,11 @@ def main(words: Sequence[str]) -> int:
     command.add_count(parser, '--seed', 0, 'seed of the problems of scenes', least=0)
     command.add_out(parser)
     options: argparse.Namespace = parser.parse_args(words)
-    problems = [*found(options.paths), *own(options.own, options.seed)]
-    document = {'seed': options.seed, **run(problems, options.siconos, options.repeats)}
+    made = own(options.own, options.seed) + tall(options.own, options.seed)
+    problems = [*found(options.paths), *made]
+    levers = {name: _largest_lever(Scene.load(name)) for name in SCENES}
+    document = {'seed': options.seed, 'levers': levers}
+    document |= run(problems, options.siconos, options.repeats)
     kept = command.write(options.out, 'friction_problems', document)
     command.show(options, kept, table(document))
     return 0

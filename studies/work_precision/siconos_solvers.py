@@ -15,11 +15,12 @@ import time
 import numpy as np
 
 SOLVERS = {
-    'siconos NSGS': ('NSGS', 'fc3d_nsgs'),
-    'siconos NSN_AC': ('NSN_AC', 'fc3d_nonsmooth_Newton_AlartCurnier'),
-    'siconos ADMM': ('ADMM', 'fc3d_admm'),
-    'siconos TFP': ('TFP', 'fc3d_TrescaFixedPoint'),
+    'siconos NSGS': ('NSGS', 'fc3d_nsgs', 10000),
+    'siconos NSN_AC': ('NSN_AC', 'fc3d_nonsmooth_Newton_AlartCurnier', 200),
+    'siconos ADMM': ('ADMM', 'fc3d_admm', 10000),
+    'siconos TFP': ('TFP', 'fc3d_TrescaFixedPoint', 100),
 }
+"""Name of the options, function, and most iterations of each solver."""
 
 
 def solve(
@@ -27,9 +28,9 @@ def solve(
 ) -> tuple[np.ndarray, int, float]:
     """Return impulses, iterations and time, s."""
     siconos = importlib.import_module('siconos.numerics')
-    kind, function = SOLVERS[name]
+    kind, function, most = SOLVERS[name]
     options = siconos.SolverOptions(getattr(siconos, f'SICONOS_FRICTION_3D_{kind}'))
-    options.iparam[siconos.SICONOS_IPARAM_MAX_ITER] = 10000
+    options.iparam[siconos.SICONOS_IPARAM_MAX_ITER] = most
     options.dparam[siconos.SICONOS_DPARAM_TOL] = tolerance
     problem = siconos.FrictionContactProblem(3, len(friction), compliance, free, friction)
     impulses, velocity = np.zeros(len(free)), np.zeros(len(free))
