@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare ellipsoids of force and yaw moment with friction summed over the pressure of a contact.
 
-Each point of a contact resists against its own velocity in proportion to its pressure. Summed over
-a fine quadrature this gives the force F and the moment M of a sole that slides and turns, the limit
-surface. The simulator takes the ellipsoid |(F, M/ρ)| = c with ρ = 2/3 of the sole's radius.
+Each point of a contact resists against its own velocity in proportion to its pressure. Summed
+over a fine quadrature this gives the force F and the moment M of a sole that slides and turns, the
+limit surface. The simulator takes the ellipsoid |(F, M/ρ)| = c with ρ = 2/3 of the sole's radius.
 
-``--rival FOLDER``: a checkout of Gabrieleenx/FrictionModelling (MIT), whose distributed and reduced
-LuGre models, steady, run on the same contacts. Writes limit_surface.json and .png.
+``--rival FOLDER``: a checkout of Gabrieleenx/FrictionModelling (MIT), whose distributed and
+reduced LuGre models, steady, run on the same contacts. Writes limit_surface.json and .png.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
+from unittest import mock
 
 import matplotlib
 import numpy as np
@@ -31,7 +32,11 @@ from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.contact.resistance import DOMED
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
+from ros_pad.simulation.planar_step import X
+from ros_pad.simulation.scene import Scene
+from ros_pad.trials.loop import ClosedLoop
 from studies import command
+from studies.closed_loop.loops import walk
 from studies.drawing import BLACK
 from studies.drawing import BLUE
 from studies.drawing import ORANGE
@@ -48,6 +53,8 @@ FINE, COARSE = 200, 24
 
 ANGLES, DIRECTIONS = 91, (0.0, 15.0, 30.0)
 """Mixtures of sliding and turning, and directions of sliding, °, that are tried."""
+
+SCENE = 'hexapod_patches'
 
 GRID, SEGMENTS = 51, 20
 """Cells of the rival's grid along a side, and segments of its reduced model, as in its tests."""
@@ -94,16 +101,15 @@ def disc(
 def many(places: np.ndarray, radius: float, rings: int) -> tuple[np.ndarray, np.ndarray]:
     """Return points and shares of equal, evenly pressed discs that share the load."""
     points, shares = disc(radius, rings)
-    return (places[:, None] + points[None]).reshape(-1, 2), np.tile(shares, len(places)) / len(
-        places
-    )
+    spread = np.tile(shares, len(places)) / len(places)
+    return (places[:, None] + points[None]).reshape(-1, 2), spread
 
 
 def domes(foot: Foot, rings: int) -> Patch:
     """Return the contacts of a foot on domes alone, at half of their force limit.
 
-    The pressure is :data:`DOMED` of the ceiling. No pressure under a dome has been measured: by the
-    membrane model it is the air's, all over the contact.
+    The air is at :data:`DOMED` of the ceiling. How the pressure spreads under a dome has not been
+    measured: by the membrane model it is the air's, all over the contact.
     """
     pressure = DOMED * foot.ceiling
     load = 0.5 * foot.dome_load(math.inf, pressure) / foot.pads
@@ -222,7 +228,8 @@ def rivals(patch: Patch, folder: pathlib.Path) -> dict[str, Force]:
         sys.path.remove(str(folder))
     cell = 2.04 * float(np.abs(patch.points).max()) / GRID
     edges = cell * (np.arange(GRID + 1) - 0.5 * GRID)
-    grid, _, _ = np.histogram2d(*patch.points.T, bins=(edges, edges), weights=patch.shares)
+    x, y = patch.points.T
+    grid, _, _ = np.histogram2d(x, y, bins=[edges, edges], weights=patch.shares)
     properties = {
         'grid_shape': (GRID, GRID), 'grid_size': cell, 'mu_c': 1.0, 'mu_s': 1.0, 'v_s': 1e-3,
         'alpha': 2, 's0': 1e6, 's1': 8e2, 's2': 0.0, 'dt': 1e-4, 'z_ba_ratio': 0.9,
@@ -256,6 +263,15 @@ def rivals(patch: Patch, folder: pathlib.Path) -> dict[str, Force]:
 # --- the study -----------------------------------------------------------------------------------
 
 
+def walked(turning: float, seed: int) -> float:
+    """Return how far a walk of :data:`SCENE` on L1 comes, m, with feet of a turning radius, m."""
+    scene = Scene.load(SCENE)
+    with mock.patch.object(Foot, 'turning_radius', turning):
+        loop = ClosedLoop(scene, 'adaptive', seed, 'L1')
+        walk(loop, scene)
+    return float(loop.robot.body[X])
+
+
 def methods_of(name: str, patch: Patch, folder: pathlib.Path | None) -> dict[str, Force]:
     """Return each method for a contact."""
     found = {
@@ -272,8 +288,11 @@ def methods_of(name: str, patch: Patch, folder: pathlib.Path | None) -> dict[str
     return found | (rivals(patch, folder) if folder else {})
 
 
-def run(folder: pathlib.Path | None, repeats: int) -> dict[str, Any]:
-    """Return the document: for each contact its radii, and errors and time of each method."""
+def run(folder: pathlib.Path | None, repeats: int, walks: int) -> dict[str, Any]:
+    """Return the document: for each contact its radii, and errors and time of each method.
+
+    Beside it are walks with the sole's radius and with that of its domes.
+    """
     document: dict[str, Any] = {'rival': folder is not None, 'repeats': repeats, 'contacts': {}}
     for name, patch in command.each(list(patches().items()), 'limit_surface', 'contact'):
         truth = summed(patch.points, patch.shares)(twists(patch))
@@ -291,6 +310,11 @@ def run(folder: pathlib.Path | None, repeats: int) -> dict[str, Any]:
             ]).round(5).tolist(),
             'methods': methods,
         }  # fmt: skip
+    on_domes = domes(Scene.load(SCENE).foot, COARSE)
+    document['walks'] = [
+        [walked(turning, seed) for turning in (on_domes.turning, on_domes.own_turning)]
+        for seed in command.each(range(walks), 'limit_surface: walks', 'seed')
+    ]
     return document
 
 
@@ -309,6 +333,8 @@ def table(document: dict[str, Any]) -> str:
                 f' {100 * each["moment"]:.1f} | {100 * each["motion"]:.1f} |'
                 f' {1e6 * each["seconds"]:.3g} |'
             )
+    for seed, (shipped, own) in enumerate(document['walks']):
+        lines.append(f'walk {seed}: {shipped:.4f} m, with the radius of the domes {own:.4f} m')
     return '\n'.join(lines)
 
 
@@ -317,7 +343,7 @@ def draw(document: dict[str, Any]) -> Figure:
     colours = (BLUE, SKY, ORANGE, VERMILION, BLACK)
     shown = ('disc, even pressure', 'disc, Hertz', 'ring of 6 small discs', 'large37 on domes')
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 4.2), layout='constrained')
+        figure = Figure(figsize=(10.0, 4.0), layout='constrained')
         left, right = figure.subplots(1, 2)
         turn = np.linspace(0.0, 0.5 * math.pi, 91)
         left.plot(np.cos(turn), np.sin(turn), ':', color=BLACK, lw=1.0, label='ellipsoid')
@@ -332,7 +358,7 @@ def draw(document: dict[str, Any]) -> Figure:
             right.plot(1e6 * each['seconds'], 100 * each['motion'], 'o', color=BLUE)
             right.annotate(method, (1e6 * each['seconds'], 100 * each['motion']), (4, 4),
                            textcoords='offset points', fontsize=7.5)  # fmt: skip
-        right.set(xscale='log', yscale='log', xlabel='time of one motion (µs)',
+        right.set(xscale='log', yscale='log', xlim=(3.0, 6e4), xlabel='time of one motion (µs)',
                   ylabel='largest error of force and moment (%)',
                   title='b  37 domes of a foot: error against time')  # fmt: skip
     return figure
@@ -343,9 +369,10 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('limit_surface', __doc__)
     parser.add_argument('--rival', type=pathlib.Path, metavar='FOLDER', help='FrictionModelling')
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
+    command.add_count(parser, '--walks', 4, 'pairs of walks', least=0)
     command.add_out(parser)
     options = parser.parse_args(words)
-    document = run(options.rival, options.repeats)
+    document = run(options.rival, options.repeats, options.walks)
     kept = command.write(options.out, 'limit_surface', document, {'limit_surface': draw(document)})
     command.show(options, kept, table(document))
     return 0
