@@ -45,6 +45,7 @@ from studies.closed_loop.labelled_contacts import features
 from studies.closed_loop.labelled_contacts import operating_threshold
 from studies.samples import auc
 from studies.samples import runs
+from studies.samples import share_interval
 
 SOURCE = 'https://github.com/MichaelMarav/ProbabilisticContactEstimation (folder offline/data)'
 ATLAS = ('ATLAS_01ground_003slip', 'ATLAS_01ground', 'ATLAS_01ground_3steps')
@@ -130,17 +131,6 @@ def scores_of(recording: Recording) -> dict[str, np.ndarray]:
     # As for the rim: the median at more than half of the expected load, which needs no label.
     quiet = float(np.median(speed[recording.load > 0.5 * recording.expected_load]))
     return features(recording) | {INERTIAL: cusum(recording, speed, quiet)}
-
-
-def share_interval(hits: int, count: int) -> list[float]:
-    """Return the 95 % interval of a share (Wilson 1927)."""
-    if not count:
-        return [0.0, 1.0]
-    z, share = 1.96, hits / count
-    middle = share + z * z / (2.0 * count)
-    half = z * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
-    scale = 1.0 + z * z / count
-    return [max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)]
 
 
 def on_patch(recording: Recording) -> dict[str, Any]:

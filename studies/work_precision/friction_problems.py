@@ -41,6 +41,7 @@ from ros_pad.simulation.planar_robot import GRAVITY
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from studies import command
+from studies.samples import share_interval
 from studies.work_precision.friction import RigidStep
 from studies.work_precision.friction import least_energy
 from studies.work_precision.friction import least_in_ball
@@ -519,26 +520,48 @@ def _found(problem: Problem, impulses: np.ndarray, steps: int, seconds: float) -
     return {'residual': residual, 'steps': steps, 'seconds': seconds, 'solved': residual <= SOLVED}
 
 
+def grouped(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the figures of each method for problems of one kind: those of a name's first word."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        first = 'Rover' if row['name'].startswith('Rover') else row['name'].split()[0]
+        groups.setdefault(first, []).append(row)
+    found = []
+    for name, group in groups.items():
+        counts = [row['contacts'] for row in group]
+        for method in group[0]['methods']:
+            each = [row['methods'][method] for row in group]
+            solved = sum(one['solved'] for one in each)
+            found.append({
+                'problems': name,
+                'count': len(group),
+                'contacts': [min(counts), max(counts)],
+                'method': method,
+                'solved': solved,
+                'interval': share_interval(solved, len(group)),
+                'steps': [float(np.median([one['steps'] for one in each])),
+                          max(one['steps'] for one in each)],
+                'residual': max(one['residual'] for one in each),
+                'seconds': float(np.median([one['seconds'] for one in each])),
+            })  # fmt: skip
+    return found
+
+
 def table(document: dict[str, Any]) -> str:
-    """Return the table of the documentation: methods by group of problems."""
-    groups: dict[str, list[Any]] = {}
-    for row in document['rows']:
-        name = row['name']
-        groups.setdefault('Rover' if name.startswith('Rover') else name.split()[0], []).append(row)
+    """Return the table of the documentation: methods by kind of problem."""
     lines = ['| problems | contacts | method | solved | steps | largest residual | time, ms |',
              '|---|---|---|---|---|---|---|']  # fmt: skip
-    for group, rows in groups.items():
-        counts = sorted({row['contacts'] for row in rows})
-        size = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
-        for method in rows[0]['methods']:
-            each = [row['methods'][method] for row in rows]
-            steps = sorted(one['steps'] for one in each)
-            lines.append(
-                f'| {group} | {size} | {method} | {sum(one["solved"] for one in each)} of'
-                f' {len(each)} | {steps[len(steps) // 2]}, at most {steps[-1]} |'
-                f' {max(one["residual"] for one in each):.0e} |'
-                f' {1e3 * float(np.median([one["seconds"] for one in each])):.2g} |'
-            )
+    for each in document['kinds']:
+        low, high = (100.0 * end for end in each['interval'])
+        interval = f' ({low:.0f} to {high:.0f} %)' if each['count'] > 1 else ''
+        few, many = each['contacts']
+        middle, most = each['steps']
+        lines.append(
+            f'| {each["problems"]} | {few if few == many else f"{few} to {many}"} |'
+            f' {each["method"]} | {each["solved"]} of {each["count"]}{interval} |'
+            f' {middle:.0f}, at most {most} | {each["residual"]:.0e} |'
+            f' {1e3 * each["seconds"]:.2g} |'
+        )
     return '\n'.join(lines)
 
 
@@ -554,9 +577,12 @@ def main(words: Sequence[str]) -> int:
     options: argparse.Namespace = parser.parse_args(words)
     made = own(options.own, options.seed) + tall(options.own, options.seed)
     problems = [*found(options.paths), *made]
+    # The rows of a problem are kept for problems of others only, which a reader can look up.
     levers = {name: _largest_lever(Scene.load(name)) for name in SCENES}
     document = {'seed': options.seed, 'levers': levers}
     document |= run(problems, options.siconos, options.repeats)
+    document['kinds'] = grouped(document['rows'])
+    document['rows'] = document['rows'][: len(problems) - len(made)]
     kept = command.write(options.out, 'friction_problems', document)
     command.show(options, kept, table(document))
     return 0
