@@ -548,21 +548,29 @@ def grouped(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def table(document: dict[str, Any]) -> str:
-    """Return the table of the documentation: methods by kind of problem."""
-    lines = ['| problems | contacts | method | solved | steps | largest residual | time, ms |',
-             '|---|---|---|---|---|---|---|']  # fmt: skip
-    for each in document['kinds']:
-        low, high = (100.0 * end for end in each['interval'])
-        interval = f' ({low:.0f} to {high:.0f} %)' if each['count'] > 1 else ''
-        few, many = each['contacts']
-        middle, most = each['steps']
-        lines.append(
-            f'| {each["problems"]} | {few if few == many else f"{few} to {many}"} |'
-            f' {each["method"]} | {each["solved"]} of {each["count"]}{interval} |'
-            f' {middle:.0f}, at most {most} | {each["residual"]:.0e} |'
-            f' {1e3 * each["seconds"]:.2g} |'
-        )
+    """Return the table of the documentation: a row for each kind of problem.
+
+    A cell has the number solved with its 95 % interval in %, median and largest number of steps,
+    and the median time.
+    """
+    methods = list(dict.fromkeys(each['method'] for each in document['kinds']))
+    lines = [f'| problems, contacts | {" | ".join(methods)} |', '|---' * (len(methods) + 1) + '|']
+    for name in dict.fromkeys(each['problems'] for each in document['kinds']):
+        kind = [each for each in document['kinds'] if each['problems'] == name]
+        few, many = kind[0]['contacts']
+        head = f'{name}, {few if few == many else f"{few} to {many}"}'
+        lines.append(f'| {head} | {" | ".join(map(_cell, kind))} |')
     return '\n'.join(lines)
+
+
+def _cell(kind: dict[str, Any]) -> str:
+    low, high = (100.0 * end for end in kind['interval'])
+    interval = f' ({low:.0f} to {high:.0f})' if kind['count'] > 1 else ''
+    middle, most = kind['steps']
+    steps = f'{middle:.0f}, {most}' if kind['count'] > 1 else f'{most}'
+    return (
+        f'{kind["solved"]} of {kind["count"]}{interval}; {steps}; {1e3 * kind["seconds"]:.2g} ms'
+    )
 
 
 def main(words: Sequence[str]) -> int:

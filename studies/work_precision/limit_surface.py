@@ -32,7 +32,6 @@ from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.contact.resistance import DOMED
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation.planar_step import X
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
@@ -269,7 +268,7 @@ def walked(turning: float, seed: int) -> float:
     with mock.patch.object(Foot, 'turning_radius', turning):
         loop = ClosedLoop(scene, 'adaptive', seed, 'L1')
         walk(loop, scene)
-    return float(loop.robot.body[X])
+    return loop.robot.body[0]
 
 
 def methods_of(name: str, patch: Patch, folder: pathlib.Path | None) -> dict[str, Force]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study friction_problems: files of others, and contacts whose solution is known."""
 
+import json
 import math
 
 import numpy as np
@@ -136,6 +137,9 @@ def test_the_table_counts_what_is_solved(tmp_path, capsys, monkeypatch):
     words = ['friction_problems', '--own', '1', '--repeats', '1', '--out', str(tmp_path)]
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
-    solved = [line for line in lines if 'exact_stick, the same, mixed' in line]
-    assert len(solved) == 2 + len(study.LEVERS)
-    assert '1 of 1' in solved[0]
+    names = [line[2:].partition(',')[0] for line in lines[2:]]
+    assert names == [*study.SCENES, 'lever_0.5']
+    kept = json.loads((tmp_path / 'friction_problems.json').read_text(encoding='utf-8'))
+    for line in lines[2:]:
+        kinds = [each for each in kept['kinds'] if each['problems'] in line]
+        assert line.count('1 of 1; ') == sum(each['solved'] for each in kinds) >= 2
