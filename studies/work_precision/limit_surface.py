@@ -53,7 +53,7 @@ FINE, COARSE = 200, 24
 ANGLES, DIRECTIONS = 91, (0.0, 15.0, 30.0)
 """Mixtures of sliding and turning, and directions of sliding, °, that are tried."""
 
-SCENE = 'hexapod_patches'
+SCENE, POLICIES = 'hexapod_patches', ('dome', 'flat', 'adaptive')
 
 GRID, SEGMENTS = 51, 20
 """Cells of the rival's grid along a side, and segments of its reduced model, as in its tests."""
@@ -262,11 +262,11 @@ def rivals(patch: Patch, folder: pathlib.Path) -> dict[str, Force]:
 # --- the study -----------------------------------------------------------------------------------
 
 
-def walked(turning: float, seed: int) -> float:
+def walked(turning: float, policy: str, seed: int) -> float:
     """Return how far a walk of :data:`SCENE` on L1 comes, m, with feet of a turning radius, m."""
     scene = Scene.load(SCENE)
     with mock.patch.object(Foot, 'turning_radius', turning):
-        loop = ClosedLoop(scene, 'adaptive', seed, 'L1')
+        loop = ClosedLoop(scene, policy, seed, 'L1')
         walk(loop, scene)
     return loop.robot.body[0]
 
@@ -310,10 +310,12 @@ def run(folder: pathlib.Path | None, repeats: int, walks: int) -> dict[str, Any]
             'methods': methods,
         }  # fmt: skip
     on_domes = domes(Scene.load(SCENE).foot, COARSE)
+    cases = [(policy, seed) for policy in POLICIES for seed in range(walks)]
     document['walks'] = [
-        [walked(turning, seed) for turning in (on_domes.turning, on_domes.own_turning)]
-        for seed in command.each(range(walks), 'limit_surface: walks', 'seed')
-    ]
+        (policy, seed, walked(on_domes.turning, policy, seed),
+         walked(on_domes.own_turning, policy, seed))
+        for policy, seed in command.each(cases, 'limit_surface: walks', 'pair')
+    ]  # fmt: skip
     return document
 
 
@@ -332,8 +334,10 @@ def table(document: dict[str, Any]) -> str:
                 f' {100 * each["moment"]:.1f} | {100 * each["motion"]:.1f} |'
                 f' {1e6 * each["seconds"]:.3g} |'
             )
-    for seed, (shipped, own) in enumerate(document['walks']):
-        lines.append(f'walk {seed}: {shipped:.4f} m, with the radius of the domes {own:.4f} m')
+    for policy, seed, shipped, own in document['walks']:
+        lines.append(
+            f'{policy}, seed {seed}: {shipped:.4f} m; {1e2 * (own / shipped - 1.0):+.4f} %'
+        )
     return '\n'.join(lines)
 
 
@@ -368,7 +372,7 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('limit_surface', __doc__)
     parser.add_argument('--rival', type=pathlib.Path, metavar='FOLDER', help='FrictionModelling')
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
-    command.add_count(parser, '--walks', 4, 'pairs of walks', least=0)
+    command.add_count(parser, '--walks', 4, 'pairs of walks with each policy', least=0)
     command.add_out(parser)
     options = parser.parse_args(words)
     document = run(options.rival, options.repeats, options.walks)
