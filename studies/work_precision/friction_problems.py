@@ -65,9 +65,9 @@ LEVERS = (0.5, 1.0, 1.5, 2.0, 3.0)
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
 LOOPS = {
-    'exact_stick, any loads': (FREE, False),
-    'exact_stick, loads near the last': (NEAR, False),
-    'exact_stick, the same, mixed': (NEAR, True),
+    'loop, any loads': (FREE, False),
+    'loop, near loads': (NEAR, False),
+    'loop, near, mixed': (NEAR, True),
 }
 """Weight of a change of the normals, and whether steps are mixed, of each outer loop."""
 
@@ -243,7 +243,7 @@ def tall(count: int, seed: int) -> list[Problem]:
     for ratio in LEVERS:
         raised = replace(body, height=body.height * ratio / lever(body, 0.8))
         for number in range(count):
-            name = f'lever_{ratio:g} {number}'
+            name = f'μh/a {ratio:g} {number}'
             friction = rng.choice([0.8, 0.12], 3)
             problems.append(standing(name, raised, (0, 2, 4), friction, rng))
     return problems
@@ -521,11 +521,11 @@ def _found(problem: Problem, impulses: np.ndarray, steps: int, seconds: float) -
 
 
 def grouped(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the figures of each method for problems of one kind: those of a name's first word."""
+    """Return the figures of each method by kind of problem: a name without its number."""
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        first = 'Rover' if row['name'].startswith('Rover') else row['name'].split()[0]
-        groups.setdefault(first, []).append(row)
+        kind = 'Rover' if row['name'].startswith('Rover') else row['name']
+        groups.setdefault(kind.rpartition(' ')[0] or kind, []).append(row)
     found = []
     for name, group in groups.items():
         counts = [row['contacts'] for row in group]

@@ -138,7 +138,7 @@ def test_the_table_counts_what_is_solved(tmp_path, capsys, monkeypatch):
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     names = [line[2:].partition(',')[0] for line in lines[2:]]
-    assert names == [*study.SCENES, 'lever_0.5']
+    assert names == [*study.SCENES, 'μh/a 0.5']
     kept = json.loads((tmp_path / 'friction_problems.json').read_text(encoding='utf-8'))
     for line in lines[2:]:
         kinds = [each for each in kept['kinds'] if each['problems'] in line]
