@@ -19,7 +19,7 @@ STUDIES = {
         'work_precision.friction_problems',
         'contact problems of other groups (15 min)',
     ),
-    'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (4 min)'),
+    'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),

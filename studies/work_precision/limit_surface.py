@@ -372,7 +372,7 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('limit_surface', __doc__)
     parser.add_argument('--rival', type=pathlib.Path, metavar='FOLDER', help='FrictionModelling')
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
-    command.add_count(parser, '--walks', 4, 'pairs of walks with each policy', least=0)
+    command.add_count(parser, '--walks', 6, 'pairs of walks with each policy', least=0)
     command.add_out(parser)
     options = parser.parse_args(words)
     document = run(options.rival, options.repeats, options.walks)
