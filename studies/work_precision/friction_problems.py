@@ -578,7 +578,7 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('friction_problems', __doc__)
     parser.add_argument('paths', type=pathlib.Path, nargs='*', metavar='PATH')
     parser.add_argument('--siconos', metavar='PYTHON', help='an interpreter that has siconos')
-    command.add_count(parser, '--own', 100, 'problems of each scene of ros_pad')
+    command.add_count(parser, '--own', 40, 'problems of each scene and of each lever')
     command.add_count(parser, '--repeats', 3, 'how often each is timed; the median counts')
     command.add_count(parser, '--seed', 0, 'seed of the problems of scenes', least=0)
     command.add_out(parser)
