@@ -15,6 +15,11 @@ STUDIES = {
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
     'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
+    'friction_problems': (
+        'work_precision.friction_problems',
+        'contact problems of other groups (15 min)',
+    ),
+    'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
@@ -35,6 +40,10 @@ STUDIES = {
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
     'turning_feet': ('closed_loop.turning_feet', 'slip alarm from the rate of shanks (2 min)'),
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
+    'labelled_pce': (
+        'closed_loop.labelled_pce',
+        'ATLAS on a slippery patch, a Go1 on grease (15 s)',
+    ),
     'lead_picture': ('closed_loop.lead_picture', 'picture and figures of the README (2 min)'),
     'real_time': ('nodes.real_time', 'speed of a trial without ROS and on nodes (1 min)'),
     'nodes': ('nodes.cost', 'processor time of the nodes, beside another checkout (20 min)'),

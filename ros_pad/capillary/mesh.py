@@ -301,7 +301,7 @@ class Mesh:
                 f'pitch = {pitch:g} m is not allowed: above {widest:.6g} m, the width of the'
                 ' domes, is needed'
             )
-        places = np.column_stack([pitch * _hexagonal(pads), np.zeros(pads)])
+        places = np.column_stack([pitch * hexagonal(pads), np.zeros(pads)])
         points = (places[:, None] + one.points[None]).reshape(-1, 3)
         shifts = len(one.points) * np.arange(pads)
         faces = (one.faces[None] + shifts[:, None, None]).reshape(-1, 3)
@@ -344,7 +344,7 @@ def revolved(r: Array, z: Array, sectors: int, source: str) -> Mesh:
     return Mesh(points, np.concatenate(bands), source)
 
 
-def _hexagonal(count: int) -> Array:
+def hexagonal(count: int) -> Array:
     """Return the places of a hexagonal lattice of distance 1 that are nearest to its origin."""
     reach = int(math.sqrt(count)) + 2
     i, j = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])

@@ -49,7 +49,7 @@ from studies.samples import runs
 SOURCE = 'https://github.com/mrsp/lcd (folder data)'
 STABLE, NONE, SLIP = 0, 1, 2
 PERIOD = 0.01
-"""Sampling period, s."""
+"""Sampling period of the set, s."""
 
 GATE = Tuning().load_gate
 """Share of the expected load above which a foot is in stance, as for FootEstimator."""
@@ -117,6 +117,8 @@ class Recording:
         N, N m, m/s², rad/s.
     label : ndarray of int, shape (n,)
         ``STABLE``, ``NONE`` or ``SLIP``.
+    period : float
+        Sampling period, s.
     """
 
     name: str
@@ -125,6 +127,7 @@ class Recording:
     acceleration: np.ndarray
     rate: np.ndarray
     label: np.ndarray
+    period: float = PERIOD
 
     @property
     def robot(self) -> str:
@@ -234,19 +237,19 @@ class Recording:
     @functools.cached_property
     def quiet(self) -> np.ndarray:
         """Whether each sample is stable, in stance, and :data:`CLEAR` away from labelled slips."""
-        reach = round(CLEAR / PERIOD)
+        reach = round(CLEAR / self.period)
         near = np.convolve(self.label == SLIP, np.ones(2 * reach + 1), 'same') > 0.5
         return self.sticking & ~near
 
     @property
     def quiet_minutes(self) -> float:
         """Total time of the quiet samples, minutes."""
-        return float(self.quiet.sum()) * PERIOD / 60.0
+        return float(self.quiet.sum()) * self.period / 60.0
 
     @functools.cached_property
     def events(self) -> list[tuple[int, int]]:
         """Start and end (exclusive) of labelled slips in stance of at least :data:`SHORTEST`."""
-        shortest = round(SHORTEST / PERIOD)
+        shortest = round(SHORTEST / self.period)
         joined = runs(self.slipping, join=shortest - 1)
         return [(start, stop) for start, stop in joined if stop - start >= shortest]
 
@@ -307,7 +310,8 @@ def features(recording: Recording) -> dict[str, np.ndarray]:
     """
     low, high = recording.reach
     off_centre = np.abs(recording.centre - 0.5 * (low + high)) / (0.5 * (high - low))
-    rim = 2.0 / 3.0 * recording.sole_radius * recording.speed
+    lever = 2.0 / 3.0 * recording.sole_radius
+    rim = lever * recording.speed
 
     def logarithm(value: np.ndarray) -> np.ndarray:
         return np.log10(np.maximum(value, LEAST))
@@ -335,26 +339,24 @@ def features(recording: Recording) -> dict[str, np.ndarray]:
             QUIETLY: logarithm(recording.speed / max(recording.quiet_rate, LEAST)),
             LARGELY: logarithm(recording.speed / max(recording.speed.max(), LEAST)),
             RIM: logarithm(rim),
-            CUSUM: cusum(recording, rim),
+            CUSUM: cusum(recording, rim, lever * recording.quiet_rate),
             SHAKE: logarithm(np.linalg.norm(recording.acceleration, axis=1)),
         }
     )
 
 
-def cusum(recording: Recording, rim: np.ndarray) -> np.ndarray:
-    """Return the statistic of ros_pad's slip alarm for the speed of the rim of the sole, m/s.
+def cusum(recording: Recording, speed: np.ndarray, quiet: float) -> np.ndarray:
+    """Return the statistic of ros_pad's slip alarm for a speed, m/s.
 
-    The noise is the rim speed of the quiet foot with the default noise of Tuning. Nothing else is
-    fitted to the robot: the alarm tests for its default slip speed.
+    The noise is the speed of the quiet foot, m/s, with the default noise of Tuning. Nothing else
+    is fitted to the robot: the alarm tests for its default slip speed.
     """
-    noise = 2.0 / 3.0 * recording.sole_radius * recording.quiet_rate
-    noise = math.hypot(noise, Tuning().speed_noise)
-    alarm = SlipAlarm(noise, Tuning().smoothing)
-    statistic = np.zeros(len(rim))
+    alarm = SlipAlarm(math.hypot(quiet, Tuning().speed_noise), Tuning().smoothing)
+    statistic = np.zeros(len(speed))
     for start, stop in recording.stances:
         alarm.reset()
         for index in range(start, stop):
-            alarm.update(float(rim[index]), PERIOD)
+            alarm.update(float(speed[index]), recording.period)
             statistic[index] = alarm.statistic
     return statistic
 
@@ -367,7 +369,7 @@ def margin(recording: Recording) -> np.ndarray:
     """
     ground = GroundFilter(PRIOR)
     noise = Tuning().ratio_noise
-    window = round(Tuning().filter_period / PERIOD)
+    window = round(Tuning().filter_period / recording.period)
     quantile = np.zeros(len(recording.label))
     for start, stop in recording.stances:
         ground.touch_down(math.inf, dome=False)
@@ -377,7 +379,7 @@ def margin(recording: Recording) -> np.ndarray:
             ratio = float(recording.ratio[first:end].mean())
             weight = -math.expm1(-0.5 * ((ratio - last) / noise) ** 2)
             last = ratio if math.isinf(last) else last + weight * (ratio - last)
-            ground.update(ratio, noise, 0.0, 1.0, (end - first) * PERIOD, weight)
+            ground.update(ratio, noise, 0.0, 1.0, (end - first) * recording.period, weight)
             quantile[first:end] = ground.quantile(0.05)
     return quantile - recording.ratio
 
@@ -562,7 +564,7 @@ class Study:
         """Return how labels, forces and rates of a recording are related."""
         slip, stick = recording.slipping, recording.sticking
         after, before = _distance_to_edges(recording)
-        at_edge = np.minimum(after, before) * PERIOD < EDGE_TIME
+        at_edge = np.minimum(after, before) * recording.period < EDGE_TIME
         horizontal = np.hypot(recording.rate[:, 0], recording.rate[:, 1])
         all_slips = recording.label == SLIP
         ratio, rate = recording.ratio, recording.speed
@@ -694,18 +696,20 @@ def operating_threshold(scores: Sequence[np.ndarray], recordings: Sequence[Recor
     return chosen
 
 
-def alarm_figures(score: np.ndarray, threshold: float, recording: Recording) -> dict[str, Any]:
+def alarm_figures(
+    score: np.ndarray, threshold: float, recording: Recording, fewest: int = FEWEST
+) -> dict[str, Any]:
     """Return misses, median delay and false alarms of a threshold.
 
-    The share of misses is None for fewer than :data:`FEWEST` slips.
+    The share of misses is None for fewer than ``fewest`` slips.
     """
     slips = recording.events
     above = [np.flatnonzero(score[start:stop] > threshold) for start, stop in slips]
-    delays = [float(each[0]) * PERIOD for each in above if len(each)]
+    delays = [float(each[0]) * recording.period for each in above if len(each)]
     return {
         'threshold': threshold,
         'events': len(slips),
-        'missed': 1.0 - len(delays) / len(slips) if len(slips) >= FEWEST else None,
+        'missed': 1.0 - len(delays) / len(slips) if len(slips) >= fewest else None,
         'delay_s': float(np.median(delays)) if delays else None,
         'false_per_minute': (false_alarms(score, threshold, recording) / recording.quiet_minutes),
     }

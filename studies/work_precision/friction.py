@@ -264,17 +264,27 @@ def exact_stick(
     """
     choice('method', method, ('gradient', 'gauss_seidel'))
     _check(dt)
-    step = _RigidStep(free, mass, inertia, contacts, dt, tolerance)
-    impulses, count = [0.0] * len(step.rows), 0
-    if method == 'gauss_seidel':
-        impulses, count = _gauss_seidel(step, min(sweeps, CRAWLING))
-    impulses = _gradient(step, impulses, count, sweeps)
+    step = RigidStep(free, mass, inertia, contacts, dt, tolerance)
+    impulses, _ = least_energy(step, [0.0] * len(step.rows), sweeps, method)
     twist = step.twist(impulses)
     _set_forces(contacts, step, impulses, twist, dt)
     return twist
 
 
-class _RigidStep:
+def least_energy(
+    step: RigidStep, impulses: list[float], sweeps: int, method: str
+) -> tuple[list[float], int]:
+    """Return impulses that settle a step, from a first guess, and the number of sweeps.
+
+    Method and errors are those of :func:`exact_stick`.
+    """
+    count = 0
+    if method == 'gauss_seidel':
+        impulses, count = _gauss_seidel(step, impulses, min(sweeps, CRAWLING))
+    return _gradient(step, impulses, count, sweeps)
+
+
+class RigidStep:
     """A rigid-plastic step: impulses, three a contact, each three in a ball of radius c dt."""
 
     def __init__(
@@ -305,7 +315,7 @@ class _RigidStep:
 
     def blocks(self) -> Iterator[tuple[int, float]]:
         """Yield for each contact its first row and the radius of its ball, N s."""
-        return zip(range(0, len(self.rows), 3), self._limits, strict=True)
+        return zip(range(0, 3 * len(self._limits), 3), self._limits, strict=True)
 
     def twist(self, impulses: Sequence[float]) -> Twist:
         """Return the twist after impulses, N s."""
@@ -351,7 +361,7 @@ class _RigidStep:
                 (jx * vx + jy * vy + jw * turn + motion - stiffness * impulse, stiffness)
                 for (jx, jy, jw, motion, stiffness), impulse in block
             ]
-            for index, impulse in enumerate(_least_in_ball(pulls, limit), place):
+            for index, impulse in enumerate(least_in_ball(pulls, limit), place):
                 after[index], added = impulse, impulse - impulses[index]
                 jx, jy, jw, _, _ = self.rows[index]
                 vx += jx * added / self.mass
@@ -360,9 +370,8 @@ class _RigidStep:
         return after
 
 
-def _gauss_seidel(step: _RigidStep, most: int) -> tuple[list[float], int]:
+def _gauss_seidel(step: RigidStep, impulses: list[float], most: int) -> tuple[list[float], int]:
     """Return impulses and number of sweeps, until they converge or converge too slowly."""
-    impulses = [0.0] * len(step.rows)
     swept, change = impulses, impulses
     count = 0
     while count < most and not step.settled(impulses):
@@ -380,8 +389,10 @@ def _gauss_seidel(step: _RigidStep, most: int) -> tuple[list[float], int]:
     return impulses, count
 
 
-def _gradient(step: _RigidStep, impulses: list[float], count: int, sweeps: int) -> list[float]:
-    """Return settled impulses by accelerated projected gradient.
+def _gradient(
+    step: RigidStep, impulses: list[float], count: int, sweeps: int
+) -> tuple[list[float], int]:
+    """Return settled impulses by accelerated projected gradient, and the number of sweeps.
 
     Raises
     ------
@@ -405,12 +416,12 @@ def _gradient(step: _RigidStep, impulses: list[float], count: int, sweeps: int) 
         age, older = (1.0, 1.0) if turned > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
         pull = (older - 1.0) / age
         ahead = [p + pull * (p - o) for p, o in zip(impulses, last, strict=True)]
-    return impulses
+    return impulses, count
 
 
 def _set_forces(
     contacts: Sequence[Contact],
-    step: _RigidStep,
+    step: RigidStep,
     impulses: Sequence[float],
     twist: Twist,
     dt: float,
@@ -460,7 +471,7 @@ def _directions(contact: Contact, mass: float, inertia: float) -> list[_Row]:
     return rows
 
 
-def _least_in_ball(pulls: Sequence[tuple[float, float]], limit: float) -> list[float]:
+def least_in_ball(pulls: Sequence[tuple[float, float]], limit: float) -> list[float]:
     """Minimise Σ (½ d p² + g p) over |p| <= limit, for (g, d) in pulls.
 
     On the sphere p = -g/(d + λ), with λ the root of |p(λ)| = limit. Newton's method is applied to
