@@ -2,10 +2,10 @@
 """Measure errors of what ``wet`` and ``wet_pattern`` return and refuse.
 
 Prints the number of returned heights, and of volumes between pads, with the range of their errors,
-and the same of refused ones: with the limits of ros_pad.capillary.layers as shipped, and with each of these limits
-halved and doubled (angles in rad, up to 90 degrees). Single pads, domes and cones from 0.01 to 3
-capillary lengths, are compared with the exact meniscus of a wide bath (``bath_meniscus``),
-patterns of domes with the surface of minimum energy (``pattern_surface``).
+and the same of refused ones: with the limits of ros_pad.capillary.layers as shipped, and with each
+of these limits halved and doubled (angles in rad, up to 90 degrees). Single pads, domes and cones
+from 0.01 to 3 capillary lengths, are compared with the exact meniscus of a wide bath
+(``bath_meniscus``), patterns of domes with the surface of minimum energy (``pattern_surface``).
 """
 
 from __future__ import annotations
