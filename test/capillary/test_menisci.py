@@ -130,6 +130,10 @@ def test_without_weight_the_film_between_domes_is_level(pitch, sides):
     )
     assert again.pressure == pytest.approx(0.0, abs=2e-3 * 0.073 / SPHERE)
     assert line_heights(again) == pytest.approx(level, rel=2e-3)
+    wetted = 2.0 * math.pi * SPHERE * level
+    line = math.pi * SPHERE**2 * math.sin(math.radians(50)) ** 2
+    energy = 0.073 * (cell - line - math.cos(math.radians(50)) * wetted)
+    assert (found.energy, again.energy) == pytest.approx((energy, energy), rel=1e-6)
 
 
 def test_liquid_rises_higher_between_close_domes_and_their_pads_carry_it():
