@@ -2,8 +2,8 @@
 """Surface Evolver and YADE's bridges beside ``ros_pad``: rows for ``python -m studies capillary``.
 
 - Arrays of domes: ``pattern_surface`` and ``wet_pattern`` against Surface Evolver on a twelfth (or
-  an eighth) of a cell, extrapolated by Richardson from its two finest meshes. The difference to the
-  extrapolation one mesh coarser is Evolver's own error.
+  an eighth) of a cell, extrapolated by Richardson from its two finest meshes. The difference to
+  the extrapolation one mesh coarser is Evolver's own error.
 - One pad in a wide bath: Evolver against the exact meniscus, as the methods of ros_pad.
 - Bridges between two equal spheres: ``bridge`` and YADE's Laplace-Young solver against quadrature
   of the first integral of the meridian.
@@ -287,8 +287,15 @@ def our_arrays(arrays: Sequence[Array]) -> list[Row]:
     face, dome = Face.of_wall(Wall.dome(SPHERE, REST)), Mesh.dome(SPHERE, REST, 2.9e-3)
 
     def least(array: Array, sectors: int, halved: int) -> dict[str, float]:
-        given = {'pressure': 0.0, 'sectors': sectors, 'refinements': halved}
-        found = pattern_surface(face, array.liquid, array.pitch, array.sides, **given)
+        found = pattern_surface(
+            face,
+            array.liquid,
+            array.pitch,
+            array.sides,
+            pressure=0.0,
+            sectors=sectors,
+            refinements=halved,
+        )
         height = float(found.vertices[found.lines[0].vertices, 2].mean())
         pull = -float(found.forces[0, 2])
         values = (height, pull, found.volume, found.energy)
@@ -389,7 +396,7 @@ def bridges() -> list[Neck]:
 
 
 def quadrature(contact: float, filling: float, suction: float) -> tuple[float, float, float]:
-    """Return distance, volume and force over 2π of a bridge of two unit spheres; angles in degrees.
+    """Return distance, volume and force over 2π of a bridge of unit spheres; angles in degrees.
 
     Along the meridian ``r sin ψ = F - p r²/2`` with the suction p: this and ``dz/dr = tan ψ`` give
     height and volume as integrals over r from the neck outwards, here over the root of r - neck.
