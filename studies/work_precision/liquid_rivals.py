@@ -2,8 +2,8 @@
 """Surface Evolver and YADE's bridges beside ``ros_pad``: rows for ``python -m studies capillary``.
 
 - Arrays of domes: ``pattern_surface`` and ``wet_pattern`` against Surface Evolver on a twelfth (or
-  an eighth) of a cell, extrapolated by Richardson from its two finest meshes. The difference to
-  the extrapolation one mesh coarser is Evolver's own error.
+  an eighth) of a cell with curved facets, extrapolated by Richardson from its two finest meshes;
+  what that changes is given as Evolver's own error.
 - One pad in a wide bath: Evolver against the exact meniscus, as the methods of ros_pad.
 - Bridges between two equal spheres: ``bridge`` and YADE's Laplace-Young solver against quadrature
   of the first integral of the meridian.
@@ -14,6 +14,8 @@ Rows of rivals that are not given are those stored in ``docs/charts``.
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import functools
 import json
 import math
 import pathlib
@@ -44,6 +46,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.pace import Progress
 from ros_pad.reports.style import legend
 from studies import command
+from studies.drawing import BLACK
 from studies.drawing import BLUE
 from studies.drawing import GREEN
 from studies.drawing import ORANGE
@@ -57,21 +60,24 @@ from studies.work_precision import evolver
 from studies.work_precision.capillary import REST
 from studies.work_precision.capillary import SPHERE
 
-PITCHES = (3.4e-3, 4.4e-3, 6e-3, 9e-3)  # m
+PITCHES = (3.4e-3, 4.4e-3, 6e-3, 9e-3)  # m, in turn hexagonal and square
 LIQUIDS = (
     Liquid(0.073, 0.027),
     Liquid(0.073, 0.073, contact_angle=math.radians(30.0)),
     Liquid(0.01, 0.006),
 )
 SIZES = ((24, 0), (24, 1), (24, 2))  # vertices round a dome, and how often triangles are halved
-PARTS, WHOLES = (0, 1, 2, 3), (0, 1, 2)  # how often Evolver refines a part, and a whole cell
-FINEST = 4
+FINEST = 3  # how often Evolver refines the mesh of the reference
 STEPS = (1e-3, 1e-4, 1e-5)  # of YADE's meridian, over the radius
 REACH = 8.0  # capillary lengths from a pad to the end of Evolver's bath
 
 OURS, LEVEL = 'pattern_surface', 'wet_pattern'
-PART, WHOLE = 'Surface Evolver, part of a cell', 'Surface Evolver, whole cell'
-BATH = 'Surface Evolver'
+EVOLVER, CURVED = 'Surface Evolver', 'Surface Evolver, curved facets'
+PART, WHOLE = ', part of a cell', ', whole cell'
+# How often facets are refined, for each way in which Evolver is asked.
+WAYS = {EVOLVER + PART: (0, 1, 2, 3), CURVED + PART: (1, 2), EVOLVER + WHOLE: (0, 1, 2)}
+WAYS |= {CURVED + WHOLE: (0, 1)}
+BATHS = [(EVOLVER, k) for k in range(4)] + [(CURVED, k) for k in (1, 2)]
 YADE = 'YADE'
 EXACT, CIRCLE = 'bridge, young_laplace', 'bridge, circle'
 ARRAY, BRIDGE = 'arrays of domes', 'bridges of spheres'
@@ -79,8 +85,10 @@ QUANTITIES = ('height', 'force', 'volume', 'energy')
 LOOKS = {
     OURS: (PURPLE, 'D'),
     LEVEL: (GREEN, '^'),
-    PART: (ORANGE, 'P'),
-    WHOLE: (VERMILION, 'X'),
+    EVOLVER + PART: (ORANGE, 'P'),
+    CURVED + PART: (BLACK, 'p'),
+    EVOLVER + WHOLE: (VERMILION, 'X'),
+    CURVED + WHOLE: (VERMILION, 's'),
     EXACT: (BLUE, '*'),
     CIRCLE: (SKY, 'o'),
     YADE: (ORANGE, 'v'),
@@ -166,7 +174,7 @@ def measure(options: argparse.Namespace, progress: Progress) -> list[Row]:
     if options.evolver:
         rows += _evolved(options.evolver, options.arrays, progress)
     else:
-        rows += [row for row in kept if _rival(row) in (BATH, PART, WHOLE, ARRAY)]
+        rows += [row for row in kept if _rival(row) in (ARRAY, EVOLVER, CURVED, *WAYS)]
     arrays = [row for row in rows if isinstance(row, Array)][: options.arrays]
     rows += our_arrays(arrays)
     progress(0.9)
@@ -192,7 +200,7 @@ def stored(path: pathlib.Path) -> list[Row]:
     rows = json.loads(path.read_text(encoding='utf-8'))['rows']
     found: list[Row] = [kinds[row['kind']](**row) for row in rows if row['kind'] in kinds]
     for row in rows:
-        if row['kind'] == 'result' and row['family'] == BATH:
+        if row['kind'] == 'result' and row['family'] in (EVOLVER, CURVED):
             cases = [capillary.Case(**case) for case in row['cases']]
             found.append(capillary.Result(**{**row, 'cases': cases}))
     return found
@@ -223,53 +231,48 @@ def _evolved(program: pathlib.Path, count: int, progress: Progress) -> list[Row]
     runs: dict[tuple[str, int], list[Solved]] = {}
     for number, (pitch, liquid) in enumerate(wanted):
         sides = 4 if number % 2 else 6
-        parts = [_cell(program, pitch, sides, liquid, k) for k in range(FINEST + 1)]
-        last, before = (_extrapolated(*parts[k : k + 2]) for k in (FINEST - 1, FINEST - 2))
-        own = {name: abs(last[name] / before[name] - 1.0) for name in QUANTITIES}
-        array = Array('array', pitch, sides, liquid.surface_tension, liquid.angle, last, own)
+        coarse, fine = (
+            _cell(program, pitch, sides, liquid, k, CURVED + PART) for k in (FINEST - 1, FINEST)
+        )
+        exact = {name: (4.0 * fine[name] - coarse[name]) / 3.0 for name in QUANTITIES}
+        array = Array('array', pitch, sides, liquid.surface_tension, liquid.angle, exact, {})
+        array = dataclasses.replace(array, own=array.errors(fine))
         arrays.append(array)
-        for k in PARTS:
-            runs.setdefault((PART, k), []).append((parts[k]['s'], array.errors(parts[k])))
-        for k in WHOLES:
-            found = _cell(program, pitch, sides, liquid, k, whole=True)
-            runs.setdefault((WHOLE, k), []).append((found['s'], array.errors(found)))
+        for way, levels in WAYS.items():
+            for k in levels:
+                found = _cell(program, pitch, sides, liquid, k, way)
+                runs.setdefault((way, k), []).append((found['s'], array.errors(found)))
         progress(0.6 * (number + 1) / len(wanted))
     rows: list[Row] = [
         _summed(ARRAY, method, f'{24 * 2**k} vertices round a dome', solved)
         for (method, k), solved in runs.items()
     ]
     for number, shape in enumerate(capillary.SHAPES):
-        rows += [_bath(program, shape, k) for k in PARTS]
+        rows += [_bath(program, shape, k, family) for family, k in BATHS]
         progress(0.6 + 0.1 * (number + 1))
     return [*arrays, *rows]
 
 
-def _extrapolated(coarse: Mapping[str, float], fine: Mapping[str, float]) -> dict[str, float]:
-    return {name: (4.0 * fine[name] - coarse[name]) / 3.0 for name in QUANTITIES}
-
-
 def _cell(
-    program: pathlib.Path,
-    pitch: float,
-    sides: int,
-    liquid: Liquid,
-    refinements: int,
-    whole: bool = False,
+    program: pathlib.Path, pitch: float, sides: int, liquid: Liquid, refinements: int, way: str
 ) -> dict[str, float]:
-    """Return Evolver's result for a cell, in SI units; the pad carries the weight."""
-    weight = liquid.density * GRAVITY
-    solid = evolver.Solid.dome(1e3 * SPHERE, 1e3 * REST)
-    level = 1e3 * (math.sqrt(SPHERE**2 - REST**2) + SPHERE * math.cos(liquid.angle))
+    """Return Evolver's result for a cell, in SI units, from a level surface at first."""
+    cell = pitch**2 * (1.0 if sides == 4 else math.sqrt(0.75))
     task = evolver.Task(
-        solid,
+        evolver.Solid.dome(1e3 * SPHERE, 1e3 * REST),
         liquid.angle,
-        1e-6 * weight / liquid.surface_tension,
-        0.6 * level,
+        1e-6 * liquid.density * GRAVITY / liquid.surface_tension,
+        1e3 * wet_pattern(_mesh(), liquid, cell, strict=False).height,
         0.5e3 * pitch,
         sides,
-        whole,
+        way.endswith(WHOLE),
     )
-    return _in_si(evolver.solve(program, task, refinements), liquid)
+    return _in_si(evolver.solve(program, task, refinements, way.startswith(CURVED)), liquid)
+
+
+@functools.cache
+def _mesh() -> Mesh:
+    return Mesh.dome(SPHERE, REST, 2.9e-3)
 
 
 def _in_si(found: evolver.Found, liquid: Liquid) -> dict[str, float]:
@@ -284,7 +287,7 @@ def _in_si(found: evolver.Found, liquid: Liquid) -> dict[str, float]:
 
 def our_arrays(arrays: Sequence[Array]) -> list[Row]:
     """Return the errors of our surfaces of least energy, and of level surfaces."""
-    face, dome = Face.of_wall(Wall.dome(SPHERE, REST)), Mesh.dome(SPHERE, REST, 2.9e-3)
+    face = Face.of_wall(Wall.dome(SPHERE, REST))
 
     def least(array: Array, sectors: int, halved: int) -> dict[str, float]:
         found = pattern_surface(
@@ -302,7 +305,7 @@ def our_arrays(arrays: Sequence[Array]) -> list[Row]:
         return dict(zip(QUANTITIES, values, strict=True))
 
     def level(array: Array) -> dict[str, float]:
-        found = wet_pattern(dome, array.liquid, array.cell, strict=False)
+        found = wet_pattern(_mesh(), array.liquid, array.cell, strict=False)
         return {'height': found.height, 'volume': found.volume}
 
     least(arrays[0], *SIZES[0])  # imports are not timed
@@ -323,7 +326,9 @@ def _timed(solve: Callable[[Array], dict[str, float]], array: Array) -> Solved:
 # --- baths ---------------------------------------------------------------------------------------
 
 
-def _bath(program: pathlib.Path, shape: capillary.Shape, refinements: int) -> capillary.Result:
+def _bath(
+    program: pathlib.Path, shape: capillary.Shape, refinements: int, family: str
+) -> capillary.Result:
     """Return Evolver's errors in a wide bath, on the cases that our minimiser solves."""
     cases = [(tension, ratio) for tension in capillary.TENSIONS for ratio in capillary.RATIOS]
     few = cases[capillary.FEW]
@@ -340,11 +345,11 @@ def _bath(program: pathlib.Path, shape: capillary.Shape, refinements: int) -> ca
             _solid(shape).radius(0.0) + REACH * length,
             0,
         )
-        found = _in_si(evolver.solve(program, task, refinements), liquid)
+        found = _in_si(evolver.solve(program, task, refinements, family == CURVED), liquid)
         return found['height'], found['force']
 
     size = f'{24 * 2**refinements} vertices round a pad'
-    return capillary.result(shape, BATH, size, solve, few, exact)
+    return capillary.result(shape, family, size, solve, few, exact)
 
 
 def _solid(shape: capillary.Shape) -> evolver.Solid:
