@@ -488,7 +488,8 @@ def yade_bridges(solve: Callable[..., Any], necks: Sequence[Neck]) -> list[Row]:
                 'volume': abs(found[1] / neck.volume - 1.0),
             }
             solved.append((took, errors))
-        rows.append(_summed(BRIDGE, YADE, f'steps of {step:g} radii', solved))
+        if solved:
+            rows.append(_summed(BRIDGE, YADE, f'steps of {step:g} radii', solved))
     return rows
 
 

