@@ -13,7 +13,10 @@ from studies import command
 STUDIES = {
     'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
-    'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
+    'capillary': (
+        'work_precision.capillary',
+        'methods for liquid on meshes (2 min; rivals 15 min more)',
+    ),
     'walk': ('work_precision.walk.study', 'every fidelity level of a walk (1 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),

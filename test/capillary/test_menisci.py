@@ -71,8 +71,8 @@ def test_bath_round_a_dome_is_the_exact_one_to_second_order(degrees):
 @pytest.mark.parametrize('reach', [2.0, 4.0])
 def test_what_a_bath_beyond_reach_would_change(reach):
     exact = bath_meniscus(SPHERE, REST, liquid=water(50))
-    found = bath_surface(DOME, water(50), reach=reach)
-    most = 2.1 * math.exp(-2.0 * reach) + 2e-3  # of reach, and of the mesh
+    found = bath_surface(DOME, water(50), reach=reach, sectors=16)
+    most = 2.1 * math.exp(-2.0 * reach) + 5e-3  # of reach, and of the mesh
     assert found.volume == pytest.approx(exact.volume, rel=most)
     assert line_heights(found).mean() == pytest.approx(exact.height, rel=most)
     assert -found.forces[0, 2] == pytest.approx(exact.force, rel=most)
