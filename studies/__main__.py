@@ -15,7 +15,7 @@ STUDIES = {
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
     'capillary': (
         'work_precision.capillary',
-        'methods for liquid on meshes (2 min; rivals 15 min more)',
+        'methods for liquid on meshes (2 min, with rivals 15)',
     ),
     'walk': ('work_precision.walk.study', 'every fidelity level of a walk (1 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),

@@ -22,6 +22,7 @@ import math
 import pathlib
 import re
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from collections.abc import Mapping
@@ -170,7 +171,11 @@ def add_options(part: argparse.ArgumentParser) -> None:
 
 def measure(options: argparse.Namespace, progress: Progress) -> list[Row]:
     """Measure rivals that are given, keep the stored rows of others, and compare our methods."""
-    kept = stored(command.CHARTS / 'capillary.json')
+    path = command.CHARTS / 'capillary.json'
+    kept = stored(path)
+    for name in ('evolver', 'yade'):
+        if not getattr(options, name):
+            print(f'without --{name} its rows are those of {path.name}', file=sys.stderr)
     rows: list[Row] = []
     if options.evolver:
         rows += _evolved(options.evolver, options.arrays, progress)

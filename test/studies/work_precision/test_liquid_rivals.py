@@ -115,10 +115,11 @@ def test_yade_is_read_though_it_is_for_python_2(tmp_path):
         liquid_rivals.load_yade(tmp_path / 'none')
 
 
-def test_without_rivals_their_stored_rows_are_kept_and_ours_measured(monkeypatch):
+def test_without_rivals_their_stored_rows_are_kept_and_ours_measured(monkeypatch, capsys):
     monkeypatch.setattr(liquid_rivals, 'SIZES', ((24, 0),))
     options = argparse.Namespace(evolver=None, yade=None, arrays=1)
     rows = liquid_rivals.measure(options, lambda share: None)
+    assert 'without --yade its rows are those of capillary.json' in capsys.readouterr().err
     kept = liquid_rivals.stored(DOCS / 'charts' / 'capillary.json')
     ours = (liquid_rivals.OURS, liquid_rivals.LEVEL, liquid_rivals.EXACT, liquid_rivals.CIRCLE)
     assert [row for row in rows if getattr(row, 'method', '') not in ours] == [
