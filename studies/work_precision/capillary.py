@@ -397,9 +397,8 @@ def result(
         answers.append(Case(tension, ratio, given, lifted, height, force, status))
     rising = [case for case in answers if case.exact_height > 0.0]
     still = [case for case in answers if case.exact_height == 0.0]
-    good = [case for case in rising if case.height is not None]
-    heights = [_off(case.height, case.exact_height) for case in good]
-    forces = [_off(case.force, case.exact_force) for case in good]
+    good = errors(answers)
+    heights, forces = [each[0] for each in good], [each[1] for each in good]
     return Result(
         kind='result',
         shape=shape.name,
@@ -415,6 +414,15 @@ def result(
         false=sum(case.height is not None for case in still),
         cases=answers,
     )
+
+
+def errors(cases: Sequence[Case]) -> list[Pair]:
+    """Return the relative errors of height and force where liquid rises and there is a result."""
+    return [
+        (_off(case.height, case.exact_height), _off(case.force, case.exact_force))
+        for case in cases
+        if case.height is not None and case.exact_height > 0.0
+    ]
 
 
 def _off(found: float | None, exact: float) -> float:

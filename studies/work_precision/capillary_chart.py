@@ -21,7 +21,6 @@ from studies.drawing import ORANGE
 from studies.drawing import PALE
 from studies.drawing import PAPER_STYLE
 from studies.drawing import PURPLE
-from studies.drawing import SKY
 from studies.drawing import VERMILION
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ LOOKS = {
     'energy': (GREEN, '^', 'layers, energy'),
     'minimised': (PURPLE, 'D', 'surface of least energy'),
     'Surface Evolver': (ORANGE, 'P', 'Surface Evolver, a twelfth'),
-    'Surface Evolver, curved facets': (SKY, 'p', 'the same, curved facets'),
     'exact meniscus': (BLACK, '*', 'exact meniscus'),
 }
 

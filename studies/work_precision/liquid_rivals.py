@@ -79,10 +79,11 @@ PART, WHOLE = ', part of a cell', ', whole cell'
 # How often facets are refined, for each way in which Evolver is asked.
 WAYS = {EVOLVER + PART: (0, 1, 2, 3), CURVED + PART: (1, 2), EVOLVER + WHOLE: (0, 1, 2)}
 WAYS |= {CURVED + WHOLE: (0, 1)}
+IN_BATHS = ('minimised', EVOLVER, CURVED)
 BATHS = [(EVOLVER, k) for k in range(4)] + [(CURVED, k) for k in (1, 2)]
 YADE = 'YADE'
 EXACT, CIRCLE = 'bridge, young_laplace', 'bridge, circle'
-ARRAY, BRIDGE = 'arrays of domes', 'bridges of spheres'
+ARRAY, BATH, BRIDGE = 'arrays of domes', 'pads in a wide bath', 'bridges of spheres'
 QUANTITIES = ('height', 'force', 'volume', 'energy')
 LOOKS = {
     OURS: (PURPLE, 'D'),
@@ -206,7 +207,7 @@ def stored(path: pathlib.Path) -> list[Row]:
     rows = json.loads(path.read_text(encoding='utf-8'))['rows']
     found: list[Row] = [kinds[row['kind']](**row) for row in rows if row['kind'] in kinds]
     for row in rows:
-        if row['kind'] == 'result' and row['family'] in (EVOLVER, CURVED):
+        if row['kind'] == 'result' and row['family'] in IN_BATHS:
             cases = [capillary.Case(**case) for case in row['cases']]
             found.append(capillary.Result(**{**row, 'cases': cases}))
     return found
@@ -505,8 +506,13 @@ def table(rows: Sequence[Any]) -> str:
     """Return the compared rows as tables of Markdown, with the error of the reference."""
     arrays = [row for row in rows if isinstance(row, Array)]
     compared = [row for row in rows if isinstance(row, Compared)]
+    compared += in_baths([row for row in rows if isinstance(row, capillary.Result)])
     lines = []
-    for problem, names in ((ARRAY, QUANTITIES), (BRIDGE, ('force', 'volume'))):
+    for problem, names in (
+        (ARRAY, QUANTITIES),
+        (BATH, QUANTITIES[:2]),
+        (BRIDGE, ('force', 'volume')),
+    ):
         part = [row for row in compared if row.problem == problem]
         lines += [f'| {problem} | time | {" | ".join(names)} |', '|---' * (2 + len(names)) + '|']
         for row in part:
@@ -521,6 +527,23 @@ def table(rows: Sequence[Any]) -> str:
             lines.append(f'| the reference itself ({len(arrays)}) | | {" | ".join(cells)} |')
         lines.append('')
     return '\n'.join(lines)
+
+
+def in_baths(results: Sequence[capillary.Result]) -> list[Compared]:
+    """Return the rows of a wide bath, each over pads of all shapes."""
+    rows = []
+    for family in IN_BATHS:
+        part = [each for each in results if each.family == family]
+        for size in dict.fromkeys(each.size for each in part):
+            solved = [
+                (1e-3 * each.ms_per_solve, dict(zip(QUANTITIES, errors, strict=False)))
+                for each in part
+                if each.size == size
+                for errors in capillary.errors(each.cases)
+            ]
+            method = 'bath_surface' if family == 'minimised' else family + PART
+            rows.append(_summed(BATH, method, size, solved))
+    return rows
 
 
 def _brief(value: float) -> str:
@@ -554,7 +577,7 @@ def figures(rows: Sequence[Any]) -> dict[str, Figure]:
                 for k, row in enumerate(part):
                     median, worst = row.errors[name]
                     axis.plot([row.ms] * 2, [median, worst], '-_', color=colour, lw=0.8, alpha=0.6)
-                    axis.plot(row.ms, median, mark, color=colour, ms=4.0 + 1.2 * k, mec='white')
+                    axis.plot(row.ms, median, mark, color=colour, ms=5.5 + 1.2 * k, mew=0.0)
                 axis.plot(times, [row.errors[name][0] for row in part], color=colour, lw=0.7)
             axis.set(xscale='log', yscale='log')
             axis.grid(color=PALE, alpha=0.3, lw=0.5)
@@ -566,5 +589,5 @@ def figures(rows: Sequence[Any]) -> dict[str, Figure]:
             matplotlib.lines.Line2D([], [], color=colour, marker=mark, ls='', label=method)
             for method, (colour, mark) in LOOKS.items()
         ]
-        legend(figure, handles, 4)
+        legend(figure, handles, 3)
     return {'capillary_rivals': figure}
