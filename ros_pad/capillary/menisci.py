@@ -215,7 +215,7 @@ def pattern_surface(
     Raises
     ------
     NoSurface
-        As :func:`bath_surface` does.
+        As :func:`minimise` does.
     InvalidInput
         When a value is out of range, pads of this pitch touch, or both or none of pressure and
         volume are given.
@@ -290,5 +290,13 @@ def _film_place(
     lean = np.arctan2(np.gradient(heights), np.gradient(radii))
     level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
     if gravity > 0.0:
-        level = 0.5 * (level + _round_bath(mean, liquid, gravity).height)
+        from scipy.special import k0e
+        from scipy.special import k1e
+
+        # Its meniscus is that of small slopes, with the height of steep ones for wide pads.
+        length = math.sqrt(liquid.surface_tension / (liquid.density * gravity))
+        slopes = np.maximum(math.pi - liquid.angle - lean, 0.0)
+        distance = np.maximum(radii / length, 1e-9)
+        met = 2.0 * length * np.sin(0.5 * slopes) * k0e(distance) / k1e(distance) <= heights
+        level = 0.5 * (level + float(heights[np.argmax(met)] if met.any() else heights[-1]))
     return float(np.clip(np.interp(level, heights, places), 0.02, 0.98))
