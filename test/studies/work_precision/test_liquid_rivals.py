@@ -116,7 +116,7 @@ def test_yade_is_read_though_it_is_for_python_2(tmp_path):
 
 
 def test_without_rivals_their_stored_rows_are_kept_and_ours_measured(monkeypatch, capsys):
-    monkeypatch.setattr(liquid_rivals, 'SIZES', ((24, 0),))
+    monkeypatch.setattr(liquid_rivals, 'SIZES', ((24, 1),))
     options = argparse.Namespace(evolver=None, yade=None, arrays=1)
     rows = liquid_rivals.measure(options, lambda share: None)
     assert 'without --yade its rows are those of capillary.json' in capsys.readouterr().err
