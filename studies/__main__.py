@@ -13,7 +13,10 @@ from studies import command
 STUDIES = {
     'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
-    'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
+    'capillary': (
+        'work_precision.capillary',
+        'methods for liquid on meshes (2 min, with rivals 15)',
+    ),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
     'friction_problems': (
         'work_precision.friction_problems',

@@ -30,8 +30,8 @@ def add(commands: Commands) -> None:
     part.add_argument(
         'name',
         choices=(*CHARTS, 'all'),
-        help='study to run: stability takes 10 s, contact 15 s, capillary and walk about a minute'
-        ' each, estimator and meniscus a minute and a half each',
+        help='study to run: stability takes 10 s, contact 15 s, walk about a minute, estimator and'
+        ' meniscus a minute and a half each, capillary two minutes',
     )
     part.add_argument(
         '--out',

@@ -43,6 +43,8 @@ from studies.work_precision import capillary_chart
 
 Pair = tuple[float, float]  # height, m, and force, N
 
+rivals = 'studies.work_precision.liquid_rivals'  # module of further rows, with its options
+
 SPHERE, REST = 1.55e-3, 0.583e-3  # m: the dome of the reference table
 TENSIONS = (0.004, 0.073)  # N/m: the thesis' highest, and water
 RATIOS = (0.3, 0.5, 0.65, 0.8, 0.95)  # tension of the solid over tension of the liquid
@@ -315,6 +317,8 @@ def _minimised(shape: Shape, sectors: int, refinements: int) -> Callable[[Liquid
 
 def _read(shape: Shape, found: Any) -> tuple[Pair | None, str]:
     """Return height and force, if there are any, and status of a method's result."""
+    if isinstance(found, tuple):
+        return found, 'ok'
     if isinstance(found, Wet):
         status = str(found.status[0])
         if status != 'ok':
@@ -357,7 +361,7 @@ def run(shape: Shape, progress: Progress) -> list[Result]:
     methods.append((EXACT, '', meniscus, slice(None)))
     results = []
     for family, size, solve, which in methods:
-        results.append(_result(shape, family, size, solve, cases[which], exact[which]))
+        results.append(result(shape, family, size, solve, cases[which], exact[which]))
         progress(0.2 + 0.8 * len(results) / len(methods))
     return results
 
@@ -367,7 +371,7 @@ def _worded(size: tuple[int, ...]) -> str:
     return f'{layers} × {slices}, {2 * (rings + 1) * sectors} triangles'
 
 
-def _result(
+def result(
     shape: Shape,
     family: str,
     size: str,
@@ -393,9 +397,8 @@ def _result(
         answers.append(Case(tension, ratio, given, lifted, height, force, status))
     rising = [case for case in answers if case.exact_height > 0.0]
     still = [case for case in answers if case.exact_height == 0.0]
-    good = [case for case in rising if case.height is not None]
-    heights = [_off(case.height, case.exact_height) for case in good]
-    forces = [_off(case.force, case.exact_force) for case in good]
+    good = errors(answers)
+    heights, forces = [each[0] for each in good], [each[1] for each in good]
     return Result(
         kind='result',
         shape=shape.name,
@@ -411,6 +414,15 @@ def _result(
         false=sum(case.height is not None for case in still),
         cases=answers,
     )
+
+
+def errors(cases: Sequence[Case]) -> list[Pair]:
+    """Return the relative errors of height and force where liquid rises and there is a result."""
+    return [
+        (_off(case.height, case.exact_height), _off(case.force, case.exact_force))
+        for case in cases
+        if case.height is not None and case.exact_height > 0.0
+    ]
 
 
 def _off(found: float | None, exact: float) -> float:

@@ -17,6 +17,7 @@ from ros_pad.reports.style import legend
 from studies.drawing import BLACK
 from studies.drawing import BLUE
 from studies.drawing import GREEN
+from studies.drawing import ORANGE
 from studies.drawing import PALE
 from studies.drawing import PAPER_STYLE
 from studies.drawing import PURPLE
@@ -33,6 +34,7 @@ LOOKS = {
     'force': (BLUE, 's', 'layers, force'),
     'energy': (GREEN, '^', 'layers, energy'),
     'minimised': (PURPLE, 'D', 'surface of least energy'),
+    'Surface Evolver': (ORANGE, 'P', 'Surface Evolver, a twelfth'),
     'exact meniscus': (BLACK, '*', 'exact meniscus'),
 }
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure errors of the heights that ``wet`` and ``wet_pattern`` return and refuse.
+"""Measure errors of what ``wet`` and ``wet_pattern`` return and refuse.
 
-Prints the number of returned heights with the range of their errors, and the same of refused
-heights: with the limits of ros_pad.capillary.layers as shipped, and with each of these limits
-halved and doubled (angles in rad, up to 90 degrees). Single pads, domes and cones from 0.01 to 3
-capillary lengths, are compared with the exact meniscus of a wide bath (``bath_meniscus``),
-patterns of domes with the surface of minimum energy (``pattern_surface``).
+Prints the number of returned heights, and of volumes between pads, with the range of their errors,
+and the same of refused ones: with the limits of ros_pad.capillary.layers as shipped, and with each
+of these limits halved and doubled (angles in rad, up to 90 degrees). Single pads, domes and cones
+from 0.01 to 3 capillary lengths, are compared with the exact meniscus of a wide bath
+(``bath_meniscus``), patterns of domes with the surface of minimum energy (``pattern_surface``).
 """
 
 from __future__ import annotations
@@ -46,12 +46,13 @@ SINGLE = ('AGREEMENT', 'SLENDER', 'WETTING', '_STEEP', '_STRAIGHT')
 
 
 class Case(NamedTuple):
-    """A pad, its liquid, the exact height, m, and in a pattern the area per pad, m²."""
+    """A pad, its liquid, the exact height, m; in a pattern area (m²) and volume (m³) per pad."""
 
     mesh: Mesh
     liquid: Liquid
     exact: float
     cell: float = math.inf
+    volume: float = math.nan
 
 
 Ask = Callable[[Case, str], tuple[float, float]]
@@ -65,6 +66,7 @@ def main(words: Sequence[str]) -> int:
     single, many = list(pads())[:: options.every], list(patterns())[:: options.every]
     rows = measure('one pad', SINGLE, single, layers.BALANCES, on_one)
     rows += measure('pattern', ('AGREEMENT', 'WIDEST_GAP'), many, ('energy', 'force'), between)
+    rows += measure('volume', ('WIDEST_GAP',), many, ('energy', 'force'), volumes)
     lines = [f'{len(single)} cases of one pad, {len(many)} of patterns']
     lines.append(
         'what     limit              value  balance   given    off by %  refused    off by %'
@@ -126,11 +128,20 @@ def on_one(case: Case, balance: str) -> tuple[float, float]:
 
 def between(case: Case, balance: str) -> tuple[float, float]:
     """Return the same as :func:`on_one` for a pattern of pads."""
+    return _filled(case, balance, 'height', case.exact)
+
+
+def volumes(case: Case, balance: str) -> tuple[float, float]:
+    """Return the same as :func:`between` for the volume of the liquid."""
+    return _filled(case, balance, 'volume', case.volume)
+
+
+def _filled(case: Case, balance: str, what: str, exact: float) -> tuple[float, float]:
     loose, strict = (
         wet_pattern(case.mesh, case.liquid, case.cell, balance=balance, strict=strict)
         for strict in (False, True)
     )
-    off = loose.height / case.exact - 1.0
+    off = getattr(loose, what) / exact - 1.0
     refused = strict.status in ('far_off', 'far_apart')
     return off if strict.status == 'ok' else math.nan, off if refused else math.nan
 
@@ -169,4 +180,4 @@ def patterns() -> Iterator[Case]:
             except (MeshError, NoSurface):
                 continue
             exact = float(drawn.vertices[drawn.lines[0].vertices, 2].mean())
-            yield Case(dome, liquid, exact, math.sqrt(0.75) * pitch**2)
+            yield Case(dome, liquid, exact, math.sqrt(0.75) * pitch**2, drawn.volume)

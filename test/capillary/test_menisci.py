@@ -68,6 +68,16 @@ def test_bath_round_a_dome_is_the_exact_one_to_second_order(degrees):
     assert found.pressure == 0.0
 
 
+@pytest.mark.parametrize('reach', [2.0, 4.0])
+def test_what_a_bath_beyond_reach_would_change(reach):
+    exact = bath_meniscus(SPHERE, REST, liquid=water(50))
+    found = bath_surface(DOME, water(50), reach=reach, sectors=16)
+    most = 2.1 * math.exp(-2.0 * reach) + 5e-3  # of reach, and of the mesh
+    assert found.volume == pytest.approx(exact.volume, rel=most)
+    assert line_heights(found).mean() == pytest.approx(exact.height, rel=most)
+    assert -found.forces[0, 2] == pytest.approx(exact.force, rel=most)
+
+
 def test_bath_round_a_meshed_dome():
     exact = bath_meniscus(SPHERE, REST, liquid=water(50))
     face = Face.of_mesh(dome_mesh(40, 80))
@@ -120,6 +130,10 @@ def test_without_weight_the_film_between_domes_is_level(pitch, sides):
     )
     assert again.pressure == pytest.approx(0.0, abs=2e-3 * 0.073 / SPHERE)
     assert line_heights(again) == pytest.approx(level, rel=2e-3)
+    wetted = 2.0 * math.pi * SPHERE * level
+    line = math.pi * SPHERE**2 * math.sin(math.radians(50)) ** 2
+    energy = 0.073 * (cell - line - math.cos(math.radians(50)) * wetted)
+    assert (found.energy, again.energy) == pytest.approx((energy, energy), rel=1e-6)
 
 
 def test_liquid_rises_higher_between_close_domes_and_their_pads_carry_it():
