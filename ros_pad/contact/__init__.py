@@ -24,6 +24,7 @@ from ros_pad.contact.meniscus import THESIS_LIQUID
 from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.meniscus import Meniscus
+from ros_pad.contact.meniscus import capillary_pull
 from ros_pad.contact.meniscus import contact_angle
 from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
@@ -60,6 +61,7 @@ __all__ = [
     'Pressed',
     'Squeezed',
     'bridge',
+    'capillary_pull',
     'contact_angle',
     'design',
     'design_pressure',

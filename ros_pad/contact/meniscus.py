@@ -234,3 +234,52 @@ def hysteresis_force(
     # cos(back) - cos(ahead), without cancellation.
     drop = 2.0 * np.sin(0.5 * (ahead + back)) * np.sin(0.5 * (ahead - back))
     return plain(factor * tension * 2.0 * r * drop)
+
+
+def capillary_pull(
+    radius: npt.ArrayLike, film: npt.ArrayLike, liquid: Liquid, gravity: float = GRAVITY
+) -> Floats:
+    """Return an upper bound of the force with which liquid pulls a pad to the floor, N.
+
+    It holds for round pads of any form, any contact angles and any amount of liquid, at rest.
+
+    Parameters
+    ----------
+    radius : float or array
+        Radius of the largest disc of the pad that is wetted, m, from 0: of a dome that of its rim,
+        of a flat sole that of the sole.
+    film : float or array
+        Least height of the contact line on the pad above the floor, m, above 0 and at most two
+        capillary lengths: the film on ground that stays wet.
+    liquid : Liquid
+        Its contact angle is not used.
+    gravity : float
+        Gravity, m/s², from 0.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of range, or shapes do not broadcast.
+
+    Notes
+    -----
+    ``2π γ r + π r² (2γ/h + ρ g h/2)``: tension along the line, and suction on the whole disc,
+    contact included. Along a meridian from the floor to the line, at height H, Young and Laplace
+    give ``∫ p dz = γ (cos φ_floor - cos φ_line + ∫ sin φ/r dz) >= -2γ``, so that suction at the
+    line is at most ``2γ/H + ρ g H/2``. For H from h to ``4γ/(ρ g h)`` this is largest at h, and
+    liquid rises by two capillary lengths at most.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import WATER
+    >>> round(1e3 * capillary_pull(1.5e-3, 3e-4, WATER), 2)
+    4.14
+    """
+    if not isinstance(liquid, Liquid):
+        raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
+    weight, tension = liquid.density * number('gravity', gravity, 'm/s²'), liquid.surface_tension
+    most = 2.0 * math.sqrt(tension / weight) if weight else math.inf
+    r, h = quantity('radius', radius, 'm'), quantity('film', film, 'm', high=most, above=True)
+    r, h = broadcast('radius and film', r, h)
+    suction = 2.0 * tension / h + 0.5 * weight * h
+    return plain(math.pi * r * (2.0 * tension + r * suction))

@@ -14,13 +14,16 @@ from ros_pad.contact import THESIS_LIQUID
 from ros_pad.contact import WATER
 from ros_pad.contact import Liquid
 from ros_pad.contact import Pressed
+from ros_pad.contact import bridge
+from ros_pad.contact import capillary_pull
 from ros_pad.contact import contact_angle
 from ros_pad.contact import hysteresis_force
 from ros_pad.contact import meniscus
 from ros_pad.contact import press
 from ros_pad.errors import InvalidInput
 
-REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'meniscus_thesis.json'
+REFERENCES = pathlib.Path(__file__).parent.parent / 'reference'
+REFERENCE = REFERENCES / 'meniscus_thesis.json'
 APPENDIX_PI = math.pi / 3.1415  # see test_dome.py
 
 
@@ -222,3 +225,48 @@ def test_bad_hysteresis(change, name):
 def test_a_liquid_is_needed():
     with pytest.raises(InvalidInput, match="liquid = 'water' is not allowed"):
         meniscus(press(LARGE_PAD, 75e3, 0.1), 'water')
+
+
+def test_no_bridge_pulls_more_than_the_bound_and_some_nearly_as_much():
+    rows = json.loads((REFERENCES / 'sphere_plane_bridge.json').read_text())['rows']
+    liquid = Liquid(1.0, 1.0, contact_angle=0.0)
+    shares = [
+        4.0
+        * math.pi
+        * row['F_quad']
+        / capillary_pull(math.sin(math.radians(row['beta'])), row['h'], liquid, 0.0)
+        for row in rows
+    ]
+    assert len(shares) == 12 and 0.97 < max(shares) < 1.0
+    # A bridge from plate to plate, height 1 and radius 200: 2γ/h on its area, to 1/200.
+    wide = bridge(1e6, 1.0, 0.0, filling_angle=2e-4, separation=1.0, method='young_laplace')
+    most = capillary_pull(1e6 * math.sin(2e-4), wide.height, liquid, 0.0)
+    assert 0.98 * most < wide.force < most
+
+
+def test_weight_adds_half_a_column_to_suction():
+    # 1e-5 m³ of liquid hang half below the line: 500 kg/m³ · 10 m/s² · 0.01 m / 2 on 0.002 m².
+    radius = math.sqrt(0.002 / math.pi)
+    heavy, light = (
+        capillary_pull(radius, 1e-2, Liquid(0.5, 0.5, density=500.0), each) for each in (10.0, 0.0)
+    )
+    assert heavy - light == pytest.approx(25.0 * 0.002, rel=1e-9)
+    # Water on 20 mm of glass, 0.1 mm thick, between plates: 2 · 0.072/1e-4 Pa, and its rim.
+    glass = capillary_pull([0.0, 0.02], 1e-4, Liquid(0.072, 0.072), 0.0)
+    assert glass == pytest.approx([0.0, 1440.0 * 4e-4 * math.pi + 0.144 * math.pi * 0.02])
+
+
+@pytest.mark.parametrize(
+    ('change', 'name'),
+    [
+        ({'radius': -1e-3}, 'radius = -0.001'),
+        ({'film': 0.0}, 'film = 0'),
+        ({'film': 6e-3}, 'up to 0.0054'),
+        ({'liquid': 0.073}, 'liquid = 0.073'),
+        ({'gravity': -1.0}, 'gravity = -1'),
+        ({'radius': [1.0, 2.0], 'film': [1e-4, 1e-4, 1e-4]}, 'broadcast'),
+    ],
+)
+def test_bad_pulls(change, name):
+    with pytest.raises(InvalidInput, match=name):
+        capillary_pull(**{'radius': 1e-3, 'film': 1e-4, 'liquid': WATER, **change})
