@@ -40,7 +40,7 @@ STICKING = 'no slip'
 """The answer without a simulation: feet never slip, so the body moves as the gait intends."""
 
 FRICTION = 'friction'
-"""Not a level: how much five per cent more friction changes the distance on the cheapest level."""
+"""Not a level: how much five per cent more friction changes a walk on the cheapest level."""
 
 LEAST = 1e-4
 """Error that is added to every error, so that its logarithm is finite."""
@@ -104,34 +104,32 @@ class Promises:
         path = configuration.shared_folder() / 'fidelity.yaml'
         try:
             robots = configuration.read_yaml(path.read_text(encoding='utf-8'))['robots']
-            found = cls(
-                *(
-                    {
-                        robot: {key: (float(low), float(high)) for key, (low, high) in own.items()}
-                        for robot, own in ((robot, robots[robot][part]) for robot in robots)
-                    }
-                    for part in ('ranges', 'features')
-                ),
+            ranges, spans = (
                 {
-                    robot: {
-                        name: {key: float(value) for key, value in line.items()}
-                        for name, line in robots[robot]['bounds'].items()
-                    }
-                    for robot in robots
-                },
+                    robot: {name: (float(low), float(high)) for name, (low, high) in own.items()}
+                    for robot, own in ((robot, robots[robot][part]) for robot in robots)
+                }
+                for part in ('ranges', 'features')
             )
-            for robot, lines in found.lines.items():
-                assert all(line.keys() == {'constant', *found.spans[robot]} for line in lines.values())
+            lines = {
+                robot: {
+                    name: {key: float(value) for key, value in line.items()}
+                    for name, line in robots[robot]['bounds'].items()
+                }
+                for robot in robots
+            }
+            for robot, own in lines.items():
+                assert all(line.keys() == {'constant', *spans[robot]} for line in own.values())
         except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
             raise ConfigError(
                 f'{path}: the bounds of the fidelity levels cannot be read ({e!r}): write the file'
                 ' again with python -m studies fidelity'
             ) from e
-        return found
+        return cls(ranges, spans, lines)
 
-    def bound(self, level: str, scene: Scene, policy: str | None = None, metric: str = '') -> float:
+    def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
         """Return the bound on the error of a level; infinite if none was drawn."""
-        line = self.lines.get(scene.robot, {}).get(f'{level} {metric or scene.metric}')
+        line = self.lines.get(scene.robot, {}).get(f'{level} {scene.metric}')
         if line is None:
             return math.inf
         known = features(scene, policy)
@@ -142,8 +140,11 @@ class Promises:
         """Return as text what of a scene is outside the ranges drawn; empty if nothing is."""
         if scene.robot not in self.ranges:
             return f'robot = {scene.robot}, drawn were {", ".join(self.ranges)}'
-        values = {name: operator.attrgetter(name)(scene) for name in self.ranges[scene.robot]}
-        rows = [(name, values[name], ends) for name, ends in self.ranges[scene.robot].items()]
+        rows = [
+            (name, operator.attrgetter(name)(scene), ends)
+            for name, ends in self.ranges[scene.robot].items()
+            if scene.tow.weight or not name.startswith('tow.')
+        ]
         known = features(scene, policy)
         rows += [(name, known[name], ends) for name, ends in self.spans[scene.robot].items()]
         found = [
@@ -225,8 +226,10 @@ def _within(bound: float) -> str:
     """Return a bound in words, rounded up to two digits."""
     percent = 100.0 * bound
     unit = 10.0 ** (math.floor(math.log10(max(percent, 1e-3))) - 1)
-    return f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %' if percent < 99.5 else (
-        f'off by up to {percent:.0f} %'
+    return (
+        f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
+        if percent < 99.5
+        else (f'off by up to {percent:.0f} %')
     )
 
 
@@ -283,4 +286,3 @@ def build(scene: Scene, floor: Floor, period: float, fidelity: str = 'auto') -> 
     if name == 'L1':
         return PlanarRobot(scene, floor, period)
     return FullRobot(scene, floor, period)
-

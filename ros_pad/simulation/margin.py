@@ -57,6 +57,7 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
     if isinstance(scene.gait, RailGait):
         return found
     body = scene.body
+    assert isinstance(body, LeggedBody)
     return found | {
         'climbed': slope / demand,
         'adapts': float(policy not in ('flat', 'dome') and 0.0 < wet < 1.0),
@@ -148,6 +149,7 @@ class Stand:
         return film.drain(self.on_domes, self.on_sole, self.pressure, time)
 
     def resistance(self, dome_film: float, sole_film: float) -> float:
+        """Return the tangential resistance, N, on films under domes and sole, m."""
         return self.foot.resistance_of(
             self.on_domes, self.on_sole, self.pressure, dome_film, sole_film
         )
@@ -177,6 +179,7 @@ class Stand:
             mean = trapped_film(foot.sole_radius, modulus, self.on_sole / foot.sole_area)
             mean = min(mean, self.floor.film_thickness)
             yield 'sole', sole_film, DIMPLE / TRAPPED * mean, mean
+
 
 def dome_pressure(scene: Scene) -> float:
     """Return the pressure of a dome, Pa: the scene's, or what a controller would choose."""

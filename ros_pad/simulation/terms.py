@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The physical terms of a scene: those that a trial has, those that it leaves out, and why.
 
-A term matters if its effect on the distance is above the scene's accuracy. Most terms change the
-friction of the feet; their effect is estimated with that of five per cent more friction, which was
-measured on random scenes as the errors of the levels were.
+A term matters if its effect on the scene's metric is above the scene's accuracy. Most terms change
+the friction of the feet; their effect is estimated with that of five per cent more friction, which
+was measured on random scenes as the errors of the levels were.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ANGLES = (2.0944, 1.5708)
 
 LINES = 'capillary force of the pads'
 
-_STEP = 0.05  # more friction, with which its effect on the distance was measured
+_STEP = 0.05  # more friction, with which its effect was measured
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Term:
     taken : bool
         Whether the trial has the term.
     effect : float or None
-        Estimated effect on the distance, as a share of it; None if it is not known.
+        Estimated effect on the scene's metric, as a share of it; None if it is not known.
     exceeds : bool
         Whether the trial leaves out a term whose effect is above the scene's accuracy.
     """
@@ -148,14 +148,16 @@ def _lines(scene: Scene) -> Term:
 
 
 def _worth_of_friction(scene: Scene, policy: str) -> float | None:
-    """Return the relative change of the distance over that of the friction; None if unknown."""
+    """Return the relative change of the metric over that of the friction; None if unknown."""
     if scene.robot == RAIL_LEG:
+        if scene.metric != 'distance':
+            return None
         effect = _friction_of_the_rail(scene, policy).bound
         return None if effect is None else 100.0 * effect
     promises = levels.Promises.load()
     if promises.beyond(scene, policy):
         return None
-    effect = promises.bound(levels.FRICTION, scene, policy, 'distance')
+    effect = promises.bound(levels.FRICTION, scene, policy)
     return effect / _STEP if effect < math.inf else None
 
 
@@ -331,7 +333,7 @@ def _soft_pads(scene: Scene) -> Term:
         lost,
         'of the distance: at each step the pads shear by the whole grip over their stiffness, and'
         ' nothing of this shear is recovered',
-        effect=lost,
+        effect=lost if scene.metric == 'distance' else None,
     )
 
 

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import RAIL_LEG
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import patch_lengths
 from ros_pad.trials.loop import ClosedLoop
@@ -120,8 +122,9 @@ def _with(scene: Scene, values: dict[str, float]) -> Scene:
         part, _, key = name.rpartition('.')
         parts.setdefault(part, {})[key] = value
     own: dict[str, Any] = dict(parts.pop('', {}))
-    if 'inertia' not in (body := parts.get('body', {})) and hasattr(scene.body, 'inertia'):
-        body['inertia'] = scene.body.inertia * body.get('mass', scene.body.mass) / scene.body.mass
+    if isinstance(scene.body, LeggedBody) and 'body' in parts:
+        body = parts['body']
+        body['inertia'] = scene.body.inertia * body['mass'] / scene.body.mass
     own |= {part: replace(getattr(scene, part), **keys) for part, keys in parts.items()}
     return replace(scene, **own)
 
@@ -131,13 +134,12 @@ def ranges(robot: str) -> dict[str, tuple[float, float]]:
     scene = Scene.load(BASES[robot])
     found = dict(RAIL) if robot == RAIL_LEG else WALKS[robot] | GROUND
     found['cycles'] = CYCLES[robot]
-    if robot != RAIL_LEG:
+    if isinstance(scene.body, LeggedBody):
         found |= {'heading_gain': (0.0, 1.0), 'dome_pressure': (60e3, 85e3)}
         share = scene.body.inertia / scene.body.mass
-        found['body.inertia'] = tuple(share * each for each in found['body.mass'])
-    return found | {
-        name: (operator.attrgetter(name)(scene),) * 2 for name in FIXED[robot]
-    }
+        low, high = found['body.mass']
+        found['body.inertia'] = share * low, share * high
+    return found | {name: (operator.attrgetter(name)(scene),) * 2 for name in FIXED[robot]}
 
 
 Walk = tuple[float, float, float] | None
@@ -149,10 +151,12 @@ def walk(scene: Scene, policy: str, seed: int, level: str, top: bool = False) ->
     started = time.process_time()
     loop = ClosedLoop(scene, policy, seed, level)
     period = loop.period_ns * 1e-9
-    if top and level == 'L2':
+    if not top:
+        loop.robot = fidelity.build(scene, loop.floor, period, level)  # without added terms
+    elif level == 'L2':
         settings = SolverSettings(timestep=TOP_STEP[level])
         loop.robot = FullRobot(scene, loop.floor, period, settings)
-    elif top:
+    else:
         loop.robot = _FineLeg(scene, loop.floor, period, round(period / TOP_STEP[level]))
     if policy == 'flat':  # nothing that is estimated moves the robot
         for _ in range(round(scene.duration * 1e9) // loop.period_ns):
