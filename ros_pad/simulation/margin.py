@@ -52,7 +52,6 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
         'dragged': load / demand,
         'wet': wet,
         'domes': float(policy == 'dome' or (policy != 'flat' and wet > 0.0)),
-        'cycles': math.log(scene.cycles),
     }
     if isinstance(scene.gait, RailGait):
         return found

@@ -26,7 +26,6 @@ from ros_pad.simulation.margin import dome_pressure
 from ros_pad.simulation.margin import mid_stance_grip
 from ros_pad.simulation.margin import stance
 from ros_pad.simulation.rail_leg import walk_many
-from ros_pad.simulation.scene import RAIL_LEG
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
@@ -94,8 +93,8 @@ def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> li
     found = []
     if scene.floor.kind != 'dry':
         worth = _worth_of_friction(scene, policy)
+        found += [*_of_liquid(scene, policy), _lines(scene)]
         found += [_by_friction(term, worth) for term in _of_friction(scene, policy)]
-        found += [_lines(scene), *_of_liquid(scene, policy)]
     if level == 'L0':
         found.append(_friction_of_the_rail(scene, policy))
     else:
@@ -149,11 +148,6 @@ def _lines(scene: Scene) -> Term:
 
 def _worth_of_friction(scene: Scene, policy: str) -> float | None:
     """Return the relative change of the metric over that of the friction; None if unknown."""
-    if scene.robot == RAIL_LEG:
-        if scene.metric != 'distance':
-            return None
-        effect = _friction_of_the_rail(scene, policy).bound
-        return None if effect is None else 100.0 * effect
     promises = levels.Promises.load()
     if promises.beyond(scene, policy):
         return None

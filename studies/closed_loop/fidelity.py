@@ -34,7 +34,6 @@ from studies import command
 from studies.closed_loop import conformal
 from studies.closed_loop.fidelity_chart import figure
 from studies.closed_loop.random_scenes import BASES
-from studies.closed_loop.random_scenes import CYCLES
 from studies.closed_loop.random_scenes import Walk
 from studies.closed_loop.random_scenes import draw
 from studies.closed_loop.random_scenes import ranges
@@ -64,10 +63,10 @@ GROUPS: dict[str, Any] = {
     'grip margin below 0.7': lambda row: row['margin'] < math.log(0.7),
     'grip margin 0.7 to 1.5': lambda row: math.log(0.7) <= row['margin'] < math.log(1.5),
     'grip margin from 1.5': lambda row: row['margin'] >= math.log(1.5),
-    'towing': lambda row: row.get('climbed') is not None and row['dragged'] > 0.0,
+    'towing': lambda row: 'climbed' in row and row['dragged'] > 0.0,
     'slopes': lambda row: row.get('climbed', 0.0) > 0.0,
     'patches': lambda row: 0.0 < row['wet'] < 1.0,
-    'more than ten cycles': lambda row: row['cycles'] > math.log(10.5),
+    'more than ten cycles': lambda row: row['cycles'] > 10,
 }
 
 
@@ -104,8 +103,9 @@ def table(robot: str, stored: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             continue
         scene, policy = draw(robot, each['seed'])
         times = {name: walk and walk[2] / scene.duration for name, walk in each['walks'].items()}
-        row = {'seed': each['seed'], 'features': features(scene, policy), 'seconds': times}
-        rows.append(row | {'errors': errors(scene, each['walks'])})
+        row = {'seed': each['seed'], 'cycles': scene.cycles, 'seconds': times}
+        row |= {'features': features(scene, policy), 'errors': errors(scene, each['walks'])}
+        rows.append(row)
     return rows
 
 
@@ -147,10 +147,10 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
     if not len(found):
         return {'held_out': 0}
     limits = conformal.bounds(_line(model), known)
-    names = [*rows[0]['features']]
+    own = [row['features'] | {'cycles': row['cycles']} for row in rows if name in row['errors']]
     groups = {}
     for group, belongs in GROUPS.items():
-        inside = np.array([bool(belongs(dict(zip(names, row, strict=True)))) for row in known])
+        inside = np.array([belongs(row) for row in own])
         if inside.any():
             groups[group] = _share(found[inside] <= limits[inside])
     result = _share(found <= limits) | {
@@ -194,8 +194,6 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
             for name in tuning[0]['features']
             for values in [[row['features'][name] for row in tuning]]
         }
-        low, high = CYCLES[robot]
-        spans['cycles'] = math.log(low), math.log(high)
         inside = _within(others, spans)
         names = {name: None for row in rows for name in row['errors']}
         models = {name: fitted(tuning, name) for name in names}
