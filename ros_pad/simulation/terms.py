@@ -32,8 +32,8 @@ from ros_pad.simulation.terrain import Floor
 
 ATMOSPHERE = 101325.0  # Pa
 
-ANGLES = (2.0944, 1.5708)
-"""Advancing and receding contact angle of water on the pads, rad, where auto adds their force."""
+ADVANCING, RECEDING = 2.0944, 1.5708
+"""Contact angles of water on the pads, rad, with which the force of contact lines is added."""
 
 LINES = 'capillary force of the pads'
 
@@ -122,7 +122,9 @@ def with_terms(scene: Scene) -> Scene:
     """
     if scene.foot.capillary_force or not _lines(scene).taken:
         return scene
-    force = float(hysteresis_force(scene.foot.pad.radius, WATER.surface_tension, *ANGLES))
+    force = float(
+        hysteresis_force(scene.foot.pad.radius, WATER.surface_tension, ADVANCING, RECEDING)
+    )
     return replace(scene, foot=replace(scene.foot, capillary_force=force))
 
 

@@ -82,9 +82,9 @@ def bounds(line: Array, features: Array) -> Array:
     return found
 
 
-def interval(kept: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share that was found, by Clopper and Pearson."""
+def interval(kept: int, count: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the interval of a share that was found, by Clopper and Pearson."""
     if not count:
         return 0.0, 1.0
-    found = stats.binomtest(kept, count).proportion_ci(0.95, 'exact')
+    found = stats.binomtest(kept, count).proportion_ci(level, 'exact')
     return float(found.low), float(found.high)

@@ -155,13 +155,13 @@ def test_no_promise_with_what_was_not_drawn():
 
 
 def test_without_a_load_its_line_does_not_matter():
-    scene = Scene.load('hexapod_slow_dry_flat')
+    scene = Scene.load('hexapod_dry_slow')
     assert (scene.tow.weight, scene.tow.distance) == (0.0, 0.0)
     assert fidelity.choose(scene).bound < math.inf
 
 
 def test_shipped_scenes_for_which_l1_suffices():
-    for name in ('hexapod_slow_dry_flat',):
+    for name in ('hexapod_dry_slow',):
         choice = fidelity.choose(Scene.load(name))
         assert choice.level == 'L1' and choice.bound < 0.1
         assert 'no slip at all' in choice.note
