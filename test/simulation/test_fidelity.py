@@ -311,14 +311,62 @@ def bound(scene, word):
     return next((t.bound for t in terms.terms(scene) if word in t.term), None)
 
 
-def test_bound_of_the_capillary_force():
+def test_bound_of_contact_lines():
     # By hand: 37 pads with 2 · 0.073 N/m · 3 mm each, over 0.35 · 6.834 N.
     assert bound(HEXAPOD, 'capillary') == pytest.approx(37 * 0.000438 / 2.392, rel=1e-3)
 
 
 def test_a_foot_with_a_capillary_force_leaves_none_out():
     foot = dataclasses.replace(HEXAPOD.foot, capillary_force=1e-4)
-    assert bound(dataclasses.replace(HEXAPOD, foot=foot), 'capillary') is None
+    (line,) = (t for t in terms.terms(dataclasses.replace(HEXAPOD, foot=foot)) if 'capillary' in t.term)
+    assert line.taken and line.bound is None
+
+
+def test_bound_of_the_pull_of_liquid():
+    """By hand: 2 π γ r + π r² (2 γ/h + ρ g h/2), under 37 domes to their rims, or the sole."""
+    pressure = 2.0 * 0.073 / 3e-4 + 0.5 * 998.0 * 9.81 * 3e-4
+    for policy, count, r in [('dome', 37, 1.5e-3), ('flat', 1, 17e-3)]:
+        pull = count * (2.0 * math.pi * 0.073 * r + math.pi * r * r * pressure)
+        (term,) = (t for t in terms.omitted(HEXAPOD, policy=policy) if 'pull' in t.term)
+        assert term.bound == pytest.approx(pull / 6.834, rel=0.01)
+
+
+def test_the_effect_of_a_term_is_that_of_friction_in_proportion(monkeypatch):
+    """Five per cent of friction change the distance by 20 %: contact lines, 0.68 %, by 2.7 %."""
+    with_bounds(monkeypatch, L2=(0.01, 0.1), friction=(0.2, 0.1))
+    line = 37 * 0.000438 / 2.392
+    for accuracy, added in [(0.03, False), (0.025, True)]:
+        scene = dataclasses.replace(HEXAPOD, accuracy=accuracy)
+        (term,) = (t for t in terms.terms(scene) if 'capillary' in t.term)
+        assert term.effect == pytest.approx(4.0 * line, rel=1e-3)
+        assert term.taken == added and not term.exceeds
+    (pull,) = (t for t in terms.omitted(HEXAPOD, policy='dome') if 'pull' in t.term)
+    assert pull.effect == pytest.approx(4.0 * pull.bound) and pull.exceeds
+    # A metric of its own: five per cent of friction change the slip by 10 %.
+    slip = dataclasses.replace(HEXAPOD, metric='slip')
+    (pull,) = (t for t in terms.omitted(slip, policy='dome') if 'pull' in t.term)
+    assert pull.effect == pytest.approx(2.0 * pull.bound)
+
+
+def test_contact_lines_that_matter_are_added_to_the_robot(monkeypatch):
+    """A pad of 1.5 mm resists by γ 2 r (cos 90° - cos 120°), 0.109 mN, on domes on wet ground."""
+    with_bounds(monkeypatch, L2=(0.01, 0.1), friction=(0.2, 0.1))
+    strict = dataclasses.replace(HEXAPOD, accuracy=0.02)
+    force = 0.073 * 3e-3 * 0.5
+    assert terms.with_terms(strict).foot.capillary_force == pytest.approx(force, rel=0.01)
+    assert terms.with_terms(HEXAPOD).foot.capillary_force == 0.0
+    dry = dataclasses.replace(strict, floor=dataclasses.replace(strict.floor, kind='dry'))
+    assert terms.with_terms(dry).foot.capillary_force == 0.0
+    own = dataclasses.replace(strict, foot=dataclasses.replace(strict.foot, capillary_force=1e-4))
+    assert terms.with_terms(own).foot.capillary_force == 1e-4
+
+
+def test_outside_the_ranges_effects_are_not_known():
+    friction = dataclasses.replace(HEXAPOD.foot, friction=0.5)
+    scene = dataclasses.replace(HEXAPOD, foot=friction, accuracy=1e-4)
+    found = {term.term: term for term in terms.terms(scene)}
+    assert found['pull of the liquid to the floor'].effect is None
+    assert not found[terms.LINES].taken
 
 
 def test_film_that_a_dome_can_drag():
