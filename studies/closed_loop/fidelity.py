@@ -36,11 +36,14 @@ from studies.closed_loop.fidelity_chart import figure
 from studies.closed_loop.random_scenes import BASES
 from studies.closed_loop.random_scenes import Walk
 from studies.closed_loop.random_scenes import draw
+from studies.closed_loop.random_scenes import listed
 from studies.closed_loop.random_scenes import ranges
 from studies.closed_loop.random_scenes import walks
 from studies.machine import machine
 
 CONFIG = command.ROOT / 'config'
+PAGE = command.ROOT / 'docs' / 'model' / 'fidelity.md'
+MARKS = '<!-- made by python -m studies fidelity -->', '<!-- end -->'
 PROMISE = 0.95
 HELD_OUT = 100000
 """Seed of the first scene that is held out; those of the scenes of the fit begin at 0."""
@@ -86,6 +89,8 @@ def errors(scene: Scene, found: dict[str, Walk]) -> dict[str, float]:
         if name == 'top' or walk is None:
             continue
         for place, (metric, share) in enumerate(LEAST_SHARES.items()):
+            if name == STICKING and metric == 'slip':
+                continue
             if reference is None:
                 result[f'{name} {metric}'] = math.inf
                 continue
@@ -213,29 +218,17 @@ def judged(stored: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, 
             'held_out': len(others),
             'outside': len(others) - len(inside),
             'bounds': {name: checked(model, inside, name) for name, model in known.items()},
-            'walks': [
-                {
-                    'seed': row['seed'],
-                    'errors': {key: _brief(value) for key, value in row['errors'].items()},
-                    'seconds': {key: _brief(value) for key, value in row['seconds'].items()},
-                }
-                for row in inside
-            ],
+            'walks': listed(inside),
         }
     return config, document
-
-
-def _brief(value: float | None) -> float | None:
-    """Return a number with four digits; None for infinite, which JSON does not have."""
-    return None if value is None or value == math.inf else float(f'{value:.4g}')
 
 
 def text_of(config: dict[str, Any], scenes: dict[str, int]) -> str:
     """Return the text of fidelity.yaml."""
     lines = [
-        '# Made by python -m studies fidelity. Bound of the error of each level and metric: exp of',
-        '# constant + slopes times features, less 1e-4. The promise: the error of 95 of 100 scenes',
-        '# drawn in these ranges is within it.',
+        '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of',
+        '# constant + slopes times features, less 1e-4. The promise: the error of 95 of 100',
+        '# scenes drawn in these ranges is within it.',
         f'machine: {{{", ".join(f"{key}: {value!r}" for key, value in machine().items())}}}',
         f'scenes: {{{", ".join(f"{key}: {value}" for key, value in scenes.items())}}}'
         '  # a half each for fit and calibration',
@@ -277,6 +270,12 @@ def summary(document: dict[str, Any]) -> str:
                 f' | {old} |'
             )
     return '\n'.join(lines)
+
+
+def pasted(page: str, lines: str) -> str:
+    """Return the text of a page with another table between its marks."""
+    before, rest = page.split(MARKS[0])
+    return before + '\n'.join((MARKS[0], lines, MARKS[1])) + rest.split(MARKS[1])[1]
 
 
 def measure(
@@ -334,6 +333,8 @@ def main(words: Sequence[str]) -> int:
     assert yaml.safe_load(text)['robots'].keys() == config.keys()
     save(options.config / 'fidelity.yaml', text.encode())
     document = {'promise': PROMISE, 'robots': robots}
+    if options.out == command.CHARTS:
+        save(PAGE, pasted(PAGE.read_text(encoding='utf-8'), summary(document)).encode())
     command.write(options.out, 'fidelity', document, {'fidelity': figure(document)})
     command.show(options, document, summary(document))
     return 0

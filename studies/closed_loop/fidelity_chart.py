@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies.closed_loop.random_scenes import unlisted
 from studies.drawing import BLACK
 from studies.drawing import BLUE
 from studies.drawing import GREEN
@@ -55,12 +56,12 @@ def figure(document: dict[str, Any]) -> Figure:
 def _work(axes: Axes, part: dict[str, Any], level: str, label: str, look: tuple[str, str]) -> None:
     colour, marker = look
     rows = [
-        (walk['seconds'][level], max(walk['errors'][f'{level} distance'] or np.inf, _LEAST))
-        for walk in part['walks']
-        if walk['seconds'].get(level) and f'{level} distance' in walk['errors']
+        (walk[f'{level} seconds'], max(min(walk[f'{level} distance'], 10.0), _LEAST))
+        for walk in unlisted(part['walks'])
+        if f'{level} seconds' in walk and f'{level} distance' in walk
     ]
     times, errors = np.array(rows).T
-    axes.plot(times, errors, '.', color=colour, alpha=0.25, ms=4, mew=0)
+    axes.plot(times, errors, '.', color=colour, alpha=0.5, ms=5, mew=0)
     row, time = part['bounds'][f'{level} distance'], np.median(times)
     ends = max(row['median_error'], _LEAST), row['median_bound']
     axes.plot([time, time], ends, color=colour, lw=1)

@@ -205,3 +205,23 @@ def walks(robot: str, seed: int) -> dict[str, Walk]:
     if robot != 'go2':
         found['friction'] = walk(slippery(scene, MORE_FRICTION), policy, seed, levels[0])
     return found
+
+
+def listed(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Return rows of errors and times as lines of words, after one with the names of columns."""
+    names = [*{name: None for row in rows for name in row['errors']}]
+    timed = [*{name: None for row in rows for name in row['seconds']}]
+    lines = [';'.join(['seed', *names, *(f'{name} seconds' for name in timed)])]
+    for row in rows:
+        values = [row['errors'].get(name) for name in names]
+        values += [row['seconds'].get(name) for name in timed]
+        words = ['' if value is None else f'{value:.4g}' for value in values]
+        lines.append(';'.join([str(row['seed']), *words]))
+    return lines
+
+
+def unlisted(lines: Sequence[str]) -> list[dict[str, float]]:
+    """Return the rows of such lines, each without the columns in which it has no value."""
+    names = lines[0].split(';')
+    rows = [zip(names, line.split(';'), strict=True) for line in lines[1:]]
+    return [{name: float(word) for name, word in row if word} for row in rows]

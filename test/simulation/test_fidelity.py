@@ -172,7 +172,7 @@ def test_shipped_scenes_for_which_l1_suffices():
     [
         'robots: {}\nreserves: [0, 1]: 3',
         'bounds: {L0: [1], L1: [1, 2]}',
-        'robots: {ch3r: {ranges: {}, features: {margin: [0, 1]}, bounds: {L1 slip: {constant: 1}}}}',
+        'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {L1 slip: {constant: 1}}}}',
     ],
 )
 def test_a_broken_file_of_bounds_is_an_error(monkeypatch, tmp_path, text):
@@ -318,7 +318,9 @@ def test_bound_of_contact_lines():
 
 def test_a_foot_with_a_capillary_force_leaves_none_out():
     foot = dataclasses.replace(HEXAPOD.foot, capillary_force=1e-4)
-    (line,) = (t for t in terms.terms(dataclasses.replace(HEXAPOD, foot=foot)) if 'capillary' in t.term)
+    (line,) = (
+        t for t in terms.terms(dataclasses.replace(HEXAPOD, foot=foot)) if 'capillary' in t.term
+    )
     assert line.taken and line.bound is None
 
 
