@@ -290,7 +290,9 @@ def _at_most(term: dict[str, Any]) -> str:
     """Return a bound, of what it is a share, and whether its effect is too large."""
     if term['bound'] is None:
         return 'no bound known'
-    text = f'at most {100.0 * term["bound"]:.1f} % {re.split("[:;,]", term["reason"])[0]}'
+    word = {'bound': 'at most', 'promise': '95 of 100 times at most', 'estimate': 'about'}
+    text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
+    text += f' {re.split("[:;,]", term["reason"])[0]}'
     if term['exceeds']:
         text += f', about {100.0 * term["effect"]:.0f} % of the result: exceeds the accuracy asked'
     return text

@@ -195,7 +195,12 @@ def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
         ]
         for each in omitted
     ]
-    head = ['left out', 'bound (≤) or estimate (≈)', 'of the result', 'quantity, and source']
+    head = [
+        'left out',
+        'bound (≤) or estimate (≈)',
+        'effect on the result',
+        'quantity, and source',
+    ]
     return table(head, rows, range(1, 3))
 
 
