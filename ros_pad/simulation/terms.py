@@ -167,7 +167,7 @@ def _by_friction(term: Term, worth: float | None) -> Term:
 
 def _of_friction(scene: Scene, policy: str) -> list[Term]:
     """Return the terms of liquid that change the friction of the feet."""
-    stand, foot = _on_wet_ground(scene, policy), scene.foot
+    stand = _on_wet_ground(scene, policy)
     now = stand.resistance(*stand.films(0.5 * stance(scene)))
     ends = stand.resistance(THICK_FILM, THICK_FILM), stand.resistance(0.0, 0.0)
     found = [
@@ -180,19 +180,24 @@ def _of_friction(scene: Scene, policy: str) -> list[Term]:
     ]
     if soft := _soft_film(scene, policy):
         found.append(soft)
-    # Domes are wetted to their rims, a foot that is flat or pressed flat all over.
-    count, radius = (1, foot.sole_radius) if stand.on_sole > 0.0 else (foot.pads, foot.pad.radius)
+    found.append(_pull(scene, policy))
+    return found
+
+
+def _pull(scene: Scene, policy: str) -> Term:
+    """Return the pull of liquid on a foot; one that adapts may be flat on wet ground, too."""
+    foot = scene.foot
     highest = 2.0 * math.sqrt(WATER.surface_tension / WATER.density / GRAVITY)
     film = min(scene.floor.film_thickness, highest)
+    # Domes are wetted to their rims, a foot that is flat or pressed flat all over.
+    domed = policy == 'dome' and Stand(scene, True).on_sole == 0.0
+    count, radius = (foot.pads, foot.pad.radius) if domed else (1, foot.sole_radius)
     pull = count * float(capillary_pull(radius, film, WATER))
-    found.append(
-        Term(
-            'pull of the liquid to the floor',
-            pull / scene.expected_load,
-            f'of the load of a foot: at most {_brief(pull)} N at rest on ground that stays wet',
-        )
+    return Term(
+        'pull of the liquid to the floor',
+        pull / scene.expected_load,
+        f'of the load of a foot: at most {_brief(pull)} N at rest on ground that stays wet',
     )
-    return found
 
 
 def _of_liquid(scene: Scene, policy: str) -> list[Term]:
