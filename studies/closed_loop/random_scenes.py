@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import operator
 import time
@@ -80,10 +81,15 @@ FIXED = {
 FIXED['go2'] = FIXED['ch3r']
 
 
+@functools.cache
+def _base(robot: str) -> Scene:
+    return Scene.load(BASES[robot])
+
+
 def draw(robot: str, seed: int) -> tuple[Scene, str]:
     """Return a random scene of a robot, and the policy of its feet."""
     random = np.random.default_rng([seed, list(BASES).index(robot)])
-    scene = Scene.load(BASES[robot])
+    scene = _base(robot)
     low, high = CYCLES[robot]
     if robot in SHORT and random.random() < 14 / 15:
         high = SHORT[robot]
@@ -130,7 +136,7 @@ def _with(scene: Scene, values: dict[str, float]) -> Scene:
 
 def ranges(robot: str) -> dict[str, tuple[float, float]]:
     """Return lowest and highest value, by dotted name, of all that scenes of a robot have."""
-    scene = Scene.load(BASES[robot])
+    scene = _base(robot)
     found = dict(RAIL) if robot == RAIL_LEG else WALKS[robot] | GROUND
     found['cycles'] = CYCLES[robot]
     if isinstance(scene.body, LeggedBody):

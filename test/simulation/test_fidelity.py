@@ -343,7 +343,7 @@ def test_the_effect_of_a_term_is_that_of_friction_in_proportion(monkeypatch):
         (term,) = (t for t in terms.terms(scene) if 'capillary' in t.term)
         assert term.effect == pytest.approx(4.0 * line, rel=1e-3)
         assert term.taken == added and not term.exceeds
-    (pull,) = (t for t in terms.omitted(HEXAPOD, policy='dome') if 'pull' in t.term)
+    (pull,) = (t for t in terms.omitted(scene, policy='dome') if 'pull' in t.term)
     assert pull.effect == pytest.approx(4.0 * pull.bound) and pull.exceeds
     # A metric of its own: five per cent of friction change the slip by 10 %.
     slip = dataclasses.replace(HEXAPOD, metric='slip')

@@ -91,7 +91,8 @@ def test_errors_by_hand():
         {'L1': (1.4, 0.0, 0.1), 'L2': (1.0, 0.05, 0.2), 'top': (0.5, 0.04, 1.0),
          'friction': (1.33, 0.014, 0.1)},
     )  # fmt: skip
-    assert found['L1 distance'] == found['no slip distance'] == pytest.approx(0.9 / 0.7)
+    assert found['L1 distance'] == pytest.approx(0.9 / 0.7)
+    assert found['no slip distance'] == pytest.approx(0.9 / 0.7)
     assert found['L2 distance'] == pytest.approx(0.5 / 0.7)
     assert found['L2 slip'] == pytest.approx(0.25)
     assert found['friction distance'] == pytest.approx(0.05)  # against L1
@@ -117,13 +118,13 @@ def test_shift_is_an_order_statistic():
 def test_fit_finds_a_quantile_that_depends_on_a_feature():
     """Logarithms are 2 x - 3 plus an exponential law, whose 90 % quantile is ln 10."""
     random = np.random.default_rng(5)
-    known = np.column_stack([random.uniform(0.0, 1.0, 2000), np.ones(2000)])
-    errors = np.exp(2.0 * known[:, 0] - 3.0 + random.exponential(size=2000)) - conformal.LEAST
+    known = np.column_stack([random.uniform(0.0, 1.0, 800), np.ones(800)])
+    errors = np.exp(2.0 * known[:, 0] - 3.0 + random.exponential(size=800)) - conformal.LEAST
     errors[errors > 10.0] = math.inf  # what is out of reach does not move a quantile
     line = conformal.fit(known, errors, 0.9)
     assert line[2] == 0.0  # it does not vary
-    assert line[0] == pytest.approx(math.log(10.0) - 3.0, abs=0.15)
-    assert line[1] == pytest.approx(2.0, abs=0.25)
+    assert line[0] == pytest.approx(math.log(10.0) - 3.0, abs=0.3)
+    assert line[1] == pytest.approx(2.0, abs=0.5)
 
 
 def test_calibrated_bounds_cover_whatever_the_law():
