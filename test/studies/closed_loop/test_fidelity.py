@@ -116,15 +116,21 @@ def test_shift_is_an_order_statistic():
 
 
 def test_fit_finds_a_quantile_that_depends_on_a_feature():
-    """Logarithms are 2 x - 3 plus an exponential law, whose 90 % quantile is ln 10."""
-    random = np.random.default_rng(5)
-    known = np.column_stack([random.uniform(0.0, 1.0, 800), np.ones(800)])
-    errors = np.exp(2.0 * known[:, 0] - 3.0 + random.exponential(size=800)) - conformal.LEAST
-    errors[errors > 10.0] = math.inf  # what is out of reach does not move a quantile
-    line = conformal.fit(known, errors, 0.9)
-    assert line[2] == 0.0  # it does not vary
-    assert line[0] == pytest.approx(math.log(10.0) - 3.0, abs=0.3)
-    assert line[1] == pytest.approx(2.0, abs=0.5)
+    """Logarithms are 2 x - 3 plus an exponential law, whose 90 % quantile is ln 10.
+
+    With its density there, 0.1, a quantile of 400 values has a standard error of 0.15; the constant
+    twice that, the slope 0.15/0.29. Tolerances are three standard errors of the mean of eight.
+    """
+    random, lines = np.random.default_rng(5), []
+    for _ in range(8):
+        known = np.column_stack([random.uniform(0.0, 1.0, 400), np.ones(400)])
+        errors = np.exp(2.0 * known[:, 0] - 3.0 + random.exponential(size=400)) - conformal.LEAST
+        errors[errors > 10.0] = math.inf  # what is out of reach does not move a quantile
+        lines.append(conformal.fit(known, errors, 0.9))
+    constant, slope, fixed = np.mean(lines, axis=0)
+    assert fixed == 0.0  # the second feature does not vary
+    assert constant == pytest.approx(math.log(10.0) - 3.0, abs=0.32)
+    assert slope == pytest.approx(2.0, abs=0.55)
 
 
 def test_calibrated_bounds_cover_whatever_the_law():
