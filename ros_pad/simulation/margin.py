@@ -27,6 +27,9 @@ SOLE_MODULUS = 3.95e5
 """Reduced modulus of a sole whose foot names no material, Pa: Dragon Skin 10, four times 2 C1 of
 ``config/materials``, times 1.88."""
 
+NEAR = 1.5
+"""Grip margin below which feet may slip; bounds are calibrated on either side of it."""
+
 _MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
 
@@ -47,6 +50,7 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
     wet = {'dry': 0.0, 'wet': 1.0}.get(scene.floor.kind, scene.floor.wet_fraction)
     found = {
         'margin': margin,
+        'near': float(margin < math.log(NEAR)),
         'ample': max(0.0, margin - math.log(2.0)),
         'scarce': max(0.0, -margin),
         'dragged': load / demand,

@@ -119,9 +119,10 @@ def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> 
 def with_terms(scene: Scene) -> Scene:
     """Return a scene with the terms that can be added and whose effect is above its accuracy.
 
-    This is the hysteresis of the contact lines of domes on wet ground.
+    This is the hysteresis of the contact lines of domes on wet ground. To a scene with an accuracy
+    of 1 nothing is added.
     """
-    if scene.foot.capillary_force or not _lines(scene).taken:
+    if scene.foot.capillary_force or scene.accuracy >= 1.0 or not _lines(scene).taken:
         return scene
     force = float(
         hysteresis_force(scene.foot.pad.radius, WATER.surface_tension, ADVANCING, RECEDING)

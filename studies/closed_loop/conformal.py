@@ -78,6 +78,26 @@ def shift(line: Array, features: Array, errors: Array, promise: float) -> float:
     return float(np.sort(np.log(errors + LEAST) - line[0] - features @ line[1:])[rank - 1])
 
 
+def calibrated(
+    line: Array, features: Array, errors: Array, promise: float, group: int
+) -> Array | None:
+    """Return a line shifted so that it covers a share of scenes with either value of a feature.
+
+    The feature, the column ``group``, is 0 or 1. Where there are too few scenes of a kind, all
+    have one shift; None where these are too few.
+    """
+    inside = features[:, group] > 0.5
+    far, near = (shift(line, features[kind], errors[kind], promise) for kind in (~inside, inside))
+    if not (near < math.inf and far < math.inf):
+        near = far = shift(line, features, errors, promise)
+        if far == math.inf:
+            return None
+    risen = line.copy()
+    risen[0] += far
+    risen[1 + group] += near - far
+    return risen
+
+
 def bounds(line: Array, features: Array) -> Array:
     """Return the bounds of errors on a line."""
     found: Array = np.exp(line[0] + features @ line[1:]) - LEAST

@@ -154,8 +154,8 @@ Walk = tuple[float, float, float] | None
 def walk(scene: Scene, policy: str, seed: int, level: str, top: bool = False) -> Walk:
     """Walk a scene on a level, or as exactly as that level can."""
     started = time.process_time()
-    # No term is added, however little it changes: all levels walk the same scene.
-    loop = ClosedLoop(replace(scene, accuracy=math.inf), policy, seed, level)
+    # With an accuracy of 1 no term is added: all levels walk the same scene.
+    loop = ClosedLoop(replace(scene, accuracy=1.0), policy, seed, level)
     period = loop.period_ns * 1e-9
     if top and level == 'L2':
         settings = SolverSettings(timestep=TOP_STEP[level])

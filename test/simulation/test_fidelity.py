@@ -211,6 +211,8 @@ def test_features_by_hand():
     assert found['pace'] == pytest.approx(math.log(0.4 * math.pi / 9.81), rel=1e-3)
     assert (found['wet'], found['domes'], found['adapts']) == (0.3, 1.0, 1.0)
     assert (found['duty'], found['steered']) == (0.6, 1.0)
+    assert found['near'] == 1.0
+    assert fidelity.features(Scene.load('hexapod_dry_slow'))['near'] == 0.0
     flat = fidelity.features(scene, 'flat')
     assert (flat['domes'], flat['adapts']) == (0.0, 0.0)
     # 0.12 of the weight on wet ground is all that flat feet hold.

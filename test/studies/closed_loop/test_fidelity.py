@@ -64,10 +64,10 @@ def test_bounds_of_the_slip_on_l1_are_of_no_use():
 
 @pytest.mark.slow
 def test_bounds_hold_on_fresh_scenes():
-    """Of six scenes in which two bounds are promised for 95 of 100, at most two may break one."""
+    """Of eight bounds that are promised for 95 of 100, at most one is broken."""
     pytest.importorskip('mujoco')
     kept = []
-    for seed in range(300000, 300006):
+    for seed in range(300000, 300004):
         scene, policy = random_scenes.draw('ch3r', seed)
         scene = dataclasses.replace(scene, cycles=4)
         walks = {
@@ -77,7 +77,7 @@ def test_bounds_hold_on_fresh_scenes():
         errors = study.errors(scene, walks | {'top': walks['top L2']})
         for level in ('L1', 'L2'):
             kept.append(errors[f'{level} distance'] <= fidelity.choose(scene, level, policy).bound)
-    assert sum(kept) >= len(kept) - 2
+    assert sum(kept) >= len(kept) - 1
 
 
 # --- errors and conformal prediction ----------------------------------------------------------
@@ -118,8 +118,8 @@ def test_shift_is_an_order_statistic():
 def test_fit_finds_a_quantile_that_depends_on_a_feature():
     """Logarithms are 2 x - 3 plus an exponential law, whose 90 % quantile is ln 10.
 
-    With its density there, 0.1, a quantile of 400 values has a standard error of 0.15; the constant
-    twice that, the slope 0.15/0.29. Tolerances are three standard errors of the mean of eight.
+    With its density there, 0.1, a quantile of 400 values has a standard error of 0.15, the
+    constant twice that, the slope 0.15/0.29. Tolerances are three standard errors of eight fits.
     """
     random, lines = np.random.default_rng(5), []
     for _ in range(8):
@@ -143,6 +143,21 @@ def test_calibrated_bounds_cover_whatever_the_law():
         line[0] += conformal.shift(line, known[30:129], errors[30:129], 0.95)
         kept.append(np.mean(errors[129:] <= conformal.bounds(line, known[129:])))
     assert np.mean(kept) == pytest.approx(0.95, abs=0.012)  # three standard errors: 40 shifts
+
+
+def test_either_side_of_a_feature_is_calibrated_on_its_own():
+    """Errors of one kind are 1 to 39 times a unit, those of the other a hundredth of that."""
+    kind = np.arange(78) % 2.0
+    known, errors = np.column_stack([np.zeros(78), kind]), (1.0 + np.arange(78) // 2) - 1e-4
+    errors = np.where(kind > 0.5, errors, 0.01 * (errors + 1e-4) - 1e-4)
+    line = conformal.calibrated(np.zeros(3), known, errors, 0.95, 1)
+    assert np.exp(line[0]) == pytest.approx(0.38) and line[1] == 0.0
+    assert np.exp(line[0] + line[2]) == pytest.approx(38.0)
+    # With 18 scenes of a kind there is one shift for all, the 56th of 57; with 18 in all, none.
+    few = np.r_[0:36, 36:78:2]
+    line = conformal.calibrated(np.zeros(3), known[few], errors[few], 0.95, 1)
+    assert line[2] == 0.0 and np.exp(line[0]) == pytest.approx(17.0)
+    assert conformal.calibrated(np.zeros(3), known[:18], errors[:18], 0.95, 1) is None
 
 
 def test_intervals():
