@@ -111,11 +111,6 @@ def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> li
     ]
 
 
-def omitted(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> list[Term]:
-    """Return the terms that a trial of this scene leaves out; see :func:`terms`."""
-    return [term for term in terms(scene, fidelity, policy) if not term.taken]
-
-
 def with_terms(scene: Scene) -> Scene:
     """Return a scene with the terms that can be added and whose effect is above its accuracy.
 

@@ -259,7 +259,7 @@ def summary(document: dict[str, Any]) -> str:
     grouped = {}
     for robot, part in document['robots'].items():
         for name, row in part['bounds'].items():
-            if not row['held_out']:
+            if not row['held_out'] or name.startswith(FRICTION):
                 continue
             if name.startswith('L') and name.endswith('distance'):
                 grouped[f'`{robot}` {name.removesuffix(" distance")}'] = row['groups']
