@@ -320,7 +320,7 @@ def stored_walks(robot: str, seed: int, path: str) -> dict[str, Any]:
 def main(words: Sequence[str]) -> int:
     """Walk, fit, check; write the files, and print the table."""
     parser = command.parser('fidelity', __doc__)
-    command.add_count(parser, '--scenes', 300, 'scenes of each robot to fit and to calibrate')
+    command.add_count(parser, '--scenes', 260, 'scenes of each robot to fit and to calibrate')
     command.add_count(parser, '--held-out', 300, 'scenes of each robot to check')
     parser.add_argument(
         '--robots', default=','.join(BASES), metavar='LIST', help='robots (default: %(default)s)'

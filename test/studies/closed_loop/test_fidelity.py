@@ -56,7 +56,7 @@ def test_bounds_keep_their_promise_on_stored_walks(robot):
 
 
 def test_bounds_of_the_slip_on_l1_are_of_no_use():
-    """Its feet stick where those of L2 scuff: nobody is promised a slip by L1."""
+    """Its feet stick where those of L2 scuff."""
     assert DOCUMENT['ch3r']['bounds']['L1 slip']['median_error'] > 0.8
     scene = dataclasses.replace(Scene.load('hexapod_dry_slow'), metric='slip')
     assert fidelity.choose(scene, 'L1').bound > 0.8
