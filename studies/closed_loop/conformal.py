@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines that bound errors: quantile regression of their logarithm, and conformal prediction.
 
-Koenker and Bassett 1978; Romano, Patterson and Candès 2019. With exchangeable scenes of which none
-took part in the fit, a new one is within the bound with at least the promised probability, whatever
-the law of the errors. Calibrated by folds (Vovk 2015) all scenes serve both fit and calibration, and
-the probability is only nearly that: it is counted on scenes that are held out.
+Koenker and Bassett 1978; Romano, Patterson and Candès 2019. With exchangeable scenes of which
+none took part in the fit, a new one is within the bound with at least the promised probability,
+whatever the law of the errors. Calibrated by folds (Vovk 2015) all scenes serve both fit and
+calibration, and the probability is only nearly that: it is counted on scenes that are held out.
 """
 
 from __future__ import annotations
