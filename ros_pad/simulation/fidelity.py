@@ -3,7 +3,7 @@
 
 ``python -m studies fidelity`` walks random scenes on all levels and writes
 ``config/fidelity.yaml``: for each level the line by which a high quantile of the error depends on
-the features of a scene, shifted until it covers 95 % of scenes that it was not fitted to (split
+the features of a scene, shifted until it covers 95 % of scenes that it was not fitted to (cross-
 conformal prediction). Scenes outside the ranges of those drawn have no bound.
 """
 
