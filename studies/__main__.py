@@ -38,7 +38,10 @@ STUDIES = {
     'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
     'policies': ('closed_loop.policies', 'policies floor by floor, and slower gaits (30 min)'),
     'force_limits': ('closed_loop.force_limits', 'force limits of pads, and walks (40 min)'),
-    'fidelity': ('closed_loop.fidelity', 'errors of the fidelity levels by scene (30 min)'),
+    'fidelity': (
+        'closed_loop.fidelity',
+        'bounds of the fidelity levels, and if they hold (40 min)',
+    ),
     'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
     'turning_feet': ('closed_loop.turning_feet', 'slip alarm from the rate of shanks (2 min)'),

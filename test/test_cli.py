@@ -92,6 +92,19 @@ def test_unknown_policy_is_bad_usage(capsys: pytest.CaptureFixture[str]):
     assert 'adaptive' in capsys.readouterr().err
 
 
+def test_auto_runs_the_cheap_level_and_shows_why(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
+):
+    out = tmp_path / 'walk'
+    words = ['run', 'hexapod_dry_slow', '--no-ros', '--no-compare', '--cycles', '4']
+    assert cli.main([*words, '--out', str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert 'hexapod_dry_slow, seed 0, L1: ' in shown
+    assert 'the distance on L1 is within ' in shown and 'no slip at all' in shown
+    assert 'modelled: effect of soft pads on the motion of the body, torsion of the soles' in shown
+    assert 'left out: joints, servos' in shown and '(95 of 100 times at most ' in shown
+
+
 def test_a_run_without_ros_writes_report_and_summary(
     tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -281,15 +281,21 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         'bag': str(bag) if bag else None,
         'report': str(page),
         'omitted': trial.settings['omitted'],
+        'taken': trial.settings['taken'],
         'comparison': trial.settings['comparison'],
     }
 
 
-def _at_most(omission: dict[str, Any]) -> str:
-    """Return a bound, and of what it is a share."""
-    if omission['bound'] is None:
+def _at_most(term: dict[str, Any]) -> str:
+    """Return a bound, of what it is a share, and whether its effect is too large."""
+    if term['bound'] is None:
         return 'no bound known'
-    return f'at most {100.0 * omission["bound"]:.1f} % {re.split("[:;,]", omission["reason"])[0]}'
+    word = {'bound': 'at most', 'promise': '95 of 100 times at most', 'estimate': 'about'}
+    text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
+    text += f' {re.split("[:;,]", term["reason"])[0]}'
+    if term['exceeds']:
+        text += f', about {100.0 * term["effect"]:.0f} % of the result: exceeds the accuracy asked'
+    return text
 
 
 def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
@@ -324,8 +330,9 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         print(f'stayed flat: {refusal}')
     for fault in fault_lines(own.faults):
         print(f'fault: {fault}')
-    for omission in trial.settings['omitted']:
-        print(f'left out: {omission["term"]} ({_at_most(omission)})')
+    print(f'modelled: {", ".join(term["term"] for term in trial.settings["taken"])}')
+    for term in trial.settings['omitted']:
+        print(f'left out: {term["term"]} ({_at_most(term)})')
     if bag:
         print(f'bag:      {bag}')
     print(f'report:   {page}')

@@ -43,6 +43,7 @@ from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.terms import with_terms
 
 PARAMETERS = (
     SCENE,
@@ -138,7 +139,8 @@ class SimulatorNode(Node):
             level = fidelity.level(self.scene, values['fidelity'], joints=joints)
         except InvalidInput as error:
             raise ConfigError(f'node {self.get_name()}: {error}') from error
-        self.robot = fidelity.build(self.scene, self.floor, self.period_ns * 1e-9, level)
+        scene, period = with_terms(self.scene), self.period_ns * 1e-9
+        self.robot = fidelity.build(scene, self.floor, period, level)
         self._sensors = Sensors.of(self.scene, values['seed'])
         self._body_sensors: BodySensors | None = None
         if joints:

@@ -187,13 +187,33 @@ def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
     rows = [
         [
             html.escape(str(each['term'])),
-            'not known' if each['bound'] is None else f'≤ {100.0 * each["bound"]:.1f} %',
+            'not known'
+            if each['bound'] is None
+            else f'{_sign(each)} {100.0 * each["bound"]:.1f} %',
+            _effect(each),
             html.escape(str(each['reason'])),
         ]
         for each in omitted
     ]
-    head = ['left out', 'bound on its effect', 'quantity, and source of the bound']
-    return table(head, rows, range(1, 2))
+    head = [
+        'left out',
+        'bound (≤) or estimate (≈)',
+        'effect on the result',
+        'quantity, and source',
+    ]
+    return table(head, rows, range(1, 3))
+
+
+def _sign(term: dict[str, Any]) -> str:
+    return '≈' if term.get('kind') == 'estimate' else '≤'
+
+
+def _effect(term: dict[str, Any]) -> str:
+    """Return the effect of a term, and whether it is above the accuracy of the scene."""
+    if term.get('effect') is None:  # as in bags of versions that did not estimate it
+        return 'not known'
+    note = ', exceeds the accuracy asked' if term['exceeds'] else ''
+    return f'≈ {100.0 * term["effect"]:.1f} %{note}'
 
 
 def _facts(trial: Trial) -> list[str]:
@@ -214,9 +234,8 @@ def _fidelity_note(view: View) -> str:
         return ''
     note = html.escape(promise(view.trial))
     return (
-        f'<p>{note[:1].upper()}{note[1:]}. The bound is a safety factor times the largest error '
-        'of this level on random scenes with a similar grip margin; the reference is the highest '
-        'level with short time steps.</p>'
+        f'<p>{note[:1].upper()}{note[1:]}. The bound was calibrated on random scenes and checked '
+        'on others; the reference is the highest level with short time steps.</p>'
     )
 
 

@@ -35,6 +35,8 @@ T = TypeVar('T')
 LEAST_TRUNK = 0.01
 """Least share of a robot's mass that is not legs."""
 
+METRICS = ('distance', 'slip')
+
 RAIL_LEG = 'rail_leg'
 """The robot of a scene with the leg on its rail."""
 
@@ -373,7 +375,9 @@ class Scene:
     cycles : int
         Gait cycles of a trial.
     accuracy : float
-        Largest relative error of the distance that the scene allows a fidelity level.
+        Largest relative error of its metric that the scene allows a fidelity level.
+    metric : str
+        What must be that accurate: ``distance`` of the body, or ``slip`` path of its feet.
     faults : tuple of Fault
         Faults of regulators, hoses and sensors; see :mod:`ros_pad.simulation.faults`.
     """
@@ -395,6 +399,7 @@ class Scene:
     settle: float
     cycles: int
     accuracy: float
+    metric: str = 'distance'
     faults: tuple[Fault, ...] = ()
 
     @property
@@ -488,6 +493,7 @@ class Scene:
             settle=table.number('settle', 's', 0.0, 60.0, default=1.0),
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
+            metric=table.choice('metric', METRICS, default='distance'),
             faults=listed(table),
         )
         table.finish()

@@ -21,6 +21,7 @@ from ros_pad.configuration import Setting
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.terms import terms
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
@@ -139,6 +140,7 @@ def promise(trial: Trial) -> str:
 def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers') -> dict[str, Any]:
     """Return what pages and replays show of a trial's settings: scene, level and versions."""
     choice = levels.choose(scene, fidelity, policy)
+    known = [asdict(each) for each in terms(scene, choice.level, policy)]
     return {
         'foot': scene.foot.source,
         'expected_load': scene.expected_load,
@@ -150,7 +152,8 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
         # JSON has no infinity.
         'fidelity_bound': choice.bound if choice.bound < math.inf else None,
         'fidelity_note': choice.note,
-        'omitted': [asdict(each) for each in levels.omitted(scene, choice.level, policy)],
+        'omitted': [each for each in known if not each['taken']],
+        'taken': [each for each in known if each['taken']],
         'version': ros_pad.__version__,
         'versions': {name: each for name, each in made_with().items() if name != 'git'},
         'git': made_with().get('git'),

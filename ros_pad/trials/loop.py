@@ -48,6 +48,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.terms import with_terms
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
@@ -251,7 +252,8 @@ class ClosedLoop:
         self.period_ns = round(1e9 / scene.sensors.rate)
         self.floor = scene.floor.build(seed)
         fidelity = levels.level(scene, fidelity, joints=sensing == 'joints')
-        self.robot = levels.build(scene, self.floor, self.period_ns * 1e-9, fidelity)
+        period = self.period_ns * 1e-9
+        self.robot = levels.build(with_terms(scene), self.floor, period, fidelity)
         self.sensors = Sensors.of(scene, seed)
         self._stamp_ns = 0
         tuning = tuning or tuning_for(scene, sensing)

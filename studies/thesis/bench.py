@@ -38,8 +38,8 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.contact.squeeze import trapped_film
 from ros_pad.errors import ConfigError
 from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation.fidelity import SOLE_MODULUS
-from ros_pad.simulation.fidelity import Omission
+from ros_pad.simulation.margin import SOLE_MODULUS
+from ros_pad.simulation.terms import Term as Omission
 from studies.thesis.bench_scene import BenchScene
 from studies.thesis.bench_scene import FootBench
 from studies.thesis.bench_scene import InflationBench

@@ -27,7 +27,7 @@ from ros_pad.contact.meniscus import hysteresis_force
 from ros_pad.contact.meniscus import meniscus
 from ros_pad.contact.pad import Array
 from ros_pad.contact.resistance import Foot
-from ros_pad.simulation.fidelity import Omission
+from ros_pad.simulation.terms import Term as Omission
 from studies.thesis.bench import CAPILLARY
 from studies.thesis.bench import DRY
 from studies.thesis.bench import NOT_CODED

@@ -141,6 +141,14 @@ def made_up(per_cycle=0.12, policy='adaptive'):
             'omitted': [
                 {'term': 'wind & weather', 'bound': 0.034, 'reason': 'indoors'},
                 {'term': 'moods', 'bound': None, 'reason': 'nobody asked'},
+                {
+                    'term': 'tides',
+                    'bound': 0.2,
+                    'reason': 'the moon',
+                    'kind': 'estimate',
+                    'effect': 0.3,
+                    'exceeds': True,
+                },
             ],
         },
     )
@@ -306,8 +314,9 @@ def test_footprints_window_and_omissions(tmp_path):
     assert 'From 6 s to 14 s' in seen.text
     # Flat stances with an end: ten of leg 1, five of leg 2.
     assert '15 flat stances' in seen.alt('Reliability')
-    assert re.search(r'wind & weather *≤ 3\.4 % *indoors', seen.text)
-    assert re.search(r'moods *not known *nobody asked', seen.text)
+    assert re.search(r'wind & weather *≤ 3\.4 % *not known *indoors', seen.text)
+    assert re.search(r'tides *≈ 20\.0 % *≈ 30\.0 %, exceeds the accuracy asked', seen.text)
+    assert re.search(r'moods *(not known *){2}nobody asked', seen.text)
 
 
 def test_reliability_counts_what_was_wet():
