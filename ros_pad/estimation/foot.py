@@ -16,6 +16,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
 from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.friction import FrictionScales
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
 from ros_pad.estimation.parts import History
@@ -168,7 +169,13 @@ class FootEstimator:
         When the expected load is not a number above 0.
     """
 
-    def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
+    def __init__(
+        self,
+        foot: Foot,
+        expected_load: float,
+        tuning: Tuning | None = None,
+        shared: FrictionScales | None = None,
+    ) -> None:
         expected_load = number('expected_load', expected_load, 'N', above=True)
         self.tuning = tuning = tuning or Tuning()
         self._foot = foot
@@ -193,7 +200,7 @@ class FootEstimator:
             threshold=tuning.alarm_threshold,
         )
         self._ground = GroundFilter(
-            FrictionPrior.of(foot, expected_load),
+            shared or FrictionScales(FrictionPrior.of(foot, expected_load)),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
             rim_speed=tuning.rim_speed(foot),
@@ -359,7 +366,7 @@ class FootEstimator:
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
         self._ground.touch_down(
-            self._path.touch_down(time, x, y), self._stance.dome_share > doubt.DOMED
+            self._path.touch_down(time, x, y), self._stance.dome_share > doubt.DOMED, time
         )
         self._history.add(time, self._ground.posterior)
         self._quantile = self._ground.quantile(MARGIN_SHARE)
@@ -459,7 +466,7 @@ class FootEstimator:
         stance = self._stance
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
         if (before > doubt.DOMED) != (stance.dome_share > doubt.DOMED):
-            self._ground.touch_down(0.0, stance.dome_share > doubt.DOMED)
+            self._ground.touch_down(0.0, stance.dome_share > doubt.DOMED, self._time)
             stance.forget_counted()
 
     def _doubt(self, friction_mean: float, friction_sd: float) -> str:

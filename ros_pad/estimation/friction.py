@@ -12,19 +12,22 @@ does not fade.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from scipy import special
 
-from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import expected_friction
+from ros_pad.estimation.scales import EDGES
+from ros_pad.estimation.scales import GRID
+from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
-GRID = np.linspace(0.01, 1.59, 80)
+__all__ = ['GRID', 'FrictionPrior', 'FrictionScales', 'GroundFilter', 'Posterior']
+
 _SQUARES = GRID * GRID
-_UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
+_UPPER_EDGES = EDGES[1:]
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
 _ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
@@ -45,44 +48,10 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+MODEL_FLOOR = 0.03
 MODEL_SHARE = 0.05
 """Relative error of friction measured in slip, mean over a walk: a window may contain some stick,
 and feet turn more or less than assumed."""
-
-
-@dataclass(frozen=True)
-class FrictionPrior:
-    """Expected friction of a foot before it is measured, for each ground and morphology.
-
-    Attributes
-    ----------
-    flat_dry, flat_wet, dome : float
-        Expected coefficients of friction. One is enough for a dome, whose friction is about the
-        same on wet and dry ground.
-    spread : float
-        Relative standard deviation of each coefficient.
-    """
-
-    flat_dry: float
-    flat_wet: float
-    dome: float
-    spread: float = 0.2
-
-    @classmethod
-    def of(cls, foot: Foot, load: float, spread: float = 0.2) -> FrictionPrior:
-        """Return the friction that the contact model predicts for a foot at a load, N."""
-        return cls(*expected_friction(foot, load), spread=spread)
-
-    def table(self, dome: bool) -> np.ndarray:
-        """Return the probabilities on :data:`GRID` for dry and wet ground, shape (2, grid)."""
-        means = (self.dome, self.dome) if dome else (self.flat_dry, self.flat_wet)
-        rows = []
-        for mean in means:
-            spread = self.spread * mean + 0.03
-            # Heavy tails: unexpected ground stays possible, and wet or dry never become certain.
-            row = np.exp(-0.5 * ((GRID - mean) / spread) ** 2) / spread + 0.01
-            rows.append(row / row.sum())
-        return np.array(rows)
 
 
 class GroundFilter:
@@ -124,7 +93,7 @@ class GroundFilter:
 
     def __init__(
         self,
-        prior: FrictionPrior,
+        shared: FrictionScales,
         wet_prior: float = Tuning.wet_prior,
         patch_length: float = Tuning.patch_length,
         forgetting_time: float = 1.0,
@@ -132,32 +101,60 @@ class GroundFilter:
         rim_speed: float = 0.0,
         model_error: float = Tuning.ratio_noise,
     ) -> None:
-        self.prior = prior
-        self._tables = {dome: prior.table(dome) for dome in (False, True)}
+        self.prior = shared.prior
+        self._shared, self._foot = shared, shared.join()
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
-        self._flat_prior = self._grounds * self._tables[False]
+        self._expect(-math.inf)
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(model_error, MODEL_SHARE * GRID)
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2)
+        error = np.hypot(MODEL_FLOOR, MODEL_SHARE * GRID)
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         self._blur = blur / blur.sum(axis=0)
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
+        self._walked = 0.0
+        self._counted = [-math.inf, -math.inf]
         self._normalise(self._flat_prior)
+        self._felt = np.zeros_like(self._posterior)
+        self._felt_any=False
+        self._wet_before = wet_prior
 
-    def touch_down(self, distance: float, dome: bool) -> None:
+    def _expect(self, time: float) -> None:
+        """Expect the friction that the feet have learnt by a time, s."""
+        dry, wet, dome = self._shared.expected(time) if time > -math.inf else self._shared._now
+        self._flat_prior = self._grounds * np.array([dry, wet])
+        self._dome_prior = dome
+
+    def _end_stance(self, time: float) -> None:
+        if self._felt_any:
+            weight = -math.expm1(-(self._walked - self._counted[self._dome]) / self._patch_length)
+            self._counted[self._dome] = self._walked
+            self._shared.add(Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight))
+        self._forget_felt()
+
+    def _forget_felt(self) -> None:
+        self._felt = np.zeros_like(self._posterior)
+        self._felt_any=False
+
+    def touch_down(self, distance: float, dome: bool, time: float = -math.inf) -> None:
         """Begin a stance at a distance, m, from the last one, as a dome or flat."""
+        self._end_stance(time)
+        self._expect(time)
         if dome != self._dome:
             # The friction of one morphology gives no evidence of the friction of the other: keep
             # only the probability of wet ground.
             self._dome = dome
-            self._posterior = self._wet_or_dry() * self._tables[dome]
+            self._posterior = self._wet_or_dry() * self._table(dome)
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
+        self._wet_before = self.wet_probability
+
+    def _table(self, dome: bool) -> np.ndarray:
+        return self._dome_prior if dome else self._flat_prior / self._grounds
 
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
@@ -172,6 +169,7 @@ class GroundFilter:
     @posterior.setter
     def posterior(self, posterior: Posterior) -> None:
         grid, self._dome = posterior
+        self._forget_felt()
         self._normalise(grid)
 
     def update(
@@ -224,7 +222,12 @@ class GroundFilter:
             unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
-        self._posterior = self._posterior * (likelihood + 1e-6) ** (weight * self._temper)
+        likelihood += 1e-6
+        if weight:
+            felt = weight * self._temper * np.log(likelihood)
+            self._felt += felt
+            self._felt_any=True
+            self._posterior = self._posterior * np.exp(felt)
         self._posterior /= self._posterior.sum()
         dry, wet = self._posterior.dot(_ONES).tolist()
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
@@ -234,20 +237,21 @@ class GroundFilter:
             # The film under domes drains during a stance, so friction rises on the same ground.
             keep = math.exp(-dt / self._forgetting_time)
             self._posterior = keep * self._posterior + (1.0 - keep) * (
-                self._wet_or_dry() * self._tables[True]
+                self._wet_or_dry() * self._dome_prior
             )
+            self._felt *= keep
         self._normalise(self._posterior)
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         stay = math.exp(-distance / self._patch_length)
+        self._walked += distance
         if self._dome:
             # Under domes wet and dry ground have the same friction: when friction fades, the
             # probability of wet ground must not change.
             grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
             friction = self._posterior[0] + self._posterior[1]
-            table = self._tables[True][0]
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * table)
+            self._posterior = grounds * (stay * friction + (1.0 - stay) * self._dome_prior)
         else:
             self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
 
@@ -281,3 +285,10 @@ class GroundFilter:
         on_dry, on_wet = np.add.accumulate(self._blurred, axis=1)
         below = on_dry + np.interp(edges, wet * _UPPER_EDGES, on_wet, left=0.0)
         return float(np.interp(share, below, edges))
+
+    def quantiles(self, shares: np.ndarray) -> np.ndarray:
+        dry, wet = self.scales
+        edges = dry * EDGES
+        on_dry, on_wet = np.add.accumulate(self._blurred, axis=1)
+        below = np.append(0.0, on_dry) + np.interp(edges, wet * EDGES, np.append(0.0,on_wet), left=0.0)
+        return np.interp(shares, below, edges)
