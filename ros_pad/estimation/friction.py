@@ -49,6 +49,7 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
 MODEL_FLOOR = 0.03
+SLOW = 0.1
 MODEL_SHARE = 0.05
 """Relative error of friction measured in slip, mean over a walk: a window may contain some stick,
 and feet turn more or less than assumed."""
@@ -108,6 +109,7 @@ class GroundFilter:
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
+        self._rim = rim_speed
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
         error = np.hypot(MODEL_FLOOR, MODEL_SHARE * GRID)
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
@@ -224,10 +226,23 @@ class GroundFilter:
         before = self.wet_probability
         likelihood += 1e-6
         if weight:
+            shown = 1.0
+            if slip > 0.0 and not turning_known and self._rim > 0.0:
+                shown = max(SLOW, speed * speed / (speed * speed + self._rim * self._rim))
+                slid = slip / (slip + stick)
+                shown = 1.0 - slid + slid * shown
             felt = weight * self._temper * np.log(likelihood)
+            after = self._posterior * np.exp(felt)
+            if shown < 1.0:
+                grounds = after.dot(_ONES)
+                felt *= shown
+                after = self._posterior * np.exp(felt)
+                ratio = (grounds / after.dot(_ONES))[:, None]
+                after *= ratio
+                felt += np.log(ratio)
             self._felt += felt
-            self._felt_any=True
-            self._posterior = self._posterior * np.exp(felt)
+            self._felt_any = True
+            self._posterior = after
         self._posterior /= self._posterior.sum()
         dry, wet = self._posterior.dot(_ONES).tolist()
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
