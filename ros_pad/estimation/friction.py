@@ -126,9 +126,9 @@ class GroundFilter:
 
     def _expect(self, time: float) -> None:
         """Expect the friction that the feet have learnt by a time, s."""
-        dry, wet, dome = self._shared.expected(time) if time > -math.inf else self._shared._now
-        self._flat_prior = self._grounds * np.array([dry, wet])
-        self._dome_prior = dome
+        expected = self._shared.expected(time) if time > -math.inf else self._shared._now
+        self._flat_prior = self._grounds * expected[:2]
+        self._dome_prior = expected[2:]
 
     def _end_stance(self, time: float) -> None:
         if self._felt_any:
@@ -233,13 +233,16 @@ class GroundFilter:
                 shown = 1.0 - slid + slid * shown
             felt = weight * self._temper * np.log(likelihood)
             after = self._posterior * np.exp(felt)
+            grounds = after.dot(_ONES)
             if shown < 1.0:
-                grounds = after.dot(_ONES)
                 felt *= shown
                 after = self._posterior * np.exp(felt)
                 ratio = (grounds / after.dot(_ONES))[:, None]
                 after *= ratio
                 felt += np.log(ratio)
+            if self._dome:
+                # wet or dry makes no difference under domes
+                after *= self._wet_or_dry() / grounds[:, None]
             self._felt += felt
             self._felt_any = True
             self._posterior = after
@@ -265,7 +268,7 @@ class GroundFilter:
             # Under domes wet and dry ground have the same friction: when friction fades, the
             # probability of wet ground must not change.
             grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
-            friction = self._posterior[0] + self._posterior[1]
+            friction = self._posterior / self._wet_or_dry()
             self._posterior = grounds * (stay * friction + (1.0 - stay) * self._dome_prior)
         else:
             self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior

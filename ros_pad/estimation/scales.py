@@ -33,11 +33,14 @@ SCALE_SPREAD = 0.4
 SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
 """Standard deviations of ln μ from place to place that are considered, equally likely."""
 
+SPREAD_P=(1,1,1,1)
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
 
 TAIL = 0.01
 """Probability of friction that has nothing to do with the class, uniform in ln μ: unexpected ground
 stays possible, and wet or dry never become certain."""
+
+UNDRAINED = 0.3
 
 PERIOD = 0.5
 """Time between updates of what the feet share, s: it does not depend on which sample of two feet
@@ -102,13 +105,16 @@ class FrictionScales:
         self._feet = 0
         means = (prior.flat_dry, prior.flat_wet, prior.dome)
         scale = np.exp(-0.5 * (LOG_SCALES / spread) ** 2)
-        weights = np.multiply.outer(scale / scale.sum(), np.ones(len(SPREADS)) / len(SPREADS))
+        ps=np.array(SPREAD_P); weights = np.multiply.outer(scale / scale.sum(), ps/ps.sum())
         self._weights = np.tile(weights.ravel(), (3, 1))
         at = (np.log(EDGES) - np.log(means)[:, None, None, None] - LOG_SCALES[:, None, None]) / SPREADS[:, None]
         below = special.ndtr(at)
         mass = np.diff(below, axis=-1) + TAIL / len(GRID)
         mass /= mass.sum(axis=-1, keepdims=True)
         self._cells = mass.reshape(3, -1, len(GRID))
+        low, high = sorted((prior.flat_wet, prior.dome))
+        undrained = ((GRID >= low) & (GRID <= high)) + 1e-3
+        self._undrained = undrained / undrained.sum()
         self._felt: list[Felt] = []
         self._epoch = -math.inf
         self._now = self._before = self._expected()
@@ -118,7 +124,8 @@ class FrictionScales:
         return self._feet - 1
 
     def _expected(self) -> np.ndarray:
-        return np.einsum('ck,ckg->cg', self._weights, self._cells)
+        dry, wet, dome = np.einsum('ck,ckg->cg', self._weights, self._cells)
+        return np.array([dry, wet, dome, (1.0 - UNDRAINED) * dome + UNDRAINED * self._undrained])
 
     def expected(self, time: float) -> np.ndarray:
         epoch = math.floor(time / PERIOD)
@@ -141,8 +148,9 @@ class FrictionScales:
     def _learn(self, felt: Felt) -> None:
         likelihood = np.exp(felt.likelihood - felt.likelihood.max())
         if felt.dome:
-            grounds = (1.0 - felt.wet) * likelihood[0] + felt.wet * likelihood[1]
-            self._multiply(2, self._cells[2].dot(grounds), felt.weight)
+            slow = felt.wet * UNDRAINED
+            drained = self._cells[2].dot(likelihood[0])
+            self._multiply(2, (1.0 - slow) * drained + slow * self._undrained.dot(likelihood[1]), felt.weight)
             return
         on_dry, on_wet = (self._cells[i].dot(likelihood[i]) for i in (0, 1))
         dry, wet = 1.0 - felt.wet, felt.wet
