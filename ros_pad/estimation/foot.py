@@ -15,8 +15,6 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
-from ros_pad.estimation.friction import FrictionPrior
-from ros_pad.estimation.friction import FrictionScales
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
 from ros_pad.estimation.parts import History
@@ -25,6 +23,8 @@ from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Path
 from ros_pad.estimation.parts import Stance
 from ros_pad.estimation.parts import Window
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
@@ -157,6 +157,9 @@ class FootEstimator:
         Normal force in stance, N, above 0.
     tuning : Tuning
         Settings for sensors and ground.
+    shared : FrictionScales or None
+        What this foot learns of friction together with others, see :func:`estimators_of`; None:
+        it learns alone.
 
     Attributes
     ----------
@@ -200,11 +203,10 @@ class FootEstimator:
             threshold=tuning.alarm_threshold,
         )
         self._ground = GroundFilter(
-            shared or FrictionScales(FrictionPrior.of(foot, expected_load)),
+            shared or shared_friction(foot, expected_load, tuning),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
             rim_speed=tuning.rim_speed(foot),
-            model_error=tuning.ratio_noise,
         )
         # An estimated position never stops, and its noise is not that of a marker.
         marker_noise = 0.0 if self._joints else tuning.position_noise
@@ -518,6 +520,21 @@ class FootEstimator:
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
         return dry / prior.flat_dry, wet / prior.flat_wet
+
+
+def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:
+    """Return what feet of one robot share of friction, before a walk."""
+    prior = FrictionPrior.of(foot, expected_load)
+    return FrictionScales(prior, tuning.scales, tuning.learn_friction)
+
+
+def estimators_of(
+    count: int, foot: Foot, expected_load: float, tuning: Tuning
+) -> tuple[list[FootEstimator], FrictionScales]:
+    """Return the estimators of all feet of a robot, and what they share of friction."""
+    expected_load = number('expected_load', expected_load, 'N', above=True)
+    shared = shared_friction(foot, expected_load, tuning)
+    return [FootEstimator(foot, expected_load, tuning, shared) for _ in range(count)], shared
 
 
 def _check_motion(time: float, motion: ContactMotion) -> None:

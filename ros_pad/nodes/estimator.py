@@ -26,6 +26,7 @@ from ros_pad.errors import UnknownEncoding
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
@@ -198,15 +199,13 @@ class EstimatorNode(Node):
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.emissions = 0
         self.messages = Messages(self)
+        estimators, self.shared = estimators_of(
+            len(values['legs']), foot, values['expected_load'], tuning
+        )
+        period_ns, ambient = round(1e9 / values['publish_rate']), values['ambient_pressure']
         self.legs = {
-            leg: _LegTopics(
-                self,
-                leg,
-                FootEstimator(foot, values['expected_load'], tuning),
-                round(1e9 / values['publish_rate']),
-                values['ambient_pressure'],
-            )
-            for leg in values['legs']
+            leg: _LegTopics(self, leg, estimator, period_ns, ambient)
+            for leg, estimator in zip(values['legs'], estimators, strict=True)
         }
         if tuning.source == 'joints':
             self.messages.receive(topics.BODY_DOUBT, self._on_body_doubt, ('data',))

@@ -23,6 +23,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
@@ -223,6 +224,8 @@ class ClosedLoop:
         None with markers.
     estimators : list of FootEstimator
         One for each leg; see :meth:`connect`.
+    shared : FrictionScales
+        What they share of friction.
     controller : MorphologyController
     legs : list of LegStages
     pads : list of float
@@ -259,7 +262,9 @@ class ClosedLoop:
         if sensing == 'joints':
             assert isinstance(self.robot, FullRobot)
             self.body = BodySensing(scene, seed, self.robot, self._doubt_body)
-        estimators = [FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs]
+        estimators, self.shared = estimators_of(
+            len(scene.legs), scene.foot, scene.expected_load, tuning
+        )
         controller = MorphologyController(
             scene.foot,
             scene.legs,

@@ -35,7 +35,7 @@ from ros_pad.control import policy_named
 from ros_pad.control.footprints import Footprints
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator

@@ -32,7 +32,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from studies import command
 from studies.drawing import BLACK

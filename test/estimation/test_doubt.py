@@ -14,7 +14,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation import sensor_fault
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N

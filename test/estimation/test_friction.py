@@ -10,7 +10,7 @@ from scipy import stats
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.friction import GRID
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)

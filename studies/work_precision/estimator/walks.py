@@ -16,7 +16,7 @@ import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.foot import Tuning
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
