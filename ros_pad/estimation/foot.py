@@ -165,6 +165,8 @@ class FootEstimator:
     ----------
     estimate : Estimate
         Estimate after the last sample.
+    ground : GroundFilter
+        Posterior of wet ground and friction.
 
     Raises
     ------
@@ -202,7 +204,7 @@ class FootEstimator:
             BODY_CORRELATION if self._joints else tuning.smoothing,
             threshold=tuning.alarm_threshold,
         )
-        self._ground = GroundFilter(
+        self.ground = GroundFilter(
             shared or shared_friction(foot, expected_load, tuning),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
@@ -220,11 +222,11 @@ class FootEstimator:
         self._history = History(HINDSIGHT)
         self._time = -math.inf
         self._height = math.inf  # height of the marker in the last stance, m; infinite if unknown
-        mean, sd = self._ground.friction
-        self._quantile = self._ground.quantile(MARGIN_SHARE)
+        mean, sd = self.ground.friction
+        self._quantile = self.ground.quantile(MARGIN_SHARE)
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
-            self._ground.wet_probability, mean, sd, self._quantile, True, NOT_YET, True,
+            self.ground.wet_probability, mean, sd, self._quantile, True, NOT_YET, True,
         )  # fmt: skip
 
     def update(
@@ -367,11 +369,11 @@ class FootEstimator:
         self._alarm.reset()
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
-        self._ground.touch_down(
+        self.ground.touch_down(
             self._path.touch_down(time, x, y), self._stance.dome_share > doubt.DOMED, time
         )
-        self._history.add(time, self._ground.posterior)
-        self._quantile = self._ground.quantile(MARGIN_SHARE)
+        self._history.add(time, self.ground.posterior)
+        self._quantile = self.ground.quantile(MARGIN_SHARE)
         self._window.begin(time, first=True)
 
     def _stand(
@@ -400,10 +402,10 @@ class FootEstimator:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
             window.begin(time, first=False)
-            friction_mean, friction_sd = self._ground.friction
-            wet = self._ground.wet_probability
-            self._quantile = self._ground.quantile(MARGIN_SHARE)
-            self._history.add(time, self._ground.posterior)
+            friction_mean, friction_sd = self.ground.friction
+            wet = self.ground.wet_probability
+            self._quantile = self.ground.quantile(MARGIN_SHARE)
+            self._history.add(time, self.ground.posterior)
             reason = self._doubt(friction_mean, friction_sd)
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
@@ -440,7 +442,7 @@ class FootEstimator:
 
     def _without_sensors(self, time: float, dt: float, x: float, y: float, fault: str) -> Estimate:
         """Return the estimate while sensors are faulty: undo the samples since then, and fade."""
-        last, ground = self.estimate, self._ground
+        last, ground = self.estimate, self.ground
         self._gate.standing = False
         posterior = self._history.undo(self._sensing.since)
         if posterior is not None:
@@ -468,11 +470,11 @@ class FootEstimator:
         stance = self._stance
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
         if (before > doubt.DOMED) != (stance.dome_share > doubt.DOMED):
-            self._ground.touch_down(0.0, stance.dome_share > doubt.DOMED, self._time)
+            self.ground.touch_down(0.0, stance.dome_share > doubt.DOMED, self._time)
             stance.forget_counted()
 
     def _doubt(self, friction_mean: float, friction_sd: float) -> str:
-        ground, stance = self._ground, self._stance
+        ground, stance = self.ground, self._stance
         evidence = doubt.StanceEvidence(
             stance.dome_share, ground.log_odds, stance.peak_load, stance.peak_ratio,
             stance.peak_turning, ground.wet_probability, friction_mean, friction_sd,
@@ -503,7 +505,7 @@ class FootEstimator:
         )
         if self._joints:  # the error of the body's velocity is the same in the whole window
             speed_noise = window.noise / window.count
-        self._ground.update(
+        self.ground.update(
             ratio, noise, window.speed / window.count, speed_noise, duration,
             stance.weight(ratio, noise, *self._place), turning_known,
             self._scales(load),
@@ -516,7 +518,7 @@ class FootEstimator:
         """
         if self._stance.dome_share > doubt.DOMED:
             return 1.0, 1.0
-        kernel, prior = self._foot.resistance_of, self._ground.prior
+        kernel, prior = self._foot.resistance_of, self.ground.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
         return dry / prior.flat_dry, wet / prior.flat_wet

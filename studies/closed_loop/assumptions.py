@@ -290,7 +290,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     )
     estimators = [FootEstimator(configured.foot, load, tuning) for _ in configured.legs]
     for estimator in estimators:
-        estimator._ground = GroundFilter(
+        estimator.ground = GroundFilter(
             FrictionPrior.of(configured.foot, load, **setup.prior),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,

@@ -10,8 +10,9 @@ from scipy import stats
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.friction import GRID
-from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
 STILL = 0.0  # m/s
@@ -26,7 +27,7 @@ def exact(monkeypatch):
 
 
 def flat(**options):
-    ground = GroundFilter(PRIOR, **options)
+    ground = GroundFilter(FrictionScales(PRIOR), **options)
     ground.touch_down(0.0, dome=False)
     return ground
 
@@ -65,7 +66,7 @@ def test_prior_tables_are_probabilities_with_heavy_tails():
 
 
 def test_nothing_felt_is_the_prior(exact):
-    ground = GroundFilter(PRIOR, wet_prior=0.3, model_error=EXACT)
+    ground = GroundFilter(FrictionScales(PRIOR), wet_prior=0.3, model_error=EXACT)
     dry, wet = PRIOR.table(dome=False)
     marginal = 0.7 * dry + 0.3 * wet
     mean = marginal @ GRID
@@ -242,7 +243,7 @@ def test_it_is_never_certain():
 
 def test_forgetting_under_domes_follows_a_film_that_drains():
     """A dome slips at 0.2, then sticks at 0.4: within half a second the estimate follows."""
-    ground = GroundFilter(PRIOR)
+    ground = GroundFilter(FrictionScales(PRIOR))
     ground.touch_down(0.0, dome=True)
     slip(ground, 0.2, 5)
     assert ground.friction[0] < 0.25

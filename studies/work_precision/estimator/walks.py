@@ -115,9 +115,20 @@ class _NoLog:
         pass
 
 
-def record(scene: Scene, policy: str, seed: int, level: str) -> Recording:
-    """Walk once in closed loop, and return readings and truth, up to a verdict if there is one."""
+def record(
+    scene: Scene,
+    policy: str,
+    seed: int,
+    level: str,
+    prepare: Callable[[ClosedLoop], None] | None = None,
+) -> Recording:
+    """Walk once in closed loop, and return readings and truth, up to a verdict if there is one.
+
+    ``prepare`` is called with the loop before the walk.
+    """
     loop = ClosedLoop(scene, policy, seed, level)
+    if prepare:
+        prepare(loop)
     tap = _SensorTap(loop)
     loop.sensors = tap  # type: ignore[assignment]
     log: Any = _NoLog()
