@@ -13,11 +13,10 @@ does not fade. What is expected of new ground is learnt by all feet together, se
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import special
 
 from ros_pad.estimation.scales import EDGES
@@ -124,6 +123,8 @@ class GroundFilter:
         self._way = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # way at the last evidence, by shape
         self._expect(0.0)
+        self._posterior: np.ndarray = self._flat_prior
+        self.wet_probability = wet_prior
         self._normalise(self._flat_prior)
         self._begin()
 
@@ -305,13 +306,14 @@ class GroundFilter:
 
         The share is from 0 to 1; the coefficient is that at the load of the last sample.
         """
-        return float(self.quantiles(share))
+        return float(self.quantiles([share])[0])
 
-    def quantiles(self, shares: ArrayLike) -> Any:
+    def quantiles(self, shares: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
         on_dry, on_wet = self._cumulated
         np.add.accumulate(self._blurred, axis=1, out=self._cumulated[:, 1:])
         below = on_dry + np.interp(edges, wet * EDGES, on_wet)
-        return np.interp(shares, below, edges)
+        found: np.ndarray = np.interp(np.asarray(shares), below, edges)
+        return found

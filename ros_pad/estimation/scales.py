@@ -36,15 +36,15 @@ SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
 
-SCALE_RANGE = 0.3, 3.3
+SCALE_RANGE = 0.3, 3.4
 """Range of a scale that may be expected: that of the grid."""
 
 NEXT_FLOOR = 0.1
 """Standard deviation of ln(scale) from one floor to the next, for what is kept for later walks."""
 
 TAIL = 0.01
-"""Probability of friction of another origin, equal for all cells: unexpected ground stays possible,
-and wet or dry never become certain."""
+"""Probability of friction of another origin, equal for all cells: unexpected ground stays
+possible, and wet or dry never become certain."""
 
 UNDRAINED = 0.3
 """Share of a stance on wet ground in which the film under a dome has not drained: friction is then

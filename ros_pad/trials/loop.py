@@ -49,6 +49,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
+from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
@@ -442,4 +443,6 @@ def run(
     finally:
         loop.close()
     wall = time.perf_counter() - started
-    return log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
+    trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
+    trial.settings['learnt'] = settings_of(loop.shared)
+    return trial

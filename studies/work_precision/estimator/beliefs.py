@@ -12,8 +12,8 @@ expected, and it does not depend on the cells of a grid. Beside it are the share
 stances, in which the truth is within the 95 % interval (calibration), the width of the interval
 (sharpness), and the share of time below the 5 % quantile, on which the friction margin rests.
 
-Settings were chosen on walks of seeds 1 and 2; these begin with seed 50. "Late" is from two minutes
-on. The interval beside a figure is the range over walks.
+Settings were chosen on walks of seeds 1 and 2; these begin with seed 50. "Late" is from two
+minutes on. The interval beside a figure is the range over walks.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def believed(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, i
                 yield time, leg, stances[leg], ground, friction, estimators[leg]
 
 
-def score(condition: Condition, policy: str, seed: int, cycles: int) -> dict[str, list[Sample]]:
+def measure(condition: Condition, policy: str, seed: int, cycles: int) -> dict[str, list[Sample]]:
     """Walk once, and return the samples of each filter."""
     walk = walked(condition, policy, seed, cycles)
     found: dict[str, list[Sample]] = {name: [] for name in FILTERS}
@@ -222,16 +222,14 @@ def _sample(believed: Any, time: float, stance: int, ground: int, friction: floa
     )  # fmt: skip
 
 
-def _without_measurement(
-    walk: Recording, condition: Condition
-) -> dict[str, list[GroundFilter]]:
+def _without_measurement(walk: Recording, condition: Condition) -> dict[str, list[GroundFilter]]:
     """Return, for each filter without measurement, what it believes in each class."""
     foot, load, tuning = walk.settings
     sure: dict[str, Any] = {}
     for name in ('flat_dry', 'flat_wet', 'dome'):
         sure[f'scale_{name}'] = getattr(condition, name.removeprefix('flat_'))
         sure[f'scale_sd_{name}'] = 0.01
-    found = {}
+    found: dict[str, list[GroundFilter]] = {}
     for name, change in ((PRIOR, {}), (LABEL, {}), (KNOWN, sure)):
         shared = shared_friction(foot, load, replace(tuning, **change))
         found[name] = []
@@ -416,6 +414,3 @@ def main(words: Sequence[str]) -> int:
     kept = command.write(options.out, NAME, document, {NAME: draw(rows)})
     command.show(options, kept, table(rows))
     return 0
-
-
-measure = score
