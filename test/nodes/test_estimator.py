@@ -482,7 +482,10 @@ def test_in_simulated_time_no_rate_is_reported(robot, health):
     robot.start()
     robot.tick(1.0)
     robot.until(lambda: health)
-    assert {each.name for each in health} == {f'estimator: leg {leg} sensing' for leg in (1, 2)}
+    assert {each.name for each in health} == {
+        *(f'estimator: leg {leg} sensing' for leg in (1, 2)),
+        'estimator: friction of the floor',
+    }
 
 
 def test_a_moment_counts_where_there_is_one(robot):
