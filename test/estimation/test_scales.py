@@ -83,7 +83,7 @@ def test_sticking_shows_only_that_friction_is_larger():
     found = learnt(FrictionScales(PRIOR), stances)['flat_dry']
     assert found.scale > 1.0 and found.sd > 0.15
     low, high = found.interval
-    assert 0.6 / 0.8 < low and high > 1.5
+    assert low > 0.6 / 0.8 and high > 1.5
 
 
 def test_under_domes_only_the_friction_of_domes_is_learnt():
