@@ -10,9 +10,9 @@ import pytest
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from studies.work_precision.estimator.beliefs import Condition
-from studies.work_precision.estimator.beliefs import believed
-from studies.work_precision.estimator.beliefs import walked as walked_on
+from studies.work_precision.estimator.priors import Condition
+from studies.work_precision.estimator.priors import updates
+from studies.work_precision.estimator.priors import walked as walked_on
 
 PERIOD = 0.004  # s
 LATE = 15  # samples after a slip in which an alarm still counts for the slip
@@ -112,7 +112,7 @@ def test_the_true_friction_is_where_it_is_expected_on_floors_that_the_foot_file_
     walk = walked_on(Condition('', dry=1.0 / 1.4, wet=1.4), 'flat', 60, cycles=60)
     seen = [
         (*estimator.ground.quantiles([0.025, 0.05, 0.975]), friction)
-        for time, *_, friction, estimator in believed(walk, learns=True)
+        for time, *_, friction, estimator in updates(walk, learns=True)
         if time > 30.0
     ]
     low, least, high, true = np.array(seen).T

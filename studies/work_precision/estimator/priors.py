@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Score what the estimator believes of friction, where its foot file is wrong.
+"""Score the estimates of friction where the foot file is wrong.
 
 Robots with full dynamics (L2) walk on floors whose friction differs from that of the foot file by
 a factor, and from place to place by a spread that is correlated over 0.3 m. Their readings are
@@ -53,7 +53,7 @@ from studies.work_precision.estimator.walks import SETTLED
 from studies.work_precision.estimator.walks import Recording
 from studies.work_precision.estimator.walks import record
 
-NAME = 'beliefs'
+NAME = 'priors'
 FIRST_SEED = 50
 CYCLES = 150
 LATE = 120.0  # s
@@ -114,8 +114,8 @@ def _conditions() -> Iterator[Condition]:
         yield Condition(f'all {shown}', dry=factor, wet=factor, dome=factor)
     for factor in (0.5, 2.0):
         yield Condition(f'film {factor:g}', film=factor)
-        yield Condition(f'believed stiffness {factor:g}', stiffness=factor)
-        yield Condition(f'believed load {factor:g}', load=factor)
+        yield Condition(f'configured stiffness {factor:g}', stiffness=factor)
+        yield Condition(f'configured load {factor:g}', load=factor)
 
 
 CONDITIONS = tuple(_conditions())
@@ -162,7 +162,7 @@ def walked(condition: Condition, policy: str, seed: int, cycles: int) -> Recordi
 
 @dataclass
 class Sample:
-    """One update of the filter of a standing foot, and the score of what it believes."""
+    """One update of the filter of a standing foot, and the score of its posterior."""
 
     time: float
     stance: int
@@ -175,7 +175,7 @@ class Sample:
     within: bool = False
 
 
-def believed(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, int, float, Any]]:
+def updates(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, int, float, Any]]:
     """Yield time, leg, stance, class, true friction and estimator at each update under load."""
     foot, load, tuning = walk.settings
     legs = range(walk.load.shape[1])
@@ -200,7 +200,7 @@ def measure(condition: Condition, policy: str, seed: int, cycles: int) -> dict[s
     found: dict[str, list[Sample]] = {name: [] for name in FILTERS}
     blind = _without_measurement(walk, condition)
     for name in (LEARNS, FIXED):
-        for time, leg, stance, ground, friction, estimator in believed(walk, name == LEARNS):
+        for time, leg, stance, ground, friction, estimator in updates(walk, name == LEARNS):
             filters = {name: estimator.ground}
             if name == LEARNS:
                 filters |= {other: kinds[ground] for other, kinds in blind.items()}
@@ -210,12 +210,12 @@ def measure(condition: Condition, policy: str, seed: int, cycles: int) -> dict[s
     return found
 
 
-def _sample(believed: Any, time: float, stance: int, ground: int, friction: float) -> Sample:
-    low, least, high, *middle = believed.quantiles(SHARES)
+def _sample(ground_filter: Any, time: float, stance: int, ground: int, friction: float) -> Sample:
+    low, least, high, *middle = ground_filter.quantiles(SHARES)
     away = friction - np.array(middle)
-    mean, sd = believed.friction
+    mean, sd = ground_filter.friction
     return Sample(
-        time, stance, ground, abs(believed.wet_probability - ground % 2),
+        time, stance, ground, abs(ground_filter.wet_probability - ground % 2),
         low <= friction <= high, friction < least, high - low,
         2.0 * float(np.mean(np.where(away > 0.0, LEVELS * away, (LEVELS - 1.0) * away))),
         abs(friction - mean) <= 2.0 * sd,
@@ -223,7 +223,7 @@ def _sample(believed: Any, time: float, stance: int, ground: int, friction: floa
 
 
 def _without_measurement(walk: Recording, condition: Condition) -> dict[str, list[GroundFilter]]:
-    """Return, for each filter without measurement, what it believes in each class."""
+    """Return, for each filter without measurement, its posterior in each class."""
     foot, load, tuning = walk.settings
     sure: dict[str, Any] = {}
     for name in ('flat_dry', 'flat_wet', 'dome'):
