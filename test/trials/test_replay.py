@@ -307,7 +307,8 @@ def test_a_leg_may_be_another_one(sample, tmp_path):
     assert rows == 101
     for kind in ('slip', 'wetness', 'friction_margin'):
         one, other = found.replayed[2, kind], sample.replayed[4, kind]
-        np.testing.assert_array_equal(one.values, other.values[:rows])
+        # What other feet felt at rest changes no more than the last digit of what this one expects.
+        np.testing.assert_allclose(one.values, other.values[:rows], rtol=1e-12)
 
 
 def test_times_of_day_that_jitter_are_no_difference(tmp_path):
