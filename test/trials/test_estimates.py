@@ -109,7 +109,7 @@ def test_wet_and_dry_are_distinguished_at_the_end_of_a_flat_stance(walks):
 def test_the_true_friction_is_where_it_is_expected_on_floors_that_the_foot_file_does_not_have():
     """Friction differs from the file by a factor, and by 10 % from place to place. After half a
     minute the interval of 95 % holds it so often, and a margin errs in one case of twenty."""
-    walk = walked_on(Condition('', dry=1.0 / 1.4, wet=1.4), 'flat', 60, cycles=60)
+    walk = walked_on(Condition('', dry=1.0 / 1.4, wet=1.4), 'flat', 60, duration=60)
     seen = [
         (*estimator.ground.quantiles([0.025, 0.05, 0.975]), friction)
         for time, *_, friction, estimator in updates(walk, learns=True)

@@ -307,7 +307,7 @@ def test_a_leg_may_be_another_one(sample, tmp_path):
     assert rows == 101
     for kind in ('slip', 'wetness', 'friction_margin'):
         one, other = found.replayed[2, kind], sample.replayed[4, kind]
-        # What other feet felt at rest changes no more than the last digit of what this one expects.
+        # What other feet felt at rest changes only the last digit of what this one expects.
         np.testing.assert_allclose(one.values, other.values[:rows], rtol=1e-12)
 
 

@@ -55,7 +55,7 @@ from studies.work_precision.estimator.walks import record
 
 NAME = 'priors'
 FIRST_SEED = 50
-CYCLES = 150
+DURATION = 150  # s
 LATE = 120.0  # s
 EARLY = 30.0  # s
 SPREAD_LENGTH = 0.3  # m over which friction changes from place to place
@@ -149,9 +149,10 @@ def on_ground(condition: Condition, seed: int) -> Callable[[ClosedLoop], None]:
     return prepare
 
 
-def walked(condition: Condition, policy: str, seed: int, cycles: int) -> Recording:
-    """Walk once, and return the readings for the estimator of a condition."""
-    scene = replace(Scene.load(condition.scene), cycles=cycles)
+def walked(condition: Condition, policy: str, seed: int, duration: int) -> Recording:
+    """Walk for a duration, s, and return the readings for the estimator of a condition."""
+    scene = Scene.load(condition.scene)
+    scene = replace(scene, cycles=math.ceil(duration / scene.gait.cycle))
     floor = replace(scene.floor, film_thickness=condition.film * scene.floor.film_thickness)
     scene = replace(scene, floor=floor)
     walk = record(scene, policy, seed, 'L2', on_ground(condition, seed))
@@ -194,9 +195,11 @@ def updates(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, in
                 yield time, leg, stances[leg], ground, friction, estimators[leg]
 
 
-def measure(condition: Condition, policy: str, seed: int, cycles: int) -> dict[str, list[Sample]]:
-    """Walk once, and return the samples of each filter."""
-    walk = walked(condition, policy, seed, cycles)
+def measure(
+    condition: Condition, policy: str, seed: int, duration: int
+) -> dict[str, list[Sample]]:
+    """Walk for a duration, s, and return the samples of each filter."""
+    walk = walked(condition, policy, seed, duration)
     found: dict[str, list[Sample]] = {name: [] for name in FILTERS}
     blind = _without_measurement(walk, condition)
     for name in (LEARNS, FIXED):
@@ -388,7 +391,7 @@ def main(words: Sequence[str]) -> int:
     """Walk, print and save."""
     parser = command.parser(NAME, __doc__)
     command.add_count(parser, '--walks', 2, 'number of walks of a condition and policy')
-    command.add_count(parser, '--cycles', CYCLES, 'gait cycles of a walk')
+    command.add_count(parser, '--duration', DURATION, 'duration of a walk, s')
     parser.add_argument(
         '--only', default=[''], nargs='+', metavar='TEXT', help='conditions that begin with a text'
     )
@@ -398,7 +401,7 @@ def main(words: Sequence[str]) -> int:
     chosen = [each for each in CONDITIONS if each.name.startswith(tuple(options.only))]
     seeds = range(FIRST_SEED, FIRST_SEED + options.walks)
     cases = [
-        (each, policy, seed, options.cycles)
+        (each, policy, seed, options.duration)
         for each in chosen for policy in each.policies for seed in seeds
     ]  # fmt: skip
     parts = command.in_processes(measure, cases, options.processes, NAME)
@@ -407,7 +410,7 @@ def main(words: Sequence[str]) -> int:
         mine = [part for case, part in zip(cases, parts, strict=True) if case[0] is each]
         rows += rows_of(each, mine)
     document = {
-        'cycles': options.cycles,
+        'duration_s': options.duration,
         'seeds': list(seeds),
         'rows': [asdict(row) for row in rows],
     }

@@ -54,7 +54,7 @@ def test_rows_count_time_and_stances():
 def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
     """Wet friction halved is half of 0.12, and the friction that is configured is the file's."""
     ground = Condition('', wet=0.5, spread=0.0, stiffness=2.0, load=2.0)
-    walk = priors.walked(ground, 'flat', 50, cycles=2)
+    walk = priors.walked(ground, 'flat', 50, duration=2)
     light = (walk.load > 2.0) & walk.wet
     assert light.sum() > 100
     assert np.median(walk.grip[light] / walk.load[light]) == pytest.approx(0.06, abs=1e-6)
@@ -65,7 +65,7 @@ def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
 
 
 def test_a_short_study_writes_its_figures(tmp_path, capsys):
-    words = ['--walks', '1', '--cycles', '2', '--only', 'wet 2', '--processes', '1']
+    words = ['--walks', '1', '--duration', '2', '--only', 'wet 2', '--processes', '1']
     assert priors.main([*words, '--out', str(tmp_path)]) == 0
     document = json.loads((tmp_path / 'priors.json').read_text())
     assert document['seeds'] == [50] and document['machine']
