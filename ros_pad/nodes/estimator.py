@@ -201,6 +201,8 @@ class EstimatorNode(Node):
         Publishers and subscriptions.
     """
 
+    _learnt = ''  # until the parameters are declared
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(
             'estimator', automatically_declare_parameters_from_overrides=True, **kwargs
@@ -208,7 +210,7 @@ class EstimatorNode(Node):
         self._begin_with_learnt()
         values = declare(self, PARAMETERS)
         self._foot: Foot = values['foot']
-        self._learnt: str = values['learnt']
+        self._learnt = values['learnt']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.emissions = 0
         self.messages = Messages(self)
