@@ -34,7 +34,9 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import is_bench
 from ros_pad.trials import Trial
 from ros_pad.trials import label as labels
+from ros_pad.trials import learnt
 from ros_pad.trials import loop
+from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines
 
@@ -46,6 +48,7 @@ _ONLY_WALKS = {
     'seed': (0, 'in which nothing is random'),
     'fidelity': ('auto', 'which is calculated, not simulated'),
     'sensing': ('markers', 'in which nothing is estimated'),
+    'learnt': (None, 'in which nothing is estimated'),
     'no_compare': (False, 'which has no policies to compare'),
     'live': (False, 'which has no nodes'),
 }
@@ -87,6 +90,12 @@ def add(commands: Commands) -> None:
         'forces in the axes of the feet, as robots have them; joints needs L2',
     )
     part.add_argument(
+        '--learnt',
+        type=pathlib.Path,
+        metavar='FILE',
+        help='begin with what feet have learnt of friction: learnt.yaml of an earlier trial',
+    )
+    part.add_argument(
         '--no-ros', action='store_true', help='walk without nodes and bag; much faster'
     )
     part.add_argument(
@@ -122,6 +131,11 @@ def run(options: argparse.Namespace) -> int:
         scene = dataclasses.replace(scene, cycles=options.cycles)
     if options.foot is not None:
         scene = _on_foot(scene, Foot.load(options.foot))
+    options.tuning = tuning_for(scene, options.sensing)
+    if options.learnt is not None:
+        known = learnt.load(options.learnt, scene.foot.source)
+        changes = {name.replace('.', '_'): value for name, value in known.items()}
+        options.tuning = dataclasses.replace(options.tuning, **changes)
     if not 0 <= options.seed < 2**31:
         raise InvalidInput(
             f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
@@ -191,7 +205,7 @@ def _run_beside(
     given = scene, policy, options.seed, level
     if bag is None:
         with bar(f'{policy}, without ROS', scene.duration) as progress:
-            trial = loop.run(*given, progress, sensing=options.sensing)
+            trial = loop.run(*given, progress, options.tuning, sensing=options.sensing)
     else:
         trial = _walk_on_nodes(given, bag, options)
     assert trial.metrics is not None
@@ -201,6 +215,7 @@ def _run_beside(
             f' pads vented, bag closed: {bag}',
             INTERRUPTED,
         )
+    learnt.save(folder / learnt.FILE, trial.settings['learnt'], scene.foot)
     trial.settings['comparison'] = [
         {'policy': other, **metrics.as_dict()} for other, metrics in others.metrics(bar).items()
     ]
@@ -246,7 +261,9 @@ def _walk_on_nodes(
         contextlib.nullcontext() if options.live else alone(),
         bar(f'{policy}, on ROS 2 nodes', scene.duration) as progress,
     ):
-        return composed.run(*given, bag=bag, progress=progress, sensing=options.sensing)
+        return composed.run(
+            *given, bag=bag, progress=progress, sensing=options.sensing, tuning=options.tuning
+        )
 
 
 @contextlib.contextmanager
@@ -280,6 +297,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,
         'report': str(page),
+        'learnt': trial.settings['learnt'],
         'omitted': trial.settings['omitted'],
         'taken': trial.settings['taken'],
         'comparison': trial.settings['comparison'],

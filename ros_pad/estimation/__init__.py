@@ -6,6 +6,7 @@ from ros_pad.estimation.doubt import OF_THE_GROUND
 from ros_pad.estimation.foot import ContactMotion
 from ros_pad.estimation.foot import Estimate
 from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation.foot import estimators_of
 from ros_pad.estimation.sensing import SENSOR_FAULTS
 from ros_pad.estimation.sensing import sensor_fault
 from ros_pad.estimation.tuning import SETTINGS
@@ -21,5 +22,6 @@ __all__ = [
     'Estimate',
     'FootEstimator',
     'Tuning',
+    'estimators_of',
     'sensor_fault',
 ]

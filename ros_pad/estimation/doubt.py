@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 
 CONCLUSIVE = 1.0
 """Change of the log odds of wet ground, up or down, above which a stance is conclusive."""

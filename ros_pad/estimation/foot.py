@@ -15,7 +15,6 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
-from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
 from ros_pad.estimation.parts import History
@@ -24,6 +23,8 @@ from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Path
 from ros_pad.estimation.parts import Stance
 from ros_pad.estimation.parts import Window
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
@@ -156,11 +157,16 @@ class FootEstimator:
         Normal force in stance, N, above 0.
     tuning : Tuning
         Settings for sensors and ground.
+    shared : FrictionScales or None
+        What this foot learns of friction together with others, see :func:`estimators_of`; None:
+        it learns alone.
 
     Attributes
     ----------
     estimate : Estimate
         Estimate after the last sample.
+    ground : GroundFilter
+        Posterior of wet ground and friction.
 
     Raises
     ------
@@ -168,7 +174,13 @@ class FootEstimator:
         When the expected load is not a number above 0.
     """
 
-    def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
+    def __init__(
+        self,
+        foot: Foot,
+        expected_load: float,
+        tuning: Tuning | None = None,
+        shared: FrictionScales | None = None,
+    ) -> None:
         expected_load = number('expected_load', expected_load, 'N', above=True)
         self.tuning = tuning = tuning or Tuning()
         self._foot = foot
@@ -192,12 +204,11 @@ class FootEstimator:
             BODY_CORRELATION if self._joints else tuning.smoothing,
             threshold=tuning.alarm_threshold,
         )
-        self._ground = GroundFilter(
-            FrictionPrior.of(foot, expected_load),
+        self.ground = GroundFilter(
+            shared or shared_friction(foot, expected_load, tuning),
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
             rim_speed=tuning.rim_speed(foot),
-            model_error=tuning.ratio_noise,
         )
         # An estimated position never stops, and its noise is not that of a marker.
         marker_noise = 0.0 if self._joints else tuning.position_noise
@@ -211,11 +222,11 @@ class FootEstimator:
         self._history = History(HINDSIGHT)
         self._time = -math.inf
         self._height = math.inf  # height of the marker in the last stance, m; infinite if unknown
-        mean, sd = self._ground.friction
-        self._quantile = self._ground.quantile(MARGIN_SHARE)
+        mean, sd = self.ground.friction
+        self._quantile = self.ground.quantile(MARGIN_SHARE)
         self.estimate = Estimate(
             self._time, False, False, (0.0, 0.0), 0.0, self._speed_noise,
-            self._ground.wet_probability, mean, sd, self._quantile, True, NOT_YET, True,
+            self.ground.wet_probability, mean, sd, self._quantile, True, NOT_YET, True,
         )  # fmt: skip
 
     def update(
@@ -358,11 +369,11 @@ class FootEstimator:
         self._alarm.reset()
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
-        self._ground.touch_down(
-            self._path.touch_down(time, x, y), self._stance.dome_share > doubt.DOMED
+        self.ground.touch_down(
+            self._path.touch_down(time, x, y), self._stance.dome_share > doubt.DOMED, time
         )
-        self._history.add(time, self._ground.posterior)
-        self._quantile = self._ground.quantile(MARGIN_SHARE)
+        self._history.add(time, self.ground.posterior)
+        self._quantile = self.ground.quantile(MARGIN_SHARE)
         self._window.begin(time, first=True)
 
     def _stand(
@@ -391,10 +402,10 @@ class FootEstimator:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
             window.begin(time, first=False)
-            friction_mean, friction_sd = self._ground.friction
-            wet = self._ground.wet_probability
-            self._quantile = self._ground.quantile(MARGIN_SHARE)
-            self._history.add(time, self._ground.posterior)
+            friction_mean, friction_sd = self.ground.friction
+            wet = self.ground.wet_probability
+            self._quantile = self.ground.quantile(MARGIN_SHARE)
+            self._history.add(time, self.ground.posterior)
             reason = self._doubt(friction_mean, friction_sd)
         else:
             friction_mean, friction_sd = last.friction_mean, last.friction_sd
@@ -431,7 +442,7 @@ class FootEstimator:
 
     def _without_sensors(self, time: float, dt: float, x: float, y: float, fault: str) -> Estimate:
         """Return the estimate while sensors are faulty: undo the samples since then, and fade."""
-        last, ground = self.estimate, self._ground
+        last, ground = self.estimate, self.ground
         self._gate.standing = False
         posterior = self._history.undo(self._sensing.since)
         if posterior is not None:
@@ -459,11 +470,11 @@ class FootEstimator:
         stance = self._stance
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
         if (before > doubt.DOMED) != (stance.dome_share > doubt.DOMED):
-            self._ground.touch_down(0.0, stance.dome_share > doubt.DOMED)
+            self.ground.touch_down(0.0, stance.dome_share > doubt.DOMED, self._time)
             stance.forget_counted()
 
     def _doubt(self, friction_mean: float, friction_sd: float) -> str:
-        ground, stance = self._ground, self._stance
+        ground, stance = self.ground, self._stance
         evidence = doubt.StanceEvidence(
             stance.dome_share, ground.log_odds, stance.peak_load, stance.peak_ratio,
             stance.peak_turning, ground.wet_probability, friction_mean, friction_sd,
@@ -494,7 +505,7 @@ class FootEstimator:
         )
         if self._joints:  # the error of the body's velocity is the same in the whole window
             speed_noise = window.noise / window.count
-        self._ground.update(
+        self.ground.update(
             ratio, noise, window.speed / window.count, speed_noise, duration,
             stance.weight(ratio, noise, *self._place), turning_known,
             self._scales(load),
@@ -507,10 +518,25 @@ class FootEstimator:
         """
         if self._stance.dome_share > doubt.DOMED:
             return 1.0, 1.0
-        kernel, prior = self._foot.resistance_of, self._ground.prior
+        kernel, prior = self._foot.resistance_of, self.ground.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
         return dry / prior.flat_dry, wet / prior.flat_wet
+
+
+def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:
+    """Return what feet of one robot share of friction, before a walk."""
+    prior = FrictionPrior.of(foot, expected_load)
+    return FrictionScales(prior, tuning.scales, tuning.learn_friction)
+
+
+def estimators_of(
+    count: int, foot: Foot, expected_load: float, tuning: Tuning
+) -> tuple[list[FootEstimator], FrictionScales]:
+    """Return the estimators of all feet of a robot, and what they share of friction."""
+    expected_load = number('expected_load', expected_load, 'N', above=True)
+    shared = shared_friction(foot, expected_load, tuning)
+    return [FootEstimator(foot, expected_load, tuning, shared) for _ in range(count)], shared
 
 
 def _check_motion(time: float, motion: ContactMotion) -> None:

@@ -6,25 +6,26 @@ at T/N shows only that friction is larger (censored evidence). A foot that slips
 itself, less the part that turning uses. Whether a foot sticks is uncertain, so the likelihood of
 each sample is a mixture of stick and slip, weighted by the slip speed. Ground changes with the
 distance that the foot steps or slides, not with time: the estimate of a foot that stands still
-does not fade.
+does not fade. What is expected of new ground is learnt by all feet together, see
+:mod:`ros_pad.estimation.scales`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 from scipy import special
 
-from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import expected_friction
+from ros_pad.estimation.scales import EDGES
+from ros_pad.estimation.scales import GRID
+from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
-GRID = np.linspace(0.01, 1.59, 80)
 _SQUARES = GRID * GRID
-_UPPER_EDGES = GRID + 0.5 * (GRID[1] - GRID[0])
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
 _ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
@@ -45,44 +46,15 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
-MODEL_SHARE = 0.05
-"""Relative error of friction measured in slip, mean over a walk: a window may contain some stick,
-and feet turn more or less than assumed."""
+SLOWEST = 0.1
+"""Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
+only by the speed at which they turn, which is not known and the same all through a stance."""
 
-
-@dataclass(frozen=True)
-class FrictionPrior:
-    """Expected friction of a foot before it is measured, for each ground and morphology.
-
-    Attributes
-    ----------
-    flat_dry, flat_wet, dome : float
-        Expected coefficients of friction. One is enough for a dome, whose friction is about the
-        same on wet and dry ground.
-    spread : float
-        Relative standard deviation of each coefficient.
-    """
-
-    flat_dry: float
-    flat_wet: float
-    dome: float
-    spread: float = 0.2
-
-    @classmethod
-    def of(cls, foot: Foot, load: float, spread: float = 0.2) -> FrictionPrior:
-        """Return the friction that the contact model predicts for a foot at a load, N."""
-        return cls(*expected_friction(foot, load), spread=spread)
-
-    def table(self, dome: bool) -> np.ndarray:
-        """Return the probabilities on :data:`GRID` for dry and wet ground, shape (2, grid)."""
-        means = (self.dome, self.dome) if dome else (self.flat_dry, self.flat_wet)
-        rows = []
-        for mean in means:
-            spread = self.spread * mean + 0.03
-            # Heavy tails: unexpected ground stays possible, and wet or dry never become certain.
-            row = np.exp(-0.5 * ((GRID - mean) / spread) ** 2) / spread + 0.01
-            rows.append(row / row.sum())
-        return np.array(rows)
+MODEL_ERROR = 0.01
+MODEL_SQUARE = 0.11
+"""Error of friction measured in slip, mean over a walk: the first, and the second times the square
+of friction. A window may contain some stick, and feet turn more or less than assumed; the more
+they hold, the slower they slip, and the more turning hides."""
 
 
 class GroundFilter:
@@ -90,8 +62,8 @@ class GroundFilter:
 
     Parameters
     ----------
-    prior : FrictionPrior
-        Expected friction.
+    shared : FrictionScales
+        Expected friction, which the foot learns together with others.
     wet_prior : float
         Prior probability of wet ground, in (0, 1).
     patch_length : float
@@ -107,12 +79,13 @@ class GroundFilter:
         and Cutkosky 1996); s is not measured.
     model_error : float
         Standard deviation of T/N as a measure of friction, > 0, in addition to
-        :data:`MODEL_SHARE` of T/N. It is the same in every sample: averaging does not reduce it.
+        :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
+        reduce it.
 
     Attributes
     ----------
     prior : FrictionPrior
-        Expected friction, as given.
+        Friction by the contact model.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -124,40 +97,69 @@ class GroundFilter:
 
     def __init__(
         self,
-        prior: FrictionPrior,
+        shared: FrictionScales,
         wet_prior: float = Tuning.wet_prior,
         patch_length: float = Tuning.patch_length,
         forgetting_time: float = 1.0,
         temper: float = 0.5,
         rim_speed: float = 0.0,
-        model_error: float = Tuning.ratio_noise,
+        model_error: float = MODEL_ERROR,
     ) -> None:
-        self.prior = prior
-        self._tables = {dome: prior.table(dome) for dome in (False, True)}
+        self.prior = shared.prior
+        self._shared, self._foot = shared, shared.join()
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
-        self._flat_prior = self._grounds * self._tables[False]
         self._patch_length = patch_length
         self._forgetting_time = forgetting_time
         self._temper = temper
+        self._rim_speed = rim_speed
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(model_error, MODEL_SHARE * GRID)
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2)
+        error = np.hypot(model_error, MODEL_SQUARE * _SQUARES)
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         self._blur = blur / blur.sum(axis=0)
+        self._cumulated = np.zeros((2, len(EDGES)))
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
+        self._way = 0.0  # of the foot so far, m
+        self._counted = {False: -math.inf, True: -math.inf}  # way at the last evidence, by shape
+        self._expect(0.0)
+        self._posterior: np.ndarray = self._flat_prior
+        self.wet_probability = wet_prior
         self._normalise(self._flat_prior)
+        self._begin()
 
-    def touch_down(self, distance: float, dome: bool) -> None:
-        """Begin a stance at a distance, m, from the last one, as a dome or flat."""
+    def _expect(self, time: float) -> None:
+        """Expect what the feet have learnt up to a time, s."""
+        expected = self._shared.expected(time)
+        self._flat_prior = self._grounds * expected[:2]
+        self._priors = {False: expected[:2], True: expected[2:]}
+
+    def _begin(self) -> None:
+        """Begin to note what is felt."""
+        self._felt = np.zeros_like(self._posterior)
+        self._has_felt = False
+        self._wet_before = self.wet_probability
+
+    def touch_down(self, distance: float, dome: bool, time: float = 0.0) -> None:
+        """Begin a stance at a distance, m, from the last one, as a dome or flat, at a time, s."""
+        if self._has_felt:
+            # Stances on the same patch are no new evidence of what all patches have in common.
+            way = self._way - self._counted[self._dome]
+            self._counted[self._dome] = self._way
+            weight = -math.expm1(-way / self._patch_length)
+            self._shared.add(
+                Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
+            )
+        self._expect(time)
         if dome != self._dome:
             # The friction of one morphology gives no evidence of the friction of the other: keep
             # only the probability of wet ground.
             self._dome = dome
-            self._posterior = self._wet_or_dry() * self._tables[dome]
+            self._posterior = self._wet_or_dry() * self._priors[dome]
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
+        self._begin()
 
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
@@ -173,6 +175,7 @@ class GroundFilter:
     def posterior(self, posterior: Posterior) -> None:
         grid, self._dome = posterior
         self._normalise(grid)
+        self._begin()
 
     def update(
         self,
@@ -224,7 +227,12 @@ class GroundFilter:
             unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
             likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
-        self._posterior = self._posterior * (likelihood + 1e-6) ** (weight * self._temper)
+        shown = 1.0
+        if slip > 0.0 and not turning_known and self._rim_speed > 0.0:
+            slid = slip / (slip + stick)
+            share = speed * speed / (speed * speed + self._rim_speed**2)
+            shown -= slid * (1.0 - max(SLOWEST, share))
+        self._multiply(np.log(likelihood + 1e-6) * (weight * self._temper), shown)
         self._posterior /= self._posterior.sum()
         dry, wet = self._posterior.dot(_ONES).tolist()
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
@@ -234,20 +242,42 @@ class GroundFilter:
             # The film under domes drains during a stance, so friction rises on the same ground.
             keep = math.exp(-dt / self._forgetting_time)
             self._posterior = keep * self._posterior + (1.0 - keep) * (
-                self._wet_or_dry() * self._tables[True]
+                self._wet_or_dry() * self._priors[True]
             )
+            self._felt *= keep
         self._normalise(self._posterior)
+
+    def _multiply(self, evidence: np.ndarray, shown: float) -> None:
+        """Multiply by a likelihood, given as logarithm; a share of it shows friction.
+
+        The rest shows only whether the ground is wet, or nothing under a dome.
+        """
+        if self._dome:
+            grounds = self._posterior.dot(_ONES)
+        elif shown < 1.0:
+            grounds = (self._posterior * np.exp(evidence)).dot(_ONES)
+        evidence *= shown
+        after = self._posterior * np.exp(evidence)
+        if self._dome or shown < 1.0:
+            rest = (grounds / after.dot(_ONES))[:, None]
+            after *= rest
+            if not self._dome:
+                evidence += np.log(rest)
+        self._felt += evidence
+        self._has_felt = True
+        self._posterior = after
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
+        self._way += distance
         stay = math.exp(-distance / self._patch_length)
         if self._dome:
-            # Under domes wet and dry ground have the same friction: when friction fades, the
-            # probability of wet ground must not change.
-            grounds = stay * self._wet_or_dry() + (1.0 - stay) * self._grounds
-            friction = self._posterior[0] + self._posterior[1]
-            table = self._tables[True][0]
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * table)
+            # Under domes the ground is unobservable: when friction fades, the probability of wet
+            # ground must not change.
+            before = self._wet_or_dry()
+            grounds = stay * before + (1.0 - stay) * self._grounds
+            friction = self._posterior / before
+            self._posterior = grounds * (stay * friction + (1.0 - stay) * self._priors[True])
         else:
             self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
 
@@ -276,8 +306,14 @@ class GroundFilter:
 
         The share is from 0 to 1; the coefficient is that at the load of the last sample.
         """
+        return float(self.quantiles([share])[0])
+
+    def quantiles(self, shares: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return the same for several shares."""
         dry, wet = self.scales
-        edges = dry * _UPPER_EDGES
-        on_dry, on_wet = np.add.accumulate(self._blurred, axis=1)
-        below = on_dry + np.interp(edges, wet * _UPPER_EDGES, on_wet, left=0.0)
-        return float(np.interp(share, below, edges))
+        edges = dry * EDGES
+        on_dry, on_wet = self._cumulated
+        np.add.accumulate(self._blurred, axis=1, out=self._cumulated[:, 1:])
+        below = on_dry + np.interp(edges, wet * EDGES, on_wet)
+        found: np.ndarray = np.interp(np.asarray(shares), below, edges)
+        return found

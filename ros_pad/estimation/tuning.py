@@ -9,6 +9,10 @@ from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.alarm import THRESHOLD
 from ros_pad.estimation.load_gate import CONTACT_SHARE
+from ros_pad.estimation.scales import CLASSES
+from ros_pad.estimation.scales import SCALE_RANGE
+from ros_pad.estimation.scales import SCALE_SD
+from ros_pad.estimation.scales import Scale
 
 EXPECTED_LOAD = Setting(
     'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',
@@ -82,6 +86,26 @@ SETTINGS = (
         'With source joints: whether pads that shear move the link above them, as on a robot; the'
         ' joints of simulated robots are those of rigid feet.',
     ),
+    Setting(
+        'learn_friction', True,
+        'Whether the feet learn how much the friction of their floor differs from the contact'
+        ' model.',
+    ),
+    *(
+        Setting(
+            f'scale.{name}', 1.0,
+            f'Expected friction over that of the contact model, {name.replace("_", " and ")}.',
+            '', *SCALE_RANGE,
+        )
+        for name in CLASSES
+    ),
+    *(
+        Setting(
+            f'scale_sd.{name}', SCALE_SD,
+            f'Standard deviation of the logarithm of scale.{name}.', '', 0.01, 1.0,
+        )
+        for name in CLASSES
+    ),
 )  # fmt: skip
 """Settings of an estimator; an attribute of :class:`Tuning` has ``_`` in place of a dot."""
 
@@ -120,10 +144,25 @@ class Tuning:
     alarm_threshold: float = _DEFAULTS['alarm.threshold']
     source: str = _DEFAULTS['source']
     pads_shear: bool = _DEFAULTS['pads_shear']
+    learn_friction: bool = _DEFAULTS['learn_friction']
+    scale_flat_dry: float = _DEFAULTS['scale.flat_dry']
+    scale_flat_wet: float = _DEFAULTS['scale.flat_wet']
+    scale_dome: float = _DEFAULTS['scale.dome']
+    scale_sd_flat_dry: float = _DEFAULTS['scale_sd.flat_dry']
+    scale_sd_flat_wet: float = _DEFAULTS['scale_sd.flat_wet']
+    scale_sd_dome: float = _DEFAULTS['scale_sd.dome']
 
     def __post_init__(self) -> None:
         for setting in SETTINGS:
             setting.accept(getattr(self, attribute(setting)))
+
+    @property
+    def scales(self) -> dict[str, Scale]:
+        """What is known of the scales of friction before a walk, by class."""
+        return {
+            name: Scale(getattr(self, f'scale_{name}'), getattr(self, f'scale_sd_{name}'))
+            for name in CLASSES
+        }
 
     def rim_speed(self, foot: Foot) -> float:
         """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius, m/s."""

@@ -31,6 +31,7 @@ from ros_pad.bags import annotate
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
 from ros_pad.estimation import SETTINGS
+from ros_pad.estimation import Tuning
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
@@ -53,6 +54,7 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.label import label
+from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
@@ -83,6 +85,8 @@ class ComposedTrial:
         ``auto`` or a fidelity level.
     sensing : str
         ``markers`` or ``joints``.
+    tuning : Tuning or None
+        Tuning of the estimators; None takes that for the scene's sensors.
 
     Attributes
     ----------
@@ -112,6 +116,7 @@ class ComposedTrial:
         context: rclpy.Context,
         fidelity: str = 'auto',
         sensing: str = 'markers',
+        tuning: Tuning | None = None,
     ) -> None:
         self.scene = scene
         self.stopped = False
@@ -121,7 +126,8 @@ class ComposedTrial:
         self._nodes: list[Node] = []
         self._pace = Pace(CONTROL_PERIOD_NS)
         try:
-            self._add_nodes(policy, seed, bag, fidelity, sensing)
+            tuning = tuning or tuning_for(scene, sensing)
+            self._add_nodes(policy, seed, bag, fidelity, sensing, tuning)
             parameters = {each.get_fully_qualified_name(): values_of(each) for each in self._nodes}
             self.recorder.describe({PARAMETERS: json.dumps(parameters)})
             # The executor adds nodes only while it spins; messages that were published before
@@ -152,6 +158,7 @@ class ComposedTrial:
         bag: str | os.PathLike[str],
         fidelity: str,
         sensing: str,
+        tuning: Tuning,
     ) -> None:
         """Make the nodes: the recorder first; last the simulator, which starts the trial."""
         scene = self.scene
@@ -159,7 +166,6 @@ class ComposedTrial:
         shared = {'use_sim_time': True, 'legs': legs, 'foot': foot}
         loaded = shared | {'expected_load': scene.expected_load}
         ground = {'scene': scene.source, 'seed': seed}
-        tuning = tuning_for(scene, sensing)
 
         about = label(scene, policy, seed, fidelity, sensing=sensing)
         self.recorder = self._add(
@@ -367,10 +373,11 @@ def _walked(
     level: str,
     progress: Progress | None,
     sensing: str,
+    tuning: Tuning | None,
 ) -> tuple[ComposedTrial, float]:
     """Walk a scene and close its nodes; return them, and the wall time of the walk, s."""
     with STOP.during():  # no signal leaves half a trial
-        trial = ComposedTrial(scene, policy, seed, bag, context, level, sensing)
+        trial = ComposedTrial(scene, policy, seed, bag, context, level, sensing, tuning)
         started = time.perf_counter()
         with _interruptible(trial):
             try:
@@ -395,12 +402,13 @@ def run(
     bag: str | os.PathLike[str],
     progress: Progress | None = None,
     sensing: str = 'markers',
+    tuning: Tuning | None = None,
 ) -> Trial:
     """Run a trial on ROS 2 nodes and record it.
 
     Parameters
     ----------
-    scene, policy, seed, fidelity, progress, sensing
+    scene, policy, seed, fidelity, progress, sensing, tuning
         As for :func:`ros_pad.trials.run`.
     bag : path
         Folder of the bag; must not exist.
@@ -430,11 +438,11 @@ def run(
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}') from error
     try:
-        trial, wall = _walked(scene, policy, seed, bag, context, level, progress, sensing)
+        trial, wall = _walked(scene, policy, seed, bag, context, level, progress, sensing, tuning)
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    controller, stopped = trial.walked, trial.stopped
+    controller, stopped, shared = trial.walked, trial.stopped, trial.estimator.shared
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
@@ -443,5 +451,6 @@ def run(
     result.floor = floor
     result.metrics = summarise(scene, result, robot, controller)
     result.real_time_factor = robot.time / wall
+    result.settings['learnt'] = settings_of(shared)
     annotate(bag, describe(metrics=result.metrics, real_time_factor=result.real_time_factor))
     return result

@@ -7,6 +7,7 @@ the sensors, on ``/diagnostics``.
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Any
 
@@ -22,10 +23,12 @@ from ros_pad.bags.topics import STAMP
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import BadMessage
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
 from ros_pad.errors import UnknownEncoding
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
@@ -46,6 +49,7 @@ from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
+from ros_pad.trials import learnt
 
 PARAMETERS = (
     LEGS,
@@ -54,7 +58,15 @@ PARAMETERS = (
     AMBIENT_PRESSURE,
     *(Parameter(**vars(setting)) for setting in SETTINGS),
     Parameter(**vars(PUBLISH_RATE)),
+    Parameter(
+        'learnt', '',
+        'File in which what feet learn of friction is kept; empty: none. If it exists at the'
+        ' start, its values are those of scale and scale_sd.',
+    ),
 )  # fmt: skip
+
+KEEP_PERIOD_NS = 10_000_000_000
+"""Time between two savings of what was learnt, ns."""
 
 OLDEST = 0.1
 """Age of the last sample, s, from which the estimator counts as late."""
@@ -189,29 +201,32 @@ class EstimatorNode(Node):
         Publishers and subscriptions.
     """
 
+    _learnt = ''  # until the parameters are declared
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(
             'estimator', automatically_declare_parameters_from_overrides=True, **kwargs
         )
+        self._begin_with_learnt()
         values = declare(self, PARAMETERS)
-        foot: Foot = values['foot']
+        self._foot: Foot = values['foot']
+        self._learnt = values['learnt']
         tuning = Tuning(**{attribute(each): values[each.name] for each in SETTINGS})
         self.emissions = 0
         self.messages = Messages(self)
+        estimators, self.shared = estimators_of(
+            len(values['legs']), self._foot, values['expected_load'], tuning
+        )
+        period_ns, ambient = round(1e9 / values['publish_rate']), values['ambient_pressure']
         self.legs = {
-            leg: _LegTopics(
-                self,
-                leg,
-                FootEstimator(foot, values['expected_load'], tuning),
-                round(1e9 / values['publish_rate']),
-                values['ambient_pressure'],
-            )
-            for leg in values['legs']
+            leg: _LegTopics(self, leg, estimator, period_ns, ambient)
+            for leg, estimator in zip(values['legs'], estimators, strict=True)
         }
         if tuning.source == 'joints':
             self.messages.receive(topics.BODY_DOUBT, self._on_body_doubt, ('data',))
         self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         self._diagnostics_pace = Pace(1_000_000_000)
+        self._keep_pace = Pace(KEEP_PERIOD_NS)
         self._reported = [True] * len(self.legs)
         self._simulated: bool = self.get_parameter('use_sim_time').value
         self._since_ns, self._counted = self.messages.now_ns(), 0
@@ -219,6 +234,35 @@ class EstimatorNode(Node):
         if not self._simulated:
             self._hold(round(1e9 / values['publish_rate']))
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+
+    def _begin_with_learnt(self) -> None:
+        """Declare what was learnt in earlier trials, if there is a file of it."""
+
+        def given(name: str, default: str) -> str:
+            return str(self.get_parameter(name).value if self.has_parameter(name) else default)
+
+        path = given('learnt', '')
+        if not path or not os.path.exists(path):
+            return
+        known = learnt.load(path, given('foot', FOOT.default))
+        for name, value in known.items():
+            if self.has_parameter(name):
+                self.undeclare_parameter(name)
+            self.declare_parameter(name, value, ignore_override=True)
+
+    def keep_learnt(self) -> None:
+        """Write what feet have learnt of friction, if there is a file for it."""
+        if not self._learnt:
+            return
+        try:
+            learnt.save(self._learnt, learnt.settings_of(self.shared), self._foot)
+        except PadError as error:
+            self.get_logger().warning(f'parameter learnt: {error}', throttle_duration_sec=60.0)
+
+    def destroy_node(self) -> None:
+        """Write what was learnt, and destroy the node."""
+        self.keep_learnt()
+        super().destroy_node()
 
     def _on_body_doubt(self, doubt: str) -> None:
         for leg in self.legs.values():
@@ -249,15 +293,33 @@ class EstimatorNode(Node):
             return
         for leg in self.legs.values():
             leg.stage.tick(now_ns)
+        if self._keep_pace.due(now_ns):
+            self.keep_learnt()
         sound = [leg.stage.sound for leg in self.legs.values()]
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=[leg.status() for leg in self.legs.values()])
+            array.status.append(self._learnt_status())
             array.status.extend(self.messages.refusals.statuses())
             if not self._simulated:
                 array.status.append(self._rate(now_ns))
             set_stamp(array.header.stamp, now_ns)
             self._diagnostics(array)
+
+    def _learnt_status(self) -> DiagnosticStatus:
+        """Return the scales of friction with their intervals, for ``/diagnostics``."""
+        values = []
+        for name, scale in self.shared.scales.items():
+            low, high = scale.interval
+            text = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
+            values.append(KeyValue(key=name, value=text))
+        return DiagnosticStatus(
+            name=f'{self.get_name()}: friction of the floor',
+            hardware_id='feet',
+            level=DiagnosticStatus.OK,
+            message='friction over that of the contact model, with the interval of 95 %',
+            values=values,
+        )
 
     def _rate(self, now_ns: int) -> DiagnosticStatus:
         """Return rate and age of the samples, for ``/diagnostics``."""

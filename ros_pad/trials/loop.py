@@ -23,6 +23,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
@@ -49,6 +50,7 @@ from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
 from ros_pad.simulation.terms import with_terms
+from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.node_settings import body_settings_for
 from ros_pad.trials.node_settings import tuning_for
@@ -224,6 +226,8 @@ class ClosedLoop:
         None with markers.
     estimators : list of FootEstimator
         One for each leg; see :meth:`connect`.
+    shared : FrictionScales
+        What they share of friction.
     controller : MorphologyController
     legs : list of LegStages
     pads : list of float
@@ -261,7 +265,9 @@ class ClosedLoop:
         if sensing == 'joints':
             assert isinstance(self.robot, FullRobot)
             self.body = BodySensing(scene, seed, self.robot, self._doubt_body)
-        estimators = [FootEstimator(scene.foot, scene.expected_load, tuning) for _ in scene.legs]
+        estimators, self.shared = estimators_of(
+            len(scene.legs), scene.foot, scene.expected_load, tuning
+        )
         controller = MorphologyController(
             scene.foot,
             scene.legs,
@@ -439,4 +445,6 @@ def run(
     finally:
         loop.close()
     wall = time.perf_counter() - started
-    return log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
+    trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
+    trial.settings['learnt'] = settings_of(loop.shared)
+    return trial

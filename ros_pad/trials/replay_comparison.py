@@ -29,6 +29,9 @@ from ros_pad.trials.replay_player import ReplayedLeg
 LONGER = 1.6
 """A time between two messages that is longer than their median time by this factor is a gap."""
 
+OF_FRICTION = ('wetness', 'friction', 'friction_margin', 'doubt')
+"""Kinds of topics that depend on what feet expect of friction."""
+
 EARLY_NS = 20_000_000
 """Longest time by which a text may be recorded before the estimate of the same sample, ns."""
 
@@ -53,7 +56,9 @@ def compare_topics(
         Settings of the replay.
     """
     gaps = {leg: gap[0] for leg, each in player.legs.items() if (gap := first_gap(each))}
-    # The controller's decision for one leg depends on the inputs of all legs.
+    # The controller's decision for one leg depends on the inputs of all legs, and so does friction
+    # where they learn it together.
+    together = DECISIONS + (OF_FRICTION if settings.tuning.learn_friction else ())
     of_all = min(gaps.values(), default=None)
     if absent(player, there, settings):
         of_all = -1
@@ -63,7 +68,7 @@ def compare_topics(
         for kind in ESTIMATES + DECISIONS:
             if (leg, kind) not in there:
                 continue
-            gap_ns = of_all if kind in DECISIONS else gaps.get(leg)
+            gap_ns = of_all if kind in together else gaps.get(leg)
             one, other = _matched(player, leg, kind)
             found.append(
                 compare(

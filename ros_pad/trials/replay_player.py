@@ -26,6 +26,7 @@ from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import TICK_PERIOD_NS
@@ -84,13 +85,15 @@ class ReplayedLeg:
         Number of samples that the estimation rejected, and the reason of the last one.
     """
 
-    def __init__(self, player: Player, leg: int, settings: NodeSettings) -> None:
+    def __init__(
+        self, player: Player, leg: int, settings: NodeSettings, estimator: FootEstimator
+    ) -> None:
         self._player = player
         self._ambient = settings.ambient_pressure
         self._output = {kind: player.replayed[leg, kind] for kind in ESTIMATES + DECISIONS}
         self._period_ns = round(1e9 / settings.publish_rate)
         self.estimation = EstimationStage(
-            FootEstimator(settings.foot, settings.expected_load, settings.tuning),
+            estimator,
             self._period_ns,
             self._take_estimate,
             self._take_doubt,
@@ -231,7 +234,13 @@ class Player:
         self.recorded, self.replayed = _tracks(legs), _tracks(legs)
         self.now_ns = self.log_ns = 0
         self.later: list[Callable[[], None]] = []
-        self.legs = {leg: ReplayedLeg(self, leg, settings) for leg in legs}
+        estimators, _ = estimators_of(
+            len(legs), settings.foot, settings.expected_load, settings.tuning
+        )
+        self.legs = {
+            leg: ReplayedLeg(self, leg, settings, estimator)
+            for leg, estimator in zip(legs, estimators, strict=True)
+        }
         self._tick_pace = Pace(TICK_PERIOD_NS)
         self.clocked = clocked
         self._next_tick_ns: int | None = None

@@ -33,9 +33,8 @@ from ros_pad.control import adaptive
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.footprints import Footprints
-from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation import estimators_of
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -68,7 +67,6 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
-    prior: dict[str, Any] = field(default_factory=lambda: defaults(FrictionPrior.of, 'spread'))
     ground: dict[str, Any] = field(
         default_factory=lambda: defaults(GroundFilter, 'forgetting_time', 'temper')
     )
@@ -187,7 +185,6 @@ ASSUMPTIONS = (
     Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
     Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption(FILTER + 'FrictionPrior.spread', 'prior.spread', 'spread of friction', ''),
     Assumption(FILTER + 'GroundFilter.forgetting_time',
                'ground.forgetting_time', 'forgetting time', 's'),
     Assumption(FILTER + 'GroundFilter.temper', 'ground.temper', 'temper', '', 'odds'),
@@ -288,14 +285,13 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         position_noise=configured.sensors.position,
         force_noise=configured.sensors.force,
     )
-    estimators = [FootEstimator(configured.foot, load, tuning) for _ in configured.legs]
+    estimators, shared = estimators_of(len(configured.legs), configured.foot, load, tuning)
     for estimator in estimators:
-        estimator._ground = GroundFilter(
-            FrictionPrior.of(configured.foot, load, **setup.prior),
+        estimator.ground = GroundFilter(
+            shared,
             wet_prior=tuning.wet_prior,
             patch_length=tuning.patch_length,
             rim_speed=tuning.rim_speed(configured.foot),
-            model_error=tuning.ratio_noise,
             **setup.ground,
         )
     choose = policy_named(policy, loop.floor.wet)

@@ -32,8 +32,9 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
 from studies import command
 from studies.drawing import BLACK
 from studies.drawing import BLUE
@@ -367,7 +368,7 @@ def margin(recording: Recording) -> np.ndarray:
     The slip speed is not measured: the filter gets zero with a standard deviation of 1 m/s. Each
     stance is on new ground, and T/N that does not change has no weight, as in FootEstimator.
     """
-    ground = GroundFilter(PRIOR)
+    ground = GroundFilter(FrictionScales(PRIOR, learns=False))
     noise = Tuning().ratio_noise
     window = round(Tuning().filter_period / recording.period)
     quantile = np.zeros(len(recording.label))

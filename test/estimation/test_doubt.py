@@ -14,7 +14,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation import sensor_fault
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -187,10 +187,11 @@ def test_doubts_are_where_the_errors_are():
     for seed in range(250):
         wet = random.random() < 0.5
         mean = PRIOR.flat_wet if wet else PRIOR.flat_dry
-        friction = max(0.03, random.normal(mean, PRIOR.spread * mean))
+        # Places differ by 0.14 (root mean square of the spreads), scales by the given deviation.
+        friction = mean * math.exp(random.normal(0.0, math.hypot(0.15, 0.14)))
         demand = random.exponential(0.2)
         slips = demand > friction
-        walk = Walk(seed)
+        walk = Walk(seed, scale_sd_flat_dry=0.15, scale_sd_flat_wet=0.15)
         estimate = walk.stand(min(demand, friction), random.gamma(2.0, 0.04) if slips else 0.0)
         likely = estimate.wet_probability if wet else 1.0 - estimate.wet_probability
         (doubting if estimate.doubt else knowing).append(likely)

@@ -3,6 +3,7 @@ import math
 import re
 
 import pytest
+import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import WrenchStamped
@@ -10,6 +11,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
 
+from ros_pad.errors import ConfigError
 from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.messages import Hooks
@@ -482,7 +484,10 @@ def test_in_simulated_time_no_rate_is_reported(robot, health):
     robot.start()
     robot.tick(1.0)
     robot.until(lambda: health)
-    assert {each.name for each in health} == {f'estimator: leg {leg} sensing' for leg in (1, 2)}
+    assert {each.name for each in health} == {
+        *(f'estimator: leg {leg} sensing' for leg in (1, 2)),
+        'estimator: friction of the floor',
+    }
 
 
 def test_a_moment_counts_where_there_is_one(robot):
@@ -494,3 +499,34 @@ def test_a_moment_counts_where_there_is_one(robot):
     stance(robot, ratio=0.05, speed=0.0, seconds=0.2, start=0.2)
     robot.until(lambda: robot.heard['leg_1/wetness'][-1].data < 0.2)
     assert robot.heard['leg_1/friction'][-1].data > 0.5
+
+
+def test_what_is_learnt_is_kept_and_reported(context, tmp_path):
+    """A file gives parameters at the start, before any other source, and is written at the end."""
+    path = tmp_path / 'learnt.yaml'
+    given = (
+        'flat_dry: {scale: 0.7, sd: 0.05}\nflat_wet: {scale: 1.0, sd: 0.3}\n'
+        'dome: {scale: 1.0, sd: 0.4}\n'
+    )
+    path.write_text('foot: large37\n' + given)
+
+    def made(**more):
+        values = {'legs': [1], 'scale.flat_dry': 2.0, 'learnt': str(path), **more}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        return EstimatorNode(context=context, parameter_overrides=overrides)
+
+    node = made()
+    assert node.get_parameter('scale.flat_dry').value == 0.7
+    assert node.get_parameter('scale_sd.flat_wet').value == 0.3
+    status = node._learnt_status()
+    values = {each.key: each.value for each in status.values}
+    assert values['flat_dry'] == '0.70 (0.63 to 0.77)'  # 0.7 exp(±1.96 × 0.05)
+    path.unlink()
+    node.destroy_node()
+    kept = yaml.safe_load(path.read_text())
+    assert kept['foot'] == 'large37'
+    assert kept['flat_dry']['scale'] == pytest.approx(0.7, abs=0.005)
+    assert kept['flat_dry']['sd'] == pytest.approx(0.112, abs=0.005)  # √(0.05² + 0.1²)
+    path.write_text('foot: small19\n' + given)
+    with pytest.raises(ConfigError, match="foot = 'small19' is not allowed"):
+        made()

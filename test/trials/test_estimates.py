@@ -10,6 +10,9 @@ import pytest
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from studies.work_precision.estimator.priors import Condition
+from studies.work_precision.estimator.priors import updates
+from studies.work_precision.estimator.priors import walked as walked_on
 
 PERIOD = 0.004  # s
 LATE = 15  # samples after a slip in which an alarm still counts for the slip
@@ -103,17 +106,17 @@ def test_wet_and_dry_are_distinguished_at_the_end_of_a_flat_stance(walks):
     assert np.mean(right) >= 0.97
 
 
-def test_the_true_friction_is_within_two_sigma_nine_times_in_ten(walks):
-    """It is so at most 99 times in a hundred: else the standard deviation is too large."""
-    covered, below, spread = [], [], []
-    for walk in walks:
-        use = (walk['fresh'] > 0.0) & (walk['standing'] > 0.0) & np.isfinite(walk['grip'])
-        covered.append(np.abs(walk['grip'] - walk['mean'])[use] <= 2.0 * walk['sd'][use])
-        below.append((walk['grip'] < walk['quantile'])[use])
-        spread.append(walk['sd'][use])
-    covered, below, spread = map(np.concatenate, (covered, below, spread))
-    assert len(covered) > 5000
-    assert 0.90 <= np.mean(covered) <= 0.99
-    assert all(np.mean(part) > 0.85 for part in np.array_split(covered, len(WALKS)))
-    assert np.mean(below) < 0.05
-    assert np.mean(spread) < 0.1
+def test_the_true_friction_is_where_it_is_expected_on_floors_that_the_foot_file_does_not_have():
+    """Friction differs from the file by a factor, and by 10 % from place to place. After half a
+    minute the interval of 95 % holds it so often, and a margin errs in one case of twenty."""
+    walk = walked_on(Condition('', dry=1.0 / 1.4, wet=1.4), 'flat', 60, duration=60)
+    seen = [
+        (*estimator.ground.quantiles([0.025, 0.05, 0.975]), friction)
+        for time, *_, friction, estimator in updates(walk, learns=True)
+        if time > 30.0
+    ]
+    low, least, high, true = np.array(seen).T
+    assert len(true) > 1500
+    assert 0.90 <= np.mean((low <= true) & (true <= high)) <= 0.98
+    assert 0.02 <= np.mean(true < least) <= 0.09
+    assert np.mean(high - low) < 0.5

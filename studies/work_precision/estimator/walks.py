@@ -16,7 +16,7 @@ import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.foot import Tuning
-from ros_pad.estimation.friction import FrictionPrior
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
@@ -115,9 +115,20 @@ class _NoLog:
         pass
 
 
-def record(scene: Scene, policy: str, seed: int, level: str) -> Recording:
-    """Walk once in closed loop, and return readings and truth, up to a verdict if there is one."""
+def record(
+    scene: Scene,
+    policy: str,
+    seed: int,
+    level: str,
+    prepare: Callable[[ClosedLoop], None] | None = None,
+) -> Recording:
+    """Walk once in closed loop, and return readings and truth, up to a verdict if there is one.
+
+    ``prepare`` is called with the loop before the walk.
+    """
     loop = ClosedLoop(scene, policy, seed, level)
+    if prepare:
+        prepare(loop)
     tap = _SensorTap(loop)
     loop.sensors = tap  # type: ignore[assignment]
     log: Any = _NoLog()

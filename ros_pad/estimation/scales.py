@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all feet of a robot share about friction, learnt over a walk.
+
+The contact model expects a coefficient of friction for each class: flat on dry ground, flat on wet
+ground, dome. On the floor at hand each is wrong by a *scale*, which all feet share, and differs
+from place to place by a *spread*: ln μ = ln(expected) + ln(scale) + N(0, spread). Scale and spread
+of a class have a posterior on a grid. After each stance it is multiplied by the probability of
+what the foot felt, whatever its friction was, and the friction that the feet expect of their next
+stances is the mean over the posterior (a hierarchical prior).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special
+
+from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import expected_friction
+
+EDGES = np.geomspace(0.025, 2.5, 97)
+GRID = np.sqrt(EDGES[:-1] * EDGES[1:])
+"""Coefficients of friction, each for a cell between two of :data:`EDGES`, 5 % wide."""
+
+CLASSES = ('flat_dry', 'flat_wet', 'dome')
+"""Classes of friction; that of a dome is about the same on dry and wet ground."""
+
+LOG_SCALES = np.linspace(-1.2, 1.2, 49)
+SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
+"""Grid of ln(scale), and of spreads, which are equally likely before a walk."""
+
+SCALE_SD = 0.4
+"""Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
+
+SCALE_RANGE = 0.3, 3.4
+"""Range of a scale that may be expected: that of the grid."""
+
+NEXT_FLOOR = 0.1
+"""Standard deviation of ln(scale) from one floor to the next, for what is kept for later walks."""
+
+TAIL = 0.01
+"""Probability of friction of another origin, equal for all cells: unexpected ground stays
+possible, and wet or dry never become certain."""
+
+UNDRAINED = 0.3
+"""Share of a stance on wet ground in which the film under a dome has not drained: friction is then
+anywhere between that of a flat sole and that of a dome."""
+
+PERIOD = 0.5
+"""Time between updates, s. All stances that begin in a period expect the same friction, so that
+results do not depend on which of two feet is heard first."""
+
+DELAY = 0.1
+"""Least time between the end of a stance and the update that uses it, s."""
+
+
+@dataclass(frozen=True)
+class FrictionPrior:
+    """Friction of a foot by the contact model, for each ground and morphology.
+
+    Attributes
+    ----------
+    flat_dry, flat_wet, dome : float
+        Coefficients of friction.
+    """
+
+    flat_dry: float
+    flat_wet: float
+    dome: float
+
+    @classmethod
+    def of(cls, foot: Foot, load: float) -> FrictionPrior:
+        """Return the friction that the contact model predicts for a foot at a load, N."""
+        return cls(*expected_friction(foot, load))
+
+
+class Scale(NamedTuple):
+    """Friction of a class over that of the contact model.
+
+    Attributes
+    ----------
+    scale : float
+        The factor, at the mean of its logarithm.
+    sd : float
+        Standard deviation of ln(scale).
+    """
+
+    scale: float = 1.0
+    sd: float = SCALE_SD
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval that holds the scale with a probability of 0.95."""
+        return self.scale * math.exp(-1.96 * self.sd), self.scale * math.exp(1.96 * self.sd)
+
+
+class Felt(NamedTuple):
+    """What a foot felt in a stance.
+
+    Attributes
+    ----------
+    time : float
+        Time at which the next stance began, s.
+    foot : int
+        Number of the foot, see :meth:`FrictionScales.join`.
+    dome : bool
+        Whether the foot was a dome.
+    wet : float
+        Probability of wet ground before the stance.
+    likelihood : array (2, grid)
+        Logarithm of the likelihood of friction on dry and on wet ground.
+    weight : float
+        Share of the stance that is new evidence, 0 to 1.
+    """
+
+    time: float
+    foot: int
+    dome: bool
+    wet: float
+    likelihood: np.ndarray
+    weight: float
+
+
+class FrictionScales:
+    """Posterior of scale and spread of each class of friction, shared by the feet of a robot.
+
+    Parameters
+    ----------
+    prior : FrictionPrior
+        Friction by the contact model.
+    scales : mapping
+        What is known of scales before the walk: a :class:`Scale` by class; a class that is left
+        out has the default.
+    learns : bool
+        Whether anything is learnt.
+
+    Attributes
+    ----------
+    prior : FrictionPrior
+        As given.
+    """
+
+    def __init__(
+        self,
+        prior: FrictionPrior,
+        scales: Mapping[str, Scale] | None = None,
+        learns: bool = True,
+    ) -> None:
+        self.prior = prior
+        self._learns = learns
+        self._feet = 0
+        rows, tables = [], []
+        for name in CLASSES:
+            scale, sd = (scales or {}).get(name, Scale())
+            row = np.exp(-0.5 * ((LOG_SCALES - math.log(scale)) / sd) ** 2)
+            row = np.repeat(row, len(SPREADS))
+            rows.append(row / row.sum())
+            away = np.log(EDGES / getattr(prior, name)) - LOG_SCALES[:, None, None]
+            table = np.diff(special.ndtr(away / SPREADS[:, None]), axis=-1) + TAIL / len(GRID)
+            tables.append((table / table.sum(axis=-1, keepdims=True)).reshape(-1, len(GRID)))
+        self._weights, self._tables = rows, tables
+        ends = sorted((prior.flat_wet, prior.dome))
+        between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
+        self._undrained = between / between.sum()
+        self._felt: list[Felt] = []
+        self._period = -math.inf
+        self._now = self._before = self._expected()
+
+    def join(self) -> int:
+        """Return the number of one more foot."""
+        self._feet += 1
+        return self._feet - 1
+
+    @property
+    def scales(self) -> dict[str, Scale]:
+        """The present posterior of the scale of each class."""
+        found = {}
+        for name, weights in zip(CLASSES, self._weights, strict=True):
+            shares = weights.reshape(len(LOG_SCALES), -1).sum(axis=1)
+            mean = float(shares.dot(LOG_SCALES))
+            sd = math.sqrt(float(shares.dot((LOG_SCALES - mean) ** 2)))
+            found[name] = Scale(math.exp(mean), sd)
+        return found
+
+    def expected(self, time: float) -> np.ndarray:
+        """Return the probabilities of friction in a stance that begins at a time, s.
+
+        The rows of the array (4, grid) are a flat foot on dry and on wet ground, and a dome on dry
+        and on wet ground.
+        """
+        period = math.floor(time / PERIOD)
+        if not self._period - 2 < period <= self._period:
+            back = period < self._period  # the clock has been set back: all evidence is old
+            self._learn_until(math.inf if back else period * PERIOD - DELAY)
+            self._before, self._now = self._now, self._expected()
+            self._period = period
+        return self._now if period == self._period else self._before
+
+    def add(self, felt: Felt) -> None:
+        """Add what a foot felt in a stance."""
+        if self._learns:
+            self._felt.append(felt)
+
+    def _expected(self) -> np.ndarray:
+        dry, wet, dome = (
+            weights.dot(table) for weights, table in zip(self._weights, self._tables, strict=True)
+        )
+        return np.array([dry, wet, dome, (1.0 - UNDRAINED) * dome + UNDRAINED * self._undrained])
+
+    def _learn_until(self, time: float) -> None:
+        """Use the stances before a time, s, in an order that does not depend on who came first."""
+        self._felt.sort(key=lambda felt: felt[:2])
+        while self._felt and self._felt[0].time < time:
+            self._learn(self._felt.pop(0))
+
+    def _learn(self, felt: Felt) -> None:
+        on_dry, on_wet = np.exp(felt.likelihood - felt.likelihood.max())
+        dry, wet = 1.0 - felt.wet, felt.wet
+        if felt.dome:
+            films = wet * UNDRAINED
+            either = self._undrained.dot(on_wet)
+            self._multiply(
+                2, (1.0 - films) * self._tables[2].dot(on_dry) + films * either, felt.weight
+            )
+            return
+        # The ground is uncertain: what the scale of one class explains, the other need not.
+        dries, wets = self._tables[0].dot(on_dry), self._tables[1].dot(on_wet)
+        if_dry, if_wet = self._weights[0].dot(dries), self._weights[1].dot(wets)
+        self._multiply(0, dry * dries + wet * if_wet, felt.weight)
+        self._multiply(1, wet * wets + dry * if_dry, felt.weight)
+
+    def _multiply(self, index: int, likelihood: np.ndarray, weight: float) -> None:
+        weights = self._weights[index] * (likelihood / likelihood.max()) ** weight
+        self._weights[index] = weights / weights.sum()

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keep what feet have learnt of friction for the next trial, in a small YAML file."""
+
+from __future__ import annotations
+
+import math
+import os
+import pathlib
+from typing import Any
+
+from ros_pad.configuration import Table
+from ros_pad.contact.resistance import Foot
+from ros_pad.errors import ConfigError
+from ros_pad.errors import PadError
+from ros_pad.estimation.scales import CLASSES
+from ros_pad.estimation.scales import NEXT_FLOOR
+from ros_pad.estimation.scales import SCALE_SD
+from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.tuning import SETTINGS
+
+FILE = 'learnt.yaml'
+"""Name of the file in the folder of a trial."""
+
+_HEAD = """\
+# Friction of feet on their floor over that of the contact model, learnt by ros_pad; sd is of its
+# logarithm. `pad run --learnt` and the parameter learnt of the estimator read it.
+"""
+
+
+def settings_of(shared: FrictionScales) -> dict[str, float]:
+    """Return settings of an estimator that begin where these feet are, by name.
+
+    The next floor may be another one, so the deviations are larger, up to those before any walk.
+    """
+    found = {}
+    for name, (scale, sd) in shared.scales.items():
+        found[f'scale.{name}'] = round(scale, 4)
+        found[f'scale_sd.{name}'] = round(min(math.hypot(sd, NEXT_FLOOR), SCALE_SD), 4)
+    return found
+
+
+def save(path: str | os.PathLike[str], settings: dict[str, float], foot: Foot) -> None:
+    """Write the settings of a robot with this foot to a file, completely or not at all.
+
+    Raises
+    ------
+    PadError
+        When the file cannot be written.
+    """
+    lines = [
+        f'{name}: {{scale: {settings[f"scale.{name}"]}, sd: {settings[f"scale_sd.{name}"]}}}\n'
+        for name in CLASSES
+    ]
+    source = foot.source.replace("'", "''")
+    new = pathlib.Path(f'{os.fspath(path)}.new')
+    try:
+        new.write_text(f"{_HEAD}foot: '{source}'\n{''.join(lines)}", encoding='utf-8')
+        new.replace(path)
+    except OSError as error:
+        raise PadError(f'{os.fspath(path)}: cannot be written: {error.strerror}') from error
+
+
+def load(path: str | os.PathLike[str], foot: str) -> dict[str, Any]:
+    """Read the settings from a file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    foot : str
+        Name or path of the robot's foot, which must be that in the file.
+
+    Raises
+    ------
+    ConfigError
+        When the file cannot be read, is of another foot, or a key or value is not allowed.
+    """
+    table = Table.load(path)
+    other = table.text('foot')
+    if other != foot:
+        raise ConfigError(
+            f'{table.origin}: foot = {other!r} is not allowed: it was learnt with another foot'
+            f' than {foot!r}, which this robot has'
+        )
+    ranges = {each.name: (each.low, each.high) for each in SETTINGS}
+    found = {}
+    for name in CLASSES:
+        with table.table(name) as part:
+            for key, setting in (('scale', f'scale.{name}'), ('sd', f'scale_sd.{name}')):
+                found[setting] = part.number(key, '', *ranges[setting])
+    table.finish()
+    return found

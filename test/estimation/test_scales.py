@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.scales import CLASSES
+from ros_pad.estimation.scales import GRID
+from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.scales import Scale
+
+PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
+NOTHING = np.zeros(len(GRID))
+
+
+def felt(on_dry=NOTHING, on_wet=NOTHING, time=0.0, foot=0, dome=False, wet=0.5, weight=1.0):
+    return Felt(time, foot, dome, wet, np.array([on_dry, on_wet]), weight)
+
+
+def slip_at(friction, error=0.05):
+    return -0.5 * (np.log(GRID / friction) / error) ** 2
+
+
+def learnt(shared, stances):
+    for stance in stances:
+        shared.add(stance)
+    shared.expected(1e3)
+    return shared.scales
+
+
+def test_expected_friction_is_a_probability_with_a_tail():
+    for row in FrictionScales(PRIOR).expected(0.0):
+        assert row.sum() == pytest.approx(1.0, abs=1e-12)
+        assert row.min() > 1e-5
+
+
+@pytest.mark.parametrize(('scale', 'sd'), [(1.0, 0.4), (0.7, 0.1)])
+def test_friction_is_expected_log_normally_about_the_contact_model(scale, sd):
+    """Mean and deviation of ln μ; four equally likely spreads of 3 to 24 % widen the deviation."""
+    given = {name: Scale(scale, sd) for name in CLASSES}
+    rows = FrictionScales(PRIOR, given).expected(0.0)
+    spread = np.mean(np.square([0.03, 0.06, 0.12, 0.24]))
+    for row, mean in zip(rows, (0.8, 0.12, 0.41), strict=False):
+        core = row - row.min()  # without the tail
+        core /= core.sum()
+        center = core @ np.log(GRID)
+        assert center == pytest.approx(math.log(scale * mean), abs=0.05)
+        deviation = math.sqrt(core @ (np.log(GRID) - center) ** 2)
+        # The grid cuts the tail off where both are wide.
+        assert deviation == pytest.approx(math.hypot(sd, math.sqrt(spread)), rel=0.1)
+
+
+def test_under_a_dome_on_wet_ground_the_film_may_not_have_drained():
+    *_, on_dry, on_wet = FrictionScales(PRIOR).expected(0.0)
+    between = (GRID > 0.13) & (GRID < 0.25)
+    assert on_wet[between].sum() > on_dry[between].sum() + 0.1
+
+
+def test_slips_at_known_ground_show_the_scale():
+    """With a normal prior and slips that differ by a spread, mean and deviation are those of
+    Bayes' rule for a normal distribution with a known spread, between those of the two nearest
+    spreads of the grid."""
+    logs = np.random.default_rng(1).normal(math.log(0.5), 0.08, 40)
+    stances = [felt(slip_at(math.exp(each)), slip_at(math.exp(each)), wet=1e-6) for each in logs]
+    found = learnt(FrictionScales(PRIOR), stances)
+    scale, sd = found['flat_dry']
+    precision = len(logs) / (0.08**2 + 0.05**2)
+    mean = (logs.mean() - math.log(0.8)) * precision / (precision + 1.0 / 0.4**2)
+    assert math.log(scale) == pytest.approx(mean, abs=0.02)
+    assert sd == pytest.approx(1.0 / math.sqrt(precision), rel=0.5)
+    assert found['flat_wet'] == pytest.approx(Scale(), rel=0.02)
+    assert found['dome'] == pytest.approx(Scale(), rel=0.02)
+
+
+def test_sticking_shows_only_that_friction_is_larger():
+    """T/N of 0.6 excludes less; how much more it is remains open."""
+    holds = stats.norm.logcdf(GRID, 0.6, 0.02)
+    stances = [felt(holds, NOTHING - 40.0, wet=0.01)] * 60
+    found = learnt(FrictionScales(PRIOR), stances)['flat_dry']
+    assert found.scale > 1.0 and found.sd > 0.15
+    low, high = found.interval
+    assert low > 0.6 / 0.8 and high > 1.5
+
+
+def test_under_domes_only_the_friction_of_domes_is_learnt():
+    stances = [felt(slip_at(0.3), slip_at(0.3), dome=True)] * 20
+    found = learnt(FrictionScales(PRIOR), stances)
+    assert found['dome'].scale == pytest.approx(0.3 / 0.41, rel=0.06)
+    assert found['flat_dry'] == found['flat_wet'] == pytest.approx(Scale(), rel=0.02)
+
+
+def test_where_the_ground_is_open_a_slip_changes_the_class_that_explains_it():
+    """A slip at 0.11 is one on wet ground, as far as anybody knows."""
+    found = learnt(FrictionScales(PRIOR), [felt(slip_at(0.09), slip_at(0.09))] * 20)
+    assert found['flat_wet'].scale == pytest.approx(0.75, rel=0.08)
+    assert found['flat_dry'] == pytest.approx(Scale(), rel=0.05)
+
+
+def test_weights_count_as_parts_of_a_stance():
+    one = learnt(FrictionScales(PRIOR), [felt(slip_at(0.5), slip_at(0.5), wet=1e-6)])
+    parts = [felt(slip_at(0.5), slip_at(0.5), wet=1e-6, weight=0.1)] * 10
+    many = learnt(FrictionScales(PRIOR), parts)
+    assert many['flat_dry'] == pytest.approx(one['flat_dry'], rel=0.01)
+
+
+def test_the_order_in_which_feet_are_heard_does_not_matter():
+    stances = [
+        felt(slip_at(0.4 + 0.1 * foot), slip_at(0.12), 0.1 * step, foot, wet=0.3)
+        for step in range(8) for foot in range(3)
+    ]  # fmt: skip
+    first, second = FrictionScales(PRIOR), FrictionScales(PRIOR)
+    assert learnt(first, stances) == learnt(second, stances[::-1])
+    assert np.array_equal(first.expected(1e3), second.expected(1e3))
+
+
+def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
+    shared = FrictionScales(PRIOR)
+    before = shared.expected(9.9)
+    shared.add(felt(slip_at(0.4), slip_at(0.4), 9.2, wet=1e-6))
+    assert np.array_equal(shared.expected(9.95), before)
+    after = shared.expected(10.01)
+    assert not np.array_equal(after, before)
+    assert np.array_equal(shared.expected(9.99), before)
+    # After the clock was set back, nothing that was learnt is lost.
+    assert np.array_equal(shared.expected(1.0), after)
+
+
+def test_without_learning_the_expectation_stays():
+    shared = FrictionScales(PRIOR, learns=False)
+    before = shared.expected(0.0)
+    learnt(shared, [felt(slip_at(0.4), slip_at(0.4))] * 10)
+    assert np.array_equal(shared.expected(2e3), before)
+
+
+def test_feet_learn_from_one_another():
+    """One foot slips at 0.5 on dry ground; another one, that has felt nothing, expects it."""
+    shared = FrictionScales(PRIOR)
+    feet = [GroundFilter(shared, wet_prior=0.1) for _ in range(2)]
+    alone = GroundFilter(FrictionScales(PRIOR), wet_prior=0.1)
+    for step in range(12):
+        feet[0].touch_down(1.0, False, float(step))
+        for _ in range(8):
+            feet[0].update(0.5, 0.03, 0.1, 0.003, 0.04)
+    for each in (feet[1], alone):
+        each.touch_down(0.0, False, 20.0)
+        each.touch_down(100.0, False, 21.0)  # far from all that it knew
+    dry = shared.scales['flat_dry']
+    assert dry.scale == pytest.approx(0.5 / 0.8, rel=0.1)
+    assert dry.sd < 0.15
+    assert feet[1].quantile(0.5) == pytest.approx(0.5, abs=0.05)
+    assert alone.quantile(0.5) > 0.65

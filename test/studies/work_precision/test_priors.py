@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from studies.work_precision.estimator import priors
+from studies.work_precision.estimator.priors import Condition
+from studies.work_precision.estimator.priors import Sample
+
+
+class Normal:
+    """A posterior that is normal, of friction 0.5 with a deviation of 0.1."""
+
+    friction = 0.5, 0.1
+    wet_probability = 0.2
+
+    def quantiles(self, shares):
+        return stats.norm.ppf(shares, 0.5, 0.1)
+
+
+@pytest.mark.parametrize('away', [0.0, 0.1, 0.3])
+def test_the_score_is_that_of_a_normal_distribution(away):
+    """CRPS of a normal distribution: Gneiting and Raftery (2007), equation 21."""
+    z = away / 0.1
+    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    below = 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
+    expected = 0.1 * (z * (2.0 * below - 1.0) + 2.0 * density - 1.0 / math.sqrt(math.pi))
+    sample = priors._sample(Normal(), 1.0, 1, 0, 0.5 + away)
+    assert sample.crps == pytest.approx(expected, abs=0.02 * 0.1)
+    assert sample.covered == (away < 0.196) and sample.within == (away < 0.2)
+    assert sample.width == pytest.approx(2.0 * 1.96 * 0.1, rel=1e-3)
+    assert not sample.below
+    assert priors._sample(Normal(), 1.0, 1, 0, 0.5 - 0.17).below
+
+
+def test_rows_count_time_and_stances():
+    """A stance of one sample counts by stance as much as one of nine."""
+    covered = [Sample(130.0 + 0.1 * k, 1, 0, 0.1, True, False, 0.2, 0.01, True) for k in range(9)]
+    missed = [Sample(140.0, 2, 0, 0.9, False, True, 0.2, 0.05)]
+    early = [Sample(10.0, 3, 1, 0.9, True, False, 0.4, 0.02, True)]
+    walk = {name: [] for name in priors.FILTERS} | {priors.LEARNS: early + covered + missed}
+    first, second = priors.rows_of(Condition('any'), [walk])
+    assert (first.phase, first.ground, first.samples) == ('early', 'wet', 1)
+    assert (second.phase, second.ground, second.stances) == ('late', 'dry', 2)
+    assert second.coverage == 0.9 and second.stance_coverage == 0.5
+    assert second.below == 0.1 and second.wrong_labels == 0.5
+    assert second.crps == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
+    assert '| any | dry | learning | 0.900 (0.90 to 0.90) |' in priors.table([second])
+
+
+def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
+    """Wet friction halved is half of 0.12, and the friction that is configured is the file's."""
+    ground = Condition('', wet=0.5, spread=0.0, stiffness=2.0, load=2.0)
+    walk = priors.walked(ground, 'flat', 50, duration=2)
+    light = (walk.load > 2.0) & walk.wet
+    assert light.sum() > 100
+    assert np.median(walk.grip[light] / walk.load[light]) == pytest.approx(0.06, abs=1e-6)
+    foot, load, _ = walk.settings
+    assert foot.friction == walk.foot.friction
+    assert foot.shear_stiffness == 2.0 * walk.foot.shear_stiffness
+    assert load == 2.0 * walk.expected_load
+
+
+def test_a_short_study_writes_its_figures(tmp_path, capsys):
+    words = ['--walks', '1', '--duration', '2', '--only', 'wet 2', '--processes', '1']
+    assert priors.main([*words, '--out', str(tmp_path)]) == 0
+    document = json.loads((tmp_path / 'priors.json').read_text())
+    assert document['seeds'] == [50] and document['machine']
+    assert {row['filter'] for row in document['rows']} == set(priors.FILTERS)
+    assert (tmp_path / 'priors.png').stat().st_size > 1000
+    assert 'CRPS' in capsys.readouterr().out
