@@ -18,6 +18,7 @@ from ros_pad.estimation.alarm import SlipAlarms
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
+from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.parts import History
 from ros_pad.estimation.parts import Motion
 from ros_pad.estimation.parts import Offset
@@ -144,6 +145,9 @@ class FootEstimator:
     ``pads_shear`` is false. Simulated robots stand on rigid feet: their joints follow the contact
     itself, and only their markers are displaced.
 
+    The noise of the sensors is measured while the foot stands, beginning with the settings (see
+    :mod:`ros_pad.estimation.noise`); with joints only that of the force.
+
     The reading of the force sensor in the air is its offset, and is subtracted. No sample is used
     while sensors are faulty (see :mod:`ros_pad.estimation.sensing`): the posterior is set back to
     the one before the fault, and fades to the prior with distance.
@@ -161,6 +165,8 @@ class FootEstimator:
     ----------
     estimate : Estimate
         Estimate after the last sample.
+    noise : SensorNoise
+        Configured and measured noise of the sensors.
 
     Raises
     ------
@@ -177,16 +183,14 @@ class FootEstimator:
         self._measures_moment = tuning.moment_noise > 0.0
         self._stiffness = foot.shear_stiffness
         self._filter_period = tuning.filter_period - 1e-9
-        noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
-        self._contact_noise = noise
-        self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
         self._lever = foot.turning_radius
         self._gate = LoadGate(expected_load, tuning.load_gate)
         self._joints = tuning.source == 'joints'
         self._softness = 1.0 / foot.shear_stiffness if tuning.pads_shear else 0.0
-        self._shear_noise = math.hypot(
-            tuning.force_noise * self._softness / tuning.smoothing, tuning.speed_noise
-        )
+        # An estimated position never stops, and its noise is not that of a marker.
+        marker_noise = 0.0 if self._joints else tuning.position_noise
+        self.noise = SensorNoise(marker_noise, tuning.force_noise, expected_load, tuning.smoothing)
+        self._speed_noise = self._set_noise()
         self._alarm = SlipAlarms(
             self._speed_noise,
             BODY_CORRELATION if self._joints else tuning.smoothing,
@@ -199,8 +203,6 @@ class FootEstimator:
             rim_speed=tuning.rim_speed(foot),
             model_error=tuning.ratio_noise,
         )
-        # An estimated position never stops, and its noise is not that of a marker.
-        marker_noise = 0.0 if self._joints else tuning.position_noise
         self._sensing = Sensing(tuning.force_noise, marker_noise, tuning.force_range or math.inf)
         self._offset = Offset(expected_load)
         self._motion = Motion(tuning.smoothing)  # of the contact; of the pads' shear with joints
@@ -267,7 +269,7 @@ class FootEstimator:
         age = 0.0 if position_time is None else abs(time - position_time)
         yaw = 0.0 if moment is None else moment
         if motion:
-            self._speed_noise = math.hypot(motion.sd, self._shear_noise)
+            self._speed_noise = math.hypot(motion.sd, self._sensor_speed_noise)
         dt = time - self._time
         if dt <= 0.0:
             dt = self._set_back(time)
@@ -309,6 +311,7 @@ class FootEstimator:
         else:
             velocity = self._motion.update(contact_x, contact_y, dt)
             self._place = self._motion.x, self._motion.y
+        self.noise.add(dt, x, y, fx, fy, fz)
         # On the ellipsoidal limit surface, friction used by turning is not available to the pull.
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
@@ -356,6 +359,7 @@ class FootEstimator:
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._alarm.reset()
+        self.noise.begin()
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
         self._ground.touch_down(
@@ -390,6 +394,7 @@ class FootEstimator:
         if fresh:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
+            self._measure_noise()
             window.begin(time, first=False)
             friction_mean, friction_sd = self._ground.friction
             wet = self._ground.wet_probability
@@ -405,6 +410,26 @@ class FootEstimator:
             fresh, reason, True,
         ))  # fmt: skip
         return estimate
+
+    def _set_noise(self) -> float:
+        """Set the noise of the contact; return that of the slip speed without the body's, m/s."""
+        tuning, noise = self.tuning, self.noise
+        softness = self._softness if self._joints else 1.0 / self._stiffness
+        self._contact_noise = math.hypot(noise.position.noise, noise.force.noise * softness)
+        self._sensor_speed_noise = math.hypot(
+            self._contact_noise / tuning.smoothing, tuning.speed_noise
+        )
+        return self._sensor_speed_noise
+
+    def _measure_noise(self) -> None:
+        """Use the noise that the sensors have shown until the end of this window."""
+        noise = self.noise
+        noise.end_window()
+        self._sensing.set_noise(noise.force.white, noise.position.white)
+        speed_noise = self._set_noise()
+        if not self._joints:
+            self._speed_noise = speed_noise
+            self._alarm.set_noise(speed_noise)
 
     def _in_doubt(self, time: float, force: tuple[float, float, float], why: str) -> Estimate:
         """Return the estimate of a standing foot while the motion of the body is in doubt."""
@@ -476,7 +501,7 @@ class FootEstimator:
         load = window.load / window.count
         pull, turning = window.pull / window.load, window.turning / window.load
         ratio = math.hypot(pull, turning)
-        force_noise = tuning.force_noise
+        force_noise = self.noise.force.noise
         if turning > 0.0:
             share = turning / ratio
             force_noise = math.hypot(force_noise, share * tuning.moment_noise / self._lever)
