@@ -20,13 +20,13 @@ PRIOR_WINDOWS = 5
 KEPT_WINDOWS = 301
 """Windows over which noise is measured: those of about half a minute of walking."""
 
-COARSE = 0.4
+COARSE = 0.5
 """Least noise of a sensor with steps, share of a step: one step is then no alarm for fast slip."""
 
 FEWEST_CHANGES = 16
-"""Windows in which a reading changes from which on the smallest change is the sensor's step."""
+"""Changes of a reading from which on the smallest of them is the step of the sensor."""
 
-LAG = 3
+LAG = 2
 """Blocks between those that are compared: noise that is correlated over one of them counts."""
 
 STEADY = 0.03
@@ -88,13 +88,12 @@ class Meter:
         `white`, or more if noise is correlated in time or the sensor has steps.
     """
 
-    __slots__ = ('_changes', '_ratios', '_step', '_variances', 'configured', 'noise', 'white')
+    __slots__ = ('_ratios', '_variances', 'configured', 'noise', 'white')
 
     def __init__(self, configured: float) -> None:
         self.configured = self.white = self.noise = configured
         self._variances = Pool(configured * configured)
         self._ratios = Pool(1.0)
-        self._step, self._changes = math.inf, 0
 
     def add_blocks(self, bend_x: float, bend_y: float, samples: float) -> None:
         """Process the second difference of means over blocks of so many samples."""
@@ -103,21 +102,16 @@ class Meter:
             square = samples * (bend_x * bend_x + bend_y * bend_y) / 12.0
             self._ratios.add(square / (_MEDIAN * variance))
 
-    def add_window(self, squares: float, count: int, change: float) -> None:
+    def add_window(self, squares: float, count: int, least: float = 0.0) -> None:
         """Process the second differences of a window: their sum of squares and their number.
 
-        ``change`` is the last change of a component from one sample to the next.
+        ``least`` is the least noise of a sensor with steps.
         """
         # The median of chi-square over its mean; half of the differences are independent.
         median = (1.0 - 4.0 / (9.0 * count)) ** 3
         self._variances.add(squares / (6.0 * count * median))
         self.white = math.sqrt(self._variances.median)
-        self.noise = self.white * math.sqrt(max(1.0, self._ratios.median))
-        if change:
-            self._changes += 1
-            self._step = min(self._step, abs(change))
-        if self._changes >= FEWEST_CHANGES:
-            self.noise = max(self.noise, COARSE * self._step)
+        self.noise = max(least, self.white * math.sqrt(max(1.0, self._ratios.median)))
 
 
 Values = tuple[float, float, float, float, float]
@@ -135,8 +129,9 @@ class SensorNoise:
         Configured standard deviations of a component, m and N; 0: not measured.
     load : float
         Expected normal force in stance, N.
-    block : float
-        Duration of a block, s: the time over which slip speeds are smoothed.
+    smoothing : float
+        Time constant of the slip speed, s. Blocks are twice as long: white noise has the same
+        standard deviation in their means as in the smoothed position.
 
     Attributes
     ----------
@@ -146,16 +141,17 @@ class SensorNoise:
 
     __slots__ = (
         '_bends', '_block', '_blocks', '_changes', '_dt', '_elapsed', '_force_squares', '_last',
-        '_run', '_samples', '_squares', '_steady', '_sums', 'force', 'position',
+        '_run', '_samples', '_squares', '_steady', '_step', '_steps', '_sums', 'force', 'position',
     )  # fmt: skip
 
-    def __init__(self, position: float, force: float, load: float, block: float) -> None:
+    def __init__(self, position: float, force: float, load: float, smoothing: float) -> None:
         self.position, self.force = Meter(position), Meter(force)
-        self._block = block - 1e-9
+        self._block = 2.0 * smoothing - 1e-9
         self._steady = STEADY * load
         self._blocks: deque[tuple[Values, int]] = deque(maxlen=2 * LAG + 1)
         self._squares = self._force_squares = 0.0  # of second differences in this window
         self._bends = 0
+        self._step, self._steps = math.inf, 0  # smallest change of a coordinate; number of changes
         self.begin()
 
     def begin(self) -> None:
@@ -172,6 +168,11 @@ class SensorNoise:
         change_x, change_y, a, b, c = x - x_before, y - y_before, fx - a, fy - b, fz - c
         last_x, last_y, d, e, f = self._changes
         self._changes = change_x, change_y, a, b, c
+        if self._run > 0 and (change_x or change_y):
+            self._steps += 1
+            step = abs(change_x or change_y)
+            if step < self._step:
+                self._step = step
         if self._run > 1 and abs(dt - self._dt) <= _UNEVEN * dt:
             self._squares += (change_x - last_x) ** 2 + (change_y - last_y) ** 2
             self._force_squares += (a - d) ** 2 + (b - e) ** 2 + (c - f) ** 2
@@ -209,7 +210,8 @@ class SensorNoise:
         if count < 2:
             return
         if self.position.configured:
-            self.position.add_window(self._squares, 2 * count, self._changes[0])
+            least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
+            self.position.add_window(self._squares, 2 * count, least)
         if self.force.configured:
-            self.force.add_window(self._force_squares, 3 * count, self._changes[2])
+            self.force.add_window(self._force_squares, 3 * count)
         self._squares, self._force_squares, self._bends = 0.0, 0.0, 0
