@@ -113,6 +113,12 @@ class Meter:
         self.white = math.sqrt(self._variances.median)
         self.noise = max(least, self.white * math.sqrt(max(1.0, self._ratios.median)))
 
+    def text(self, unit: str) -> str:
+        """Return the noise for people, measured and configured."""
+        if not self.configured:
+            return 'not measured'
+        return f'{self.noise:.2g} {unit}, configured {self.configured:.2g} {unit}'
+
 
 Values = tuple[float, float, float, float, float]
 """Position x and y, m, and force, N, or their changes."""
