@@ -15,6 +15,8 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
+from ros_pad.estimation.axes import BLOCK
+from ros_pad.estimation.axes import Axes
 from ros_pad.estimation.friction import FrictionPrior
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
@@ -204,6 +206,12 @@ class FootEstimator:
             model_error=tuning.ratio_noise,
         )
         self._sensing = Sensing(tuning.force_noise, marker_noise, tuning.force_range or math.inf)
+        self._axes = (
+            Axes(expected_load, self._softness, BODY_CORRELATION)
+            if self._joints
+            else Axes(expected_load, 1.0 / foot.shear_stiffness)
+        )
+        self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._offset = Offset(expected_load)
         self._motion = Motion(tuning.smoothing)  # of the contact; of the pads' shear with joints
         self._place = (0.0, 0.0)  # of the contact, m
@@ -281,6 +289,7 @@ class FootEstimator:
         leaps = stood and not (motion and motion.doubt)
         fault = self._sensing.update(time, force, position, age, leaps, not z <= air < math.inf)
         if fault:
+            self._axes.restart()
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z
         if stood and z > self._stance.height + AIRBORNE:
@@ -289,6 +298,9 @@ class FootEstimator:
         if z > air and load < self._least_load:
             offset.update(dt, fx, fy, fz, yaw)
             load = 0.0
+        self._check_axes(dt, (fx - offset.x, fy - offset.y, fz - offset.z), x, y, z, motion)
+        if self._axes.doubt:
+            return self._without_sensors(time, dt, x, y, self._axes.doubt)
         if not gate.update(load):
             return self._swing(time, stood)
         if load >= self._least_load:
@@ -344,6 +356,38 @@ class FootEstimator:
         if motion:
             _check_motion(time, motion)
 
+    def _check_axes(
+        self,
+        dt: float,
+        force: tuple[float, float, float],
+        x: float,
+        y: float,
+        z: float,
+        motion: ContactMotion | None,
+    ) -> None:
+        """Look for turned axes; from the first sample with a doubt on, only the prior holds."""
+        axes, was = self._axes, self._axes.doubt
+        dt = min(dt, BLOCK)  # at the first sample, and in gaps
+        if motion and motion.doubt:
+            axes.restart()
+            return
+        if motion:
+            x, y = self._slid = (
+                self._slid[0] + motion.velocity[0] * dt,
+                self._slid[1] + motion.velocity[1] * dt,
+            )
+            sd = motion.sd * BLOCK
+        else:
+            sd = self.noise.position.noise * math.sqrt(2.0 * dt / BLOCK)
+        if not self._offset.known:
+            sd = math.inf
+        axes.update(dt, force, x, y, z, sd)
+        if axes.doubt and not was:
+            self._history.clear()
+            self._ground.fade(math.inf)
+            mean, sd = self._ground.friction
+            self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
+
     def _set_back(self, time: float) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
         if time > self._time - LONGEST_GAP:
@@ -355,6 +399,7 @@ class FootEstimator:
         self._path.restart()
         self._history.clear()
         self._sensing.restart()
+        self._axes.restart()
         return math.inf
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:

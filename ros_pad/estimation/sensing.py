@@ -34,7 +34,7 @@ DEAD_ON_GROUND = 0.4
 SENSOR_FAULTS = (
     'force stands still', 'force out of range',
     'marker lost', 'marker stands still', 'marker leapt',
-    'no wrench', 'no position', 'sample refused', 'no contact velocity',
+    'axes', 'no wrench', 'no position', 'sample refused', 'no contact velocity',
 )  # fmt: skip
 """Kinds of doubt about sensors, not about the ground. The last four come from
 :class:`ros_pad.estimation.stage.EstimationStage`."""
