@@ -32,6 +32,9 @@ LAG = 2
 STEADY = 0.03
 """Change of the force over blocks up to which a foot is at rest, share of the expected load."""
 
+STILL = 1e-3
+"""Motion over blocks, m, up to which a foot is at rest: one that slips at 5 mm/s moves so far."""
+
 _UNEVEN = 0.5
 """Relative change of the sampling period above which no second difference is taken."""
 
@@ -199,8 +202,13 @@ class SensorNoise:
         block = x / count, y / count, fx / count, fy / count, fz / count
         self._sums, self._elapsed, self._samples = _NOTHING, 0.0, 0
         blocks = self._blocks
-        steady = self._steady + 4.0 * self.force.noise / math.sqrt(count)
-        while blocks and steady < max(map(abs, map(sub, block[2:], blocks[0][0][2:]))):
+        noise = 4.0 / math.sqrt(count)
+        steady = self._steady + noise * self.force.noise
+        still = STILL + noise * self.position.noise
+        while blocks:
+            a, b, c, d, e = map(sub, block, blocks[0][0])
+            if max(abs(a), abs(b)) <= still and max(abs(c), abs(d), abs(e)) <= steady:
+                break
             blocks.popleft()
         blocks.append((block, count))
         if len(blocks) > 2 * LAG:
