@@ -16,7 +16,7 @@ STUDIES = {
     'capillary': ('work_precision.capillary', 'methods for liquid on meshes (1 min)'),
     'walk': ('work_precision.walk.study', 'every fidelity level of a walk (1 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
-    'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (90 s)'),
+    'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (7 min)'),
     'coupling': ('work_precision.coupling', 'how liquid changes the shape of a pad (2 min)'),
     'liquid_limits': ('work_precision.liquid_limits', 'where liquid on meshes fails (4 min)'),
     'thickness': ('work_precision.thickness', 'solids beside the membrane of a pad (5 min)'),

@@ -29,7 +29,7 @@ from studies.work_precision.estimator.conditions import by_walk
 from studies.work_precision.estimator.conditions import stress
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
-from studies.work_precision.estimator.walks import CYCLES
+from studies.work_precision.estimator.walks import FEW_CYCLES
 from studies.work_precision.estimator.walks import full
 from studies.work_precision.estimator.walks import recordings
 
@@ -38,7 +38,7 @@ def measure(progress: Progress) -> list[Row]:
     """Record, compare the methods, and test the estimator; report progress, 0 to 1."""
     rows = compare(recordings(), lambda share: progress(0.1 * share))
     rows += stress(CHANGES, lambda share: progress(0.1 + 0.5 * share))
-    return rows + by_walk(CYCLES, lambda share: progress(0.6 + 0.4 * share))
+    return rows + by_walk(FEW_CYCLES, lambda share: progress(0.6 + 0.4 * share))
 
 
 NEEDS_MUJOCO = 'full dynamics not compared: pip install "ros_pad[mujoco]"'
