@@ -225,10 +225,10 @@ _CHANGES: dict[str, tuple[str, float, bool]] = {
 _MEASURES: dict[str, tuple[str, float, tuple[float, ...], float]] = {
     'misses': ('slips missed, %', 1e2, (1.0,), 1.0),
     'false_per_minute': ('false alarms a minute', 1.0, (1.0,), 1.0),
-    'slip_distance': ('slipped before alarm, mm', 1e3, (), 0.5),
+    'slip_distance': ('slip before alarm, mm', 1e3, (), 0.5),
     'wet_right': ('wet or dry right, %', 1e2, (97.0,), 2.0),
     'coverage': ('friction within 2σ, %', 1e2, (90.0, 99.0), 3.0),
-    'below': ('margin below its 5 %, %', 1e2, (5.0,), 2.0),
+    'below': ('margin below 5 %, %', 1e2, (5.0,), 2.0),
     'axes': ('axes in doubt, % of time', 1e2, (), 1.0),
 }
 _VARIANTS: dict[str, dict[str, Any]] = {
@@ -304,7 +304,7 @@ def draw_robustness(rows: Sequence[Row]) -> Figure:
     ]
     height = max(1, math.ceil(len(cells) / _ACROSS))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 2.1 * height + 0.7))
+        figure = Figure(figsize=(11.0, 2.2 * height + 0.7))
         figure.set_layout_engine('constrained', w_pad=0.06, h_pad=0.06)
         panels = figure.subplots(height, _ACROSS, squeeze=False).ravel()
         for panel in panels[len(cells) :]:
@@ -353,5 +353,6 @@ def _cell(panel: Axes, rows: Sequence[Row], change: str, measure: str) -> None:
         panel.set_ylim(bottom=0.0)
     elif measure in {'misses', 'slip_distance', 'below', 'axes'}:
         panel.set_ylim(bottom=0.0)
-    panel.set(title=change, ylabel=label, xlabel=unit)
+    panel.set(title=change, xlabel=unit)
+    panel.set_ylabel(label, fontsize=8.0)
     panel.grid(color=PALE, alpha=0.25, lw=0.5)

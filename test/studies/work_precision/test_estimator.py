@@ -2,6 +2,7 @@
 import importlib.util
 import json
 import math
+import pathlib
 from dataclasses import asdict
 from dataclasses import replace
 
@@ -386,6 +387,13 @@ def test_table_and_pictures(rows, tmp_path):
     for name, figure in pictures.items():
         figure.savefig(tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
+
+
+def test_the_docs_list_what_the_file_says_does_not_move():
+    docs = pathlib.Path(__file__).resolve().parents[3] / 'docs'
+    found = json.loads((docs / 'charts' / 'estimator.json').read_text())['rows']
+    listed = chart.unmoved([tally.Row(**row) for row in found])
+    assert listed in (docs / 'model' / 'estimation.md').read_text(), listed
 
 
 def test_the_best_has_few_false_alarms_and_misses():
