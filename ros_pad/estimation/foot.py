@@ -15,8 +15,11 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
+from ros_pad.estimation.axes import BLOCK
+from ros_pad.estimation.axes import Axes
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
+from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.parts import History
 from ros_pad.estimation.parts import Motion
 from ros_pad.estimation.parts import Offset
@@ -145,6 +148,9 @@ class FootEstimator:
     ``pads_shear`` is false. Simulated robots stand on rigid feet: their joints follow the contact
     itself, and only their markers are displaced.
 
+    The noise of the sensors is measured while the foot stands, beginning with the settings (see
+    :mod:`ros_pad.estimation.noise`); with joints only that of the force.
+
     The reading of the force sensor in the air is its offset, and is subtracted. No sample is used
     while sensors are faulty (see :mod:`ros_pad.estimation.sensing`): the posterior is set back to
     the one before the fault, and fades to the prior with distance.
@@ -167,6 +173,8 @@ class FootEstimator:
         Estimate after the last sample.
     ground : GroundFilter
         Posterior of wet ground and friction.
+    noise : SensorNoise
+        Configured and measured noise of the sensors.
 
     Raises
     ------
@@ -189,16 +197,14 @@ class FootEstimator:
         self._measures_moment = tuning.moment_noise > 0.0
         self._stiffness = foot.shear_stiffness
         self._filter_period = tuning.filter_period - 1e-9
-        noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
-        self._contact_noise = noise
-        self._speed_noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
         self._lever = foot.turning_radius
         self._gate = LoadGate(expected_load, tuning.load_gate)
         self._joints = tuning.source == 'joints'
         self._softness = 1.0 / foot.shear_stiffness if tuning.pads_shear else 0.0
-        self._shear_noise = math.hypot(
-            tuning.force_noise * self._softness / tuning.smoothing, tuning.speed_noise
-        )
+        # An estimated position never stops, and its noise is not that of a marker.
+        marker_noise = 0.0 if self._joints else tuning.position_noise
+        self.noise = SensorNoise(marker_noise, tuning.force_noise, expected_load, tuning.smoothing)
+        self._speed_noise = self._set_noise()
         self._alarm = SlipAlarms(
             self._speed_noise,
             BODY_CORRELATION if self._joints else tuning.smoothing,
@@ -210,9 +216,13 @@ class FootEstimator:
             patch_length=tuning.patch_length,
             rim_speed=tuning.rim_speed(foot),
         )
-        # An estimated position never stops, and its noise is not that of a marker.
-        marker_noise = 0.0 if self._joints else tuning.position_noise
         self._sensing = Sensing(tuning.force_noise, marker_noise, tuning.force_range or math.inf)
+        self._axes = (
+            Axes(expected_load, self._softness, BODY_CORRELATION)
+            if self._joints
+            else Axes(expected_load, 1.0 / foot.shear_stiffness)
+        )
+        self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._offset = Offset(expected_load)
         self._motion = Motion(tuning.smoothing)  # of the contact; of the pads' shear with joints
         self._place = (0.0, 0.0)  # of the contact, m
@@ -278,7 +288,7 @@ class FootEstimator:
         age = 0.0 if position_time is None else abs(time - position_time)
         yaw = 0.0 if moment is None else moment
         if motion:
-            self._speed_noise = math.hypot(motion.sd, self._shear_noise)
+            self._speed_noise = math.hypot(motion.sd, self._sensor_speed_noise)
         dt = time - self._time
         if dt <= 0.0:
             dt = self._set_back(time)
@@ -290,6 +300,7 @@ class FootEstimator:
         leaps = stood and not (motion and motion.doubt)
         fault = self._sensing.update(time, force, position, age, leaps, not z <= air < math.inf)
         if fault:
+            self._axes.restart()
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z
         if stood and z > self._stance.height + AIRBORNE:
@@ -298,6 +309,9 @@ class FootEstimator:
         if z > air and load < self._least_load:
             offset.update(dt, fx, fy, fz, yaw)
             load = 0.0
+        self._check_axes(dt, (fx - offset.x, fy - offset.y, fz - offset.z), x, y, z, motion)
+        if self._axes.doubt:
+            return self._without_sensors(time, dt, x, y, self._axes.doubt)
         if not gate.update(load):
             return self._swing(time, stood)
         if load >= self._least_load:
@@ -320,6 +334,7 @@ class FootEstimator:
         else:
             velocity = self._motion.update(contact_x, contact_y, dt)
             self._place = self._motion.x, self._motion.y
+        self.noise.add(dt, x, y, fx, fy, fz)
         # On the ellipsoidal limit surface, friction used by turning is not available to the pull.
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
@@ -352,6 +367,38 @@ class FootEstimator:
         if motion:
             _check_motion(time, motion)
 
+    def _check_axes(
+        self,
+        dt: float,
+        force: tuple[float, float, float],
+        x: float,
+        y: float,
+        z: float,
+        motion: ContactMotion | None,
+    ) -> None:
+        """Look for turned axes; from the first sample with a doubt on, only the prior holds."""
+        axes, was = self._axes, self._axes.doubt
+        dt = min(dt, BLOCK)  # at the first sample, and in gaps
+        if motion and motion.doubt:
+            axes.restart()
+            return
+        if motion:
+            x, y = self._slid = (
+                self._slid[0] + motion.velocity[0] * dt,
+                self._slid[1] + motion.velocity[1] * dt,
+            )
+            sd = motion.sd * BLOCK
+        else:
+            sd = self.noise.position.noise * math.sqrt(2.0 * dt / BLOCK)
+        if not self._offset.known:
+            sd = math.inf
+        axes.update(dt, force, x, y, z, sd)
+        if axes.doubt and not was:
+            self._history.clear()
+            self._ground.fade(math.inf)
+            mean, sd = self._ground.friction
+            self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
+
     def _set_back(self, time: float) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
         if time > self._time - LONGEST_GAP:
@@ -363,10 +410,12 @@ class FootEstimator:
         self._path.restart()
         self._history.clear()
         self._sensing.restart()
+        self._axes.restart()
         return math.inf
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._alarm.reset()
+        self.noise.begin()
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
         self.ground.touch_down(
@@ -401,6 +450,7 @@ class FootEstimator:
         if fresh:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
+            self._measure_noise()
             window.begin(time, first=False)
             friction_mean, friction_sd = self.ground.friction
             wet = self.ground.wet_probability
@@ -416,6 +466,26 @@ class FootEstimator:
             fresh, reason, True,
         ))  # fmt: skip
         return estimate
+
+    def _set_noise(self) -> float:
+        """Set the noise of the contact; return that of the slip speed without the body's, m/s."""
+        tuning, noise = self.tuning, self.noise
+        softness = self._softness if self._joints else 1.0 / self._stiffness
+        self._contact_noise = math.hypot(noise.position.noise, noise.force.noise * softness)
+        self._sensor_speed_noise = math.hypot(
+            self._contact_noise / tuning.smoothing, tuning.speed_noise
+        )
+        return self._sensor_speed_noise
+
+    def _measure_noise(self) -> None:
+        """Use the noise that the sensors have shown until the end of this window."""
+        noise = self.noise
+        noise.end_window()
+        self._sensing.set_noise(noise.force.white, noise.position.white)
+        speed_noise = self._set_noise()
+        if not self._joints:
+            self._speed_noise = speed_noise
+            self._alarm.set_noise(speed_noise)
 
     def _in_doubt(self, time: float, force: tuple[float, float, float], why: str) -> Estimate:
         """Return the estimate of a standing foot while the motion of the body is in doubt."""
@@ -487,7 +557,7 @@ class FootEstimator:
         load = window.load / window.count
         pull, turning = window.pull / window.load, window.turning / window.load
         ratio = math.hypot(pull, turning)
-        force_noise = tuning.force_noise
+        force_noise = self.noise.force.noise
         if turning > 0.0:
             share = turning / ratio
             force_noise = math.hypot(force_noise, share * tuning.moment_noise / self._lever)

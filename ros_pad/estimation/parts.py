@@ -50,6 +50,11 @@ class Offset:
         self.sd = OFFSET_SHARE * expected_load
         self._air_time = 0.0
 
+    @property
+    def known(self) -> bool:
+        """Whether the foot was in the air."""
+        return self._air_time > 0.0
+
     def update(self, dt: float, fx: float, fy: float, fz: float, moment: float) -> None:
         """Process forces, N, and a torque, N m, read in the air dt seconds after the last ones."""
         # This is a plain mean at first, and an exponential one after TARE_TIME.

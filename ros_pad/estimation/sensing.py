@@ -34,10 +34,13 @@ DEAD_ON_GROUND = 0.4
 SENSOR_FAULTS = (
     'force stands still', 'force out of range',
     'marker lost', 'marker stands still', 'marker leapt',
-    'no wrench', 'no position', 'sample refused', 'no contact velocity',
+    'axes', 'no wrench', 'no position', 'sample refused', 'no contact velocity',
 )  # fmt: skip
 """Kinds of doubt about sensors, not about the ground. The last four come from
 :class:`ros_pad.estimation.stage.EstimationStage`."""
+
+LEAST = 1e-12
+"""Least measured noise of a sensor, N and m: at 0 repeated readings would be no fault."""
 
 LEAP = 5.0
 """Speed above which a loaded foot cannot move, m/s."""
@@ -71,6 +74,10 @@ class Repeats:
         self._changed: float | None = 0.0  # time at which all changed last; None if not all did
         self._since: list[float] = []
         self._counts: list[int] = []
+
+    def set_noises(self, noises: Sequence[float]) -> None:
+        """Change the standard deviations, none of them to or from 0."""
+        self._noises = noises
 
     def since(self, place: int) -> float:
         """Return the time since which the value with an index has not changed, s."""
@@ -130,7 +137,7 @@ class Sensing:
     """
 
     def __init__(self, force_noise: float, position_noise: float, force_range: float) -> None:
-        self._noises = (force_noise,) * 3 + (position_noise,) * 3
+        self._noises: Sequence[float] = (force_noise,) * 3 + (position_noise,) * 3
         self._range = force_range
         self.restart()
 
@@ -142,6 +149,17 @@ class Sensing:
         self._dead = False
         self.marker_valid = True
         self.since = math.inf
+
+    def set_noise(self, force_noise: float, position_noise: float) -> None:
+        """Change the standard deviations, N and m; a sensor without noise stays so.
+
+        One that has noise, but repeats itself, is at the least taken to have hardly any.
+        """
+        new = (force_noise,) * 3 + (position_noise,) * 3
+        self._noises = [
+            max(a, LEAST) if b else 0.0 for a, b in zip(new, self._noises, strict=True)
+        ]
+        self._repeats.set_noises(self._noises)
 
     def update(
         self,

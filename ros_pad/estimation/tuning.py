@@ -25,11 +25,13 @@ SOURCES = ('markers', 'joints')
 SETTINGS = (
     Setting(
         'position_noise', 1.5e-4,
-        'Standard deviation of a marker coordinate; 0: readings may repeat.', 'm', 0.0, 0.1,
+        'Standard deviation of a marker coordinate, until it is measured; 0: readings may repeat.',
+        'm', 0.0, 0.1,
     ),
     Setting(
         'force_noise', 0.03,
-        'Standard deviation of a force component; 0: readings may repeat.', 'N', 0.0, 100.0,
+        'Standard deviation of a force component, until it is measured; 0: readings may repeat.',
+        'N', 0.0, 100.0,
     ),
     Setting(
         'moment_noise', 0.0,

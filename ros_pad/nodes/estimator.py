@@ -170,6 +170,8 @@ class _LegTopics:
                 KeyValue(key='P(wet)', value=f'{estimate.wet_probability:.3f}'),
                 KeyValue(key='friction', value=f'{estimate.friction_mean:.3f}'),
                 KeyValue(key='friction sd', value=f'{estimate.friction_sd:.3f}'),
+                KeyValue(key='position noise', value=stage.estimator.noise.position.text('m')),
+                KeyValue(key='force noise', value=stage.estimator.noise.force.text('N')),
                 KeyValue(key='samples', value=str(stage.samples)),
             ],
         )

@@ -34,6 +34,7 @@ def walked(policy, seed, cycles=12):
         row = []
         for foot, estimator in zip(loop.robot.feet, loop.estimators, strict=True):
             told, load = estimator.estimate, foot.force[2]
+            assert not told.doubt.startswith('axes')
             ratio = math.hypot(*foot.force[:2]) / load if load > 0.0 else 0.0
             row.append((
                 load, foot.grip / load if load > 0.0 else math.nan, foot.slip_speed, foot.wet,

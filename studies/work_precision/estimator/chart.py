@@ -203,36 +203,34 @@ def _costs(panel: Axes, rows: Sequence[Row]) -> None:
 
 # --- robustness ----------------------------------------------------------------------------------
 
-# Changes: heading, unit and scale of the axis, and whether it is logarithmic.
-_COLUMNS: dict[str, tuple[str, str, float, bool]] = {
-    'force bias': ('force bias', 'N', 1.0, False),
-    'position noise': ('position noise', 'mm', 1e3, True),
-    'sample rate': ('sample rate', 'Hz', 1.0, True),
-    'shear stiffness': ('shear stiffness', 'times; configured / true', 1.0, True),
-    'patch length': ('patch length', 'm', 1.0, True),
-    'wet friction': ('wet friction', '(dry: 0.8)', 1.0, False),
-    'impacts': ('impacts', 'peak, loads', 1.0, False),
-    'messages dropped': ('dropped', '% of samples', 1e2, False),
-    'position late': ('position late', 'ms', 1e3, False),
-    'clock jumps': ('clock set by', 's', 1.0, False),
-    'mass': ('mass', 'times', 1.0, True),
+# Changes: unit and scale of the axis, and whether it is logarithmic.
+_CHANGES: dict[str, tuple[str, float, bool]] = {
+    'force bias': ('N', 1.0, False),
+    'position noise': ('mm', 1e3, True),
+    'configured noise': ('times the true noise', 1.0, True),
+    'correlated noise': ('correlation time, ms', 1e3, False),
+    'position steps': ('mm', 1e3, False),
+    'force turned': ('°', 1.0, False),
+    'sample rate': ('Hz', 1.0, True),
+    'shear stiffness': ('configured / true', 1.0, True),
+    'patch length': ('m', 1.0, True),
+    'wet friction': ('dry: 0.8', 1.0, False),
+    'impacts': ('peak, loads', 1.0, False),
+    'messages dropped': ('% of samples', 1e2, False),
+    'position late': ('ms', 1e3, False),
+    'clock jumps': ('s', 1.0, False),
+    'mass': ('times', 1.0, True),
 }
-# Tick values of axes without room for every value.
-_TICKS = {
-    'clock jumps': [-0.5, 0.0, 0.5],
-    'sample rate': [50.0, 100.0, 250.0, 1000.0],
-    'mass': [0.5, 1.0, 2.0, 4.0],
+# Measures: label, scale, targets, and the change from which on a measure moves.
+_MEASURES: dict[str, tuple[str, float, tuple[float, ...], float]] = {
+    'misses': ('slips missed, %', 1e2, (1.0,), 1.0),
+    'false_per_minute': ('false alarms a minute', 1.0, (1.0,), 1.0),
+    'slip_distance': ('slip before alarm, mm', 1e3, (), 0.5),
+    'wet_right': ('wet or dry right, %', 1e2, (97.0,), 2.0),
+    'coverage': ('friction within 2σ, %', 1e2, (90.0, 99.0), 3.0),
+    'below': ('margin below 5 %, %', 1e2, (5.0,), 2.0),
+    'axes': ('axes in doubt, % of time', 1e2, (), 1.0),
 }
-# Measures: label, scale, range, and the target.
-_MEASURES: tuple[tuple[str, str, float, tuple[float, float], tuple[float, ...]], ...] = (
-    ('slip_distance', 'slipped before\nalarm, mm', 1e3, (0.0, 6.0), ()),
-    ('misses', 'slips\nmissed, %', 1e2, (0.0, 20.0), (1.0,)),
-    ('false_per_minute', 'false alarms\na minute', 1.0, (0.0, 200.0), (1.0,)),
-    ('brier', 'Brier score,\nwet', 1.0, (0.0, 0.25), ()),
-    ('wet_right', 'wet or dry\nright', 1.0, (0.7, 1.01), (0.97,)),
-    ('coverage', 'friction\nwithin 2σ', 1.0, (0.6, 1.01), (0.90, 0.99)),
-    ('below', 'margin below\nits 5 %', 1.0, (0.0, 0.4), (0.05,)),
-)
 _VARIANTS: dict[str, dict[str, Any]] = {
     '': {'color': GREEN, 'marker': 'o', 'ls': '-'},
     'configured': {'color': GREEN, 'marker': 'o', 'ls': '-'},
@@ -240,28 +238,83 @@ _VARIANTS: dict[str, dict[str, Any]] = {
     'not configured': {'color': VERMILION, 'marker': 's', 'ls': '--'},
     'L1': {'color': BLUE, 'marker': 'D', 'ls': ':'},
 }
+_ACROSS = 4  # panels
+
+
+def _points(rows: Sequence[Row], change: str, measure: str, variant: str) -> list[list[float]]:
+    """Return value of the change and measure, as drawn."""
+    across, scale = _CHANGES[change][1], _MEASURES[measure][1]
+    return [
+        [across * row.value, scale * getattr(row, measure)]
+        for row in rows
+        if (row.name, row.variant) == (change, variant) and getattr(row, measure) is not None
+    ]
+
+
+def _variants(rows: Sequence[Row], change: str) -> list[str]:
+    return list(dict.fromkeys(row.variant for row in rows if row.name == change))
+
+
+def _moves(rows: Sequence[Row], change: str, measure: str) -> bool:
+    """Return whether a measure moves with a change, in any variant."""
+    spans = [_span(rows, change, measure, variant) for variant in _variants(rows, change)]
+    return any(high - low > _MEASURES[measure][3] for low, high in spans if high >= low)
+
+
+def _span(rows: Sequence[Row], change: str, measure: str, variant: str) -> tuple[float, float]:
+    """Return the least and the largest value of a measure; the larger one first if none."""
+    values = [value for _, value in _points(rows, change, measure, variant)]
+    return min(values, default=math.inf), max(values, default=-math.inf)
+
+
+def _changes(rows: Sequence[Row]) -> list[str]:
+    return [name for name in _CHANGES if any(row.name == name for row in rows)]
+
+
+def unmoved(rows: Sequence[Row]) -> str:
+    """Return a table of what is not drawn, because it does not move: for the docs."""
+    rows = [row for row in rows if row.part == 'robustness']
+    lines = ['| changed | from, to | does not move |', '|---|---|---|']
+    for change in _changes(rows):
+        unit, across, _ = _CHANGES[change]
+        values = [across * row.value for row in rows if row.name == change]
+        parts = []
+        for measure, (label, *_) in _MEASURES.items():
+            spans = [_span(rows, change, measure, each) for each in _variants(rows, change)]
+            spans = [span for span in spans if span[1] >= span[0]]
+            if not spans or _moves(rows, change, measure):
+                continue
+            low, high = min(span[0] for span in spans), max(span[1] for span in spans)
+            ends = f'{low:.3g}' if f'{low:.3g}' == f'{high:.3g}' else f'{low:.3g} to {high:.3g}'
+            parts.append(f'{label}: {ends}')
+        if parts:
+            ends = f'{min(values):g} to {max(values):g}, {unit}'
+            lines.append(f'| {change} | {ends} | {"; ".join(parts)} |')
+    return '\n'.join(lines)
 
 
 def draw_robustness(rows: Sequence[Row]) -> Figure:
-    """Return the picture of the estimator: a column for each change, a row for each measure."""
+    """Return the picture of the estimator: a panel for each measure that a change moves."""
     rows = [row for row in rows if row.part == 'robustness']
-    columns = [name for name in _COLUMNS if any(row.name == name for row in rows)]
-    with matplotlib.rc_context(STYLE | {'font.size': 8.0, 'axes.titlesize': 8.5}):
-        figure = Figure(figsize=(13.5, 9.0))
-        figure.set_layout_engine('constrained', w_pad=0.03, h_pad=0.03)
-        panels = figure.subplots(len(_MEASURES), max(1, len(columns)), squeeze=False)
-        for row, measure in enumerate(_MEASURES):
-            for column, name in enumerate(columns):
-                part = [each for each in rows if each.name == name]
-                _cell(panels[row][column], part, name, measure, row == 0, column == 0)
-                if row < len(_MEASURES) - 1:
-                    panels[row][column].set_xticklabels([])
-                else:
-                    panels[row][column].set_xlabel(_COLUMNS[name][1])
+    cells = [
+        (change, measure)
+        for change in _changes(rows)
+        for measure in _MEASURES
+        if _moves(rows, change, measure)
+    ]
+    height = max(1, math.ceil(len(cells) / _ACROSS))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 2.2 * height + 0.7))
+        figure.set_layout_engine('constrained', w_pad=0.06, h_pad=0.06)
+        panels = figure.subplots(height, _ACROSS, squeeze=False).ravel()
+        for panel in panels[len(cells) :]:
+            panel.set_axis_off()
+        for panel, (change, measure) in zip(panels, cells, strict=False):
+            _cell(panel, rows, change, measure)
         handles = [
             Line2D([], [], ms=4.0, lw=1.2, **_VARIANTS[name], label=label)
             for name, label in (
-                ('configured', 'estimator configured with it; mass: full dynamics'),
+                ('configured', 'estimator configured with it'),
                 ('not configured', 'estimator not configured with it'),
                 ('L1', 'walks in the plane'),
             )
@@ -269,70 +322,37 @@ def draw_robustness(rows: Sequence[Row]) -> Figure:
         handles += [
             Line2D([], [], **_TARGET, label='target; of the margin, nominal'),
             Line2D([], [], color=PALE, lw=5.0, alpha=0.35, label='ordinary value'),
-            Line2D([], [], color=BLACK, marker='^', ls='', ms=5.0, label='beyond the axis'),
         ]
-        figure.legend(handles=handles, loc='outside lower center', ncol=6)
+        figure.legend(handles=handles, loc='outside lower center', ncol=5)
     return figure
 
 
-def _cell(
-    panel: Axes,
-    rows: Sequence[Row],
-    name: str,
-    measure: tuple[str, str, float, tuple[float, float], tuple[float, ...]],
-    top: bool,
-    first: bool,
-) -> None:
-    what, label, scale, (low, high), targets = measure
-    title, _, across, logarithmic = _COLUMNS[name]
-    ordinary = [across * row.value for row in rows if row.shipped]
-    for value in ordinary[:1]:
-        panel.axvline(value, color=PALE, lw=5.0, alpha=0.35, zorder=0)
+def _cell(panel: Axes, rows: Sequence[Row], change: str, measure: str) -> None:
+    unit, across, logarithmic = _CHANGES[change]
+    label, _, targets, _ = _MEASURES[measure]
+    mine = [row for row in rows if row.name == change]
+    for row in mine:
+        if row.shipped:
+            panel.axvline(across * row.value, color=PALE, lw=5.0, alpha=0.2, zorder=0)
     for target in targets:
         panel.axhline(target, **_TARGET)
-    for variant in dict.fromkeys(row.variant for row in rows):
-        look = _VARIANTS[variant]
-        points = [
-            (across * row.value, scale * getattr(row, what))
-            for row in rows
-            if row.variant == variant and getattr(row, what) is not None
-        ]
-        x, y = [point[0] for point in points], [point[1] for point in points]
-        panel.plot(x, y, ms=3.5, lw=1.1, zorder=3, **look)
-        # Values outside the panel are drawn at its edge, with their number.
-        for at, value in points:
-            if not low <= value <= high:
-                edge, mark = (high, '^') if value > high else (low, 'v')
-                panel.plot(at, edge, mark, color=look['color'], ms=5.0, clip_on=False, zorder=4)
-                panel.annotate(
-                    f'{value:.0f}' if value > 100.0 else f'{value:.2g}',
-                    (at, edge), xytext=(-5, -3 if mark == '^' else 2),
-                    textcoords='offset points', ha='right', va='center', fontsize=7,
-                    color=look['color'],
-                )  # fmt: skip
+    for variant in _variants(rows, change):
+        points = _points(rows, change, measure, variant)
+        if points:
+            x, y = zip(*points, strict=True)
+            panel.plot(x, y, ms=4.0, lw=1.2, zorder=3, clip_on=False, **_VARIANTS[variant])
     if logarithmic:
         panel.set_xscale('log')
-        panel.minorticks_off()
-    values = _TICKS.get(name) or sorted({across * row.value for row in rows})
-    panel.set_xticks(values, [f'{value:g}' for value in values])
-    panel.tick_params(axis='x', labelsize=6.5, length=2.5)
-    # All panels of a column get the same axis, even if a measure has no values.
-    ends = [across * row.value for row in rows]
-    if logarithmic:
-        panel.set_xlim(min(ends) / 1.3, 1.3 * max(ends))
-    else:
-        room = 0.12 * (max(ends) - min(ends)) or 1.0
-        panel.set_xlim(min(ends) - room, max(ends) + room)
-    if what == 'false_per_minute':
+    values = sorted({across * row.value for row in mine})
+    panel.minorticks_off()
+    panel.set_xticks(values, [f'{value:g}' for value in values], fontsize=7.5)
+    if measure == 'false_per_minute':
         panel.set_yscale('symlog', linthresh=1.0)
         panel.set_yticks([0.0, 1.0, 10.0, 100.0], ['0', '1', '10', '100'])
         panel.minorticks_off()
-    panel.set_ylim(low - 0.03 * (high - low) if what != 'false_per_minute' else -0.2, high)
+        panel.set_ylim(bottom=0.0)
+    elif measure in {'misses', 'slip_distance', 'below', 'axes'}:
+        panel.set_ylim(bottom=0.0)
+    panel.set(title=change, xlabel=unit)
+    panel.set_ylabel(label, fontsize=8.0)
     panel.grid(color=PALE, alpha=0.25, lw=0.5)
-    if top:
-        panel.set_title(title, loc='center')
-    if first:
-        panel.set_ylabel(label)
-        panel.figure.align_ylabels()
-    else:
-        panel.set_yticklabels([])

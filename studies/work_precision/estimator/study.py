@@ -25,17 +25,20 @@ from matplotlib.figure import Figure
 from ros_pad.pace import Progress
 from studies.work_precision.estimator import chart
 from studies.work_precision.estimator.conditions import CHANGES
+from studies.work_precision.estimator.conditions import by_walk
 from studies.work_precision.estimator.conditions import stress
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
+from studies.work_precision.estimator.walks import FEW_CYCLES
 from studies.work_precision.estimator.walks import full
 from studies.work_precision.estimator.walks import recordings
 
 
 def measure(progress: Progress) -> list[Row]:
     """Record, compare the methods, and test the estimator; report progress, 0 to 1."""
-    rows = compare(recordings(), lambda share: progress(0.25 * share))
-    return rows + stress(CHANGES, lambda share: progress(0.25 + 0.75 * share))
+    rows = compare(recordings(), lambda share: progress(0.1 * share))
+    rows += stress(CHANGES, lambda share: progress(0.1 + 0.5 * share))
+    return rows + by_walk(FEW_CYCLES, lambda share: progress(0.6 + 0.4 * share))
 
 
 NEEDS_MUJOCO = 'full dynamics not compared: pip install "ros_pad[mujoco]"'
@@ -53,6 +56,7 @@ def table(rows: Sequence[Row]) -> str:
     for part, title in (
         ('methods', 'methods, each over its thresholds'),
         ('robustness', 'FootEstimator under changed conditions (* ordinary)'),
+        ('walks', 'FootEstimator by robot and floors, with 95 % intervals over walks'),
     ):
         mine = [row for row in rows if row.part == part]
         if not mine:
@@ -80,7 +84,11 @@ def _line(row: Row) -> str:
         *(_shown(row.coverages.get(name)) for name in ('dry', 'wet', 'dome')),
     )  # fmt: skip
     cells = ''.join(f'{value:>{width}}' for value, width in zip(values, _WIDTHS, strict=True))
-    return f'  {named:38}{cells}' + (f'  {row.note}' if row.note else '')
+    note = row.note
+    if row.walks:
+        ends = ', '.join(f'{name} {a:.3g} to {b:.3g}' for name, (a, b) in row.intervals.items())
+        note = f'{row.walks} walks, {row.slips} slips; {ends}'
+    return f'  {named:38}{cells}' + (f'  {note}' if note else '')
 
 
 def _shown(value: float | None, scale: float = 1.0) -> str:

@@ -65,6 +65,8 @@ class Estimates:
         P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
     seconds, updates : float, int
         Computing time, s, and number of samples.
+    axes : array of bool
+        Whether turned axes are in doubt.
     """
 
     slipping: Flags
@@ -77,12 +79,13 @@ class Estimates:
     speed: Floats
     seconds: float
     updates: int
+    axes: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def replay(walk: Recording) -> Estimates:
     """Return the results of an estimator for the readings of each leg."""
     shape = walk.load.shape
-    out = np.empty((*shape, 8))
+    out = np.empty((*shape, 9))
     seconds, updates = 0.0, 0
     stamps, rows, arrived = walk.stamps.tolist(), walk.rows, walk.arrived.tolist()
     for leg in range(shape[1]):
@@ -100,7 +103,8 @@ def replay(walk: Recording) -> Estimates:
             now = estimator.estimate
             found.append(
                 (now.slipping, now.standing, new and now.fresh, now.wet_probability,
-                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed)
+                 now.friction_mean, now.friction_sd, now.margin, now.slip_speed,
+                 now.doubt.startswith('axes'))
             )  # fmt: skip
         seconds += time.perf_counter() - start
         updates += sum(each[leg] for each in arrived)
@@ -116,6 +120,7 @@ def replay(walk: Recording) -> Estimates:
         speed=out[..., 7],
         seconds=seconds,
         updates=updates,
+        axes=out[..., 8] > 0.5,
     )
 
 
@@ -138,6 +143,8 @@ class Tally:
     covered, below : dict of list of array
         By ground and morphology (``dry``, ``wet``, ``dome``), whether the true friction was within
         2 sigma, and whether the true margin was below its estimated 5 % quantile.
+    axes : list of array
+        Whether turned axes were in doubt.
     """
 
     slips: int = 0
@@ -149,6 +156,29 @@ class Tally:
     wet_ends: list[tuple[bool, float]] = field(default_factory=list)
     covered: dict[str, list[Flags]] = field(default_factory=dict)
     below: dict[str, list[Flags]] = field(default_factory=dict)
+    axes: list[Flags] = field(default_factory=list)
+
+    def add(self, other: Tally) -> None:
+        """Add the counts of other walks."""
+        self.slips += other.slips
+        self.missed += other.missed
+        self.delays += other.delays
+        self.slip_distances += other.slip_distances
+        self.false_alarms += other.false_alarms
+        self.stick_time += other.stick_time
+        self.wet_ends += other.wet_ends
+        self.axes += other.axes
+        for mine, others in ((self.covered, other.covered), (self.below, other.below)):
+            for name, arrays in others.items():
+                mine.setdefault(name, []).extend(arrays)
+
+
+def counted(walk: Recording) -> Tally:
+    """Return the counts of the estimator on a walk."""
+    tally, estimates = Tally(), replay(walk)
+    count_alarms(tally, walk, estimates.slipping)
+    count_estimates(tally, walk, estimates)
+    return tally
 
 
 def slips(speed: Floats, load: Floats, period: float, gate: float) -> Iterator[tuple[int, int]]:
@@ -204,6 +234,7 @@ def count_alarms(tally: Tally, walk: Recording, alarms: Flags) -> None:
 
 def count_estimates(tally: Tally, walk: Recording, estimates: Estimates) -> None:
     """Add to a tally whether the estimates of wetness and friction are right."""
+    tally.axes.append(estimates.axes.ravel())
     if walk.sticks_only:
         return
     settled = round(SETTLED / walk.period)
@@ -281,6 +312,12 @@ class Row:
         The same by ground and morphology.
     note : str
         Remark.
+    axes : float or None
+        Share of the time in which turned axes are in doubt.
+    walks : int
+        Number of walks; 0 if they are not counted.
+    intervals : dict of list of float
+        95 % intervals of measures, from the walks drawn anew.
     """
 
     part: str
@@ -305,6 +342,9 @@ class Row:
     coverages: dict[str, float]
     belows: dict[str, float]
     note: str = ''
+    axes: float | None = None
+    walks: int = 0
+    intervals: dict[str, list[float]] = field(default_factory=dict)
 
 
 def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Row:
@@ -329,8 +369,39 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
         below=_mean(_joined(tally.below.values())),
         coverages=_means(tally.covered),
         belows=_means(tally.below),
+        axes=_mean(_joined([tally.axes])),
         **names,
     )
+
+
+DRAWS = 2000  # of the walks
+
+
+def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
+    """Return the row of several walks, with intervals over the walks."""
+    whole = Tally()
+    for each in tallies:
+        whole.add(each)
+    parts = {
+        'misses': [(each.missed, each.slips) for each in tallies],
+        'false_per_minute': [(each.false_alarms, each.stick_time / 60.0) for each in tallies],
+        'wet_right': [
+            (sum((p > 0.5) == wet for wet, p in each.wet_ends), len(each.wet_ends))
+            for each in tallies
+        ],
+        'coverage': [
+            (int(found.sum()), len(found))
+            for found in (_joined(each.covered.values()) for each in tallies)
+        ],
+    }
+    drawn = np.random.default_rng(0).integers(len(tallies), size=(DRAWS, len(tallies)))
+    intervals = {}
+    for name, pairs in parts.items():
+        hits, all_of = np.array(pairs, dtype=np.float64)[drawn].sum(axis=1).T
+        if (all_of > 0.0).all():
+            ends = np.quantile(hits / all_of, [0.025, 0.975])
+            intervals[name] = [float(end) for end in ends]
+    return row_of(whole, walks=len(tallies), intervals=intervals, **names)
 
 
 def _median(values: Sequence[float]) -> float | None:

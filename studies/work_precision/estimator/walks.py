@@ -170,16 +170,17 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
     """Return a recording of six flat feet on dry ground that are pulled to and fro without slip.
 
     From foot to foot, the peak of the pull is 0.2 to 0.6 of the friction limit, and its period 1.2
-    to 0.3 s.
+    to 0.3 s. As in walks, the feet only stand in the first second.
     """
     period, load, foot = 1.0 / scene.sensors.rate, scene.expected_load, scene.foot
     generator = np.random.default_rng([seed, 5])
     stamps = period * np.arange(1, round(duration / period) + 1, dtype=np.float64)
     friction = FrictionPrior.of(foot, load).flat_dry
     amplitude, cycle = friction * np.linspace(0.2, 0.6, 6), np.linspace(1.2, 0.3, 6)
+    pulled = np.maximum(0.0, stamps[:, None] - SETTLED)
     shape = (len(stamps), 6, 3)
     force, position = np.zeros(shape), np.zeros(shape)
-    force[..., 0] = load * amplitude * np.sin(2.0 * math.pi * stamps[:, None] / cycle)
+    force[..., 0] = load * amplitude * np.sin(2.0 * math.pi * pulled / cycle)
     force[..., 2] = load
     position[..., 0] = -force[..., 0] / foot.shear_stiffness
     noise = scene.sensors.position * generator.normal(size=shape)

@@ -2,6 +2,7 @@
 import importlib.util
 import json
 import math
+import pathlib
 from dataclasses import asdict
 from dataclasses import replace
 
@@ -258,6 +259,21 @@ def test_impacts_ring_only_in_what_is_read():
     assert struck.load is case.load
 
 
+def test_noise_that_is_correlated_or_has_steps_or_is_configured_wrong(plain):
+    slow = conditions.correlated_noise(plain, 0.02, generator())
+    noise = slow.position - plain.position + plain.noise
+    assert np.std(noise) == pytest.approx(np.std(plain.noise), rel=0.1)
+    after = np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2)
+    assert after == pytest.approx(math.exp(-0.004 / 0.02), abs=0.03)
+    steps = conditions.position_steps(plain, 5e-4, generator()).position / 5e-4
+    assert steps == pytest.approx(np.round(steps), abs=1e-9)
+    wrong = conditions.configured_factor(plain, 4.0, generator())
+    assert wrong.settings[2].position_noise == 4.0 * plain.settings[2].position_noise
+    assert wrong.position is plain.position
+    turned = conditions.turned_forces(plain, 90.0, generator()).force
+    assert turned[..., 1] == pytest.approx(plain.force[..., 0])
+
+
 # --- the study ----------------------------------------------------------------------------------
 
 
@@ -280,6 +296,12 @@ def rows():
         patch.setattr(walks, 'FEW_CYCLES', 3)
         patch.setattr(walks, 'SEEDS', (5, 6))
         patch.setattr(study, 'CHANGES', few)
+        patch.setattr(study, 'FEW_CYCLES', 2)
+        patch.setattr(conditions, 'ROBOTS', ('hexapod',))
+        patch.setattr(
+            conditions, 'WALK_SEEDS', {conditions.TUNED: (5,), conditions.HELD_OUT: (6,)}
+        )
+        patch.setattr(conditions, 'MARKER_NOISES', (1.5e-4,))
         patch.setattr(methods, 'CUSUM_THRESHOLDS', (4.0,))
         few_walks = walks.recordings()[::4]
         patch.setattr(study, 'recordings', lambda: few_walks)
@@ -306,10 +328,53 @@ def test_higher_thresholds_detect_less(rows):
     assert same[0].us_per_update < shipped.us_per_update
 
 
-def test_noise_that_is_not_configured_makes_false_alarms(rows):
+def test_noise_that_is_not_configured_is_measured(rows):
     quiet, loud, _ = [row for row in rows if row.part == 'robustness']
     assert quiet.shipped and not loud.shipped
-    assert quiet.false_per_minute < 5.0 < 20.0 < loud.false_per_minute
+    assert quiet.stick_minutes > 0.1
+    assert quiet.false_per_minute == loud.false_per_minute == 0.0
+    assert loud.misses > quiet.misses
+    assert quiet.axes == loud.axes == 0.0
+
+
+def test_walks_have_intervals(rows):
+    tuned, held_out = [row for row in rows if row.part == 'walks']
+    assert (tuned.variant, held_out.variant) == (conditions.TUNED, conditions.HELD_OUT)
+    assert tuned.walks == held_out.walks == 3
+    for row in (tuned, held_out):
+        for name, (low, high) in row.intervals.items():
+            assert low <= getattr(row, name) <= high, name
+
+
+def test_intervals_are_those_of_walks_drawn_anew():
+    tallies = [Tally(slips=100, missed=missed, stick_time=60.0) for missed in (0, 10, 20, 30)]
+    row = tally.row_of_walks(
+        tallies, part='walks', name='', variant='', value=0.0, unit='', shipped=False
+    )
+    assert (row.slips, row.misses, row.walks) == (400, 0.15, 4)
+    # The mean of four draws from four: between its 2.5 and 97.5 % quantile by enumeration.
+    means = [
+        (a + b + c + d) / 400 for a in range(0, 40, 10) for b in range(0, 40, 10)
+        for c in range(0, 40, 10) for d in range(0, 40, 10)
+    ]  # fmt: skip
+    assert row.intervals['misses'] == pytest.approx(np.quantile(means, [0.025, 0.975]), abs=0.02)
+    assert 'coverage' not in row.intervals
+
+
+def test_what_moves_is_drawn_and_what_does_not_is_listed():
+    cases = [
+        replace(
+            BLANK, part='robustness', name='force bias', unit='N', value=value, misses=misses,
+            wet_right=0.99, shipped=not value,
+        )
+        for value, misses in ((0.0, 0.001), (2.0, 0.2))
+    ]  # fmt: skip
+    panels = [each for each in chart.draw_robustness(cases).axes if each.axison]
+    assert [(each.get_title('left'), each.get_ylabel()) for each in panels] == [
+        ('force bias', 'slips missed, %')
+    ]
+    assert '| force bias | 0 to 2, N | wet or dry right, %: 99 |' in chart.unmoved(cases)
+    assert 'missed' not in chart.unmoved(cases)
 
 
 def test_table_and_pictures(rows, tmp_path):
@@ -322,6 +387,13 @@ def test_table_and_pictures(rows, tmp_path):
     for name, figure in pictures.items():
         figure.savefig(tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
+
+
+def test_the_docs_list_what_the_file_says_does_not_move():
+    docs = pathlib.Path(__file__).resolve().parents[3] / 'docs'
+    found = json.loads((docs / 'charts' / 'estimator.json').read_text())['rows']
+    listed = chart.unmoved([tally.Row(**row) for row in found])
+    assert listed in (docs / 'model' / 'estimation.md').read_text(), listed
 
 
 def test_the_best_has_few_false_alarms_and_misses():

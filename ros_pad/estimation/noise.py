@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noise of the sensors of a foot, measured while it stands.
+
+Second differences cancel what is steady or changes evenly, and leave the noise. Those of single
+samples show white noise, also while a foot slips. Those of means over blocks of samples show how
+much of it is correlated in time, as in filtered or repeated readings; they are taken at rest only.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from bisect import insort
+from collections import deque
+from operator import sub
+
+PRIOR_WINDOWS = 5
+"""Windows of 40 ms that the configured noise is worth."""
+
+KEPT_WINDOWS = 301
+"""Windows over which noise is measured: those of about half a minute of walking."""
+
+COARSE = 0.5
+"""Least noise of a sensor with steps, share of a step: one step is then no alarm for fast slip."""
+
+FEWEST_CHANGES = 16
+"""Changes of a reading from which on the smallest of them is the step of the sensor."""
+
+LAG = 2
+"""Blocks between those that are compared: noise that is correlated over one of them counts."""
+
+STEADY = 0.03
+"""Change of the force over blocks up to which a foot is at rest, share of the expected load."""
+
+STILL = 1e-3
+"""Motion over blocks, m, up to which a foot is at rest: one that slips at 5 mm/s moves so far."""
+
+_UNEVEN = 0.5
+"""Relative change of the sampling period above which no second difference is taken."""
+
+_MEDIAN = 0.69
+"""Median over mean of the sum of two squares, that of a second difference in the plane."""
+
+
+class Pool:
+    """Median of positive values, of which the first are assumed.
+
+    Parameters
+    ----------
+    prior : float
+        Assumed value, worth :data:`PRIOR_WINDOWS` values.
+
+    Attributes
+    ----------
+    median : float
+        Median of the last :data:`KEPT_WINDOWS` values.
+    """
+
+    __slots__ = ('_recent', '_sorted', 'median')
+
+    def __init__(self, prior: float) -> None:
+        self._sorted = [prior] * PRIOR_WINDOWS
+        self._recent = deque(self._sorted)
+        self.median = prior
+
+    def add(self, value: float) -> None:
+        """Add a value."""
+        self._recent.append(value)
+        insort(self._sorted, value)
+        if len(self._sorted) > KEPT_WINDOWS:
+            del self._sorted[bisect_left(self._sorted, self._recent.popleft())]
+        self.median = self._sorted[len(self._sorted) // 2]
+
+
+class Meter:
+    """Measure the noise of one sensor.
+
+    Parameters
+    ----------
+    configured : float
+        Standard deviation of each component with which to begin; at 0 nothing is measured.
+
+    Attributes
+    ----------
+    configured : float
+        As given.
+    white : float
+        Standard deviation of a component from one sample to the next.
+    noise : float
+        Standard deviation of the white noise that has the same effect on means over a block:
+        `white`, or more if noise is correlated in time or the sensor has steps.
+    """
+
+    __slots__ = ('_ratios', '_variances', 'configured', 'noise', 'white')
+
+    def __init__(self, configured: float) -> None:
+        self.configured = self.white = self.noise = configured
+        self._variances = Pool(configured * configured)
+        self._ratios = Pool(1.0)
+
+    def add_blocks(self, bend_x: float, bend_y: float, samples: float) -> None:
+        """Process the second difference of means over blocks of so many samples."""
+        variance = self.white * self.white
+        if variance > 0.0:
+            square = samples * (bend_x * bend_x + bend_y * bend_y) / 12.0
+            self._ratios.add(square / (_MEDIAN * variance))
+
+    def add_window(self, squares: float, count: int, least: float = 0.0) -> None:
+        """Process the second differences of a window: their sum of squares and their number.
+
+        ``least`` is the least noise of a sensor with steps.
+        """
+        # The median of chi-square over its mean; half of the differences are independent.
+        median = (1.0 - 4.0 / (9.0 * count)) ** 3
+        self._variances.add(squares / (6.0 * count * median))
+        self.white = math.sqrt(self._variances.median)
+        self.noise = max(least, self.white * math.sqrt(max(1.0, self._ratios.median)))
+
+    def text(self, unit: str) -> str:
+        """Return the noise for people, measured and configured."""
+        if not self.configured:
+            return 'not measured'
+        return f'{self.noise:.2g} {unit}, configured {self.configured:.2g} {unit}'
+
+
+Values = tuple[float, float, float, float, float]
+"""Position x and y, m, and force, N, or their changes."""
+
+_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class SensorNoise:
+    """Measure the noise of the marker and of the force sensor of a foot.
+
+    Parameters
+    ----------
+    position, force : float
+        Configured standard deviations of a component, m and N; 0: not measured.
+    load : float
+        Expected normal force in stance, N.
+    smoothing : float
+        Time constant of the slip speed, s. Blocks are twice as long: white noise has the same
+        standard deviation in their means as in the smoothed position.
+
+    Attributes
+    ----------
+    position, force : Meter
+        Noise of a coordinate, m, and of a component of the force, N.
+    """
+
+    __slots__ = (
+        '_bends', '_block', '_blocks', '_changes', '_dt', '_elapsed', '_force_squares', '_last',
+        '_run', '_samples', '_squares', '_steady', '_step', '_steps', '_sums', 'force', 'position',
+    )  # fmt: skip
+
+    def __init__(self, position: float, force: float, load: float, smoothing: float) -> None:
+        self.position, self.force = Meter(position), Meter(force)
+        self._block = 2.0 * smoothing - 1e-9
+        self._steady = STEADY * load
+        self._blocks: deque[tuple[Values, int]] = deque(maxlen=2 * LAG + 1)
+        self._squares = self._force_squares = 0.0  # of second differences in this window
+        self._bends = 0
+        self._step, self._steps = math.inf, 0  # smallest change of a coordinate; number of changes
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin a stance."""
+        self._last = self._changes = self._sums = _NOTHING
+        self._dt = self._elapsed = 0.0
+        self._samples = self._run = 0
+        self._blocks.clear()
+
+    def add(self, dt: float, x: float, y: float, fx: float, fy: float, fz: float) -> None:
+        """Process a position, m, and a force, N, dt seconds after the last ones."""
+        x_before, y_before, a, b, c = self._last
+        self._last = x, y, fx, fy, fz
+        change_x, change_y, a, b, c = x - x_before, y - y_before, fx - a, fy - b, fz - c
+        last_x, last_y, d, e, f = self._changes
+        self._changes = change_x, change_y, a, b, c
+        if self._run > 0 and (change_x or change_y):
+            self._steps += 1
+            step = abs(change_x or change_y)
+            if step < self._step:
+                self._step = step
+        if self._run > 1 and abs(dt - self._dt) <= _UNEVEN * dt:
+            self._squares += (change_x - last_x) ** 2 + (change_y - last_y) ** 2
+            self._force_squares += (a - d) ** 2 + (b - e) ** 2 + (c - f) ** 2
+            self._bends += 1
+        self._dt = dt
+        self._run += 1
+        a, b, c, d, e = self._sums
+        self._sums = a + x, b + y, c + fx, d + fy, e + fz
+        self._samples += 1
+        self._elapsed += dt
+        if self._elapsed >= self._block:
+            self._end_block()
+
+    def _end_block(self) -> None:
+        """Compare the block that ends with those before, if the foot was at rest in them."""
+        count = self._samples
+        x, y, fx, fy, fz = self._sums
+        block = x / count, y / count, fx / count, fy / count, fz / count
+        self._sums, self._elapsed, self._samples = _NOTHING, 0.0, 0
+        blocks = self._blocks
+        noise = 4.0 / math.sqrt(count)
+        steady = self._steady + noise * self.force.noise
+        still = STILL + noise * self.position.noise
+        while blocks:
+            a, b, c, d, e = map(sub, block, blocks[0][0])
+            if max(abs(a), abs(b)) <= still and max(abs(c), abs(d), abs(e)) <= steady:
+                break
+            blocks.popleft()
+        blocks.append((block, count))
+        if len(blocks) > 2 * LAG:
+            (first, some), (middle, more) = blocks[0], blocks[LAG]
+            x, y, fx, fy, _ = (a - b - b + c for a, b, c in zip(first, middle, block, strict=True))
+            samples = 6.0 / (1.0 / some + 4.0 / more + 1.0 / count)
+            self.position.add_blocks(x, y, samples)
+            self.force.add_blocks(fx, fy, samples)
+
+    def end_window(self) -> None:
+        """Use the samples since the last window."""
+        count = self._bends
+        if count < 2:
+            return
+        if self.position.configured:
+            least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
+            self.position.add_window(self._squares, 2 * count, least)
+        if self.force.configured:
+            self.force.add_window(self._force_squares, 3 * count)
+        self._squares, self._force_squares, self._bends = 0.0, 0.0, 0
