@@ -28,7 +28,7 @@ STUDIES = {
     'thesis': ('thesis.command', 'one page with all figures of the thesis (45 s)'),
     'behaviour': ('closed_loop.behaviour', 'metrics of every scene, and what changed (5 min)'),
     'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
-    'policies': ('closed_loop.policies', 'policies floor by floor, and slower gaits (30 min)'),
+    'policies': ('closed_loop.policies', 'policies beside rivals on held-out floors (35 min)'),
     'force_limits': ('closed_loop.force_limits', 'force limits of pads, and walks (40 min)'),
     'fidelity': ('closed_loop.fidelity', 'errors of the fidelity levels by scene (30 min)'),
     'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
