@@ -37,7 +37,7 @@ STUDIES = {
     'thesis': ('thesis.command', 'all figures and statements of the thesis (1 min)'),
     'behaviour': ('closed_loop.behaviour', 'metrics of every scene, and what changed (5 min)'),
     'assumptions': ('closed_loop.assumptions', 'assumed numbers wrong by a factor of 2 (1 h)'),
-    'policies': ('closed_loop.policies', 'policies floor by floor, and slower gaits (30 min)'),
+    'policies': ('closed_loop.policies', 'policies beside rivals on held-out floors (35 min)'),
     'force_limits': ('closed_loop.force_limits', 'force limits of pads, and walks (40 min)'),
     'fidelity': (
         'closed_loop.fidelity',

@@ -1,71 +1,118 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare policies on the same floors, and the adaptive policy with fixed ones at slower gaits.
+"""Compare the adaptive policy with fixed shapes, rivals of the literature and the oracle.
 
-Walks ``hexapod_patches`` with full dynamics (L2) under every policy on floors that were not used
-to choose any parameter; under fewer policies with other patches and on ground where one fixed
-morphology is the optimum; and with fixed morphologies at slower gaits. Prints distance a cycle
-(mm) and speed (mm/s), with ratios and their 95 % confidence intervals over floors, and writes
-policies.json and .png.
+Walks variants of ``hexapod_patches`` with full dynamics (L2). Everything was tuned on the tuning
+grounds (``--tune``, in a walk without dynamics, at most nine settings a policy) and is compared on
+grounds that differ from them in a condition: patch length, wet share, film, towed load, friction
+of the feet. Then on grounds where adapting cannot win, or where the foot's file is wrong, and with
+fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors. Writes
+policies.json and .png, and the tables of docs/model/policies.md.
+
+Walks are kept in ``--walks``: a run after a change makes only those that the change concerns.
 """
 
 from __future__ import annotations
 
+import hashlib
+import itertools
+import json
+import os
+import pathlib
 import statistics
 import time
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
+from ros_pad.control.policies import IsWet
+from ros_pad.control.policies import Policy
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.closed_loop import quick_walk
+from studies.closed_loop import rivals
+from studies.closed_loop.policies_figure import BETTER
+from studies.closed_loop.policies_figure import draw
 
 SCENE = 'hexapod_patches'
 LEVEL = 'L2'
-FIRST_SEED = 100
+FIRST_SEED = 200
 SLOWER = (1.0, 1.5, 2.0, 3.0)
 
-# Name in this study: policy and its parameters. `adaptive` without parameters plans probes by
-# their value, the three after it by other rules.
-POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
-    'flat': ('flat', {}),
-    'dome': ('dome', {}),
-    'adaptive': ('adaptive', {}),
-    'threshold': ('adaptive', {'probing': 'threshold'}),
-    'count 20': ('adaptive', {'probing': 'count', 'probe_every': 20}),
-    'count 4': ('adaptive', {'probing': 'count', 'probe_every': 4}),
-    'oracle': ('oracle', {}),
+Changes = Mapping[str, Mapping[str, Any]]
+
+TUNING: dict[str, Changes] = {
+    'as shipped': {},
+    'patches of 0.5 m': {'floor': {'patch_length': 0.5}},
+    'patches of 1 m': {'floor': {'patch_length': 1.0}},
+    'patches of 3 m': {'floor': {'patch_length': 3.0}},
+    '30 % wet': {'floor': {'wet_fraction': 0.3}},
+    '65 % wet': {'floor': {'wet_fraction': 0.65}},
+    '7 N towed': {'tow': {'weight': 7.0}},
 }
-LOOKS = {
-    'flat': (VERMILION, 's'),
-    'dome': (BLUE, '^'),
-    'adaptive': (GREEN, 'o'),
-    'oracle': ('#000000', 'D'),
+HELD_OUT: dict[str, Changes] = {
+    'patches of 0.4 m': {'floor': {'patch_length': 0.4}},
+    'patches of 0.7 m': {'floor': {'patch_length': 0.7}},
+    'patches of 2.2 m': {'floor': {'patch_length': 2.2}},
+    '15 % wet': {'floor': {'wet_fraction': 0.15}},
+    '55 % wet': {'floor': {'wet_fraction': 0.55}},
+    '80 % wet': {'floor': {'wet_fraction': 0.8}},
+    'film of 0.1 mm': {'floor': {'film_thickness': 1e-4}},
+    'film of 0.6 mm': {'floor': {'film_thickness': 6e-4}},
+    '5 N towed': {'tow': {'weight': 5.0}},
+    '10 N towed': {'tow': {'weight': 10.0}},
+    'less adhesion': {'foot': {'shear_strength': 3500.0}},
+    'more wet friction': {'foot': {'boundary_friction': 0.2}},
 }
+AGAINST: dict[str, Changes] = {
+    'patches of 0.3 m': {'floor': {'patch_length': 0.3}},
+    'wet all over': {'floor': {'kind': 'wet'}},
+    'dry all over': {'floor': {'kind': 'dry'}},
+    'nothing towed': {'tow': {'weight': 0.0}},
+    # Without adhesion, flat feet have the same friction on dry ground as domes.
+    'no adhesion': {'foot': {'friction': 0.41, 'shear_strength': 0.0}},
+    'no adhesion, not known': {'foot': {'friction': 0.41, 'shear_strength': 0.0}, 'file': {}},
+    'adhesion 1.4 times less than known': {'file': {'shear_strength': 1.4 * 4700.0}},
+    'wet friction half of what is known': {'foot': {'boundary_friction': 0.06}, 'file': {}},
+}
+"""Grounds: changes to floor, towed load and foot of the scene. ``file``: the controller knows
+another foot, that of the scene with these changes."""
 
+GROUNDS = {**TUNING, **HELD_OUT, **AGAINST}
 
-@dataclass(frozen=True)
-class Ground:
-    """A scene, and the foot that the controller is configured for if the scene has another."""
+SETTINGS: dict[str, list[tuple[Any, ...]]] = {
+    'count': [(2,), (4,), (8,), (16,)],
+    'threshold': [(0.6,), (0.7,), (0.75,), (0.8,), (0.9,)],
+    'pomdp': [*itertools.product((0.1, 0.3, 1.0), (0.75, 1.5))],
+    'discounted_ucb': [*itertools.product((0.8, 0.9, 0.95), (0.05, 0.2, 0.5))],
+    'discounted_thompson': [(0.7,), (0.8,), (0.9,), (0.95,)],
+}
+"""Settings of the rivals that are tried on the tuning grounds."""
 
-    scene: Scene
-    configured: Foot | None = None
+RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
+    'each 4 steps': ('count', (4,)),
+    'each 8 steps': ('count', (8,)),
+    'threshold': ('threshold', (0.8,)),
+    'POMDP': ('pomdp', (0.3, 0.75)),
+    'discounted UCB': ('discounted_ucb', (0.8, 0.05)),
+    'discounted Thompson': ('discounted_thompson', (0.9,)),
+}
+"""Rivals with the settings that were best on the tuning grounds, and each 4 steps."""
+
+POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
+PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
+BEGIN, END = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
+MAIN = ('flat', 'dome', 'adaptive', 'each 4 steps', 'oracle')
 
 
 @dataclass(frozen=True)
@@ -76,89 +123,115 @@ class Job:
     policy: str
     slower: float
     seed: int
+    cycles: int
 
 
-def grounds(cycles: int) -> dict[str, Ground]:
-    """Return all grounds by name."""
-    scene = replace(Scene.load(SCENE), cycles=cycles)
-
-    def floor(**changes: Any) -> Ground:
-        return Ground(replace(scene, floor=replace(scene.floor, **changes)))
-
-    # Without adhesion, flat feet have the same friction on dry ground as domes.
-    plain = replace(scene.foot, friction=0.41, shear_strength=0.0)
-    return {
-        'as shipped': Ground(scene),
-        'patches of 0.5 m': floor(patch_length=0.5),
-        'patches of 1 m': floor(patch_length=1.0),
-        'patches of 3 m': floor(patch_length=3.0),
-        '20 % wet': floor(wet_fraction=0.2),
-        '70 % wet': floor(wet_fraction=0.7),
-        'wet all over': floor(kind='wet'),
-        'dry all over': floor(kind='dry'),
-        'nothing towed': Ground(replace(scene, tow=replace(scene.tow, weight=0.0))),
-        'flat no better than dome': Ground(replace(scene, foot=plain)),
-        'the same, but not known': Ground(replace(scene, foot=plain), configured=scene.foot),
-    }
+def ground(name: str, cycles: int, slower: float = 1.0) -> tuple[Scene, Foot | None]:
+    """Return the scene of a ground, and the foot that the controller knows if it is another."""
+    scene, changes = replace(Scene.load(SCENE), cycles=cycles), GROUNDS[name]
+    known = replace(scene.foot, **changes['file']) if 'file' in changes else None
+    for part in ('floor', 'tow', 'foot'):
+        if part in changes:
+            scene = replace(scene, **{part: replace(getattr(scene, part), **changes[part])})
+    assert isinstance(scene.gait, WalkingGait)
+    gait = replace(scene.gait, cycle=scene.gait.cycle * slower)
+    return replace(scene, gait=gait), known
 
 
-PATCHES = ('patches of 0.5 m', 'patches of 1 m', 'patches of 3 m', '20 % wet', '70 % wet')
-UNBEATABLE = (
-    'wet all over',
-    'dry all over',
-    'nothing towed',
-    'flat no better than dome',
-    'the same, but not known',
-)
+def rival(kind: str, settings: Sequence[Any], seed: int) -> Policy:
+    """Return a rival for one walk."""
+    chance = (seed,) if kind == 'discounted_thompson' else ()
+    made: Policy = getattr(rivals, kind)(*settings, *chance)
+    return made
 
 
-def fewer(floors: int) -> int:
-    """Return the number of floors for all other grounds, and for slower gaits."""
-    return max(2, floors // 3)
+def _policy(name: str, is_wet: IsWet, seed: int) -> Policy:
+    return rival(*RIVALS[name], seed) if name in RIVALS else policy_named(name, is_wet)
 
 
-def jobs(floors: int) -> list[Job]:
-    """Return every walk: ``floors`` on the shipped ground, fewer on others and at slower gaits."""
-    seeds = range(FIRST_SEED, FIRST_SEED + floors)
-    few = seeds[: fewer(floors)]
-    todo = [Job('as shipped', policy, 1.0, seed) for policy in POLICIES for seed in seeds]
-    for ground in (*PATCHES, *UNBEATABLE):
-        for policy in ('flat', 'dome', 'adaptive', *(('oracle',) if ground in PATCHES else ())):
-            todo += [Job(ground, policy, 1.0, seed) for seed in few]
-    for slower in SLOWER[1:]:
-        for policy in ('flat', 'dome'):
-            todo += [Job('as shipped', policy, slower, seed) for seed in few]
-    return todo
+def _first(policy: str) -> str:
+    """Return the policy whose feet start as those of a policy do."""
+    return 'adaptive' if policy in RIVALS else policy
 
 
-def walk(ground: Ground, job: Job) -> tuple[float, int, str | None]:
+def walk(job: Job) -> tuple[float, int, str | None]:
     """Return distance a cycle, m, number of switches, and the verdict, None for a valid walk."""
-    gait = ground.scene.gait
-    assert isinstance(gait, WalkingGait)
-    scene = replace(ground.scene, gait=replace(gait, cycle=gait.cycle * job.slower))
-    policy, parameters = POLICIES[job.policy]
-    loop = ClosedLoop(scene, policy, job.seed, LEVEL, policy_parameters=parameters)
-    if ground.configured:
-        controller = MorphologyController(
-            ground.configured,
-            scene.legs,
-            policy_named(policy, loop.floor.wet, parameters),
-            scene.expected_load,
-            start=first_morphologies(policy, scene.legs),
-            fixed_pressure=scene.dome_pressure,
-        )
-        loop.connect(controller=controller)
+    scene, known = ground(job.ground, job.cycles, job.slower)
+    first = _first(job.policy)
+    loop = ClosedLoop(scene, first, job.seed, LEVEL)
+    controller = MorphologyController(
+        known or scene.foot,
+        scene.legs,
+        _policy(job.policy, loop.floor.wet, job.seed),
+        scene.expected_load,
+        start=first_morphologies(first, scene.legs),
+        fixed_pressure=scene.dome_pressure,
+    )
+    loop.connect(controller=controller)
     loops.walk(loop, scene)
     switches = sum(loop.controller.switches.values())
     return loop.robot.body[0] / scene.cycles, switches, loop.robot.verdict
 
 
+# --- walks that are kept -------------------------------------------------------------------------
+
+
+def _code(policy: str) -> str:
+    """Return a digest of the code that a walk under a policy depends on."""
+    source = command.ROOT / 'ros_pad'
+    parts = ('contact', 'estimation', 'simulation', 'regulators', 'robots', 'sensing', 'trials')
+    files = [path for part in parts for path in sorted((source / part).rglob('*.py'))]
+    files += sorted((command.ROOT / 'config').rglob('*.yaml'))
+    own = ('policies.py', 'probing.py')
+    if policy not in ('flat', 'dome'):
+        control = sorted((source / 'control').glob('*.py'))
+        files += [path for path in control if policy == 'adaptive' or path.name not in own]
+    if policy in RIVALS:
+        files.append(pathlib.Path(rivals.__file__))
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def walked(jobs: Sequence[Job], kept: pathlib.Path, processes: int) -> dict[Job, Any]:
+    """Return the results of walks; those that are not in the file ``kept`` are made, and added."""
+    code = {policy: _code(policy) for policy in {job.policy for job in jobs}}
+    keys = {}
+    for job in jobs:
+        what = (job, GROUNDS[job.ground], RIVALS.get(job.policy), code[job.policy])
+        keys[job] = hashlib.sha256(repr(what).encode()).hexdigest()
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    lines = kept.read_text().splitlines() if kept.exists() else []
+    known = dict(map(json.loads, lines))
+    missing = [(job, keys[job], kept) for job in jobs if keys[job] not in known]
+    for (job, _, _), result in zip(
+        missing, command.in_processes(_walk_and_keep, missing, processes, 'policies'), strict=True
+    ):
+        known[keys[job]] = result
+    return {job: known[keys[job]] for job in jobs}
+
+
+def _walk_and_keep(job: Job, key: str, kept: pathlib.Path) -> tuple[float, int, str | None]:
+    result = walk(job)
+    file = os.open(kept, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        os.write(file, (json.dumps([key, result]) + '\n').encode())  # whole lines of all processes
+    finally:
+        os.close(file)
+    return result
+
+
+# --- statistics ----------------------------------------------------------------------------------
+
+
 def ratio(distances: Sequence[float], others: Sequence[float]) -> dict[str, float]:
     """Return the ratio of mean distances on the same floors, and its 95 % bootstrap interval.
 
-    ``least`` and ``most`` are the extreme ratios of single floors. For the interval, floors are
-    drawn with replacement, each with the walks of the two policies. (The mean of the ratios of
-    floors has no meaning if a policy makes no progress on some floor.)
+    ``least`` is the ratio on the worst floor, ``behind`` the share of floors on which the first is
+    more than 0.5 % behind. For the interval, floors are drawn with replacement, each with the
+    walks of the two policies. (The mean of the ratios of floors has no meaning if a policy makes
+    no progress on some floor.)
     """
     ours, theirs = np.array(distances), np.array(others)
     drawn = np.random.default_rng(0).integers(len(ours), size=(10_000, len(ours)))
@@ -168,118 +241,204 @@ def ratio(distances: Sequence[float], others: Sequence[float]) -> dict[str, floa
         'low': round(float(low), 4),
         'high': round(float(high), 4),
         'least': round(float((ours / theirs).min()), 4),
-        'most': round(float((ours / theirs).max()), 4),
+        'behind': round(float((ours < 0.995 * theirs).mean()), 3),
     }
 
 
-def measure(floors: int, cycles: int, processes: int) -> dict[str, Any]:
-    """Walk everything and return the document that is saved."""
+def _compared(rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ratios of each policy to oracle and better fixed shape, and of the adaptive to it."""
+    each = {name: row['each_mm'] for name, row in rows.items()}
+    better = [max(pair) for pair in zip(each['flat'], each['dome'], strict=True)]
+    return {
+        name: {
+            'oracle': ratio(own, each['oracle']),
+            BETTER: ratio(own, better),
+            'adaptive to it': ratio(each['adaptive'], own),
+        }
+        for name, own in each.items()
+    }
+
+
+def _row(results: Sequence[Any], jobs: Sequence[Job]) -> dict[str, Any]:
+    distances = [1e3 * distance for distance, _, _ in results]
+    return {
+        'mm_a_cycle': round(statistics.fmean(distances), 2),
+        'switches': round(statistics.fmean(each for _, each, _ in results), 1),
+        'seeds': [job.seed for job in jobs],
+        'each_mm': [round(distance, 2) for distance in distances],
+        'verdicts': sorted({verdict for _, _, verdict in results if verdict}),
+    }
+
+
+def _part(
+    grounds: Mapping[str, Changes], policies: Sequence[str], results: Mapping[Job, Any]
+) -> dict[str, Any]:
+    """Return the results on some grounds: of each ground, and of all floors together."""
+    part: dict[str, Any] = {'grounds': {}}
+    whole: dict[str, list[Job]] = {policy: [] for policy in policies}
+    for name in grounds:
+        rows = {}
+        for policy in policies:
+            jobs = [
+                job
+                for job in results
+                if (job.ground, job.policy, job.slower) == (name, policy, 1.0)
+            ]
+            whole[policy] += jobs
+            rows[policy] = _row([results[job] for job in jobs], jobs)
+        part['grounds'][name] = {**rows, 'ratios': _compared(rows)}
+    rows = {policy: _row([results[job] for job in jobs], jobs) for policy, jobs in whole.items()}
+    part['all'] = {**rows, 'ratios': _compared(rows)}
+    return part
+
+
+def measure(
+    floors: int, cycles: int, kept: pathlib.Path, processes: int, short: bool = False
+) -> dict[str, Any]:
+    """Walk everything and return the document that is saved; see ``--short`` for less."""
     started = time.perf_counter()
-    named = grounds(cycles)
-    # Slow gaits take longest, so they are started first.
-    todo = sorted(jobs(floors), key=lambda job: -job.slower)
-    walks = [(named[job.ground], job) for job in todo]
-    walked = dict(zip(todo, command.in_processes(walk, walks, processes, 'policies'), strict=True))
-
-    def result(
-        ground: str, policy: str, slower: float = 1.0, count: int = floors
-    ) -> dict[str, Any]:
-        own = {
-            job.seed: walked[job]
-            for job in sorted(walked, key=lambda job: job.seed)
-            if (job.ground, job.policy, job.slower) == (ground, policy, slower)
-            and job.seed < FIRST_SEED + count
-        }
-        distances = [1e3 * distance for distance, _, _ in own.values()]
-        cycle = named[ground].scene.gait.cycle * slower
-        return {
-            'mm_a_cycle': round(statistics.fmean(distances), 2),
-            'mm_per_s': round(statistics.fmean(distances) / cycle, 2),
-            'switches': round(statistics.fmean(each for _, each, _ in own.values()), 1),
-            'seeds': list(own),
-            'each_mm': [round(distance, 2) for distance in distances],
-            'verdicts': sorted({verdict for _, _, verdict in own.values() if verdict}),
-        }
-
+    policies = MAIN if short else POLICIES
+    few = range(FIRST_SEED, FIRST_SEED + max(2, floors))
+    slow = [
+        Job('as shipped', policy, slower, seed, cycles)
+        for slower in (() if short else reversed(SLOWER))
+        for policy in ('flat', 'dome', *(('adaptive',) if slower == 1.0 else ()))
+        for seed in few
+    ]
+    jobs = list(slow)
+    # Each condition has floors of its own.
+    for place, name in enumerate((*HELD_OUT, *AGAINST)):
+        first = FIRST_SEED + 100 * (place + 1)
+        for policy in policies if name in HELD_OUT else MAIN:
+            jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(floors)]
+    results = walked(jobs, kept, processes)
     document: dict[str, Any] = {
         'scene': SCENE,
         'cycles': cycles,
-        'grounds': {
-            ground: {
-                policy: result(ground, policy)
-                for policy in POLICIES
-                if any((job.ground, job.policy) == (ground, policy) for job in todo)
-            }
-            for ground in named
-        },
-        'slower': [
-            {
-                'slower': slower,
-                'policy': policy,
-                **result('as shipped', policy, slower, fewer(floors)),
-            }
-            for policy in ('flat', 'dome', 'adaptive')
-            for slower in (SLOWER if policy != 'adaptive' else SLOWER[:1])
-        ],
+        'rivals': {name: list(setting) for name, setting in RIVALS.items()},
+        'changes': {**HELD_OUT, **AGAINST},
+        'held out': _part(HELD_OUT, policies, results),
+        'against': _part(AGAINST, MAIN, results),
+        'slower': [],
     }
-    for policies in document['grounds'].values():
-        policies['ratios'] = {
-            other: ratio(policies['adaptive']['each_mm'], policies[other]['each_mm'])
-            for other in policies
-            if other != 'adaptive'
-        }
+    for policy, slower in dict.fromkeys((job.policy, job.slower) for job in slow):
+        jobs = [job for job in slow if (job.policy, job.slower) == (policy, slower)]
+        row = _row([results[job] for job in jobs], jobs)
+        speed = round(row['mm_a_cycle'] / slower, 2)
+        document['slower'].append({'slower': slower, 'policy': policy, 'mm_per_s': speed, **row})
     document['wall_s'] = round(time.perf_counter() - started, 1)
     return document
 
 
-def interval(part: dict[str, float]) -> str:
+# --- tuning --------------------------------------------------------------------------------------
+
+
+def _tuning_walk(kind: str, settings: tuple[Any, ...], name: str, seed: int) -> float:
+    scene, _ = ground(name, 60)
+    if kind in ('adaptive', 'oracle'):
+        policy = policy_named(kind, scene.floor.build(seed).wet)
+        return quick_walk.walk(scene, policy, kind, seed)[0]
+    return quick_walk.walk(scene, rival(kind, settings, seed), 'adaptive', seed)[0]
+
+
+def tune(floors: int, processes: int) -> dict[str, Any]:
+    """Return the mean distance of every setting on the tuning grounds, without dynamics."""
+    tried = [(kind, setting) for kind, settings in SETTINGS.items() for setting in settings]
+    tried += [('adaptive', ()), ('oracle', ())]
+    cases = [
+        (kind, setting, name, seed)
+        for kind, setting in tried
+        for name in TUNING
+        for seed in range(floors)
+    ]
+    distances = command.in_processes(_tuning_walk, cases, processes, 'tuning')
+    each = len(TUNING) * floors
+    return {
+        'grounds': TUNING,
+        'seeds': list(range(floors)),
+        'cycles': 60,
+        'tried': [
+            {
+                'policy': kind,
+                'settings': list(setting),
+                'mm_a_cycle': round(1e3 * statistics.fmean(distances[at : at + each]), 2),
+            }
+            for at, (kind, setting) in zip(range(0, len(cases), each), tried, strict=True)
+        ],
+    }
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+def interval(part: Mapping[str, float]) -> str:
     """Return a ratio and its interval as text."""
     return f'{part["of_means"]:.3f} ({part["low"]:.3f} to {part["high"]:.3f})'
 
 
-def table(document: dict[str, Any]) -> str:
+def table(document: Mapping[str, Any]) -> str:
     """Return the tables of docs/model/policies.md."""
-    shipped = document['grounds']['as shipped']
-    count = len(shipped['adaptive']['seeds'])
+    lines = []
+    for part, title in (('held out', 'held-out floors'), ('against', 'floors, see below')):
+        whole = document[part]['all']
+        lines += [
+            f'{document["scene"]}, {LEVEL}, {document["cycles"]} cycles,'
+            f' {len(whole["flat"]["seeds"])} {title}:',
+            '',
+            '| policy | mm a cycle | switches | adaptive to it | to the oracle | to the better'
+            ' fixed shape of each floor | worst floor | floors behind it by 0.5 % |',
+            '|' + '---|' * 8,
+        ]
+        for name in (name for name in POLICIES if name in whole):
+            row, ratios = whole[name], whole['ratios'][name]
+            better = ratios[BETTER]
+            lines.append(
+                f'| {name} | {row["mm_a_cycle"]:.1f} | {row["switches"]:.0f} |'
+                f' {interval(ratios["adaptive to it"]) if name != "adaptive" else ""} |'
+                f' {interval(ratios["oracle"]) if name != "oracle" else ""} |'
+                f' {interval(better)} | {better["least"]:.3f} | {better["behind"]:.0%} |'
+            )
+        lines += ['', *_by_ground(document[part]['grounds']), '']
+    return '\n'.join(lines[:-1] + (_slower(document['slower']) if document['slower'] else []))
+
+
+def _by_ground(grounds: Mapping[str, Any]) -> list[str]:
+    """Return the lines of a table with a row for each ground."""
+    each = len(next(iter(grounds.values()))['flat']['seeds'])
     lines = [
-        f'{document["scene"]}, {LEVEL}, {document["cycles"]} cycles, {count} floors from seed'
-        f' {FIRST_SEED}; ratio of mean distances, adaptive to each, with 95 % bootstrap interval',
+        f'Each ground, {each} floor{"s" * (each > 1)}; the adaptive policy to others:',
         '',
-        '| policy | mm a cycle | least, most | switches | adaptive to it | on the worst floor |',
-        '|---|---|---|---|---|---|',
+        f'| ground | {" | ".join(MAIN)} | to the better fixed shape of each floor | to the oracle'
+        ' | to each 4 steps |',
+        '|' + '---|' * (len(MAIN) + 4),
     ]
-    for policy in POLICIES:
-        row = shipped[policy]
-        own = shipped['ratios'].get(policy)
-        against = f'{interval(own)} | {own["least"]:.3f}' if own else ' | '
-        lines.append(
-            f'| {policy} | {row["mm_a_cycle"]:.1f} | {min(row["each_mm"]):.0f},'
-            f' {max(row["each_mm"]):.0f} | {row["switches"]:.0f} | {against} |'
-        )
-    lines += [
+    for name, row in grounds.items():
+        means = ' | '.join(f'{row[policy]["mm_a_cycle"]:.1f}' for policy in MAIN)
+        own = row['ratios']['adaptive']
+        others = (own[BETTER], own['oracle'], row['ratios']['each 4 steps']['adaptive to it'])
+        # An interval over one floor says nothing.
+        ratios = [interval(other) if each > 1 else f'{other["of_means"]:.3f}' for other in others]
+        lines.append(f'| {name} | {means} | {" | ".join(ratios)} |')
+    return lines
+
+
+def written(page: str, tables: str) -> str:
+    """Return docs/model/policies.md with its tables replaced."""
+    before, rest = page.split(BEGIN)
+    return f'{before}{BEGIN}\n{tables}\n{END}{rest.split(END)[1]}'
+
+
+def _slower(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the lines of the table of slower gaits."""
+    slow = {(row['policy'], row['slower']): row for row in rows}
+    lines = [
         '',
-        '| ground | flat | dome | adaptive | oracle | adaptive/flat | /dome | /oracle |',
-        '|---|---|---|---|---|---|---|---|',
-    ]
-    for ground, row in document['grounds'].items():
-        distances = [
-            f'{row[policy]["mm_a_cycle"]:.1f}' if policy in row else ''
-            for policy in ('flat', 'dome', 'adaptive', 'oracle')
-        ]
-        ratios = [
-            interval(row['ratios'][policy]) if policy in row else ''
-            for policy in ('flat', 'dome', 'oracle')
-        ]
-        lines.append('| ' + ' | '.join((ground, *distances, *ratios)) + ' |')
-    lines += [
-        '',
-        f'On the first {len(document["slower"][0]["seeds"])} floors as shipped; adaptive at full'
-        f' speed {document["slower"][-1]["mm_a_cycle"]:.1f} mm a cycle',
+        f'{len(slow["flat", 1.0]["seeds"])} floors as shipped; adaptive at full speed'
+        f' {slow["adaptive", 1.0]["mm_a_cycle"]:.1f} mm a cycle:',
         '',
         '| gait slower by | flat mm a cycle | flat mm/s | dome mm a cycle | dome mm/s |',
         '|---|---|---|---|---|',
     ]
-    slow = {(row['policy'], row['slower']): row for row in document['slower']}
     for slower in SLOWER:
         cells = [
             f'{slow[policy, slower][key]:.1f}'
@@ -287,77 +446,45 @@ def table(document: dict[str, Any]) -> str:
             for key in ('mm_a_cycle', 'mm_per_s')
         ]
         lines.append(f'| {slower:g} | ' + ' | '.join(cells) + ' |')
+    return lines
+
+
+def tuning_table(document: Mapping[str, Any]) -> str:
+    """Return the settings that were tried, and what they reached."""
+    lines = ['| policy | settings | mm a cycle |', '|---|---|---|']
+    for row in document['tried']:
+        settings = ', '.join(map(str, row['settings']))
+        lines.append(f'| {row["policy"]} | {settings} | {row["mm_a_cycle"]:.2f} |')
     return '\n'.join(lines)
-
-
-def draw(document: dict[str, Any]) -> Figure:
-    """Draw distance a cycle of every policy by floor, and over speed at slower gaits."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.8), layout='constrained')
-        floors, speeds = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-        _draw_floors(floors, document['grounds']['as shipped'])
-        _draw_speeds(speeds, document['slower'])
-        for panel in (floors, speeds):
-            panel.set_ylim(0.0, 145.0)
-            panel.set_ylabel('distance a cycle, mm')
-            panel.legend(frameon=False, loc='lower left')
-    return figure
-
-
-def _draw_floors(panel: Axes, shipped: dict[str, Any]) -> None:
-    domes = shipped['dome']['each_mm']
-    order = sorted(range(len(domes)), key=domes.__getitem__)
-    for place, index in enumerate(order):
-        own = [shipped[policy]['each_mm'][index] for policy in LOOKS]
-        panel.plot([place, place], [min(own), max(own)], color='0.8', linewidth=1.0, zorder=1)
-    for policy, (colour, marker) in LOOKS.items():
-        distances = [shipped[policy]['each_mm'][index] for index in order]
-        hollow = policy == 'oracle'
-        panel.plot(
-            range(len(order)), distances, marker, color=colour, markersize=5,
-            markerfacecolor='none' if hollow else colour, label=policy, zorder=2 + hollow,
-        )  # fmt: skip
-    seeds = shipped['dome']['seeds']
-    panel.set_xticks(range(len(order)), [str(seeds[index]) for index in order])
-    panel.set_xlabel('floor (seed)')
-    panel.set_title('Every policy on the same floors')
-
-
-def _draw_speeds(panel: Axes, slower: Sequence[dict[str, Any]]) -> None:
-    for policy in ('flat', 'dome'):
-        colour, marker = LOOKS[policy]
-        rows = [row for row in slower if row['policy'] == policy]
-        points = [(row['mm_per_s'], row['mm_a_cycle']) for row in rows]
-        panel.plot(
-            *zip(*points, strict=True), marker=marker, color=colour,
-            markersize=5, linewidth=1.2, label=policy,
-        )  # fmt: skip
-        for row, point in zip(rows, points, strict=True):
-            panel.annotate(
-                f'{row["slower"]:g}×', point,
-                xytext=(0, -14) if policy == 'flat' else (5, 5), textcoords='offset points',
-                ha='center' if policy == 'flat' else 'left', fontsize=8, color=colour,
-            )  # fmt: skip
-    colour, marker = LOOKS['adaptive']
-    (row,) = (row for row in slower if row['policy'] == 'adaptive')
-    panel.plot(
-        row['mm_per_s'], row['mm_a_cycle'], marker,
-        color=colour, markersize=7, label='adaptive', zorder=3,
-    )  # fmt: skip
-    panel.set_xlim(0.0, 150.0)
-    panel.set_xlabel('speed, mm/s')
-    panel.set_title('Slower gaits: cycle time 1 to 3 times')
 
 
 def main(words: Sequence[str]) -> int:
     """Measure, save, and print tables."""
     parser = command.parser('policies', __doc__)
-    command.add_count(parser, '--floors', 12, 'shipped floors, each with its seed', least=2)
+    command.add_count(parser, '--floors', 4, 'floors of each ground, each with its seed', least=1)
     command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
+    parser.add_argument('--tune', action='store_true', help='try the settings of the rivals')
+    parser.add_argument(
+        '--short', action='store_true',
+        help=f'walk only {", ".join(MAIN)}, at full speed',
+    )  # fmt: skip
+    parser.add_argument(
+        '--walks', type=pathlib.Path, default=command.ROOT / 'runs' / 'policies_walks.jsonl',
+        metavar='FILE', help='walks that are kept (default: runs/policies_walks.jsonl)',
+    )  # fmt: skip
     command.add_processes(parser)
     command.add_out(parser)
     options = parser.parse_args(words)
-    document = measure(options.floors, options.cycles, options.processes)
+    if options.tune:
+        document = tune(options.floors, options.processes)
+        document = command.write(options.out, 'policies_tuning', document)
+        command.show(options, document, tuning_table(document))
+        return 0
+    document = measure(
+        options.floors, options.cycles, options.walks, options.processes, options.short
+    )
     document = command.write(options.out, 'policies', document, {'policies': draw(document)})
+    if options.out == command.CHARTS:
+        PAGE.write_text(written(PAGE.read_text(), table(document)))
     command.show(options, document, table(document))
     return 0

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+from dataclasses import replace
+
+import pytest
+
+from ros_pad.control import policy_named
+from ros_pad.control.policies import Choice
+from ros_pad.control.policies import LiftOff
+from ros_pad.control.probing import Plan
+from ros_pad.simulation import Scene
+from studies.closed_loop import policies
+from studies.closed_loop import quick_walk
+from studies.closed_loop import rivals
+
+STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False, 0.5, Plan())
+
+
+def test_held_out_grounds_share_no_condition_with_tuning_grounds():
+    values = {
+        (part, name): {
+            changes[part][name]
+            for changes in policies.TUNING.values()
+            if name in changes.get(part, {})
+        }
+        for part, name in (('floor', 'patch_length'), ('floor', 'wet_fraction'), ('tow', 'weight'))
+    }
+    for name, changes in policies.HELD_OUT.items():
+        assert changes, name
+        for part, changed in changes.items():
+            for key, value in changed.items():
+                assert value not in values.get((part, key), ()), name
+                assert value != getattr(getattr(Scene.load(policies.SCENE), part), key), name
+
+
+def test_ratio_by_hand():
+    result = policies.ratio([100.0, 98.0], [100.0, 100.0])
+    assert result == {'of_means': 0.99, 'low': 0.98, 'high': 1.0, 'least': 0.98, 'behind': 0.5}
+
+
+def test_walks_that_are_kept_are_not_made_again(tmp_path, monkeypatch):
+    made = []
+
+    def in_processes(task, cases, *_):
+        made.extend(job for job, _, _ in cases)
+        return [task(*case) for case in cases]
+
+    monkeypatch.setattr(policies.command, 'in_processes', in_processes)
+    monkeypatch.setattr(policies, 'walk', lambda job: [0.1, job.seed, None])
+    jobs = [policies.Job('as shipped', 'flat', 1.0, seed, 2) for seed in (1, 2)]
+    kept = tmp_path / 'walks.jsonl'
+    policies.walked(jobs[:1], kept, 1)
+    assert policies.walked(jobs, kept, 1) == {jobs[0]: [0.1, 1, None], jobs[1]: [0.1, 2, None]}
+    assert made == jobs
+    monkeypatch.setattr(policies, '_code', lambda policy: 'another')
+    policies.walked(jobs, kept, 1)
+    assert made == [*jobs, *jobs]
+
+
+def test_the_page_has_the_tables_of_the_last_run():
+    document = json.loads((policies.command.CHARTS / 'policies.json').read_text())
+    page = policies.PAGE.read_text()
+    assert policies.written(page, policies.table(document)) == page
+
+
+def border(policy, morphology):
+    """Return the least probability of wet ground, in hundredths, at which feet become domes."""
+    steps = (replace(STEP, morphology=morphology, wet_ahead=each / 100.0) for each in range(101))
+    return [policy(step) for step in steps].index(Choice('dome'))
+
+
+def test_the_value_of_a_foot_where_each_step_is_on_new_ground():
+    """By hand, with P(wet) = 0.9 at each step, loss 1, discount 0.99: a flat step gains 1 - 2 P.
+    A dome becomes flat if that is worth two switches, 0.05 + 0.99 * 0.05; a flat foot becomes a
+    dome one step later if it is worth 0.99 * 0.05 - 0.05."""
+    policy = rivals.pomdp(loss=1.0, length=1e-3, share=0.9)
+    assert border(policy, 'dome') == pytest.approx(100 * (1.0 - 0.0995) / 2.0, abs=1.0)
+    assert border(policy, 'flat') == pytest.approx(100 * 1.0005 / 2.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    'policy', [rivals.discounted_ucb(0.9, 0.2), rivals.discounted_thompson(0.9, seed=1)]
+)
+def test_bandits_take_the_morphology_that_goes_further_and_try_the_other(policy):
+    before, x, chosen = 0.0, 0.0, []
+    for _ in range(300):
+        # Position ahead: the next step is taken to be as long as the last one.
+        morphology = policy(replace(STEP, next_position=(2.0 * x - before, 0.0))).morphology
+        chosen.append(morphology)
+        before, x = x, x + (0.13 if morphology == 'flat' else 0.02)
+    assert 0.7 < chosen.count('flat') / 300 < 1.0
+
+
+def test_a_walk_without_dynamics_goes_as_far_as_one_with_dynamics():
+    """From docs/charts/policies.json: fixed morphologies in L2, within 3 %, mm a cycle."""
+    scene = replace(Scene.load(policies.SCENE), cycles=12)
+    for kind, policy, expected in (
+        ('wet', 'flat', 81.5), ('wet', 'dome', 139.7), ('dry', 'flat', 127.1),
+        ('dry', 'dome', 97.9),
+    ):  # fmt: skip
+        ground = replace(scene, floor=replace(scene.floor, kind=kind))
+        distance, switches = quick_walk.walk(ground, policy_named(policy), policy, 0)
+        assert 1e3 * distance == pytest.approx(expected, rel=0.03)
+        assert switches == 0
