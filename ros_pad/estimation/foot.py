@@ -395,8 +395,8 @@ class FootEstimator:
         axes.update(dt, force, x, y, z, sd)
         if axes.doubt and not was:
             self._history.clear()
-            self._ground.fade(math.inf)
-            mean, sd = self._ground.friction
+            self.ground.fade(math.inf)
+            mean, sd = self.ground.friction
             self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
     def _set_back(self, time: float) -> float:

@@ -41,9 +41,9 @@ from ros_pad.reports.style import STYLE
 from ros_pad.reports.style import rendered
 from ros_pad.reports.view import view_of
 from ros_pad.simulation import Scene
-from ros_pad.simulation.fidelity import mid_stance_grip
-from ros_pad.simulation.fidelity import omitted
-from ros_pad.simulation.fidelity import reserve
+from ros_pad.simulation.margin import mid_stance_grip
+from ros_pad.simulation.margin import reserve
+from ros_pad.simulation.terms import terms
 from ros_pad.trials import Trial
 from ros_pad.trials import run
 from studies import command
@@ -150,7 +150,7 @@ def _soft_film(scene: Scene) -> dict[str, float]:
         term.bound or 0.0
         for name in configuration.names('scenes')
         if not name.startswith('bench_')
-        for term in omitted(Scene.load(name))
+        for term in terms(Scene.load(name))
         if term.term.startswith('dimple')
     ]
     load, pressure, time = DOME
