@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots of three to eight legs on L1 and L2, from YAML and URDF."""
 
+import dataclasses
 import math
 import re
 
@@ -275,9 +276,10 @@ def test_what_a_scene_lacks_is_named(tmp_path):
 
 def test_errors_of_the_levels_are_not_claimed_for_other_robots():
     scene = Scene.load('quadruped_patches')
-    choice = fidelity.choose(scene)
+    assert fidelity.choose(scene).bound < math.inf
+    choice = fidelity.choose(dataclasses.replace(scene, robot='mine'))
     assert choice.bound == math.inf
-    assert 'robot = go2, measured for ch3r, rail_leg' in choice.note
+    assert 'robot = mine, drawn were ch3r, go2, rail_leg' in choice.note
 
 
 def test_errors_of_the_levels_are_not_claimed_for_other_gaits(tmp_path):
