@@ -115,7 +115,7 @@ class Found:
     seconds: float
 
 
-def solve(program: pathlib.Path, task: Task, refinements: int, quadratic: bool = False) -> Found:
+def solve(program: str, task: Task, refinements: int, quadratic: bool = False) -> Found:
     """Run Surface Evolver on a task, from two rows of facets, refined so many times.
 
     With ``quadratic`` facets are curved in the end, which is Evolver's own way to more digits.
@@ -123,7 +123,7 @@ def solve(program: pathlib.Path, task: Task, refinements: int, quadratic: bool =
     Raises
     ------
     ConfigError
-        When the program is not there, takes too long, or does not converge.
+        When the program cannot be run, takes too long, or does not converge.
     """
     show = 'printf "FOUND %d %.15g %.15g %.15g %.15g\\n", facet_count, line.value,'
     show += ' above.value + under.value, total_energy, total_energy - last\n'

@@ -489,6 +489,7 @@ def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[s
 def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[str, Any]:
     """Return the document: for each problem its size, and what each method found."""
     rows: list[dict[str, Any]] = []
+    theirs = by_siconos(problems, python, repeats) if python else {}
     for problem in command.each(problems, 'friction_problems', 'problem'):
         methods: dict[str, Any] = {}
         for name, (near, mixed) in LOOPS.items():
@@ -506,12 +507,9 @@ def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[s
             'asymmetry': float(abs(problem.compliance - problem.symmetric).max()),
             'methods': methods,
         })  # fmt: skip
-    if python:
-        for name, answers in by_siconos(problems, python, repeats).items():
-            for row, problem, (impulses, steps, seconds) in zip(
-                rows, problems, answers, strict=True
-            ):
-                row['methods'][name] = _found(problem, impulses, int(steps), seconds)
+    for name, answers in theirs.items():
+        for row, problem, (impulses, steps, seconds) in zip(rows, problems, answers, strict=True):
+            row['methods'][name] = _found(problem, impulses, int(steps), seconds)
     return {'solved': SOLVED, 'repeats': repeats, 'rows': rows}
 
 
@@ -576,8 +574,10 @@ def _cell(kind: dict[str, Any]) -> str:
 def main(words: Sequence[str]) -> int:
     """Solve, print and write."""
     parser = command.parser('friction_problems', __doc__)
-    parser.add_argument('paths', type=pathlib.Path, nargs='*', metavar='PATH')
-    parser.add_argument('--siconos', metavar='PYTHON', help='an interpreter that has siconos')
+    parser.add_argument('paths', type=command.present, nargs='*', metavar='PATH')
+    parser.add_argument(
+        '--siconos', type=command.program, metavar='PYTHON', help='an interpreter that has siconos'
+    )
     command.add_count(parser, '--own', 40, 'problems of each scene and of each lever')
     command.add_count(parser, '--repeats', 3, 'how often each is timed; the median counts')
     command.add_count(parser, '--seed', 0, 'seed of the problems of scenes', least=0)

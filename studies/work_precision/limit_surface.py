@@ -370,7 +370,10 @@ def draw(document: dict[str, Any]) -> Figure:
 def main(words: Sequence[str]) -> int:
     """Measure, print, draw and write."""
     parser = command.parser('limit_surface', __doc__)
-    parser.add_argument('--rival', type=pathlib.Path, metavar='FOLDER', help='FrictionModelling')
+    parser.add_argument(
+        '--rival', type=command.present, metavar='FOLDER',
+        help='checkout of github.com/Gabrieleenx/FrictionModelling (MIT)',
+    )  # fmt: skip
     command.add_count(parser, '--repeats', 5, 'how often each method is timed')
     command.add_count(parser, '--walks', 6, 'pairs of walks with each policy', least=0)
     command.add_out(parser)

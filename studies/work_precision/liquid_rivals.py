@@ -155,14 +155,14 @@ def add_options(part: argparse.ArgumentParser) -> None:
     """Add the paths of the rivals, and how many cases are compared."""
     part.add_argument(
         '--evolver',
-        type=pathlib.Path,
+        type=command.program,
         metavar='PROGRAM',
         help='Surface Evolver 2.70 (K. Brakke, free to use and copy), for example evolver-nox-d of'
         ' the Debian package evolver-nox; by default its stored rows are kept (about 15 min more)',
     )
     part.add_argument(
         '--yade',
-        type=pathlib.Path,
+        type=load_yade,
         metavar='FILE',
         help='examples/capillaryLaplaceYoung/solveLiqBridge.py of github.com/bchareyre/yade-mpi'
         ' (GPL 2); by default its stored rows are kept',
@@ -188,7 +188,7 @@ def measure(options: argparse.Namespace, progress: Progress) -> list[Row]:
     given = bridges()
     rows += our_bridges(given)
     if options.yade:
-        rows += yade_bridges(load_yade(options.yade), given)
+        rows += yade_bridges(options.yade, given)
     else:
         rows += [row for row in kept if _rival(row) == YADE]
     progress(1.0)
@@ -231,7 +231,7 @@ def _summed(problem: str, method: str, size: str, solved: Sequence[Solved]) -> C
 # --- arrays of domes -----------------------------------------------------------------------------
 
 
-def _evolved(program: pathlib.Path, count: int, progress: Progress) -> list[Row]:
+def _evolved(program: str, count: int, progress: Progress) -> list[Row]:
     """Return arrays solved by Evolver, its errors on coarser meshes, and those in baths."""
     wanted = [(pitch, each) for each in LIQUIDS for pitch in PITCHES][:count]
     arrays: list[Array] = []
@@ -262,7 +262,7 @@ def _evolved(program: pathlib.Path, count: int, progress: Progress) -> list[Row]
 
 
 def _cell(
-    program: pathlib.Path, pitch: float, sides: int, liquid: Liquid, refinements: int, way: str
+    program: str, pitch: float, sides: int, liquid: Liquid, refinements: int, way: str
 ) -> dict[str, float]:
     """Return Evolver's result for a cell, in SI units, from a level surface at first."""
     cell = pitch**2 * (1.0 if sides == 4 else math.sqrt(0.75))
@@ -334,9 +334,7 @@ def _timed(solve: Callable[[Array], dict[str, float]], array: Array) -> Solved:
 # --- baths ---------------------------------------------------------------------------------------
 
 
-def _bath(
-    program: pathlib.Path, shape: capillary.Shape, refinements: int, family: str
-) -> capillary.Result:
+def _bath(program: str, shape: capillary.Shape, refinements: int, family: str) -> capillary.Result:
     """Return Evolver's errors in a wide bath, on the cases that our minimiser solves."""
     cases = [(tension, ratio) for tension in capillary.TENSIONS for ratio in capillary.RATIOS]
     few = cases[capillary.FEW]
@@ -458,19 +456,20 @@ def our_bridges(necks: Sequence[Neck]) -> list[Row]:
     ]
 
 
-def load_yade(path: pathlib.Path) -> Callable[..., Any]:
+def load_yade(path: str) -> Callable[..., Any]:
     """Return YADE's function ``solveLiqBridge``; the file is for Python 2."""
-    try:
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise ConfigError(f'--yade {path}: {error}') from error
+    text = command.present(path).read_text(encoding='utf-8')
     text = re.sub(r'^(\s*)print (.*)$', r'\1print(\2)', text, flags=re.MULTILINE)
     names: dict[str, Any] = {name: getattr(math, name) for name in ('sin', 'cos', 'tan', 'sqrt')}
     names |= {'pi': math.pi, 'numpy': np}
-    exec(compile(text, str(path), 'exec'), names)
-    if 'solveLiqBridge' not in names:
-        raise ConfigError(f'--yade {path}: solveLiqBridge is not defined there')
-    solve: Callable[..., Any] = names['solveLiqBridge']
+    try:
+        exec(compile(text, path, 'exec'), names)
+        solve: Callable[..., Any] = names['solveLiqBridge']
+    except Exception as error:
+        raise ConfigError(
+            f'--yade {path}: no function solveLiqBridge there ({type(error).__name__}: {error});'
+            ' give solveLiqBridge.py of yade-mpi'
+        ) from error
     return solve
 
 
