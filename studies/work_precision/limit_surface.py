@@ -138,7 +138,6 @@ def patches() -> dict[str, Patch]:
 
 def summed(points: np.ndarray, shares: np.ndarray) -> Force:
     """Return force and moment over the cap, for rows of twists (vx, vy, ω)."""
-
     x, y = np.ascontiguousarray(points.T)
 
     def of(twists: np.ndarray) -> np.ndarray:
