@@ -259,7 +259,7 @@ def own(count: int, seed: int) -> list[Problem]:
         for number in range(count):
             feet = range(0, legs, 2) if legs == 6 and number % 2 else range(legs)
             friction = rng.choice([dry, foot.boundary_friction], len(feet))
-            title = f'{name} {number}'
+            title = f'{name} on {len(feet)} feet {number}'
             problems.append(standing(title, scene.body, feet, friction, rng))
     return problems
 
