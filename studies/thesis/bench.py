@@ -686,14 +686,11 @@ def _rise(setup: TangentialBench) -> tuple[list[Row], dict[str, Curve]]:
     return rows, curves
 
 
-def _tangential_claims(
-    scene: BenchScene,
-    setup: TangentialBench,
-    rows: Sequence[Row],
-    curves: Mapping[str, Curve],
-    ends_of: Mapping[float, float],
-) -> tuple[Claim, ...]:
-    pressures, limits = list(ends_of), np.array(list(ends_of.values()))
+def _compared(curves: Mapping[str, Curve]) -> tuple[float, float, float, float, Array]:
+    """Return least ratios of flat to domes, dry, and of domes to flat, wet; largest losses; ends.
+
+    The losses are the share that domes lose by being wet, and the share that the flat pad keeps.
+    """
     domes = [name for name in curves if name.endswith('kPa, dry')]
 
     def over_flat(ground: str) -> float:
@@ -705,13 +702,24 @@ def _tangential_claims(
             ratios.append(dome[1:] / flat if ground == WET else flat / dome[1:])
         return float(min(ratio.min() for ratio in ratios))
 
-    dry, wet = over_flat(DRY), over_flat(WET)
     lost = max(
         float(np.max(1.0 - curves[name.replace(DRY, WET)].y[1:] / curves[name].y[1:]))
         for name in domes
     )
     flat_left = float(np.max(curves['flat, wet'].y[1:] / curves['flat, dry'].y[1:]))
     ends = np.array([curves[name].y[-1] for name in domes])
+    return over_flat(DRY), over_flat(WET), lost, flat_left, ends
+
+
+def _tangential_claims(
+    scene: BenchScene,
+    setup: TangentialBench,
+    rows: Sequence[Row],
+    curves: Mapping[str, Curve],
+    ends_of: Mapping[float, float],
+) -> tuple[Claim, ...]:
+    pressures, limits = list(ends_of), np.array(list(ends_of.values()))
+    dry, wet, lost, flat_left, ends = _compared(curves)
     middle = len(limits) // 2
     drawn = _drawn(scene, setup, pressures[middle], float(limits[middle]))
     section = '3.2.2'
