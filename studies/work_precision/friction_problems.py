@@ -370,8 +370,8 @@ class Answer:
 class _Loop:
     """The two halves of the outer loop: tangents by exact_stick, normals by least squares."""
 
-    def __init__(self, problem: Problem, near: float, method: str) -> None:
-        self.problem, self.method, self.sweeps = problem, method, 0
+    def __init__(self, problem: Problem, near: float) -> None:
+        self.problem, self.sweeps = problem, 0
         size = len(problem.free)
         self.normal = np.arange(0, size, 3)
         self.tangent = np.arange(size).reshape(-1, 3)[:, 1:]
@@ -404,7 +404,7 @@ class _Loop:
             tolerance = error * float(np.linalg.norm(self.problem.free))
             step = _CappedStep(matrix[np.ix_(flat, flat)], free, caps[holding], tolerance)
             first = step.in_balls(step.turned(impulses[flat].reshape(-1, 2)))
-            rows, sweeps = least_energy(step, first, 2 * SWEEPS, self.method)
+            rows, sweeps = least_energy(step, first, 2 * SWEEPS, 'gauss_seidel')
             self.sweeps += sweeps
             after[flat] = step.tangents(rows).ravel()
         return after
@@ -415,9 +415,7 @@ class _Loop:
         return np.asarray(self.problem.free + uneven @ impulses)
 
 
-def outer_loop(
-    problem: Problem, near: float = NEAR, mixed: bool = False, method: str = 'gauss_seidel'
-) -> Answer:
+def outer_loop(problem: Problem, near: float = NEAR, mixed: bool = False) -> Answer:
     """Solve a problem by exact_stick with the caps of given normals, and normals in turn.
 
     Each step begins with the normals of the last, as L1 takes the loads of a step from the
@@ -425,7 +423,7 @@ def outer_loop(
     such that their changes would cancel (Anderson 1965), and never below 0. The weight ``near``
     of a change of the normals does not move the solution (Rockafellar 1976).
     """
-    loop, impulses = _Loop(problem, near, method), np.zeros(len(problem.free))
+    loop, impulses = _Loop(problem, near), np.zeros(len(problem.free))
     normals = loop.press(impulses)
     tried: list[np.ndarray] = []
     became: list[np.ndarray] = []

@@ -344,17 +344,19 @@ def table(document: dict[str, Any]) -> str:
 
 def draw(document: dict[str, Any]) -> Figure:
     """Return the picture: limit surfaces beside the circle, and error against time."""
-    colours = (BLUE, SKY, ORANGE, VERMILION, BLACK)
-    shown = ('disc, even pressure', 'disc, Hertz', 'ring of 6 small discs', 'large37 on domes')
+    shown: dict[str, dict[str, Any]] = {  # three lie on each other
+        'disc, even pressure': {'color': BLUE, 'lw': 4.0},
+        'disc, Hertz': {'color': SKY, 'lw': 2.0},
+        'large37 on domes': {'color': VERMILION, 'ls': '--'},
+        'ring of 6 small discs': {'color': ORANGE},
+    }
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.0), layout='constrained')
         left, right = figure.subplots(1, 2)
         turn = np.linspace(0.0, 0.5 * math.pi, 91)
         left.plot(np.cos(turn), np.sin(turn), ':', color=BLACK, lw=1.0, label='ellipsoid')
-        for name, colour in zip(shown, colours, strict=False):
-            left.plot(
-                *np.transpose(document['contacts'][name]['surface']), color=colour, label=name
-            )
+        for name, look in shown.items():
+            left.plot(*np.transpose(document['contacts'][name]['surface']), label=name, **look)
         left.set(xlabel='force / cap', ylabel='moment / its largest', aspect='equal',
                  title='a  limit surfaces, each with its own radius')  # fmt: skip
         left.legend(fontsize=7.5, loc='lower left')
