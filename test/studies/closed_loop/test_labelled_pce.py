@@ -80,7 +80,8 @@ def test_what_is_no_recording_is_refused(tmp_path, text, says):
         study.read_atlas(tmp_path / 'x.csv')
 
 
-def test_a_folder_of_made_up_feet(tmp_path, capsys):
+def test_a_folder_of_made_up_feet(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(study, 'RESAMPLES', 50)
     for name in study.ATLAS:
         atlas(tmp_path / f'{name}.csv')
     for (name, _), jolt in zip(study.GO1.items(), (1.0, 0.1, 0.1), strict=True):
