@@ -8,7 +8,8 @@
 - Bridges between two equal spheres: ``bridge`` and YADE's Laplace-Young solver against quadrature
   of the first integral of the meridian.
 
-Rows of rivals that are not given are those stored in ``docs/charts``.
+Times are processor times; with OPENBLAS_NUM_THREADS=1 all have one thread, as Evolver and YADE
+have. Rows of rivals that are not given are those stored in ``docs/charts``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ import pathlib
 import re
 import statistics
 import sys
-import time
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -57,6 +57,7 @@ from studies.drawing import PAPER_STYLE
 from studies.drawing import PURPLE
 from studies.drawing import SKY
 from studies.drawing import VERMILION
+from studies.machine import spent_time
 from studies.work_precision import capillary
 from studies.work_precision import evolver
 from studies.work_precision.capillary import REST
@@ -158,7 +159,7 @@ def add_options(part: argparse.ArgumentParser) -> None:
         type=command.program,
         metavar='PROGRAM',
         help='Surface Evolver 2.70 (K. Brakke, free to use and copy), for example evolver-nox-d of'
-        ' the Debian package evolver-nox; by default its stored rows are kept (about 15 min more)',
+        ' the Debian package evolver-nox; by default its stored rows are kept (about 3 min more)',
     )
     part.add_argument(
         '--yade',
@@ -326,9 +327,9 @@ def our_arrays(arrays: Sequence[Array]) -> list[Row]:
 
 
 def _timed(solve: Callable[[Array], dict[str, float]], array: Array) -> Solved:
-    begun = time.perf_counter()
+    begun = spent_time()
     found = solve(array)
-    return time.perf_counter() - begun, array.errors(found)
+    return spent_time() - begun, array.errors(found)
 
 
 # --- baths ---------------------------------------------------------------------------------------
@@ -439,9 +440,9 @@ def our_bridges(necks: Sequence[Neck]) -> list[Row]:
     def solve(neck: Neck, method: str) -> Solved:
         known: dict[str, Any] = {'filling_angle': math.radians(neck.filling), 'method': method}
         known |= {'separation': 0.5 * max(neck.distance, 0.0), 'plane_angle': 0.5 * math.pi}
-        begun = time.perf_counter()
+        begun = spent_time()
         found = bridge(1.0, 1.0, math.radians(neck.contact), **known)
-        took = time.perf_counter() - begun
+        took = spent_time() - begun
         force, volume = float(found.force) / (2.0 * math.pi), 2.0 * float(found.volume)
         return took, {
             'force': abs(force / neck.force - 1.0),
@@ -482,9 +483,9 @@ def yade_bridges(solve: Callable[..., Any], necks: Sequence[Neck]) -> list[Row]:
     for step in STEPS:
         solved = []
         for neck in necks:
-            begun = time.perf_counter()
+            begun = spent_time()
             found = solve(1, neck.contact, neck.suction, neck.filling, step, 0, 0, 0)
-            took = time.perf_counter() - begun
+            took = spent_time() - begun
             if not found[8]:  # it reports a meridian that has missed its neck
                 continue
             moved = neck.slope * (found[0] - neck.distance)
