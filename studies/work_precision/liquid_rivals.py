@@ -33,6 +33,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -580,11 +581,14 @@ def figures(rows: Sequence[Any]) -> dict[str, Figure]:
                     axis.plot(row.ms, median, mark, color=colour, ms=5.5 + 1.2 * k, mew=0.0)
                 axis.plot(times, [row.errors[name][0] for row in part], color=colour, lw=0.7)
             axis.set(xscale='log', yscale='log')
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_major_formatter('{x:g}')
+            axis.xaxis.set_minor_formatter('')
             axis.grid(color=PALE, alpha=0.3, lw=0.5)
         for axis in axes[::3]:
             axis.set_ylabel('relative error')
         for axis in axes[3:]:
-            axis.set_xlabel('time of one case / ms')
+            axis.set_xlabel('processor time of one case / ms')
         handles = [
             matplotlib.lines.Line2D([], [], color=colour, marker=mark, ls='', label=method)
             for method, (colour, mark) in LOOKS.items()
