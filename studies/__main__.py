@@ -15,7 +15,7 @@ STUDIES = {
     'meniscus': ('work_precision.meniscus', 'methods for the meniscus (90 s)'),
     'capillary': (
         'work_precision.capillary',
-        'methods for liquid on meshes (2 min, with rivals 15)',
+        'methods for liquid on meshes (2 min, with rivals 5)',
     ),
     'walk': ('work_precision.walk.study', 'fidelity levels of a walk (1 min, with Drake 30 min)'),
     'friction_problems': (

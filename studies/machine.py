@@ -7,6 +7,8 @@ import datetime
 import os
 import pathlib
 import platform
+import resource
+import time
 
 import numpy as np
 
@@ -44,3 +46,9 @@ def memory(pid: int | str = 'self') -> float:
     """Return the resident memory of a process, MB."""
     pages = pathlib.Path(f'/proc/{pid}/statm').read_text(encoding='ascii').split()[1]
     return int(pages) * os.sysconf('SC_PAGE_SIZE') / 1e6
+
+
+def spent_time() -> float:
+    """Return the processor time of this process and of the programs that it has run, s."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime

@@ -344,7 +344,9 @@ def _cell(value: Any) -> str:
 def main(words: Sequence[str]) -> int:
     """Measure, print and write."""
     parser = command.parser('labelled_pce', __doc__)
-    parser.add_argument('folder', type=pathlib.Path, metavar='FOLDER', help='with all six files')
+    parser.add_argument(
+        'folder', type=command.present, metavar='FOLDER', help=f'with the six files of {SOURCE}'
+    )
     command.add_out(parser)
     options = parser.parse_args(words)
     document = run(options.folder)

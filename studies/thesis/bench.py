@@ -276,8 +276,7 @@ def _inflation_claims(
             'Calculated heights and radii of free domes are near the measured ones.',
             f'Height: {_percents(error)}; sphere radius: '
             f'{_percents(_errors(_pick(rows, "sphere radius")))} ({len(error)} domes, each '
-            'measured '
-            f'once). {within} of {len(error)} heights are within.',
+            f'measured once). {within} of {len(error)} heights are within.',
             tuple(error.tolist()),
             within == len(error),
             section,
@@ -437,9 +436,8 @@ def _press_claims(
             'The wall of the pressed dome is a sphere (Fig. 6d, 3.48).',
             'The gap of the sphere differs from that of the exact membrane of the same energy by '
             f'{_percents(high)}; from the measured gap the sphere differs by {_percents(gap)}, '
-            'the '
-            f'membrane by {_percents(_errors(exact))} ({domes}): where the sphere is nearer, its '
-            'error compensates another.',
+            f'the membrane by {_percents(_errors(exact))} ({domes}): where the sphere is nearer, '
+            'its error compensates another.',
             tuple(high.tolist()),
             bool(np.all(np.abs(high) <= MINIMAL)),
             '3.1.1',
@@ -456,8 +454,7 @@ def _press_claims(
             bool(np.all(np.abs(carried[CODED] / pressure - 1.0) <= MINIMAL)),
             '3.1.1',
             rule=f'Its own points within {100.0 * MINIMAL:g} %. 3.53 is exact for a membrane: '
-            'what is '
-            'refuted is that these points are of domes of 75 kPa.',
+            'what is refuted is that these points are of domes of 75 kPa.',
             see=PRESSED_DOME,
         ),
         Claim(
@@ -469,8 +466,7 @@ def _press_claims(
             bool(np.all(np.abs(odd) <= ON_ONE_SPHERE)),
             '3.2.1',
             rule=f'Within {100.0 * ON_ONE_SPHERE:g} %. The height was computed by this very '
-            'formula, so '
-            'this is no evidence for a sphere.',
+            'formula, so this is no evidence for a sphere.',
             see=PRESSED_DOME,
         ),
     )
@@ -690,14 +686,11 @@ def _rise(setup: TangentialBench) -> tuple[list[Row], dict[str, Curve]]:
     return rows, curves
 
 
-def _tangential_claims(
-    scene: BenchScene,
-    setup: TangentialBench,
-    rows: Sequence[Row],
-    curves: Mapping[str, Curve],
-    ends_of: Mapping[float, float],
-) -> tuple[Claim, ...]:
-    pressures, limits = list(ends_of), np.array(list(ends_of.values()))
+def _compared(curves: Mapping[str, Curve]) -> tuple[float, float, float, float, Array]:
+    """Return least ratios of flat to domes, dry, and of domes to flat, wet; largest losses; ends.
+
+    The losses are the share that domes lose by being wet, and the share that the flat pad keeps.
+    """
     domes = [name for name in curves if name.endswith('kPa, dry')]
 
     def over_flat(ground: str) -> float:
@@ -709,13 +702,24 @@ def _tangential_claims(
             ratios.append(dome[1:] / flat if ground == WET else flat / dome[1:])
         return float(min(ratio.min() for ratio in ratios))
 
-    dry, wet = over_flat(DRY), over_flat(WET)
     lost = max(
         float(np.max(1.0 - curves[name.replace(DRY, WET)].y[1:] / curves[name].y[1:]))
         for name in domes
     )
     flat_left = float(np.max(curves['flat, wet'].y[1:] / curves['flat, dry'].y[1:]))
     ends = np.array([curves[name].y[-1] for name in domes])
+    return over_flat(DRY), over_flat(WET), lost, flat_left, ends
+
+
+def _tangential_claims(
+    scene: BenchScene,
+    setup: TangentialBench,
+    rows: Sequence[Row],
+    curves: Mapping[str, Curve],
+    ends_of: Mapping[float, float],
+) -> tuple[Claim, ...]:
+    pressures, limits = list(ends_of), np.array(list(ends_of.values()))
+    dry, wet, lost, flat_left, ends = _compared(curves)
     middle = len(limits) // 2
     drawn = _drawn(scene, setup, pressures[middle], float(limits[middle]))
     section = '3.2.2'
@@ -741,9 +745,8 @@ def _tangential_claims(
             (flat_left, wet),
             wet > 1.0 and flat_left < 0.5,
             section,
-            rule='Loses more than half; a dome holds more. Rigid discs: a soft pad that is '
-            'loaded at '
-            'once floats on any sole.',
+            rule='Loses more than half; a dome holds more. Rigid discs: a soft pad that is loaded '
+            'at once floats on any sole.',
             tuned=TUNED_FRICTION + ', width of the sole',
             see='model/film.md#what-a-flat-sole-does',
         ),
@@ -756,8 +759,7 @@ def _tangential_claims(
             lost <= MINIMAL,
             section,
             rule=f'Up to {100.0 * MINIMAL:g} %. Rigid discs: a soft dome is 98 % dry only if its '
-            'load '
-            'comes in 0.1 s or more; loaded at once 9 to 13 %.',
+            'load comes in 0.1 s or more; loaded at once 9 to 13 %.',
             tuned=TUNED_FRICTION,
             see='model/film.md#the-load-comes-slowly',
         ),
@@ -772,8 +774,7 @@ def _tangential_claims(
             _rises(ends),
             section,
             rule='Both rise. Limits are those measured; the rest holds with any friction that '
-            'grows '
-            'with the load.',
+            'grows with the load.',
         ),
         *_limits_claims(scene.pad, rows, limits),
         _stiffer_claim(scene.pad, _pick(rows, 'force limit', 'max_depth')),
@@ -825,10 +826,9 @@ def _adds_claim(drawn: _Draws, less: Sequence[Row], bound: Sequence[Row], ends: 
     low, high = np.quantile(drawn.gain_with_lines, (0.05, 0.95))
     ours = (
         f'At their limits domes hold less wet than dry, {_percents(lost)}. Pinned lines of '
-        'liquid, '
-        f'an upper bound, return {1e3 * lines:.2f} mN or {100.0 * lines / ends.min():.2f} %. With '
-        f'them the dome of 75 kPa gains {100.0 * low:.1f} to {100.0 * high:+.2f} % (5 to 95 %; '
-        f'{_above(drawn.gain_with_lines, 0.0)}).'
+        f'liquid, an upper bound, return {1e3 * lines:.2f} mN or {100.0 * lines / ends.min():.2f} '
+        f'%. With them the dome of 75 kPa gains {100.0 * low:.1f} to {100.0 * high:+.2f} % (5 to '
+        f'95 %; {_above(drawn.gain_with_lines, 0.0)}).'
     )
     return Claim(
         20,
@@ -839,8 +839,7 @@ def _adds_claim(drawn: _Draws, less: Sequence[Row], bound: Sequence[Row], ends: 
         'title, 3.2.2',
         printed='more, no number',
         rule='Decided if 5 to 95 % of draws are on one side of 0. What the thesis calls F_cap '
-        'also '
-        'holds the dry friction that the film takes away.',
+        'also holds the dry friction that the film takes away.',
         missing='F_wet and F_dry of Fig. 20, to 0.1 %',
         see='model/foot.md#the-foot-of-chapter-43',
     )

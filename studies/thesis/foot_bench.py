@@ -375,8 +375,7 @@ def _linear_claim(setup: FootBench, lines: Mapping[str, Line]) -> Claim:
         34,
         'Friction is linear in the contact force.',
         f'Up to {setup.highest_load:g} N {good} of {len(lines)} lines are straight; the worst is '
-        'off '
-        f'by {100 * lines[worst].deviation:.2g} % of its largest force ({worst}). Slopes: '
+        f'off by {100 * lines[worst].deviation:.2g} % of its largest force ({worst}). Slopes: '
         + '; '.join(f'{name} {line.slope:.3f}' for name, line in lines.items())
         + '.',
         tuple(line.deviation for line in lines.values()),
@@ -402,15 +401,13 @@ def _small_claim(rows: Sequence[Row], found: Mapping[tuple[str, str], Sequence[P
         f'{last.lines / first.lines:.2f} times as much at the highest as at the lowest load, '
         f'where dry friction is {last.dry / first.dry:.1f} times as much. Suction on moist ground '
         f'may be {100 * first.suction / first.dry:.0f} % of it at the lowest load. 3.82 '
-        'corrected, '
-        f'water, would be {100 * estimates[0] / first.dry:.0f} and '
+        f'corrected, water, would be {100 * estimates[0] / first.dry:.0f} and '
         f'{100 * estimates[1] / last.dry:.1f} %.',
         (share,),
         share <= MINIMAL and last.lines / first.lines < last.dry / first.dry * (1.0 - MINIMAL),
         SECTION,
-        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground, '
-        'at any '
-        'contact angles (four times as much at most); on moist ground not at light loads.',
+        rule=f'At most {100 * MINIMAL:g} %, and growing less than the load. On flooded ground, at '
+        'any contact angles (four times as much at most); on moist ground not at light loads.',
         see=FOOT_OF_43,
     )
 
@@ -440,13 +437,11 @@ def _error_claim(
         None,
         SECTION,
         printed=f'{100 * setup.claimed_lowest:g} to {100 * setup.claimed_highest:g} %',
-        rule=f'To know F_cap to {100 * middle:.0f} %, each force at {setup.highest_load:g} N '
-        'must be '
-        f'known to {100 * needed[0] / last.dry:.2g} % (if it is that of pinned lines) or '
+        rule=f'To know F_cap to {100 * middle:.0f} %, each force at {setup.highest_load:g} N must '
+        f'be known to {100 * needed[0] / last.dry:.2g} % (if it is that of pinned lines) or '
         f'{100 * needed[1] / last.dry:.2g} % (if that of suction).',
         missing='F_wet and F_dry at each load with their scatter, number of domes, depth of '
-        'water, '
-        'contact angles, roughness',
+        'water, contact angles, roughness',
         see=FOOT_OF_43,
     )
 
@@ -472,8 +467,7 @@ def _viscosity_claim(
         '3.2.2, 4.3.1',
         printed=f'{1e3 * setup.speed:g} mm/s',
         rule=f'Shear at most {100 * STRAIGHT:g} % of the smallest force, with the thinnest film '
-        'that is '
-        'assumed to lubricate.',
+        'that is assumed to lubricate.',
         see=FOOT_OF_43,
     )
 
@@ -509,16 +503,14 @@ def _title_claim(found: Mapping[tuple[str, str], Sequence[Pulled]]) -> Claim:
         'Title: shape enhances wet adhesion.',
         f'On flooded ground domes hold {min(gains):.1f} to {max(gains):.1f} times what the flat '
         'foot holds, for their pressure drains the film. Pinned lines and suction, upper bounds, '
-        'are '
-        f'{100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain: shape enhances wet '
-        'friction.',
+        f'are {100 * min(shares):.2g} to {100 * max(shares):.2g} % of that gain: shape enhances '
+        'wet friction.',
         tuple(shares),
         max(shares) > 0.5,
         'title, 4.3.1',
         printed='none',
         rule='Half of the gain or more by liquid. With the assumed friction and film; suction '
-        'under '
-        'a flat sole on moist ground is not modelled.',
+        'under a flat sole on moist ground is not modelled.',
         see=FOOT_OF_43,
     )
 

@@ -281,8 +281,7 @@ def _claims_26() -> tuple[Claim, ...]:
             26,
             'Simulated liquid agrees with what is observed.',
             f'Heights of its balance are off by {_percents(off["thesis"])} on dome, cone and '
-            'general '
-            f'shape; those of the balance of energy by {_percents(off["energy"])}.',
+            f'general shape; those of the balance of energy by {_percents(off["energy"])}.',
             (*off['thesis'], *off['energy']),
             all(abs(each) <= _ALIGNED for each in off['thesis']),
             SECTION,
@@ -298,8 +297,7 @@ def _claims_26() -> tuple[Claim, ...]:
             spreads[1] > 0.02e6 * general.height,
             SECTION,
             rule='More than 2 % of the height, on the exact surface. Slices, which do not affect '
-            'each '
-            'other, exaggerate it.',
+            'each other, exaggerate it.',
             see=CAPILLARY,
         ),
     )
@@ -389,10 +387,8 @@ def _claims_27(readings: _Readings) -> tuple[Claim, ...]:
             'The capillary force along the motion is pressure times projected section (4.18).',
             f'Round the general shape it is {general:.2f} µN, of the surface of least energy '
             f'{net:.4f}: opposite sides cancel. For one half of the dome 4.18 gives '
-            f'{forces[0]:+.1f} '
-            f'µN, {forces[1]:+.2f} with the sign of 4.17 mended; exact is {forces[2]:+.1f}, '
-            'mostly '
-            'the pull of the contact line, which 4.18 leaves out.',
+            f'{forces[0]:+.1f} µN, {forces[1]:+.2f} with the sign of 4.17 mended; exact is '
+            f'{forces[2]:+.1f}, mostly the pull of the contact line, which 4.18 leaves out.',
             (general, net, *forces),
             net >= 0.5 * general,
             SECTION,
@@ -468,8 +464,7 @@ def _claims_28(layers: list[float], truths: list[float], curve: Array) -> tuple[
         Claim(
             28,
             'The level rises as the tension of the solid grows from a quarter of that of the '
-            'liquid '
-            'to all of it.',
+            'liquid to all of it.',
             'From panel to panel layers have '
             + ', '.join(f'{each:.2f}' for each in layers)
             + ' mm, the exact meniscus '

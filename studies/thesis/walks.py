@@ -205,8 +205,7 @@ def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
             dome <= MINIMAL * stroke,
             _RAIL_SECTION,
             rule=f'Up to {100.0 * MINIMAL:g} % of the stroke. Rigid discs of film: soft domes '
-            'need a '
-            'load that comes in 0.1 s.',
+            'need a load that comes in 0.1 s.',
             tuned=_RAIL_TUNED,
             see='model/film.md#when-a-scene-needs-it',
         ),
@@ -275,8 +274,7 @@ def _claims_39(times: Mapping[str, float | None], less: float) -> tuple[Claim, .
             39,
             'Wet, flat feet need several times as long as domes of 75 kPa.',
             f'{flat / high:.1f} times: {flat:.1f} and {high:.1f} s (1 walk each, L0). With one '
-            'assumed '
-            'number halved or doubled 1.3 to 7.2 times, or the flat foot never arrives.',
+            'assumed number halved or doubled 1.3 to 7.2 times, or the flat foot never arrives.',
             (flat / high,),
             abs(flat / high / 5.0 - 1.0) <= ABOUT,
             _RAIL_SECTION,
@@ -432,8 +430,7 @@ def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tu
             _HEXAPOD_SECTION,
             printed='twice the force',
             rule=f'At least {100.0 * MINIMAL:g} % more. A foot that pushes twice as hard carries '
-            'twice '
-            'the load, and by Coulomb is no nearer to slip.',
+            'twice the load, and by Coulomb is no nearer to slip.',
             see='model/thesis_walks.md#legs-2-and-5',
         ),
     )

@@ -39,6 +39,7 @@ from ros_pad.contact.meniscus import Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
+from studies.machine import spent_time
 from studies.work_precision import capillary_chart
 
 Pair = tuple[float, float]  # height, m, and force, N
@@ -382,14 +383,14 @@ def result(
     times, answers = [], []
     for (tension, ratio), (height, force) in zip(cases, exact, strict=True):
         liquid = Liquid(tension, ratio * tension)
-        begun = time.perf_counter()
+        begun = spent_time()
         pair: Pair | None = None
         try:
             found = solve(liquid)
         except PadError as error:
             status = str(getattr(error, 'status', type(error).__name__))
         else:
-            took = time.perf_counter() - begun
+            took = spent_time() - begun
             pair, status = _read(shape, found)
             if pair:
                 times.append(1e3 * took)

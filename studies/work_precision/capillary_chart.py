@@ -26,7 +26,7 @@ from studies.drawing import VERMILION
 if TYPE_CHECKING:
     from studies.work_precision.capillary import Result
 
-_LOWEST = 1e-4  # smaller errors are written as numbers at the lower edge
+_LOWEST = 1e-5  # smaller errors are written as numbers at the lower edge
 _BESIDE: dict[str, Any] = {'textcoords': 'offset points', 'fontsize': 7.0}
 # Colour, mark and words of each family of methods.
 LOOKS = {
@@ -99,7 +99,9 @@ def _errors(panel: Axes, results: Sequence[Result], quantity: str) -> None:
                 continue
             panel.plot([x, x], [y, worst], '-_', color=colour, lw=0.8, ms=4, alpha=0.6)
             panel.plot(x, y, mark, color=colour, ms=4.0 + 1.2 * k, mec='white', mew=0.5, zorder=3)
-    panel.set(xscale='log', yscale='log', xlabel='time of one case / ms', ylim=(_LOWEST, 20.0))
+    panel.set(
+        xscale='log', yscale='log', xlabel='processor time of one case / ms', ylim=(_LOWEST, 20.0)
+    )
     panel.grid(color=PALE, alpha=0.3, lw=0.5)
 
 

@@ -259,7 +259,7 @@ def own(count: int, seed: int) -> list[Problem]:
         for number in range(count):
             feet = range(0, legs, 2) if legs == 6 and number % 2 else range(legs)
             friction = rng.choice([dry, foot.boundary_friction], len(feet))
-            title = f'{name} {number}'
+            title = f'{name} on {len(feet)} feet {number}'
             problems.append(standing(title, scene.body, feet, friction, rng))
     return problems
 
@@ -370,8 +370,8 @@ class Answer:
 class _Loop:
     """The two halves of the outer loop: tangents by exact_stick, normals by least squares."""
 
-    def __init__(self, problem: Problem, near: float, method: str) -> None:
-        self.problem, self.method, self.sweeps = problem, method, 0
+    def __init__(self, problem: Problem, near: float) -> None:
+        self.problem, self.sweeps = problem, 0
         size = len(problem.free)
         self.normal = np.arange(0, size, 3)
         self.tangent = np.arange(size).reshape(-1, 3)[:, 1:]
@@ -404,7 +404,7 @@ class _Loop:
             tolerance = error * float(np.linalg.norm(self.problem.free))
             step = _CappedStep(matrix[np.ix_(flat, flat)], free, caps[holding], tolerance)
             first = step.in_balls(step.turned(impulses[flat].reshape(-1, 2)))
-            rows, sweeps = least_energy(step, first, 2 * SWEEPS, self.method)
+            rows, sweeps = least_energy(step, first, 2 * SWEEPS, 'gauss_seidel')
             self.sweeps += sweeps
             after[flat] = step.tangents(rows).ravel()
         return after
@@ -415,9 +415,7 @@ class _Loop:
         return np.asarray(self.problem.free + uneven @ impulses)
 
 
-def outer_loop(
-    problem: Problem, near: float = NEAR, mixed: bool = False, method: str = 'gauss_seidel'
-) -> Answer:
+def outer_loop(problem: Problem, near: float = NEAR, mixed: bool = False) -> Answer:
     """Solve a problem by exact_stick with the caps of given normals, and normals in turn.
 
     Each step begins with the normals of the last, as L1 takes the loads of a step from the
@@ -425,7 +423,7 @@ def outer_loop(
     such that their changes would cancel (Anderson 1965), and never below 0. The weight ``near``
     of a change of the normals does not move the solution (Rockafellar 1976).
     """
-    loop, impulses = _Loop(problem, near, method), np.zeros(len(problem.free))
+    loop, impulses = _Loop(problem, near), np.zeros(len(problem.free))
     normals = loop.press(impulses)
     tried: list[np.ndarray] = []
     became: list[np.ndarray] = []
@@ -489,6 +487,7 @@ def by_siconos(problems: Sequence[Problem], python: str, repeats: int) -> dict[s
 def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[str, Any]:
     """Return the document: for each problem its size, and what each method found."""
     rows: list[dict[str, Any]] = []
+    theirs = by_siconos(problems, python, repeats) if python else {}
     for problem in command.each(problems, 'friction_problems', 'problem'):
         methods: dict[str, Any] = {}
         for name, (near, mixed) in LOOPS.items():
@@ -506,12 +505,9 @@ def run(problems: Sequence[Problem], python: str | None, repeats: int) -> dict[s
             'asymmetry': float(abs(problem.compliance - problem.symmetric).max()),
             'methods': methods,
         })  # fmt: skip
-    if python:
-        for name, answers in by_siconos(problems, python, repeats).items():
-            for row, problem, (impulses, steps, seconds) in zip(
-                rows, problems, answers, strict=True
-            ):
-                row['methods'][name] = _found(problem, impulses, int(steps), seconds)
+    for name, answers in theirs.items():
+        for row, problem, (impulses, steps, seconds) in zip(rows, problems, answers, strict=True):
+            row['methods'][name] = _found(problem, impulses, int(steps), seconds)
     return {'solved': SOLVED, 'repeats': repeats, 'rows': rows}
 
 
@@ -576,8 +572,10 @@ def _cell(kind: dict[str, Any]) -> str:
 def main(words: Sequence[str]) -> int:
     """Solve, print and write."""
     parser = command.parser('friction_problems', __doc__)
-    parser.add_argument('paths', type=pathlib.Path, nargs='*', metavar='PATH')
-    parser.add_argument('--siconos', metavar='PYTHON', help='an interpreter that has siconos')
+    parser.add_argument('paths', type=command.present, nargs='*', metavar='PATH')
+    parser.add_argument(
+        '--siconos', type=command.program, metavar='PYTHON', help='an interpreter that has siconos'
+    )
     command.add_count(parser, '--own', 40, 'problems of each scene and of each lever')
     command.add_count(parser, '--repeats', 3, 'how often each is timed; the median counts')
     command.add_count(parser, '--seed', 0, 'seed of the problems of scenes', least=0)

@@ -8,7 +8,8 @@
 - Bridges between two equal spheres: ``bridge`` and YADE's Laplace-Young solver against quadrature
   of the first integral of the meridian.
 
-Rows of rivals that are not given are those stored in ``docs/charts``.
+Times are processor times; with OPENBLAS_NUM_THREADS=1 all have one thread, as Evolver and YADE
+have. Rows of rivals that are not given are those stored in ``docs/charts``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ import pathlib
 import re
 import statistics
 import sys
-import time
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -33,6 +33,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -57,6 +58,7 @@ from studies.drawing import PAPER_STYLE
 from studies.drawing import PURPLE
 from studies.drawing import SKY
 from studies.drawing import VERMILION
+from studies.machine import spent_time
 from studies.work_precision import capillary
 from studies.work_precision import evolver
 from studies.work_precision.capillary import REST
@@ -155,14 +157,14 @@ def add_options(part: argparse.ArgumentParser) -> None:
     """Add the paths of the rivals, and how many cases are compared."""
     part.add_argument(
         '--evolver',
-        type=pathlib.Path,
+        type=command.program,
         metavar='PROGRAM',
         help='Surface Evolver 2.70 (K. Brakke, free to use and copy), for example evolver-nox-d of'
-        ' the Debian package evolver-nox; by default its stored rows are kept (about 15 min more)',
+        ' the Debian package evolver-nox; by default its stored rows are kept (about 3 min more)',
     )
     part.add_argument(
         '--yade',
-        type=pathlib.Path,
+        type=load_yade,
         metavar='FILE',
         help='examples/capillaryLaplaceYoung/solveLiqBridge.py of github.com/bchareyre/yade-mpi'
         ' (GPL 2); by default its stored rows are kept',
@@ -188,7 +190,7 @@ def measure(options: argparse.Namespace, progress: Progress) -> list[Row]:
     given = bridges()
     rows += our_bridges(given)
     if options.yade:
-        rows += yade_bridges(load_yade(options.yade), given)
+        rows += yade_bridges(options.yade, given)
     else:
         rows += [row for row in kept if _rival(row) == YADE]
     progress(1.0)
@@ -231,7 +233,7 @@ def _summed(problem: str, method: str, size: str, solved: Sequence[Solved]) -> C
 # --- arrays of domes -----------------------------------------------------------------------------
 
 
-def _evolved(program: pathlib.Path, count: int, progress: Progress) -> list[Row]:
+def _evolved(program: str, count: int, progress: Progress) -> list[Row]:
     """Return arrays solved by Evolver, its errors on coarser meshes, and those in baths."""
     wanted = [(pitch, each) for each in LIQUIDS for pitch in PITCHES][:count]
     arrays: list[Array] = []
@@ -262,7 +264,7 @@ def _evolved(program: pathlib.Path, count: int, progress: Progress) -> list[Row]
 
 
 def _cell(
-    program: pathlib.Path, pitch: float, sides: int, liquid: Liquid, refinements: int, way: str
+    program: str, pitch: float, sides: int, liquid: Liquid, refinements: int, way: str
 ) -> dict[str, float]:
     """Return Evolver's result for a cell, in SI units, from a level surface at first."""
     cell = pitch**2 * (1.0 if sides == 4 else math.sqrt(0.75))
@@ -326,17 +328,15 @@ def our_arrays(arrays: Sequence[Array]) -> list[Row]:
 
 
 def _timed(solve: Callable[[Array], dict[str, float]], array: Array) -> Solved:
-    begun = time.perf_counter()
+    begun = spent_time()
     found = solve(array)
-    return time.perf_counter() - begun, array.errors(found)
+    return spent_time() - begun, array.errors(found)
 
 
 # --- baths ---------------------------------------------------------------------------------------
 
 
-def _bath(
-    program: pathlib.Path, shape: capillary.Shape, refinements: int, family: str
-) -> capillary.Result:
+def _bath(program: str, shape: capillary.Shape, refinements: int, family: str) -> capillary.Result:
     """Return Evolver's errors in a wide bath, on the cases that our minimiser solves."""
     cases = [(tension, ratio) for tension in capillary.TENSIONS for ratio in capillary.RATIOS]
     few = cases[capillary.FEW]
@@ -441,9 +441,9 @@ def our_bridges(necks: Sequence[Neck]) -> list[Row]:
     def solve(neck: Neck, method: str) -> Solved:
         known: dict[str, Any] = {'filling_angle': math.radians(neck.filling), 'method': method}
         known |= {'separation': 0.5 * max(neck.distance, 0.0), 'plane_angle': 0.5 * math.pi}
-        begun = time.perf_counter()
+        begun = spent_time()
         found = bridge(1.0, 1.0, math.radians(neck.contact), **known)
-        took = time.perf_counter() - begun
+        took = spent_time() - begun
         force, volume = float(found.force) / (2.0 * math.pi), 2.0 * float(found.volume)
         return took, {
             'force': abs(force / neck.force - 1.0),
@@ -458,19 +458,20 @@ def our_bridges(necks: Sequence[Neck]) -> list[Row]:
     ]
 
 
-def load_yade(path: pathlib.Path) -> Callable[..., Any]:
+def load_yade(path: str) -> Callable[..., Any]:
     """Return YADE's function ``solveLiqBridge``; the file is for Python 2."""
-    try:
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise ConfigError(f'--yade {path}: {error}') from error
+    text = command.present(path).read_text(encoding='utf-8')
     text = re.sub(r'^(\s*)print (.*)$', r'\1print(\2)', text, flags=re.MULTILINE)
     names: dict[str, Any] = {name: getattr(math, name) for name in ('sin', 'cos', 'tan', 'sqrt')}
     names |= {'pi': math.pi, 'numpy': np}
-    exec(compile(text, str(path), 'exec'), names)
-    if 'solveLiqBridge' not in names:
-        raise ConfigError(f'--yade {path}: solveLiqBridge is not defined there')
-    solve: Callable[..., Any] = names['solveLiqBridge']
+    try:
+        exec(compile(text, path, 'exec'), names)
+        solve: Callable[..., Any] = names['solveLiqBridge']
+    except Exception as error:
+        raise ConfigError(
+            f'--yade {path}: no function solveLiqBridge there ({type(error).__name__}: {error});'
+            ' give solveLiqBridge.py of yade-mpi'
+        ) from error
     return solve
 
 
@@ -483,9 +484,9 @@ def yade_bridges(solve: Callable[..., Any], necks: Sequence[Neck]) -> list[Row]:
     for step in STEPS:
         solved = []
         for neck in necks:
-            begun = time.perf_counter()
+            begun = spent_time()
             found = solve(1, neck.contact, neck.suction, neck.filling, step, 0, 0, 0)
-            took = time.perf_counter() - begun
+            took = spent_time() - begun
             if not found[8]:  # it reports a meridian that has missed its neck
                 continue
             moved = neck.slope * (found[0] - neck.distance)
@@ -580,11 +581,14 @@ def figures(rows: Sequence[Any]) -> dict[str, Figure]:
                     axis.plot(row.ms, median, mark, color=colour, ms=5.5 + 1.2 * k, mew=0.0)
                 axis.plot(times, [row.errors[name][0] for row in part], color=colour, lw=0.7)
             axis.set(xscale='log', yscale='log')
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_major_formatter('{x:g}')
+            axis.xaxis.set_minor_formatter('')
             axis.grid(color=PALE, alpha=0.3, lw=0.5)
         for axis in axes[::3]:
             axis.set_ylabel('relative error')
         for axis in axes[3:]:
-            axis.set_xlabel('time of one case / ms')
+            axis.set_xlabel('processor time of one case / ms')
         handles = [
             matplotlib.lines.Line2D([], [], color=colour, marker=mark, ls='', label=method)
             for method, (colour, mark) in LOOKS.items()

@@ -177,18 +177,6 @@ _LOOKS: dict[str, dict[str, Any]] = {
     'solve_ivp, smoothed, LSODA': {'color': VERMILION, 'marker': 'X'},
     'solve_ivp, smoothed, RK45': {'color': VERMILION, 'marker': 'P'},
 }
-# Offsets of the steps written beside their marks, points.
-_STEP_PLACES = {
-    'L1': (6, 4),
-    'L1, compiled, walk': (0, 7),
-    'L2': (-9, -3),
-    STIFF: (9, -4),
-    'MuJoCo defaults': (9, 3),
-    DRAKE['bristles']: (2, -12),
-    DRAKE['lagged']: (10, -3),
-    DRAKE['sap']: (-9, -3),
-    DRAKE['tamsi']: (0, 7),
-}
 _LEGEND = {STIFF: 'L2, impratio 10 and noslip 5'}
 _PANELS = {
     'distance': ('distance', 'error, %'),
@@ -218,13 +206,13 @@ def draw(results: Sequence[WalkResult]) -> Figure:
         _write_names(panels[5], rail)
         families = {result.family for result in hexapod}
         handles = [
-            Line2D([], [], ls='', ms=6, label=_LEGEND.get(family, family), **look)
+            Line2D([], [], ls='', ms=6, label=_with_steps(family, hexapod), **look)
             for family, look in _LOOKS.items()
             if family in families
         ]
         double = bool(hexapod) and ' and ' in hexapod[0].top
         doubt = (
-            'half of the difference of the two references'
+            'half of the difference of the references'
             if double
             else 'top level against half its step'
         )
@@ -238,11 +226,17 @@ def draw(results: Sequence[WalkResult]) -> Figure:
             handles=handles,
             loc='outside lower center',
             ncol=4,
-            title='Mark: median of the walks; whisker: the worst; number: step, ms.'
-            ' Dashed in e: soles free to turn. In f, events and'
-            ' smoothed friction are those of solve_ivp.',
+            title='Mark: median of the walks; whisker: the worst. Beside names: steps.'
+            ' Soles free to turn: dashed in e; SAP, lagged and TAMSI.\n'
+            'In f, events and smoothed friction are those of solve_ivp.',
         )
     return figure
+
+
+def _with_steps(family: str, part: Sequence[WalkResult]) -> str:
+    """Return the name of a family with its shortest and longest step, ms."""
+    steps = [1e3 * each.step_s for each in part if each.family == family and each.step_s]
+    return f'{_LEGEND.get(family, family)}: {min(steps):g} to {max(steps):g} ms'
 
 
 def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> None:
@@ -261,16 +255,6 @@ def _errors(panel: Axes, part: Sequence[WalkResult], name: str, title: str) -> N
             if 'compiled' not in family:
                 ends = [error, scale * result.worst[name]]
                 panel.plot([at, at], ends, '-_', color=look['color'], lw=1.0, ms=5, alpha=0.5)
-            if name == 'distance' and result.step_s is not None:
-                panel.annotate(
-                    f'{1e3 * result.step_s:g}',
-                    (at, error),
-                    xytext=_STEP_PLACES.get(family, (0, -12)),
-                    textcoords='offset points',
-                    ha='center',
-                    fontsize=7,
-                    color=look['color'],
-                )
     if part and (band := scale * part[0].band[name]):
         panel.axhspan(1e-9, band, color=PALE, alpha=0.35, lw=0, zorder=0)
         panel.set_ylim(bottom=0.3 * band)
@@ -303,9 +287,13 @@ def _write_names(panel: Axes, part: Sequence[WalkResult]) -> None:
     first = {result.family: result for result in reversed(part) if result.family in _LOOKS}
     for family, result in first.items():
         panel.annotate(
-            family.removesuffix(f', {LEGS} legs').removeprefix('solve_ivp, '),
+            (_with_steps(family, part) if result.step_s else family)
+            .replace(f', {LEGS} legs', '')
+            .removeprefix('solve_ivp, '),
             (result.ms_per_second, 1e2 * result.errors['distance']),
-            xytext=(-34, -24) if 'walk_many' in family else (8, -3),
+            xytext={'RailLeg': (-40, -16)}.get(
+                family, (-6, -18) if 'walk_many' in family else (8, -3)
+            ),
             textcoords='offset points',
             fontsize=8,
             color=_LOOKS[family]['color'],

@@ -2,12 +2,13 @@
 """The study friction_problems: files of others, and contacts whose solution is known."""
 
 import json
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
+from studies import command
 from studies.__main__ import main
 from studies.work_precision import friction_problems as study
 
@@ -126,10 +127,11 @@ def test_on_four_feet_only_loads_near_the_last_settle():
 
 
 def test_bodies_are_raised_to_their_lever():
-    """μ h/a: 0.8 times a height of 0.12 m over a distance of 0.224 m of the feet."""
+    """0.8 · 0.12 m over (4 · 0.2231 m + 2 · 0.224 m)/6; twice as high it is twice as much."""
     body = study.Scene.load(study.SCENES[0]).body
-    distance = np.mean([math.hypot(*home) for home in body.homes])
-    assert study.lever(body, 0.8) == pytest.approx(0.8 * 0.12 / distance)
+    assert study.lever(body, 0.8) == pytest.approx(0.4297, abs=1e-4)
+    raised = replace(body, height=2.0 * body.height)
+    assert study.lever(raised, 0.8) == pytest.approx(0.8594, abs=2e-4)
 
 
 def test_the_table_counts_what_is_solved(tmp_path, capsys, monkeypatch):
@@ -138,8 +140,14 @@ def test_the_table_counts_what_is_solved(tmp_path, capsys, monkeypatch):
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     names = [line[2:].partition(',')[0] for line in lines[2:]]
-    assert names == [*study.SCENES, 'μh/a 0.5']
+    assert names == ['hexapod_patches on 6 feet', 'quadruped_patches on 4 feet', 'μh/a 0.5']
     kept = json.loads((tmp_path / 'friction_problems.json').read_text(encoding='utf-8'))
     for line in lines[2:]:
         kinds = [each for each in kept['kinds'] if each['problems'] in line]
         assert line.count('1 of 1; ') == sum(each['solved'] for each in kinds) >= 2
+
+
+def test_the_table_of_the_documentation_is_that_of_the_stored_figures():
+    kept = json.loads((command.CHARTS / 'friction_problems.json').read_text(encoding='utf-8'))
+    page = (command.ROOT / 'docs' / 'model' / 'friction_step.md').read_text(encoding='utf-8')
+    assert study.table(kept) in page

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from studies.work_precision import limit_surface
@@ -13,18 +14,22 @@ from studies.work_precision import limit_surface
 SLIDE, TURN, ABOUT_RIM = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 1.0, 1.0]])
 
 
+def unit(pressure='even'):
+    return limit_surface.Patch(*limit_surface.disc(1.0, 80, pressure), 1.0, DISC_TURNING_RADIUS)
+
+
 @pytest.fixture(scope='module')
 def disc():
-    return limit_surface.patches()['disc, even pressure']
+    return unit()
 
 
 @pytest.mark.parametrize(
-    ('name', 'expected'),
+    ('pressure', 'expected'),
     # Mean distance from the middle: ∫ p r dA / ∫ p dA.
-    [('disc, even pressure', 2.0 / 3.0), ('disc, Hertz', 3.0 * math.pi / 16.0)],
+    [('even', 2.0 / 3.0), ('hertz', 3.0 * math.pi / 16.0)],
 )
-def test_turning_radius_is_that_of_the_pressure(name, expected):
-    assert limit_surface.patches()[name].own_turning == pytest.approx(expected, rel=1e-5)
+def test_turning_radius_is_that_of_the_pressure(pressure, expected):
+    assert unit(pressure).own_turning == pytest.approx(expected, rel=1e-5)
 
 
 def test_disc_that_turns_about_its_rim(disc):

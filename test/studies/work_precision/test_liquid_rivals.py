@@ -9,6 +9,7 @@ from scipy.integrate import quad
 
 from ros_pad.errors import ConfigError
 from studies import command
+from studies.__main__ import main
 from studies.work_precision import evolver
 from studies.work_precision import liquid_rivals
 
@@ -103,16 +104,36 @@ def test_yade_is_read_though_it_is_for_python_2(tmp_path):
         '    return 0.3, 1.1, 0.5, 0, 0, 0, 0, 0, given[4] < 1e-3\n'
     )
     neck = liquid_rivals.Neck(0.0, 20.0, 1.0, 0.2, 1.0, 0.6, slope=-2.0)
-    rows = liquid_rivals.yade_bridges(liquid_rivals.load_yade(path), [neck])
+    rows = liquid_rivals.yade_bridges(liquid_rivals.load_yade(str(path)), [neck])
     assert [row.cases for row in rows] == [1, 1]  # the coarsest has missed its neck
     # Its 0.5 is the force at 0.3, where the true one is 0.6 - 0.1 · 2.
     assert rows[0].errors['force'] == pytest.approx((1.0 / 6.0, 1.0 / 6.0))
     assert rows[0].errors['volume'] == pytest.approx((0.1, 0.1))
-    path.write_text('')
-    with pytest.raises(ConfigError, match='solveLiqBridge is not defined'):
-        liquid_rivals.load_yade(path)
-    with pytest.raises(ConfigError, match=r'--yade .*none'):
-        liquid_rivals.load_yade(tmp_path / 'none')
+
+
+@pytest.mark.parametrize('text', ['', 'def other(): pass', 'x', 'a b'])
+def test_another_file_than_that_of_yade_is_refused(tmp_path, text):
+    path = tmp_path / 'solve.py'
+    path.write_text(text)
+    with pytest.raises(ConfigError, match='no function solveLiqBridge there'):
+        liquid_rivals.load_yade(str(path))
+
+
+@pytest.mark.parametrize(
+    ('words', 'says'),
+    [
+        (('capillary', '--evolver', 'none'), '--evolver: none: no such program'),
+        (('capillary', '--yade', 'none'), '--yade: none: no such file'),
+        (('friction_problems', '--siconos', 'none'), '--siconos: none: no such program'),
+        (('friction_problems', 'none'), 'PATH: none: no such file'),
+        (('limit_surface', '--rival', 'none'), '--rival: none: no such file'),
+        (('labelled_pce', 'none'), 'FOLDER: none: no such file'),
+    ],
+)
+def test_a_missing_rival_is_found_before_anything_is_measured(words, says, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        main(words)
+    assert says in capsys.readouterr().err
 
 
 def test_without_rivals_their_stored_rows_are_kept_and_ours_measured(monkeypatch, capsys):
