@@ -28,7 +28,7 @@ SOLE_MODULUS = 3.95e5
 ``config/materials``, times 1.88."""
 
 NEAR = 1.5
-"""Grip margin below which feet may slip; bounds are calibrated on either side of it."""
+"""Grip margin below which feet may slip: bounds may step there."""
 
 _MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
