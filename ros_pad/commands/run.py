@@ -142,8 +142,8 @@ def run(options: argparse.Namespace) -> int:
         )
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
-    if options.fidelity == 'auto' and not joints and (known := levels.answer(scene, policy)):
-        return _answer(scene, known, options.json)
+    if options.fidelity == 'auto' and not joints and (promise := levels.answer(scene, policy)):
+        return _answer(scene, promise, options.json)
     level = levels.level(scene, options.fidelity, policy, joints)
     if level != 'L0':
         check_reach(scene)  # before there is a folder

@@ -89,8 +89,8 @@ class Promises:
         the bound.
     """
 
-    ranges: dict[str, dict[str, tuple[float, ...]]]
-    spans: dict[str, dict[str, tuple[float, ...]]]
+    ranges: dict[str, dict[str, tuple[float, float]]]
+    spans: dict[str, dict[str, tuple[float, float]]]
     lines: dict[str, dict[str, dict[str, float]]]
 
     @classmethod
@@ -117,7 +117,8 @@ class Promises:
     def _read(self, robot: str, table: Table) -> None:
         for key, pairs in (('ranges', self.ranges), ('features', self.spans)):
             with table.table(key) as part:
-                pairs[robot] = {name: tuple(part.vector(name, '', 2).tolist()) for name in part.keys}
+                ends = {name: part.vector(name, '', 2).tolist() for name in part.keys}
+            pairs[robot] = {name: (low, high) for name, (low, high) in ends.items()}
         self.lines[robot] = {}
         with table.table('bounds') as bounds:
             for level in bounds.keys:

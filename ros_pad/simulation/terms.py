@@ -244,7 +244,7 @@ def _always(scene: Scene, level: str, policy: str) -> list[Term]:
             Term(
                 'torsion of the soles',
                 1.0,
-                'of the friction: a sole that turns on the spot holds no tangential force; it costs'
+                'of the friction: what turns on the spot holds no force along the ground; it costs'
                 ' no time',
                 taken=True,
             )
@@ -284,9 +284,7 @@ def _sole(scene: Scene) -> Term:
     assert isinstance(gait, WalkingGait) and isinstance(body, LeggedBody)
     found = 0.0
     for middle in set(gait.middles):
-        feet = [
-            home for home, own in zip(body.homes, gait.middles, strict=True) if own == middle
-        ]
+        feet = [home for home, own in zip(body.homes, gait.middles, strict=True) if own == middle]
         if not gait.pushes or len(feet) != 3:
             return Term('size of the sole', None, 'loads of feet are not those of a tripod')
         longest = max(math.dist(a, b) for a, b in itertools.combinations(feet, 2))

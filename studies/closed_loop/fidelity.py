@@ -4,8 +4,9 @@
 Walks random scenes of each robot on every level, on the top one (L2 with steps of 0.5 ms, the rail
 leg with 0.2 ms), and with 5 % more friction. A line is fitted to the logarithm of each level's
 error. It is calibrated by the errors of scenes that a fit left out, a fifth at a time
-(cross-conformal prediction). The share that the bounds keep is counted on other scenes. config/fidelity.yaml has the lines, docs/charts/fidelity.json the shares and every
-error that was held out, fidelity.png draws them.
+(cross-conformal prediction). The share that the bounds keep is counted on other scenes.
+config/fidelity.yaml has the lines, docs/charts/fidelity.json the shares and every error that was
+held out, fidelity.png draws them.
 
 Walks are kept in a file of the folder of --store: a run that was stopped goes on there.
 """

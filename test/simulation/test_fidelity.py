@@ -180,8 +180,8 @@ def test_shipped_scenes_for_which_l1_or_no_simulation_suffices():
         ('bounds: {L0: [1]}', "fidelity.yaml: key 'robots' is missing"),
         ('robots: {}\nreserves: [0, 1]: 3', 'fidelity.yaml, line 2, column 17: not valid YAML'),
         (
-            'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {L1 slip: {constant: 1}}}}',
-            "robots: ch3r: bounds: L1 slip: key 'wet' is missing",
+            'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {L1: {constant: 1}}}}',
+            "robots: ch3r: bounds: L1: key 'wet' is missing",
         ),
         (
             'robots: {ch3r: {ranges: {}, features: {wet: [0, 1]}, bounds: {}}}',
@@ -428,20 +428,22 @@ def grip_of(scene, pressure):
 def test_terms_change_the_friction_by_no_more_than_their_bounds(name):
     scene = dataclasses.replace(Scene.load(name), settle=0.0)
     pressure, foot = scene.dome_pressure or 0.0, scene.foot
+    bounds = {each.term: each.bound for each in terms.terms(scene)}
     own = grip_of(scene, pressure)
     floor = dataclasses.replace(scene.floor, viscosity=10.0)
     thin = dataclasses.replace(scene.floor, film_thickness=1e-9)
     for other in (floor, thin):  # a film that never drains, and none
         changed = grip_of(dataclasses.replace(scene, floor=other), pressure)
-        assert abs(changed / own - 1.0) <= bound(scene, 'film that drains') * 1.001
+        assert abs(changed / own - 1.0) <= bounds['film that drains'] * 1.001
     if not pressure:
         return
-    assert abs(grip_of(scene, 0.0) / own - 1.0) == pytest.approx(
-        bound(scene, 'air in hose'), rel=0.01
-    )
-    lines = dataclasses.replace(foot, capillary_force=2.0 * 0.073 * 2.0 * foot.pad.radius)
+    changed = grip_of(scene, 0.0)
+    assert abs(changed / own - 1.0) == pytest.approx(bounds['air in hose and pads'], rel=0.01)
+    # Contact lines with angles of 170 and 10 degrees, twice the radius of a pad wide.
+    force = 0.073 * 2.0 * foot.pad.radius * 2.0 * math.cos(math.radians(10.0))
+    lines = dataclasses.replace(foot, capillary_force=force)
     more = grip_of(dataclasses.replace(scene, foot=lines), pressure) - own
-    assert 0.0 < more <= bound(scene, 'capillary') * foot.friction * scene.expected_load * 1.001
+    assert 0.0 < more <= bounds[terms.LINES] * foot.friction * scene.expected_load
 
 
 def test_soft_pads_change_the_distance_by_no_more_than_their_bound():
