@@ -326,7 +326,8 @@ def _at_most(term: dict[str, Any]) -> str:
     text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
     text += f' {re.split("[:;,]", term["reason"])[0]}'
     if term['exceeds']:
-        text += f', about {100.0 * term["effect"]:.0f} % of the result: exceeds the accuracy asked'
+        share = f'about {100.0 * term["effect"]:.0f} %' if term['effect'] <= 1.0 else 'all'
+        text += f', {share} of the result: exceeds the accuracy asked'
     return text
 
 

@@ -28,11 +28,9 @@ from ros_pad.simulation.margin import dome_pressure
 from ros_pad.simulation.margin import grounds
 from ros_pad.simulation.margin import mid_stance_grip
 from ros_pad.simulation.margin import stance
-from ros_pad.simulation.rail_leg import walk_many
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.terrain import Floor
 
 ATMOSPHERE = 101325.0  # Pa
 
@@ -99,10 +97,9 @@ def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> li
         if policy != 'flat':
             found.append(_lines(scene))
         found += [_by_friction(term, worth) for term in _of_friction(scene, policy)]
-    if level == 'L0':
-        found.append(_friction_of_the_rail(scene, policy))
-    else:
-        found += [_joints(scene, policy)] if level == 'L1' else []
+    if level == 'L1':
+        found.append(_joints(scene, policy))
+    if level != 'L0':
         found.append(_sole(scene))
     found.append(replace(_soft_pads(scene), taken=level == 'L1'))
     found += _always(scene, level, policy)
@@ -139,13 +136,14 @@ def _lines(scene: Scene) -> Term:
     share = most / (foot.friction * scene.expected_load)
     worth = None if scene.floor.kind == 'dry' else _worth_of_friction(scene, 'dome')
     effect = None if worth is None else share * worth
+    taken = effect is not None and effect > scene.accuracy
     return Term(
         LINES,
         share,
-        'of the friction of a loaded foot: full hysteresis of the contact angle (180'
-        ' to 0 degrees) on every pad',
+        'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0 degrees)'
+        f' on every pad{"; added, since its effect is above the accuracy asked" if taken else ""}',
         effect=effect,
-        taken=effect is not None and effect > scene.accuracy,
+        taken=taken,
     )
 
 
@@ -174,7 +172,8 @@ def _of_friction(scene: Scene, policy: str) -> list[Term]:
         Term(
             'film that drains',
             max(abs(each - now) for each in ends) / now,
-            'of the friction on wet ground in mid-stance: a film that never drains, or none',
+            'of the friction on wet ground in mid-stance: a film that never drains, or none; it'
+            ' costs no time',
             taken=True,
         )
     ]
@@ -384,39 +383,3 @@ def dragged_film(scene: Scene, speed: float) -> float:
     pressure = dome_pressure(scene)
     width = math.sqrt(scene.expected_load / pressure / scene.foot.pads / math.pi)
     return math.sqrt(0.160 * scene.floor.viscosity * speed * 2.0 * width / pressure)
-
-
-def _friction_of_the_rail(scene: Scene, policy: str) -> Term:
-    """Return how much one per cent of friction changes the distance on the rail.
-
-    The effect is large near the drag of the wheels, where the distance is ill-conditioned.
-    """
-    foot = scene.foot
-    scenes = [
-        replace(
-            scene,
-            foot=replace(
-                foot,
-                friction=factor * foot.friction,
-                shear_strength=factor * foot.shear_strength,
-                boundary_friction=factor * foot.boundary_friction,
-            ),
-        )
-        for factor in (0.995, 1.005)
-    ]
-    wet = scene.floor.kind != 'dry'
-    domed = policy == 'dome' or (policy != 'flat' and wet)
-    pressure = dome_pressure(scene) if domed else 0.0
-    gait = scene.gait
-    assert isinstance(gait, RailGait)
-    duration = scene.settle + 10.0 * gait.cycle
-    floor = Floor.uniform(wet, scene.floor.film_thickness)
-    walks = walk_many(scenes, [floor, floor], [pressure, pressure], 0.004, duration)
-    less, more = walks.position
-    return Term(
-        'friction off by one per cent',
-        (more - less) / less if less > 0.0 else None,
-        'of the distance, on a uniform floor: near the drag of the wheels a little more or less'
-        ' friction moves the body much further, or not at all',
-        kind='estimate',
-    )

@@ -23,15 +23,20 @@ from typing import Any
 import numpy as np
 import yaml
 
+from ros_pad import configuration
 from ros_pad.commands.folder import new_folder
 from ros_pad.reports.files import save
 from ros_pad.simulation.fidelity import FRICTION
 from ros_pad.simulation.fidelity import LEAST
 from ros_pad.simulation.fidelity import STICKING
+from ros_pad.simulation.fidelity import Promises
+from ros_pad.simulation.fidelity import answer
+from ros_pad.simulation.fidelity import choose
 from ros_pad.simulation.fidelity import sticking_distance
 from ros_pad.simulation.margin import features
 from ros_pad.simulation.scene import RAIL_LEG
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import is_bench
 from studies import command
 from studies.closed_loop import conformal
 from studies.closed_loop.fidelity_chart import figure
@@ -292,6 +297,22 @@ def summary(document: dict[str, Any]) -> str:
                 f'{_percent(old["median_bound"])}, {_percent(old["kept"])}' if old else '–',
             ]
             lines.append(f'| {" | ".join(cells)} |')
+    for words, levels in (('cheapest level', ('L0', 'L1')), ('L2', ('L2',))):
+        for metric in LEAST_SHARES:  # a scene counts once
+            names = [f'{level} {metric}' for level in levels]
+            own = [
+                part['bounds'][name]
+                for part in document['robots'].values()
+                for name in names
+                if part['bounds'].get(name, {}).get('held_out')
+            ]
+            kept = sum(round(row['held_out'] * row['kept']) for row in own)
+            count = sum(row['held_out'] for row in own)
+            share = [_percent(each) for each in conformal.interval(kept, count)]
+            lines.append(
+                f'| all, {words} {metric} | | {count} | {_percent(kept / count)}'
+                f' | {" to ".join(share)} | | | |'
+            )
     lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
     for group in GROUPS:
         cells = [
@@ -302,16 +323,44 @@ def summary(document: dict[str, Any]) -> str:
     return '\n'.join(lines)
 
 
+def shipped() -> str:
+    """Return which shipped scenes take which level, as a table in Markdown."""
+    lines = ['| scene | asks for | takes | bound | cheaper ones |', '|---|---|---|---|---|']
+    promises = Promises.load()
+    for name in configuration.names('scenes'):
+        if is_bench(name):
+            continue
+        scene = Scene.load(name)
+        choice = answer(scene) or choose(scene)
+        levels = (STICKING, 'L0') if scene.robot == RAIL_LEG else (STICKING, 'L1', 'L2')
+        bounds = {each: promises.bound(each, scene) for each in levels}
+        cheaper = [
+            f'{each} {_percent(bounds[each])}'
+            for each in levels[: levels.index(choice.level)]
+            if bounds[each] < math.inf
+        ]
+        cells = [
+            f'`{name}`',
+            f'{scene.metric}, {_percent(scene.accuracy)}',
+            choice.level,
+            _percent(choice.bound) if choice.bound < math.inf else 'none',
+            ', '.join(cheaper) or '–',
+        ]
+        lines.append(f'| {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
 def _percent(share: float) -> str:
     """Return a share in per cent: three digits from 10 % on, two below."""
     percent = 100.0 * share
     return f'{float(f"{percent:.3g}" if percent >= 10.0 else f"{percent:.2g}"):g} %'
 
 
-def pasted(page: str, lines: str) -> str:
-    """Return the text of a page with another table between its marks."""
+def pasted(page: str, document: dict[str, Any]) -> str:
+    """Return the text of a page with other tables between its marks."""
     before, rest = page.split(MARKS[0])
-    return before + '\n'.join((MARKS[0], lines, MARKS[1])) + rest.split(MARKS[1])[1]
+    lines = MARKS[0], summary(document), '', shipped(), MARKS[1]
+    return before + '\n'.join(lines) + rest.split(MARKS[1])[1]
 
 
 def measure(
@@ -369,8 +418,9 @@ def main(words: Sequence[str]) -> int:
     assert yaml.safe_load(text)['robots'].keys() == config.keys()
     save(options.config / 'fidelity.yaml', text.encode())
     document = {'promise': PROMISE, 'robots': robots}
-    if options.out == command.CHARTS:
-        save(PAGE, pasted(PAGE.read_text(encoding='utf-8'), summary(document)).encode())
+    if options.out == command.CHARTS and options.config == CONFIG:
+        Promises.load.cache_clear()
+        save(PAGE, pasted(PAGE.read_text(encoding='utf-8'), document).encode())
     command.write(options.out, 'fidelity', document, {'fidelity': figure(document)})
     command.show(options, document, summary(document))
     return 0

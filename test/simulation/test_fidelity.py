@@ -544,13 +544,5 @@ def test_bound_of_soft_pads():
                                  leg.foot.sole_area / 2.5, rel=1e-3)  # fmt: skip
 
 
-def test_what_a_per_cent_of_friction_is_worth():
-    """A foot that always slips gains c/(c - F) per cent: 0.30 N of friction, 0.235 N of drag."""
-    assert bound(Scene.load('leg_wet_flat'), 'per cent') == pytest.approx(
-        0.01 * 0.30 / (0.30 - 0.235), rel=0.1
-    )
-    assert bound(Scene.load('leg_dry_flat'), 'per cent') < 1e-3  # the foot sticks
-
-
 def test_a_dry_floor_has_no_menisci():
     assert bound(Scene.load('leg_dry_flat'), 'capillary') is None
