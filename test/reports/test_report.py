@@ -316,7 +316,7 @@ def test_footprints_window_and_omissions(tmp_path):
     assert '15 flat stances' in seen.alt('Reliability')
     assert re.search(r'wind & weather *no *≤ 3\.4 % *not known *indoors', seen.text)
     assert re.search(r'tides *no *≈ 20\.0 % *≈ 30\.0 %, exceeds the accuracy asked', seen.text)
-    assert re.search(r'moods *(not known *){2}nobody asked', seen.text)
+    assert re.search(r'moods *no *(not known *){2}nobody asked', seen.text)
 
 
 def test_reliability_counts_what_was_wet():
