@@ -62,15 +62,12 @@ class ChosenLevel:
         on the top level, or to half of the distance without slip if that is more; that of the slip
         relative to the slip on the top level, or to 2 % of the distance without slip. Infinite for
         scenes outside the ranges of those drawn.
-    reserve : float
-        Grip margin of the scene, see :func:`ros_pad.simulation.margin.reserve`.
     note : str
         Bound and grip margin in words, and whether the scene requires a smaller error.
     """
 
     level: str
     bound: float
-    reserve: float
     note: str
 
 
@@ -225,19 +222,19 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         available = known[:1] if missing else known
         enough = [each for each in available if bounds[each] <= scene.accuracy]
         level = (enough or available[-1:])[0]
-    own, bound = reserve(scene, policy), bounds[level]
+    bound = bounds[level]
     if beyond:
         within = f'of unknown error ({beyond})'
     else:
         within = f'{_within(bound)} of the top level, promised for 95 of 100 scenes'
-    note = f'grip capacity {own:.2g} times the demand: the {scene.metric} on {level} is {within}'
+    note = f'{_grip(scene, policy)}: the {scene.metric} on {level} is {within}'
     if bound > scene.accuracy:
         note += f', but the scene requires {100.0 * scene.accuracy:.3g} %'
         if missing and level == 'L1':
             note += '; pip install "ros_pad[mujoco]" adds L2'
     if bounds[STICKING] <= scene.accuracy:
         note += f'; no slip at all, without a simulation, is {_within(bounds[STICKING])}'
-    return ChosenLevel(level, bound, own, note)
+    return ChosenLevel(level, bound, note)
 
 
 def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
@@ -251,12 +248,11 @@ def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
     bound = promises.bound(STICKING, scene, policy)
     if bound > scene.accuracy:
         return None
-    own = reserve(scene, policy)
     note = (
-        f'grip capacity {own:.2g} times the demand: the {scene.metric} of feet that never slip is'
-        f' {_within(bound)} of the top level, promised for 95 of 100 scenes; nothing was simulated'
+        f'{_grip(scene, policy)}: the {scene.metric} of feet that never slip is {_within(bound)}'
+        ' of the top level, promised for 95 of 100 scenes; nothing was simulated'
     )
-    return ChosenLevel(STICKING, bound, own, note)
+    return ChosenLevel(STICKING, bound, note)
 
 
 def sticking_distance(scene: Scene) -> float:
@@ -265,6 +261,10 @@ def sticking_distance(scene: Scene) -> float:
     if isinstance(gait, RailGait):
         return scene.cycles * gait.stroke
     return gait.body_advance(scene.cycles * gait.cycle)
+
+
+def _grip(scene: Scene, policy: str | None) -> str:
+    return f'grip capacity {reserve(scene, policy):.2g} times the demand'
 
 
 def _within(bound: float) -> str:
