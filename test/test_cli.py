@@ -105,6 +105,18 @@ def test_auto_runs_the_cheap_level_and_shows_why(
     assert 'left out: joints, servos' in shown and '(95 of 100 times at most ' in shown
 
 
+def test_auto_takes_the_answer_without_a_simulation(
+    tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """15 cycles of 60 mm, for a scene that asks for its distance alone."""
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(['run', 'hexapod_dry_distance', '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found['fidelity'], found['distance_m']) == ('no slip', pytest.approx(0.9))
+    assert 0.0 < found['bound'] <= 0.1 and 'nothing was simulated' in found['note']
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_run_without_ros_writes_report_and_summary(
     tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -142,6 +142,8 @@ def run(options: argparse.Namespace) -> int:
         )
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
+    if options.fidelity == 'auto' and not joints and (promise := levels.answer(scene, policy)):
+        return _answer(scene, promise, options.json)
     level = levels.level(scene, options.fidelity, policy, joints)
     if level != 'L0':
         check_reach(scene)  # before there is a folder
@@ -160,6 +162,18 @@ def run(options: argparse.Namespace) -> int:
         # Remove the folder if it is empty, so that its name can be used again.
         with contextlib.suppress(OSError):
             folder.rmdir()
+
+
+def _answer(scene: Scene, known: levels.ChosenLevel, as_json: bool) -> int:
+    """Print the distance of a scene that needs no walk."""
+    far = levels.sticking_distance(scene)
+    if as_json:
+        found = {'distance_m': far, 'bound': known.bound, 'note': known.note}
+        print(json.dumps({'scene': scene.source, 'fidelity': known.level} | found))
+        return 0
+    print(f'{scene.name}, {known.level}: {far:.3g} m in {scene.cycles} cycles')
+    print(f'fidelity: {known.note}; --fidelity {levels.level(scene)} walks it')
+    return 0
 
 
 def _run_bench(options: argparse.Namespace) -> int:
@@ -312,7 +326,8 @@ def _at_most(term: dict[str, Any]) -> str:
     text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
     text += f' {re.split("[:;,]", term["reason"])[0]}'
     if term['exceeds']:
-        text += f', about {100.0 * term["effect"]:.0f} % of the result: exceeds the accuracy asked'
+        share = f'about {100.0 * term["effect"]:.0f} %' if term['effect'] <= 1.0 else 'all'
+        text += f', {share} of the result: exceeds the accuracy asked'
     return text
 
 

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Callable
 from collections.abc import Iterable
+from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 
@@ -181,27 +182,25 @@ def _metrics_tables(view: View) -> str:
     return text
 
 
-def _omitted_table(omitted: Sequence[dict[str, Any]]) -> str:
-    if not omitted:
+def _terms_table(settings: Mapping[str, Any]) -> str:
+    """Return a table of the terms that the model leaves out, and of those that it has."""
+    terms = [*settings.get('omitted', ()), *settings.get('taken', ())]
+    if not terms:
         return '<p>No simulation is on record for this trial.</p>'
     rows = [
         [
             html.escape(str(each['term'])),
+            'yes' if each.get('taken') else 'no',
             'not known'
             if each['bound'] is None
             else f'{_sign(each)} {100.0 * each["bound"]:.1f} %',
             _effect(each),
             html.escape(str(each['reason'])),
         ]
-        for each in omitted
+        for each in terms
     ]
-    head = [
-        'left out',
-        'bound (≤) or estimate (≈)',
-        'effect on the result',
-        'quantity, and source',
-    ]
-    return table(head, rows, range(1, 3))
+    head = ['term', 'modelled', 'bound (≤) or estimate (≈)', 'effect on the result']
+    return table([*head, 'quantity, and source'], rows, range(2, 4))
 
 
 def _sign(term: dict[str, Any]) -> str:
@@ -213,7 +212,8 @@ def _effect(term: dict[str, Any]) -> str:
     if term.get('effect') is None:  # as in bags of versions that did not estimate it
         return 'not known'
     note = ', exceeds the accuracy asked' if term['exceeds'] else ''
-    return f'≈ {100.0 * term["effect"]:.1f} %{note}'
+    share = 100.0 * term['effect']
+    return (f'≈ {share:.1f} %' if share <= 100.0 else 'all of it') + note
 
 
 def _facts(trial: Trial) -> list[str]:
@@ -291,8 +291,8 @@ def write(
     parts += sections.values()
     if words := unobservable_shares(trial, view.load_gate):
         parts.append(f'<h2>Where the ground was observable</h2><p>{html.escape(words)}</p>')
-    parts.append('<h2>What the model leaves out</h2>' + _fidelity_note(view))
-    parts.append(_omitted_table(view.settings.get('omitted', [])))
+    parts.append('<h2>What the model has and leaves out</h2>' + _fidelity_note(view))
+    parts.append(_terms_table(view.settings))
     parts.append('<h2>Conditions</h2>' + plain_table(conditions.rows(trial)))
     save(path, page(f'{name}: ros_pad', parts).encode())
     if progress:

@@ -13,12 +13,11 @@ import functools
 import importlib.util
 import math
 import operator
-from collections.abc import Mapping
+import pathlib
 from dataclasses import dataclass
 
-import yaml
-
 from ros_pad import configuration
+from ros_pad.configuration import Table
 from ros_pad.configuration import choice
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -31,6 +30,7 @@ from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import SimulatedRobot
 from ros_pad.simulation.scene import RAIL_LEG
 from ros_pad.simulation.scene import LeggedBody
+from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 
@@ -44,6 +44,8 @@ FRICTION = 'friction'
 
 LEAST = 1e-4
 """Error that is added to every error, so that its logarithm is finite."""
+
+_REMEDY = ': write the file again with python -m studies fidelity'
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,12 @@ class ChosenLevel:
         on the top level, or to half of the distance without slip if that is more; that of the slip
         relative to the slip on the top level, or to 2 % of the distance without slip. Infinite for
         scenes outside the ranges of those drawn.
-    reserve : float
-        Grip margin of the scene, see :func:`ros_pad.simulation.margin.reserve`.
     note : str
         Bound and grip margin in words, and whether the scene requires a smaller error.
     """
 
     level: str
     bound: float
-    reserve: float
     note: str
 
 
@@ -87,9 +86,9 @@ class Promises:
         the bound.
     """
 
-    ranges: Mapping[str, Mapping[str, tuple[float, float]]]
-    spans: Mapping[str, Mapping[str, tuple[float, float]]]
-    lines: Mapping[str, Mapping[str, Mapping[str, float]]]
+    ranges: dict[str, dict[str, tuple[float, float]]]
+    spans: dict[str, dict[str, tuple[float, float]]]
+    lines: dict[str, dict[str, dict[str, float]]]
 
     @classmethod
     @functools.cache
@@ -101,38 +100,45 @@ class Promises:
         ConfigError
             When the file is missing or is not as ``python -m studies fidelity`` writes it.
         """
-        path = configuration.shared_folder() / 'fidelity.yaml'
+        found = cls({}, {}, {})
         try:
-            robots = configuration.read_yaml(path.read_text(encoding='utf-8'))['robots']
-            ranges, spans = (
-                {
-                    robot: {name: (float(low), float(high)) for name, (low, high) in own.items()}
-                    for robot, own in ((robot, robots[robot][part]) for robot in robots)
-                }
-                for part in ('ranges', 'features')
-            )
-            lines = {
-                robot: {
-                    name: {key: float(value) for key, value in line.items()}
-                    for name, line in robots[robot]['bounds'].items()
-                }
-                for robot in robots
-            }
-            for robot, own in lines.items():
-                assert all(line.keys() == {'constant', *spans[robot]} for line in own.values())
-        except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError, AssertionError) as e:
+            table = Table.load(_file())
+            with table.table('robots') as robots:
+                for robot in robots.keys:
+                    with robots.table(robot) as own:
+                        found._read(robot, own)
+        except ConfigError as error:
+            raise ConfigError(f'{error}{_REMEDY}') from error
+        return found
+
+    def _read(self, robot: str, table: Table) -> None:
+        for key, pairs in (('ranges', self.ranges), ('features', self.spans)):
+            with table.table(key) as part:
+                ends = {name: part.vector(name, '', 2).tolist() for name in part.keys}
+            pairs[robot] = {name: (low, high) for name, (low, high) in ends.items()}
+        self.lines[robot] = {}
+        with table.table('bounds') as bounds:
+            for level in bounds.keys:
+                with bounds.table(level) as line:
+                    names = ('constant', *self.spans[robot])
+                    self.lines[robot][level] = {name: line.number(name, '') for name in names}
+
+    def _features(self, scene: Scene, policy: str | None) -> dict[str, float]:
+        """Return the features of a scene; raise `ConfigError` if the file has others."""
+        found = features(scene, policy)
+        if found.keys() != self.spans[scene.robot].keys():
             raise ConfigError(
-                f'{path}: the bounds of the fidelity levels cannot be read ({e!r}): write the file'
-                ' again with python -m studies fidelity'
-            ) from e
-        return cls(ranges, spans, lines)
+                f'{_file()}: robots: {scene.robot}: features are'
+                f' {", ".join(self.spans[scene.robot])}, needed are {", ".join(found)}{_REMEDY}'
+            )
+        return found
 
     def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
         """Return the bound on the error of a level; infinite if none was drawn."""
         line = self.lines.get(scene.robot, {}).get(f'{level} {scene.metric}')
         if line is None:
             return math.inf
-        known = features(scene, policy)
+        known = self._features(scene, policy)
         power = line['constant'] + sum(line[name] * value for name, value in known.items())
         return math.exp(min(power, 700.0)) - LEAST
 
@@ -140,12 +146,17 @@ class Promises:
         """Return as text what of a scene is outside the ranges drawn; empty if nothing is."""
         if scene.robot not in self.ranges:
             return f'robot = {scene.robot}, drawn were {", ".join(self.ranges)}'
-        rows = [
-            (name, operator.attrgetter(name)(scene), ends)
-            for name, ends in self.ranges[scene.robot].items()
-            if scene.tow.weight or not name.startswith('tow.')
-        ]
-        known = features(scene, policy)
+        try:
+            rows = [
+                (name, operator.attrgetter(name)(scene), ends)
+                for name, ends in self.ranges[scene.robot].items()
+                if scene.tow.weight or not name.startswith('tow.')
+            ]
+        except AttributeError as error:
+            raise ConfigError(
+                f'{_file()}: robots: {scene.robot}: ranges: of a scene, {error}{_REMEDY}'
+            ) from error
+        known = self._features(scene, policy)
         rows += [(name, known[name], ends) for name, ends in self.spans[scene.robot].items()]
         found = [
             f'{name} = {value:.4g}, drawn from {low:.4g} to {high:.4g}'
@@ -159,6 +170,10 @@ class Promises:
         if isinstance(scene.gait, WalkingGait) and not _walks_as_usual(scene):
             found.append(f'phases or pushes of the gait, drawn were those of {scene.robot}')
         return ', '.join(found)
+
+
+def _file() -> pathlib.Path:
+    return configuration.shared_folder() / 'fidelity.yaml'
 
 
 def _walks_as_usual(scene: Scene) -> bool:
@@ -207,19 +222,49 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
         available = known[:1] if missing else known
         enough = [each for each in available if bounds[each] <= scene.accuracy]
         level = (enough or available[-1:])[0]
-    own, bound = reserve(scene, policy), bounds[level]
+    bound = bounds[level]
     if beyond:
         within = f'of unknown error ({beyond})'
     else:
         within = f'{_within(bound)} of the top level, promised for 95 of 100 scenes'
-    note = f'grip capacity {own:.2g} times the demand: the {scene.metric} on {level} is {within}'
+    note = f'{_grip(scene, policy)}: the {scene.metric} on {level} is {within}'
     if bound > scene.accuracy:
         note += f', but the scene requires {100.0 * scene.accuracy:.3g} %'
         if missing and level == 'L1':
             note += '; pip install "ros_pad[mujoco]" adds L2'
     if bounds[STICKING] <= scene.accuracy:
         note += f'; no slip at all, without a simulation, is {_within(bounds[STICKING])}'
-    return ChosenLevel(level, bound, own, note)
+    return ChosenLevel(level, bound, note)
+
+
+def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
+    """Return the promise of the distance without slip; None if a scene asks for more.
+
+    It asks for more if it wants the walk itself, not only the metric, or more accuracy.
+    """
+    promises = Promises.load()
+    if scene.wanted != 'metric' or promises.beyond(scene, policy):
+        return None
+    bound = promises.bound(STICKING, scene, policy)
+    if bound > scene.accuracy:
+        return None
+    note = (
+        f'{_grip(scene, policy)}: the {scene.metric} of feet that never slip is {_within(bound)}'
+        ' of the top level, promised for 95 of 100 scenes; nothing was simulated'
+    )
+    return ChosenLevel(STICKING, bound, note)
+
+
+def sticking_distance(scene: Scene) -> float:
+    """Return how far the body of a scene goes if its feet never slip, m."""
+    gait = scene.gait
+    if isinstance(gait, RailGait):
+        return scene.cycles * gait.stroke
+    return gait.body_advance(scene.cycles * gait.cycle)
+
+
+def _grip(scene: Scene, policy: str | None) -> str:
+    return f'grip capacity {reserve(scene, policy):.2g} times the demand'
 
 
 def _within(bound: float) -> str:

@@ -28,7 +28,7 @@ SOLE_MODULUS = 3.95e5
 ``config/materials``, times 1.88."""
 
 NEAR = 1.5
-"""Grip margin below which feet may slip; bounds are calibrated on either side of it."""
+"""Grip margin below which feet may slip: bounds may step there."""
 
 _MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
 
@@ -97,14 +97,14 @@ def least_grip(scene: Scene, policy: str) -> float:
     """Return the tangential capacity of all feet, N, on the ground where it is least."""
     grip = min(
         mid_stance_grip(scene, policy == 'dome' or (policy != 'flat' and wet), wet)
-        for wet in _grounds(scene)
+        for wet in grounds(scene)
     )
     if not isinstance(scene.body, LeggedBody):
         return grip * scene.body.load
     return grip * scene.body.mass * GRAVITY * math.cos(scene.floor.slope)
 
 
-def _grounds(scene: Scene) -> tuple[bool, ...]:
+def grounds(scene: Scene) -> tuple[bool, ...]:
     """Return which of dry and wet ground a floor has: whether it is wet."""
     return {'dry': (False,), 'wet': (True,)}.get(scene.floor.kind, (False, True))
 
@@ -118,7 +118,7 @@ def demands(scene: Scene) -> tuple[float, float, float]:
         uphill = body.mass * GRAVITY * abs(math.sin(slope))
         return body.mass * peak, body.rolling_drag, uphill
     mass = body.mass + tow.weight / GRAVITY
-    drag = max(tow.friction_wet if wet else tow.friction_dry for wet in _grounds(scene))
+    drag = max(tow.friction_wet if wet else tow.friction_dry for wet in grounds(scene))
     drag *= tow.weight * math.cos(slope)
     return mass * gait.peak_acceleration, drag, mass * GRAVITY * abs(math.sin(slope))
 

@@ -378,6 +378,8 @@ class Scene:
         Largest relative error of its metric that the scene allows a fidelity level.
     metric : str
         What must be that accurate: ``distance`` of the body, or ``slip`` path of its feet.
+    wanted : str
+        ``walk`` with all signals, or only the ``metric``, which may need no simulation.
     faults : tuple of Fault
         Faults of regulators, hoses and sensors; see :mod:`ros_pad.simulation.faults`.
     """
@@ -400,6 +402,7 @@ class Scene:
     cycles: int
     accuracy: float
     metric: str = 'distance'
+    wanted: str = 'walk'
     faults: tuple[Fault, ...] = ()
 
     @property
@@ -494,6 +497,7 @@ class Scene:
             cycles=table.integer('cycles', 1, 100000),
             accuracy=table.number('accuracy', '(relative)', 1e-4, 1.0),
             metric=table.choice('metric', METRICS, default='distance'),
+            wanted=table.choice('wanted', ('walk', 'metric'), default='walk'),
             faults=listed(table),
         )
         table.finish()

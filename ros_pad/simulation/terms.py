@@ -8,6 +8,7 @@ was measured on random scenes as the errors of the levels were.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from dataclasses import replace
@@ -21,14 +22,15 @@ from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.squeeze import STIFF
 from ros_pad.contact.squeeze import dry_share
 from ros_pad.simulation import fidelity as levels
+from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.margin import Stand
 from ros_pad.simulation.margin import dome_pressure
+from ros_pad.simulation.margin import grounds
 from ros_pad.simulation.margin import mid_stance_grip
 from ros_pad.simulation.margin import stance
-from ros_pad.simulation.rail_leg import walk_many
+from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.terrain import Floor
 
 ATMOSPHERE = 101325.0  # Pa
 
@@ -73,9 +75,6 @@ class Term:
     exceeds: bool = False
 
 
-SOLE = Term('size of the sole', None, 'the foot is a point on an ankle that tilts freely')
-
-
 def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> list[Term]:
     """Return the terms that a trial of this scene has or leaves out on a level.
 
@@ -94,12 +93,14 @@ def terms(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> li
     found = []
     if scene.floor.kind != 'dry':
         worth = _worth_of_friction(scene, policy)
-        found += [*_of_liquid(scene, policy), _lines(scene)]
+        found += _of_liquid(scene, policy)
+        if policy != 'flat':
+            found.append(_lines(scene))
         found += [_by_friction(term, worth) for term in _of_friction(scene, policy)]
-    if level == 'L0':
-        found.append(_friction_of_the_rail(scene, policy))
-    else:
-        found.append(_joints(scene, policy) if level == 'L1' else SOLE)
+    if level == 'L1':
+        found.append(_joints(scene, policy))
+    if level != 'L0':
+        found.append(_sole(scene))
     found.append(replace(_soft_pads(scene), taken=level == 'L1'))
     found += _always(scene, level, policy)
     return [
@@ -135,13 +136,14 @@ def _lines(scene: Scene) -> Term:
     share = most / (foot.friction * scene.expected_load)
     worth = None if scene.floor.kind == 'dry' else _worth_of_friction(scene, 'dome')
     effect = None if worth is None else share * worth
+    taken = effect is not None and effect > scene.accuracy
     return Term(
         LINES,
         share,
-        'of the friction of a loaded foot: full hysteresis of the contact angle (180'
-        ' to 0 degrees) on every pad',
+        'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0 degrees)'
+        f' on every pad{"; added, since its effect is above the accuracy asked" if taken else ""}',
         effect=effect,
-        taken=effect is not None and effect > scene.accuracy,
+        taken=taken,
     )
 
 
@@ -163,14 +165,15 @@ def _by_friction(term: Term, worth: float | None) -> Term:
 
 def _of_friction(scene: Scene, policy: str) -> list[Term]:
     """Return the terms of liquid that change the friction of the feet."""
-    stand = _on_wet_ground(scene, policy)
+    stand = Stand(scene, policy != 'flat')
     now = stand.resistance(*stand.films(0.5 * stance(scene)))
     ends = stand.resistance(THICK_FILM, THICK_FILM), stand.resistance(0.0, 0.0)
     found = [
         Term(
             'film that drains',
             max(abs(each - now) for each in ends) / now,
-            'of the friction on wet ground in mid-stance: a film that never drains, or none',
+            'of the friction on wet ground in mid-stance: a film that never drains, or none; it'
+            ' costs no time',
             taken=True,
         )
     ]
@@ -223,12 +226,27 @@ def _always(scene: Scene, level: str, policy: str) -> list[Term]:
     """Return the terms that a level always has, and pads that balloon, which none has."""
     found = []
     if policy != 'flat':
+        changed = (
+            mid_stance_grip(scene, False, wet) / mid_stance_grip(scene, True, wet)
+            for wet in grounds(scene)
+        )
         found.append(
-            Term('air in hose and pads', None, 'pads fill through a hose, at no cost', taken=True)
+            Term(
+                'air in hose and pads',
+                max(abs(1.0 - share) for share in changed),
+                'of the friction in mid-stance: pads that never fill; it costs no time',
+                taken=True,
+            )
         )
     if level != 'L0':
         found.append(
-            Term('torsion of the soles', None, 'feet that turn hold less, at no cost', taken=True)
+            Term(
+                'torsion of the soles',
+                1.0,
+                'of the friction: what turns on the spot holds no force along the ground; it costs'
+                ' no time',
+                taken=True,
+            )
         )
     if scene.foot.pad.material is not None:
         found.append(
@@ -255,13 +273,34 @@ def _joints(scene: Scene, policy: str) -> Term:
     )
 
 
-def _on_wet_ground(scene: Scene, policy: str) -> Stand:
-    return Stand(scene, policy != 'flat')
+def _sole(scene: Scene) -> Term:
+    """Return what a foot that is a point, on an ankle that tilts freely, leaves out.
+
+    The centre of pressure of a sole moves by a radius R at most. On three feet moments balance
+    about the line through two of them: the load of the third, at a height h, moves by W R/h.
+    """
+    gait, body = scene.gait, scene.body
+    assert isinstance(gait, WalkingGait) and isinstance(body, LeggedBody)
+    found = 0.0
+    for middle in set(gait.middles):
+        feet = [home for home, own in zip(body.homes, gait.middles, strict=True) if own == middle]
+        if not gait.pushes or len(feet) != 3:
+            return Term('size of the sole', None, 'loads of feet are not those of a tripod')
+        longest = max(math.dist(a, b) for a, b in itertools.combinations(feet, 2))
+        (x0, y0), (x1, y1), (x2, y2) = feet
+        area = abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+        found = max(found, 3.0 * scene.foot.sole_radius * longest / area)
+    return Term(
+        'size of the sole',
+        found,
+        'of the load of a foot on a tripod: centres of pressure move by a radius of the sole; what'
+        ' one foot loses others gain',
+    )
 
 
 def _soft_film(scene: Scene, policy: str) -> Term | None:
     """Return what Stefan and Reynolds leave out under a soft foot; None if that is nothing."""
-    stand, time = _on_wet_ground(scene, policy), 0.5 * stance(scene)
+    stand, time = Stand(scene, policy != 'flat'), 0.5 * stance(scene)
     foot, found = stand.foot, []
     for name, rigid, middle, mean in stand.dimples(time):
         if mean >= STIFF * rigid:
@@ -344,39 +383,3 @@ def dragged_film(scene: Scene, speed: float) -> float:
     pressure = dome_pressure(scene)
     width = math.sqrt(scene.expected_load / pressure / scene.foot.pads / math.pi)
     return math.sqrt(0.160 * scene.floor.viscosity * speed * 2.0 * width / pressure)
-
-
-def _friction_of_the_rail(scene: Scene, policy: str) -> Term:
-    """Return how much one per cent of friction changes the distance on the rail.
-
-    The effect is large near the drag of the wheels, where the distance is ill-conditioned.
-    """
-    foot = scene.foot
-    scenes = [
-        replace(
-            scene,
-            foot=replace(
-                foot,
-                friction=factor * foot.friction,
-                shear_strength=factor * foot.shear_strength,
-                boundary_friction=factor * foot.boundary_friction,
-            ),
-        )
-        for factor in (0.995, 1.005)
-    ]
-    wet = scene.floor.kind != 'dry'
-    domed = policy == 'dome' or (policy != 'flat' and wet)
-    pressure = dome_pressure(scene) if domed else 0.0
-    gait = scene.gait
-    assert isinstance(gait, RailGait)
-    duration = scene.settle + 10.0 * gait.cycle
-    floor = Floor.uniform(wet, scene.floor.film_thickness)
-    walks = walk_many(scenes, [floor, floor], [pressure, pressure], 0.004, duration)
-    less, more = walks.position
-    return Term(
-        'friction off by one per cent',
-        (more - less) / less if less > 0.0 else None,
-        'of the distance, on a uniform floor: near the drag of the wheels a little more or less'
-        ' friction moves the body much further, or not at all',
-        kind='estimate',
-    )

@@ -27,9 +27,6 @@ PENALTY = 2.0
 0.7 to 0.9 and penalties 0.3 to 8, these gave the least bounds of L1 and L2 in 54 scenes of the
 hexapod, halved at random twelve times; none of those was held out."""
 
-LEAST_GROUP = 39
-"""Scenes of a kind that are calibrated on their own: with fewer their largest error decides."""
-
 _HIGHEST = 10.0  # error from which a fit does not distinguish
 
 
@@ -80,27 +77,6 @@ def shift(line: Array, features: Array, errors: Array, promise: float) -> float:
     if rank > count:
         return math.inf
     return float(np.sort(np.log(errors + LEAST) - line[0] - features @ line[1:])[rank - 1])
-
-
-def calibrated(
-    line: Array, features: Array, errors: Array, promise: float, group: int
-) -> Array | None:
-    """Return a line shifted so that it covers a share of scenes with either value of a feature.
-
-    The feature, the column ``group``, is 0 or 1. Where there are too few scenes of a kind, all
-    have one shift; None where these are too few.
-    """
-    inside = features[:, group] > 0.5
-    far, near = (shift(line, features[kind], errors[kind], promise) for kind in (~inside, inside))
-    few = min(inside.sum(), (~inside).sum()) < LEAST_GROUP
-    if few or math.inf in (near, far):
-        near = far = shift(line, features, errors, promise)
-        if far == math.inf:
-            return None
-    risen = line.copy()
-    risen[0] += far
-    risen[1 + group] += near - far
-    return risen
 
 
 def bounds(line: Array, features: Array) -> Array:

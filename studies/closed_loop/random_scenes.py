@@ -24,7 +24,7 @@ from ros_pad.trials.loop import ClosedLoop
 from studies.closed_loop import loops
 
 BASES = {'ch3r': 'hexapod_patches', 'go2': 'quadruped_patches', RAIL_LEG: 'leg_wet_dome_75'}
-TOP_STEP = {'L2': 5e-4, 'L0': 1e-4}  # s
+TOP_STEP = {'L2': 5e-4, 'L0': 2e-4}  # s
 
 # Ranges of what is drawn, SI units. Mass: inertia is in proportion.
 WALKS = {
