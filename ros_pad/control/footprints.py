@@ -17,7 +17,7 @@ from ros_pad.estimation import Tuning
 DRY = 0.35
 """Probability of wet ground below which the friction of a flat foot is that of dry ground."""
 
-NEW_SHARE = 0.1
+NEW_SHARE = 0.2
 """Weight of the last step in the mean friction of a morphology."""
 
 PAYS, PAYS_NOT = 1.5, 1.35

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -91,7 +92,7 @@ SETTINGS = (
 """The settings of :func:`adaptive`, each named ``policy.`` and its argument."""
 
 SELDOM = 64
-"""Steps as a dome after which a foot probes where flat feet do not pay, to see if they do again."""
+"""Steps as a dome after which a foot probes where flat feet do not pay: perhaps they do again."""
 
 PREFIX = 'policy.'
 _DEFAULTS = {each.name.removeprefix(PREFIX): each.default for each in SETTINGS}
@@ -149,7 +150,7 @@ def adaptive(
             return Choice(FLAT if wet <= wet_above and step.flat_pays else DOME)
         if wet < dry_below and step.flat_pays:
             return Choice(FLAT)
-        due = wet < probe_below if step.flat_pays else step.steps >= SELDOM
+        due = wet < probe_below if step.flat_pays else SELDOM <= step.steps < math.inf
         probe = due and not step.others_probing
         return Choice(FLAT if probe else DOME, probe)
 

@@ -78,6 +78,7 @@ def test_fixed_policies_are_fixed(wet_ahead, morphology):
         ({'morphology': 'dome', 'wet_ahead': 0.0, 'flat_pays': False}, Choice('dome')),
         ({'morphology': 'dome', 'steps': 63, 'flat_pays': False}, Choice('dome')),
         ({'morphology': 'dome', 'steps': 64, 'flat_pays': False}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'steps': math.inf, 'flat_pays': False}, Choice('dome')),
     ],
 )
 def test_adaptive_step_by_step(step, expected):

@@ -7,13 +7,12 @@ import pytest
 from ros_pad.control import policy_named
 from ros_pad.control.policies import Choice
 from ros_pad.control.policies import LiftOff
-from ros_pad.control.probing import Plan
 from ros_pad.simulation import Scene
 from studies.closed_loop import policies
 from studies.closed_loop import quick_walk
 from studies.closed_loop import rivals
 
-STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False, 0.5, Plan())
+STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False)
 
 
 def test_held_out_grounds_share_no_condition_with_tuning_grounds():
