@@ -141,21 +141,3 @@ def discounted_ucb(discount: float, exploration: float, stride: float = 0.14) ->
         return Choice(arms.arm)
 
     return choose
-
-
-def discounted_thompson(discount: float, seed: int, stride: float = 0.14) -> Policy:
-    """Choose the morphology of all feet by sampling from Beta posteriors (Raj, Kalyani 2017)."""
-    arms = _Arms(discount, stride)
-    random = np.random.default_rng([seed, 11])
-
-    def choose(step: LiftOff) -> Choice:
-        if arms.round(step):
-            arms.arm = max(
-                arms.pulls,
-                key=lambda arm: random.beta(
-                    1.0 + arms.gains[arm], 1.0 + arms.pulls[arm] - arms.gains[arm]
-                ),
-            )
-        return Choice(arms.arm)
-
-    return choose
