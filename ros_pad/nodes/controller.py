@@ -303,6 +303,7 @@ class ControllerNode(Node):
                     key='touch-downs with too little pressure',
                     value=str(controller.underpressure[leg]),
                 ),
+                KeyValue(key='flat feet pay', value=str(controller.friction.flat_pays)),
             ]
             array.status.append(status)
         array.status.extend(self.messages.refusals.statuses())

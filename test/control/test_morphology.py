@@ -200,6 +200,16 @@ def test_the_information_trap():
     assert trapped.x[1] > 45.0
 
 
+@pytest.mark.parametrize(('friction', 'last'), [(0.8, 'flat'), (0.41, 'dome'), (math.nan, 'flat')])
+def test_feet_stay_domes_on_dry_ground_where_flat_feet_have_no_more_friction(friction, last):
+    controller = MorphologyController(FOOT, (1,), adaptive(), LOAD)
+    for step in range(12):
+        at = (STRIDE * step, 0.0)
+        controller.update(1, LOAD, 0.03, at, friction)
+        controller.update(1, 0.0, 0.03, at, friction)
+    assert controller.morphology(1) == last
+
+
 def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
     legs = (1, 2, 3, 4, 5, 6)
     walk = Walk(adaptive(), legs=legs, is_wet=lambda x: True)
