@@ -20,7 +20,7 @@ DRY = 0.35
 NEW_SHARE = 0.2
 """Weight of the last step in the mean friction of a morphology."""
 
-PAYS, PAYS_NOT = 1.5, 1.4
+PAYS, PAYS_NOT = 1.6, 1.4
 """Friction of flat feet on dry ground over that of domes, from which on flat feet pay, and below
 which they do not: less gain than steps onto the next wet patch cost.
 """
