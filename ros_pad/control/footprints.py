@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of where ground was wet or dry, because hind feet step where fore feet have stood."""
+"""Memory of what feet have felt: where the ground was wet or dry, and friction.
+
+Hind feet step where fore feet have stood.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,28 @@ import math
 from collections import deque
 
 from ros_pad.configuration import number
+from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import expected_friction
 from ros_pad.estimation import Tuning
 
-PRIOR_EVIDENCE = 2.0
-"""Weight of the prior of the wet share, in footprints: for a prior of 1/2 this is Beta(1, 1)."""
+DRY = 0.35
+"""Probability of wet ground below which the friction of a flat foot is that of dry ground."""
 
-MOST_EVIDENCE = 12.0
-"""Largest weight of all footprints and the prior together: older footprints lose weight, because
-floors change.
+NEW_SHARE = 0.2
+"""Weight of the last step in the mean friction of a morphology."""
+
+PAYS, PAYS_NOT = 1.6, 1.4
+"""Friction of flat feet on dry ground over that of domes, from which on flat feet pay, and below
+which they do not: less gain than steps onto the next wet patch cost.
 """
 
 
 class Footprints:
-    """Footprints of the flat feet of all legs, and the wet share estimated from them.
+    """Footprints of the flat feet of all legs, by which P(wet) is known ahead.
 
     With the distance d from a footprint, the probability fades to the prior as in a two-state
     Markov chain of patches, P(d) = P0 + (P - P0) exp(-d / ℓ). Only the footprint whose P(d) is
     farthest from P0 counts, and of equally far ones the last.
-
-    The wet share is estimated as the mean of a Beta distribution. A footprint with P has the
-    weight |2P - 1| (1 - exp(-w / ℓ)), with w the distance since the last footprint: footprints
-    with P near 1/2, and many footprints on one patch, count little.
 
     Parameters
     ----------
@@ -51,9 +55,8 @@ class Footprints:
         self.fading_length = number('fading_length', fading_length, 'm', above=True)
         number('memory', memory, 'footprints', low=1.0)
         self._prints: deque[tuple[float, float, float]] = deque(maxlen=memory)
-        self._wet, self._evidence = PRIOR_EVIDENCE * self._wet_prior, PRIOR_EVIDENCE
 
-    def add(self, x: float, y: float, wet_probability: float, walked: float = 0.0) -> None:
+    def add(self, x: float, y: float, wet_probability: float) -> None:
         """Add a footprint of a flat foot.
 
         Parameters
@@ -62,38 +65,48 @@ class Footprints:
             Position of the foot, m.
         wet_probability : float
             Probability of wet ground that the foot has estimated, 0 to 1.
-        walked : float
-            Distance since the last footprint, m: the shorter it is, the less this footprint counts
-            in the wet share.
         """
         self._prints.append((x, y, wet_probability - self._wet_prior))
-        new = -math.expm1(-walked / self.fading_length) * abs(2.0 * wet_probability - 1.0)
-        keep = min(1.0, MOST_EVIDENCE / (self._evidence + new))
-        self._wet = keep * (self._wet + new * wet_probability)
-        self._evidence = keep * (self._evidence + new)
-
-    @property
-    def wet_share(self) -> float:
-        """Estimated share of wet ground, 0 to 1."""
-        return self._wet / self._evidence
 
     def wet_probability(self, x: float, y: float) -> float:
         """Return the probability that the ground is wet at a position, m."""
-        return self._wet_prior + self._strongest(x, y)[0]
-
-    def wet_expected(self, x: float, y: float) -> float:
-        """Return the probability that the ground is wet at a position, m, from the wet share.
-
-        Far from all footprints this is the wet share, where :meth:`wet_probability` is the prior.
-        """
-        felt, known = self._strongest(x, y)
-        return self._wet_prior + felt + (1.0 - known) * (self.wet_share - self._wet_prior)
-
-    def _strongest(self, x: float, y: float) -> tuple[float, float]:
-        """Return the largest excess over the prior at a position, m, and its fading factor."""
-        best, known = 0.0, 0.0
+        best = 0.0
         for at_x, at_y, excess in self._prints:
-            likeness = math.exp(-math.hypot(x - at_x, y - at_y) / self.fading_length)
-            if abs(excess * likeness) >= abs(best):
-                best, known = excess * likeness, likeness
-        return best, known
+            faded = excess * math.exp(-math.hypot(x - at_x, y - at_y) / self.fading_length)
+            if abs(faded) >= abs(best):
+                best = faded
+        return self._wet_prior + best
+
+
+class FrictionFelt:
+    """Mean friction of flat feet on dry ground and of domes, from the steps of all legs.
+
+    The foot file may promise adhesion that this floor does not have.
+
+    Parameters
+    ----------
+    foot : Foot
+        Its contact model predicts friction before the first step.
+    load : float
+        Normal force on a foot in stance, N, above 0.
+
+    Attributes
+    ----------
+    flat_pays : bool
+        Whether flat feet have more friction on dry ground than domes, by the factor :data:`PAYS`;
+        once they have, until the factor falls below :data:`PAYS_NOT`.
+    """
+
+    def __init__(self, foot: Foot, load: float) -> None:
+        self._flat_dry, _, self._dome = expected_friction(foot, load)
+        self.flat_pays = self._flat_dry >= PAYS * self._dome
+
+    def add(self, flat: bool, wet_probability: float, friction: float) -> None:
+        """Add P(wet) and coefficient of friction of a step; NaN or less than 0 is not known."""
+        if not 0.0 <= friction < math.inf:
+            return
+        if not flat:
+            self._dome += NEW_SHARE * (friction - self._dome)
+        elif wet_probability < DRY:
+            self._flat_dry += NEW_SHARE * (friction - self._flat_dry)
+        self.flat_pays = self._flat_dry >= (PAYS_NOT if self.flat_pays else PAYS) * self._dome

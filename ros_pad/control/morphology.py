@@ -22,6 +22,7 @@ from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
+from ros_pad.control.footprints import FrictionFelt
 from ros_pad.control.monitor import PadMonitor
 from ros_pad.control.monitor import RunningMedian
 from ros_pad.control.policies import DOME
@@ -30,9 +31,6 @@ from ros_pad.control.policies import Choice
 from ros_pad.control.policies import LiftOff
 from ros_pad.control.policies import Policy
 from ros_pad.control.pressure import dome_pressure
-from ros_pad.control.probing import Planner
-from ros_pad.control.probing import Stakes
-from ros_pad.control.probing import Step
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.estimation.load_gate import LIFT_OFF_SHARE
@@ -85,6 +83,8 @@ class FootState(NamedTuple):
         Gauge pressure of the pad, Pa; None without a reading since the last estimate.
     sensor_fault : str
         Why the sensors of the foot cannot be used; empty if they can.
+    friction : float
+        Mean coefficient of friction below the foot; NaN if it is not known.
     """
 
     time: float
@@ -93,6 +93,7 @@ class FootState(NamedTuple):
     position: tuple[float, float]
     pressure: float | None
     sensor_fault: str
+    friction: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,6 @@ class _Ground:
     gate: LoadGate
     peak: float  # largest recent load, N, for which the pressure of domes is chosen
     largest: float = 0.0  # largest load of this stance, N
-    landed: tuple[float, float] = (0.0, 0.0)  # position at touch-down, m
     stood: tuple[float, float] = (0.0, 0.0)  # last position in stance, m
     lifted: tuple[float, float] | None = None  # position at the last lift-off, m
 
@@ -240,6 +240,8 @@ class MorphologyController:
         Faults of all legs so far, in the order in which they were found.
     footprints : Footprints
         Places where flat feet of all legs stood, with the probability of wet ground there.
+    friction : FrictionFelt
+        Friction of flat feet and of domes, which decides whether flat feet pay.
     margin : float
         Pressure margin as given; a new value applies from the next lift-off.
     policy : callable
@@ -292,7 +294,7 @@ class MorphologyController:
         self.command_timeout = COMMAND_TIMEOUT.accept(command_timeout)
         self._fixed_pressure = fixed_pressure
         self.footprints = Footprints()
-        self._planner = Planner(Stakes.expected(foot, expected_load), legs)
+        self.friction = FrictionFelt(foot, expected_load)
         self._decisions = 0
         self._legs = {
             leg: _LegState(
@@ -374,7 +376,7 @@ class MorphologyController:
         x, y = state.position
         if not math.isfinite(state.load + state.wet_probability + x + y):
             return None
-        return self.update(leg, state.load, state.wet_probability, state.position)
+        return self.update(leg, state.load, state.wet_probability, state.position, state.friction)
 
     def observe(
         self, leg: int, time: float, pressure: float | None, sensor_fault: str = ''
@@ -473,7 +475,12 @@ class MorphologyController:
                 self.faults[self.faults.index(entry)] = now
 
     def update(
-        self, leg: int, load: float, wet_probability: float, position: Sequence[float]
+        self,
+        leg: int,
+        load: float,
+        wet_probability: float,
+        position: Sequence[float],
+        friction: float = math.nan,
     ) -> float:
         """Process an estimate and return the set-point, gauge Pa.
 
@@ -487,6 +494,8 @@ class MorphologyController:
             Probability of wet ground below the foot, 0 to 1.
         position : sequence of float
             Position of the foot, x and y, m.
+        friction : float
+            Coefficient of friction below the foot; NaN if it is not known.
 
         Raises
         ------
@@ -506,13 +515,12 @@ class MorphologyController:
         ground, gate = state.ground, state.ground.gate
         stood = gate.standing
         if gate.update(load) and not stood:
-            ground.landed = (position[0], position[1])
             self._touch_down(leg, state)
         if load >= gate.lift_off:
             ground.largest = max(ground.largest, load)
             ground.stood = (position[0], position[1])
         elif stood:
-            self._lift_off(leg, state, wet_probability, position)
+            self._lift_off(leg, state, wet_probability, position, friction)
         state.air.sent = state.setpoint
         return state.setpoint
 
@@ -562,7 +570,12 @@ class MorphologyController:
         return choice
 
     def _lift_off(
-        self, leg: int, state: _LegState, wet_probability: float, position: Sequence[float]
+        self,
+        leg: int,
+        state: _LegState,
+        wet_probability: float,
+        position: Sequence[float],
+        friction: float,
     ) -> None:
         """Evaluate the step that ends, and choose the morphology of the next one."""
         ground, timing = state.ground, state.timing
@@ -574,8 +587,10 @@ class MorphologyController:
         if not (state.air.monitor.silence or state.faults.sensors):
             # A pad under pressure is not flat, even if its set-point is zero.
             flat = state.morphology == FLAT and not state.air.holds
-            made = Step(ground.landed, ground.stood, flat, state.probing, wet_probability)
-            self._planner.step(leg, made, self.footprints)
+            if flat:
+                self.footprints.add(*ground.stood, wet_probability)
+            if flat or state.air.holds:
+                self.friction.add(flat, wet_probability, friction)
         ahead = ground.next_position(position)
         self._decisions += 1
         state.decided = self._decisions
@@ -587,8 +602,7 @@ class MorphologyController:
             wet_ahead=self.footprints.wet_probability(*ahead),
             next_position=ahead,
             others_probing=self._others_probing(leg),
-            wet_expected=self.footprints.wet_expected(*ahead),
-            plan=self._planner.plan(leg),
+            flat_pays=self.friction.flat_pays,
         )
         before = state.morphology
         self._apply(leg, self._permitted(leg, state, self.policy(step)))

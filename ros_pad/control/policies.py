@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -12,7 +13,6 @@ from typing import Any
 
 from ros_pad.configuration import Setting
 from ros_pad.configuration import number
-from ros_pad.control.probing import Plan
 from ros_pad.errors import InvalidInput
 
 FLAT = 'flat'
@@ -33,18 +33,15 @@ class LiftOff:
         Number of steps with that morphology, including the one that ends; infinite before the
         first change.
     probing : bool
-        Whether that step was a probe or a dome test.
+        Whether that step was a probe.
     wet_ahead : float
         Probability that the ground is wet where the foot will stand next, 0 to 1.
     next_position : tuple of float
         Position where the foot will stand next, x and y, m.
     others_probing : bool
-        Whether another leg is in a probe or a dome test now.
-    wet_expected : float
-        The same probability as `wet_ahead`, but far from footprints it approaches the wet share,
-        not the prior.
-    plan : Plan
-        Plan of probes and dome tests.
+        Whether another leg probes now.
+    flat_pays : bool
+        Whether flat feet have more friction on dry ground than domes.
     """
 
     leg: int
@@ -54,13 +51,12 @@ class LiftOff:
     wet_ahead: float
     next_position: tuple[float, float]
     others_probing: bool
-    wet_expected: float
-    plan: Plan
+    flat_pays: bool = True
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Morphology of the next step, and whether that step is a probe or a dome test."""
+    """Morphology of the next step, and whether that step is a probe."""
 
     morphology: str
     probe: bool = False
@@ -70,9 +66,6 @@ Policy = Callable[[LiftOff], Choice]
 
 IsWet = Callable[[float, float], bool]
 """Function that returns whether the ground is wet at x and y, m."""
-
-PROBING = ('value', 'count', 'threshold')
-"""Methods of planning the probes of :func:`adaptive`."""
 
 SETTINGS = (
     Setting(
@@ -87,28 +80,19 @@ SETTINGS = (
         '', 0.0, 1.0,
     ),
     Setting(
-        'policy.probe_below', 0.75,
-        'Adaptive policy: probability of wet ground ahead below which a domed foot probes, if'
-        ' policy.probing is threshold.',
+        'policy.probe_below', 0.8,
+        'Adaptive policy: probability of wet ground ahead below which a domed foot probes.',
         '', 0.0, 1.0,
     ),
     Setting(
         'policy.dwell', 2, 'Adaptive policy: steps for which a morphology is kept at least.',
         'steps', 1, 1000,
     ),
-    Setting(
-        'policy.probing', 'value',
-        'Adaptive policy: whether probes are planned by their value, by a count of steps, or by a'
-        ' threshold of the probability.',
-        choices=PROBING,
-    ),
-    Setting(
-        'policy.probe_every', 20,
-        'Adaptive policy: steps as a dome after which a foot probes, if policy.probing is count.',
-        'steps', 1, 100000,
-    ),
 )  # fmt: skip
 """The settings of :func:`adaptive`, each named ``policy.`` and its argument."""
+
+SELDOM = 64
+"""Steps as a dome after which a foot probes where flat feet do not pay: perhaps they do again."""
 
 PREFIX = 'policy.'
 _DEFAULTS = {each.name.removeprefix(PREFIX): each.default for each in SETTINGS}
@@ -129,14 +113,13 @@ def adaptive(
     dry_below: float = _DEFAULTS['dry_below'],
     probe_below: float = _DEFAULTS['probe_below'],
     dwell: int = _DEFAULTS['dwell'],
-    probing: str = _DEFAULTS['probing'],
-    probe_every: int = _DEFAULTS['probe_every'],
 ) -> Policy:
     """Return a policy that follows the probability of wet ground, with hysteresis and probes.
 
     The friction of a dome hardly depends on whether the ground is wet, so under domes the estimate
     only fades: without probes, feet would stay domes for ever after the first wet ground. A probe
-    is one flat step of a foot that is otherwise a dome. One leg probes at a time.
+    is one flat step of a foot that is otherwise a dome. One leg probes at a time. Where flat feet
+    do not pay, feet are domes on dry ground, too, and probe after :data:`SELDOM` steps.
 
     Parameters
     ----------
@@ -144,46 +127,32 @@ def adaptive(
         Probabilities of wet ground ahead, 0 to 1, above which a foot becomes a dome and below
         which it becomes flat again.
     probe_below : float
-        Probability, 0 to 1, below which a domed foot probes, if ``probing`` is ``threshold``.
+        Probability of wet ground ahead, 0 to 1, below which a domed foot probes.
     dwell : int
-        Steps for which a morphology is kept at least, except in probes and dome tests.
-    probing : str
-        How probes are planned. ``value``: by their cost and gain measured on this walk, see
-        :class:`ros_pad.control.probing.Planner`; feet then also stay domes where flat feet gain
-        nothing. Two baselines measure neither: with ``count`` a foot probes after ``probe_every``
-        steps, with ``threshold`` when the probability is below ``probe_below``.
-    probe_every : int
-        Steps as a dome after which a foot probes, if ``probing`` is ``count``.
+        Steps for which a morphology is kept at least, except in probes.
 
     Raises
     ------
     InvalidInput
-        For a probability outside 0 to 1, ``dry_below`` above ``wet_above``, ``dwell`` or
-        ``probe_every`` outside their ranges, or an unknown method of ``probing``.
+        For a probability outside 0 to 1, ``dry_below`` above ``wet_above``, or ``dwell`` outside
+        its range.
     """
-    given = (wet_above, dry_below, probe_below, dwell, probing, probe_every)
+    given = (wet_above, dry_below, probe_below, dwell)
     for setting, value in zip(SETTINGS, given, strict=True):
         setting.accept(value)
     number('policy.dry_below', dry_below, '', high=wet_above)
 
     def choose(step: LiftOff) -> Choice:
-        if probing == 'value':
-            wet, plan, due = step.wet_expected, step.plan, step.plan.probe
-        else:
-            wet, plan = step.wet_ahead, Plan()
-            due = step.steps >= probe_every if probing == 'count' else wet < probe_below
-        settled = step.probing or step.steps >= dwell
+        if not (step.probing or step.steps >= dwell):
+            return Choice(step.morphology)
+        wet = step.wet_ahead
         if step.morphology == FLAT:
-            if settled and (wet > wet_above or not plan.flat_pays):
-                return Choice(DOME)
-            if settled and plan.trial and wet < dry_below:
-                return Choice(DOME, probe=True)
+            return Choice(FLAT if wet <= wet_above and step.flat_pays else DOME)
+        if wet < dry_below and step.flat_pays:
             return Choice(FLAT)
-        if settled and wet < dry_below and plan.flat_pays:
-            return Choice(FLAT)
-        if settled and due and not step.others_probing:
-            return Choice(FLAT, probe=True)
-        return Choice(DOME)
+        due = wet < probe_below if step.flat_pays else SELDOM <= step.steps < math.inf
+        probe = due and not step.others_probing
+        return Choice(FLAT if probe else DOME, probe)
 
     return choose
 

@@ -42,7 +42,7 @@ class Decision(NamedTuple):
 
 
 class DecisionStage:
-    """Collect loads, positions, pressures and doubts of one leg, and decide at each estimate.
+    """Collect loads, positions, pressures, friction and doubts of a leg; decide at each estimate.
 
     A decision uses the largest load since the last one, because a bounce is not a step, and the
     last position. Each pressure is used once.
@@ -70,6 +70,7 @@ class DecisionStage:
         self._new_position = False
         self._position_time = 0.0  # time of the last estimate with a new position, s
         self._load, self._largest = math.nan, -math.inf
+        self._friction = math.nan
         self._pressure: float | None = None  # last reading since the last observation
         self._observed: float | None = None  # time of the controller's last observation, s
         self._morphology = ''
@@ -89,6 +90,10 @@ class DecisionStage:
     def pressure(self, gauge: float) -> None:
         """Store a gauge pressure of the pad, Pa."""
         self._pressure = gauge
+
+    def friction(self, friction: float) -> None:
+        """Store an estimate of the coefficient of friction."""
+        self._friction = friction
 
     def doubt(self, doubt: str) -> None:
         """Process a doubt of the estimator; only faults of sensors change decisions."""
@@ -120,6 +125,7 @@ class DecisionStage:
         self.load(emission.load)
         if emission.position is not None:
             self.position(*emission.position)
+        self.friction(emission.estimate.friction_mean)
         return self.estimate(now, emission.estimate.wet_probability)
 
     def tick(self, now: float) -> Decision | None:
@@ -149,6 +155,7 @@ class DecisionStage:
             position=self._position if current else NOWHERE,
             pressure=self._take_pressure(now),
             sensor_fault=self._sensor_fault,
+            friction=self._friction,
         )
 
     def _take_pressure(self, now: float) -> float | None:

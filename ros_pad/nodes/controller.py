@@ -122,6 +122,7 @@ class _LegTopics:
             (topics.CONTACT_LOAD, self.stage.load, ('data',)),
             (topics.CONTACT_POSITION, self.stage.position, ('point.x', 'point.y')),
             (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
+            (topics.FRICTION, self.stage.friction, ('data',)),
             (topics.DOUBT, self.stage.doubt, ('data',)),
             (topics.WETNESS, self._on_wetness, ('data',)),
         )
@@ -302,6 +303,7 @@ class ControllerNode(Node):
                     key='touch-downs with too little pressure',
                     value=str(controller.underpressure[leg]),
                 ),
+                KeyValue(key='flat feet pay', value=str(controller.friction.flat_pays)),
             ]
             array.status.append(status)
         array.status.extend(self.messages.refusals.statuses())

@@ -2,11 +2,12 @@
 """Compare the adaptive policy with fixed shapes, rivals of the literature and the oracle.
 
 Walks variants of ``hexapod_patches`` with full dynamics (L2). Everything was tuned on the tuning
-grounds (``--tune``, in a walk without dynamics, at most nine settings a policy) and is compared on
-grounds that differ from them in a condition: patch length, wet share, film, towed load, friction
-of the feet. Then on grounds where adapting cannot win, or where the foot's file is wrong, and with
-fixed shapes at slower gaits. Every gain has a 95 % bootstrap interval over floors. Writes
-policies.json and .png, and the tables of docs/model/policies.md.
+grounds (``--tune``, in a walk without dynamics, at most nine settings a policy; ``--tune
+--dynamics``, the adaptive policy and its nearest rival in L2) and is compared on grounds that
+differ from them in a condition: patch length, wet share, film, towed load, friction of the feet.
+Then on grounds where adapting cannot win, or where the foot's file is wrong, and with fixed shapes
+at slower gaits. Every gain has a 95 % bootstrap interval over floors. Writes policies.json and
+.png, and the tables of docs/model/policies.md.
 
 Walks are kept in ``--walks``: a run after a change makes only those that the change concerns.
 """
@@ -30,13 +31,16 @@ import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController
+from ros_pad.control import adaptive
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.policies import IsWet
 from ros_pad.control.policies import Policy
+from ros_pad.estimation import estimators_of
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
 from studies import command
 from studies.closed_loop import loops
 from studies.closed_loop import quick_walk
@@ -46,7 +50,7 @@ from studies.closed_loop.policies_figure import draw
 
 SCENE = 'hexapod_patches'
 LEVEL = 'L2'
-FIRST_SEED = 200
+FIRST_SEED = 10_000
 SLOWER = (1.0, 1.5, 2.0, 3.0)
 
 Changes = Mapping[str, Mapping[str, Any]]
@@ -58,6 +62,7 @@ TUNING: dict[str, Changes] = {
     'patches of 3 m': {'floor': {'patch_length': 3.0}},
     '30 % wet': {'floor': {'wet_fraction': 0.3}},
     '65 % wet': {'floor': {'wet_fraction': 0.65}},
+    '90 % wet': {'floor': {'wet_fraction': 0.9}},
     '7 N towed': {'tow': {'weight': 7.0}},
 }
 HELD_OUT: dict[str, Changes] = {
@@ -82,37 +87,37 @@ AGAINST: dict[str, Changes] = {
     # Without adhesion, flat feet have the same friction on dry ground as domes.
     'no adhesion': {'foot': {'friction': 0.41, 'shear_strength': 0.0}},
     'no adhesion, not known': {'foot': {'friction': 0.41, 'shear_strength': 0.0}, 'file': {}},
+    'a third of the adhesion, not known': {'foot': {'shear_strength': 1600.0}, 'file': {}},
     'adhesion 1.4 times less than known': {'file': {'shear_strength': 1.4 * 4700.0}},
     'wet friction half of what is known': {'foot': {'boundary_friction': 0.06}, 'file': {}},
 }
-"""Grounds: changes to floor, towed load and foot of the scene. ``file``: the controller knows
-another foot, that of the scene with these changes."""
+"""Grounds: changes to floor, towed load and foot of the scene. ``file``: estimators and controller
+know another foot, that of the scene with these changes."""
 
 GROUNDS = {**TUNING, **HELD_OUT, **AGAINST}
 
 SETTINGS: dict[str, list[tuple[Any, ...]]] = {
     'count': [(2,), (4,), (8,), (16,)],
-    'threshold': [(0.6,), (0.7,), (0.75,), (0.8,), (0.9,)],
+    'adaptive': [(0.6,), (0.7,), (0.75,), (0.8,), (0.85,), (0.9,)],
     'pomdp': [*itertools.product((0.1, 0.3, 1.0), (0.75, 1.5))],
     'discounted_ucb': [*itertools.product((0.8, 0.9, 0.95), (0.05, 0.2, 0.5))],
-    'discounted_thompson': [(0.7,), (0.8,), (0.9,), (0.95,)],
 }
-"""Settings of the rivals that are tried on the tuning grounds."""
+"""Settings that are tried on the tuning grounds; of the adaptive policy, ``probe_below``."""
+
+FINAL: dict[str, list[tuple[Any, ...]]] = {'count': [(8,)], 'adaptive': [(0.8,)]}
+"""Settings that are tried there in L2."""
 
 RIVALS: dict[str, tuple[str, tuple[Any, ...]]] = {
-    'each 4 steps': ('count', (4,)),
     'each 8 steps': ('count', (8,)),
-    'threshold': ('threshold', (0.8,)),
     'POMDP': ('pomdp', (0.3, 0.75)),
     'discounted UCB': ('discounted_ucb', (0.8, 0.05)),
-    'discounted Thompson': ('discounted_thompson', (0.9,)),
 }
-"""Rivals with the settings that were best on the tuning grounds, and each 4 steps."""
+"""Rivals with the settings that were best on the tuning grounds."""
 
 POLICIES = ('flat', 'dome', 'adaptive', *RIVALS, 'oracle')
 PAGE = command.ROOT / 'docs' / 'model' / 'policies.md'
 BEGIN, END = '<!-- tables: python -m studies policies -->', '<!-- end of tables -->'
-MAIN = ('flat', 'dome', 'adaptive', 'each 4 steps', 'oracle')
+MAIN = ('flat', 'dome', 'adaptive', 'each 8 steps', 'oracle')
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,7 @@ class Job:
 
 
 def ground(name: str, cycles: int, slower: float = 1.0) -> tuple[Scene, Foot | None]:
-    """Return the scene of a ground, and the foot that the controller knows if it is another."""
+    """Return the scene of a ground, and the foot that the robot knows if it is another."""
     scene, changes = replace(Scene.load(SCENE), cycles=cycles), GROUNDS[name]
     known = replace(scene.foot, **changes['file']) if 'file' in changes else None
     for part in ('floor', 'tow', 'foot'):
@@ -138,15 +143,14 @@ def ground(name: str, cycles: int, slower: float = 1.0) -> tuple[Scene, Foot | N
     return replace(scene, gait=gait), known
 
 
-def rival(kind: str, settings: Sequence[Any], seed: int) -> Policy:
+def rival(kind: str, settings: Sequence[Any]) -> Policy:
     """Return a rival for one walk."""
-    chance = (seed,) if kind == 'discounted_thompson' else ()
-    made: Policy = getattr(rivals, kind)(*settings, *chance)
+    made: Policy = getattr(rivals, kind)(*settings)
     return made
 
 
-def _policy(name: str, is_wet: IsWet, seed: int) -> Policy:
-    return rival(*RIVALS[name], seed) if name in RIVALS else policy_named(name, is_wet)
+def _policy(name: str, is_wet: IsWet) -> Policy:
+    return rival(*RIVALS[name]) if name in RIVALS else policy_named(name, is_wet)
 
 
 def _first(policy: str) -> str:
@@ -157,20 +161,28 @@ def _first(policy: str) -> str:
 def walk(job: Job) -> tuple[float, int, str | None]:
     """Return distance a cycle, m, number of switches, and the verdict, None for a valid walk."""
     scene, known = ground(job.ground, job.cycles, job.slower)
-    first = _first(job.policy)
-    loop = ClosedLoop(scene, first, job.seed, LEVEL)
+    policy = _policy(job.policy, scene.floor.build(job.seed).wet)
+    loop = _walk(scene, known, policy, _first(job.policy), job.seed)
+    switches = sum(loop.controller.switches.values())
+    return loop.robot.body[0] / scene.cycles, switches, loop.robot.verdict
+
+
+def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: int) -> ClosedLoop:
+    """Return a loop that has walked; ``first`` names the policy by which feet begin."""
+    loop = ClosedLoop(scene, first, seed, LEVEL)
+    load, foot = scene.expected_load, known or scene.foot
+    estimators, _ = estimators_of(len(scene.legs), foot, load, tuning_for(scene))
     controller = MorphologyController(
-        known or scene.foot,
+        foot,
         scene.legs,
-        _policy(job.policy, loop.floor.wet, job.seed),
-        scene.expected_load,
+        policy,
+        load,
         start=first_morphologies(first, scene.legs),
         fixed_pressure=scene.dome_pressure,
     )
-    loop.connect(controller=controller)
+    loop.connect(estimators, controller)
     loops.walk(loop, scene)
-    switches = sum(loop.controller.switches.values())
-    return loop.robot.body[0] / scene.cycles, switches, loop.robot.verdict
+    return loop
 
 
 # --- walks that are kept -------------------------------------------------------------------------
@@ -182,10 +194,9 @@ def _code(policy: str) -> str:
     parts = ('contact', 'estimation', 'simulation', 'regulators', 'robots', 'sensing', 'trials')
     files = [path for part in parts for path in sorted((source / part).rglob('*.py'))]
     files += sorted((command.ROOT / 'config').rglob('*.yaml'))
-    own = ('policies.py', 'probing.py')
     if policy not in ('flat', 'dome'):
         control = sorted((source / 'control').glob('*.py'))
-        files += [path for path in control if policy == 'adaptive' or path.name not in own]
+        files += [path for path in control if policy == 'adaptive' or path.name != 'policies.py']
     if policy in RIVALS:
         files.append(pathlib.Path(rivals.__file__))
     digest = hashlib.sha256()
@@ -298,7 +309,7 @@ def measure(
     """Walk everything and return the document that is saved; see ``--short`` for less."""
     started = time.perf_counter()
     policies = MAIN if short else POLICIES
-    few = range(FIRST_SEED, FIRST_SEED + max(2, floors))
+    few = range(FIRST_SEED, FIRST_SEED + max(2, floors // 2))
     slow = [
         Job('as shipped', policy, slower, seed, cycles)
         for slower in (() if short else reversed(SLOWER))
@@ -309,8 +320,9 @@ def measure(
     # Each condition has floors of its own.
     for place, name in enumerate((*HELD_OUT, *AGAINST)):
         first = FIRST_SEED + 100 * (place + 1)
+        many = floors if name in HELD_OUT else max(1, floors // 2)
         for policy in policies if name in HELD_OUT else MAIN:
-            jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(floors)]
+            jobs += [Job(name, policy, 1.0, first + k, cycles) for k in range(many)]
     results = walked(jobs, kept, processes)
     document: dict[str, Any] = {
         'scene': SCENE,
@@ -333,20 +345,29 @@ def measure(
 # --- tuning --------------------------------------------------------------------------------------
 
 
-def _tuning_walk(kind: str, settings: tuple[Any, ...], name: str, seed: int) -> float:
-    scene, _ = ground(name, 60)
-    if kind in ('adaptive', 'oracle'):
+def _tuning_walk(
+    kind: str, settings: tuple[Any, ...], name: str, seed: int, cycles: int, dynamics: bool
+) -> float:
+    scene, _ = ground(name, cycles)
+    first = 'oracle' if kind == 'oracle' else 'adaptive'
+    if kind == 'adaptive':
+        policy = adaptive(probe_below=settings[0])
+    elif kind == 'oracle':
         policy = policy_named(kind, scene.floor.build(seed).wet)
-        return quick_walk.walk(scene, policy, kind, seed)[0]
-    return quick_walk.walk(scene, rival(kind, settings, seed), 'adaptive', seed)[0]
+    else:
+        policy = rival(kind, settings)
+    if dynamics:
+        return _walk(scene, None, policy, first, seed).robot.body[0] / cycles
+    return quick_walk.walk(scene, policy, first, seed)[0]
 
 
-def tune(floors: int, processes: int) -> dict[str, Any]:
-    """Return the mean distance of every setting on the tuning grounds, without dynamics."""
-    tried = [(kind, setting) for kind, settings in SETTINGS.items() for setting in settings]
-    tried += [('adaptive', ()), ('oracle', ())]
+def tune(floors: int, cycles: int, processes: int, dynamics: bool) -> dict[str, Any]:
+    """Return the mean distance of every setting on the tuning grounds."""
+    given = FINAL if dynamics else SETTINGS
+    tried = [(kind, setting) for kind, settings in given.items() for setting in settings]
+    tried.append(('oracle', ()))
     cases = [
-        (kind, setting, name, seed)
+        (kind, setting, name, seed, cycles, dynamics)
         for kind, setting in tried
         for name in TUNING
         for seed in range(floors)
@@ -356,12 +377,13 @@ def tune(floors: int, processes: int) -> dict[str, Any]:
     return {
         'grounds': TUNING,
         'seeds': list(range(floors)),
-        'cycles': 60,
+        'cycles': cycles,
         'tried': [
             {
                 'policy': kind,
                 'settings': list(setting),
                 'mm_a_cycle': round(1e3 * statistics.fmean(distances[at : at + each]), 2),
+                'each_mm': [round(1e3 * distance, 2) for distance in distances[at : at + each]],
             }
             for at, (kind, setting) in zip(range(0, len(cases), each), tried, strict=True)
         ],
@@ -409,13 +431,13 @@ def _by_ground(grounds: Mapping[str, Any]) -> list[str]:
         f'Each ground, {each} floor{"s" * (each > 1)}; the adaptive policy to others:',
         '',
         f'| ground | {" | ".join(MAIN)} | to the better fixed shape of each floor | to the oracle'
-        ' | to each 4 steps |',
+        ' | to each 8 steps |',
         '|' + '---|' * (len(MAIN) + 4),
     ]
     for name, row in grounds.items():
         means = ' | '.join(f'{row[policy]["mm_a_cycle"]:.1f}' for policy in MAIN)
         own = row['ratios']['adaptive']
-        others = (own[BETTER], own['oracle'], row['ratios']['each 4 steps']['adaptive to it'])
+        others = (own[BETTER], own['oracle'], row['ratios']['each 8 steps']['adaptive to it'])
         # An interval over one floor says nothing.
         ratios = [interval(other) if each > 1 else f'{other["of_means"]:.3f}' for other in others]
         lines.append(f'| {name} | {means} | {" | ".join(ratios)} |')
@@ -461,9 +483,12 @@ def tuning_table(document: Mapping[str, Any]) -> str:
 def main(words: Sequence[str]) -> int:
     """Measure, save, and print tables."""
     parser = command.parser('policies', __doc__)
-    command.add_count(parser, '--floors', 4, 'floors of each ground, each with its seed', least=1)
+    command.add_count(
+        parser, '--floors', 4, 'floors of each ground held out, half of them elsewhere', least=1
+    )
     command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
-    parser.add_argument('--tune', action='store_true', help='try the settings of the rivals')
+    parser.add_argument('--tune', action='store_true', help='try settings on tuning grounds')
+    parser.add_argument('--dynamics', action='store_true', help='in L2, with --tune')
     parser.add_argument(
         '--short', action='store_true',
         help=f'walk only {", ".join(MAIN)}, at full speed',
@@ -476,8 +501,9 @@ def main(words: Sequence[str]) -> int:
     command.add_out(parser)
     options = parser.parse_args(words)
     if options.tune:
-        document = tune(options.floors, options.processes)
-        document = command.write(options.out, 'policies_tuning', document)
+        document = tune(options.floors, options.cycles, options.processes, options.dynamics)
+        name = 'policies_tuning_l2' if options.dynamics else 'policies_tuning'
+        document = command.write(options.out, name, document)
         command.show(options, document, tuning_table(document))
         return 0
     document = measure(

@@ -8,7 +8,6 @@ feet decide as late, and know the same footprints.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -19,14 +18,14 @@ from ros_pad.control.policies import LiftOff
 from ros_pad.control.policies import Policy
 
 WET_ABOVE, DRY_BELOW, DWELL = 0.65, 0.35, 2
-"""Hysteresis of the probing rivals: that of the adaptive policy."""
+"""Hysteresis of the rival that counts steps: that of the adaptive policy."""
 
 SWITCH = 0.05
 """Gain of a step on dry ground with a flat foot that a switch must be worth, for the POMDP."""
 
 
-def _probing(due: Callable[[LiftOff], bool]) -> Policy:
-    """Return a policy that follows wet ground with hysteresis, and probes when it is due."""
+def count(every: int) -> Policy:
+    """Follow wet ground with hysteresis, and probe after a fixed number of steps as a dome."""
 
     def choose(step: LiftOff) -> Choice:
         settled = step.probing or step.steps >= DWELL
@@ -36,20 +35,10 @@ def _probing(due: Callable[[LiftOff], bool]) -> Policy:
             return Choice(DOME if step.wet_ahead > WET_ABOVE else FLAT)
         if step.wet_ahead < DRY_BELOW:
             return Choice(FLAT)
-        probe = due(step) and not step.others_probing
+        probe = step.steps >= every and not step.others_probing
         return Choice(FLAT if probe else DOME, probe)
 
     return choose
-
-
-def count(every: int) -> Policy:
-    """Probe after a fixed number of steps as a dome."""
-    return _probing(lambda step: step.steps >= every)
-
-
-def threshold(below: float) -> Policy:
-    """Probe when the probability of wet ground has faded below a threshold."""
-    return _probing(lambda step: step.wet_ahead < below)
 
 
 def pomdp(loss: float, length: float, share: float = 0.5, stride: float = 0.14) -> Policy:
@@ -149,24 +138,6 @@ def discounted_ucb(discount: float, exploration: float, stride: float = 0.14) ->
                 return arms.gains[arm] / pulls + spread
 
             arms.arm = max(arms.pulls, key=bound)
-        return Choice(arms.arm)
-
-    return choose
-
-
-def discounted_thompson(discount: float, seed: int, stride: float = 0.14) -> Policy:
-    """Choose the morphology of all feet by sampling from Beta posteriors (Raj, Kalyani 2017)."""
-    arms = _Arms(discount, stride)
-    random = np.random.default_rng([seed, 11])
-
-    def choose(step: LiftOff) -> Choice:
-        if arms.round(step):
-            arms.arm = max(
-                arms.pulls,
-                key=lambda arm: random.beta(
-                    1.0 + arms.gains[arm], 1.0 + arms.pulls[arm] - arms.gains[arm]
-                ),
-            )
         return Choice(arms.arm)
 
     return choose

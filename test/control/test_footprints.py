@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ros_pad.contact.resistance import Foot
 from ros_pad.control.footprints import Footprints
+from ros_pad.control.footprints import FrictionFelt
 from ros_pad.errors import InvalidInput
 
 
@@ -75,39 +78,49 @@ def test_bad_values_are_named(name, value):
         Footprints(**{name: value})
 
 
-def test_the_wet_share_counts_ways_not_feet():
-    """By hand: prior Beta(1, 1), three distances of 1 m that count 1 - 1/e each, times 0.9 as
-    footprints of 0.95 are 90 % certain."""
-    prints = Footprints()
-    for step in range(4):
-        for foot in range(6):
-            # Six feet on one place count as one.
-            prints.add(float(step), 0.1 * foot, 0.95, walked=0.0 if foot or not step else 1.0)
-    told = 3 * 0.9 * 0.632121
-    assert prints.wet_share == pytest.approx((1.0 + 0.95 * told) / (2.0 + told), abs=1e-6)
+# --- friction ------------------------------------------------------------------------------------
+
+FOOT, LOAD = Foot.load('large37'), 6.8
+"""By the numbers of feet/large37.yaml: 0.80 flat on dry ground, 0.41 as a dome."""
 
 
-def test_feet_that_could_not_tell_teach_no_share():
-    prints = Footprints(wet_prior=0.3)
-    for step in range(50):
-        prints.add(float(step), 0.0, 0.5, walked=1.0)
-    assert prints.wet_share == pytest.approx(0.3)
+def test_without_steps_the_foot_file_decides():
+    assert FrictionFelt(FOOT, LOAD).flat_pays
+    assert not FrictionFelt(dataclasses.replace(FOOT, shear_strength=0.0), LOAD).flat_pays
 
 
-@pytest.mark.parametrize(('felt', 'least', 'most'), [(0.97, 0.85, 0.97), (0.03, 0.03, 0.15)])
-def test_on_ground_that_is_all_alike_the_share_is_learnt(felt, least, most):
-    prints = Footprints()
-    for step in range(60):
-        prints.add(0.5 * step, 0.0, felt, walked=0.5)
-    assert least < prints.wet_share < most
-    # Far from every footprint the wet share is expected; the prior does not change.
-    assert prints.wet_expected(999.0, 0.0) == pytest.approx(prints.wet_share)
-    assert prints.wet_probability(999.0, 0.0) == pytest.approx(0.5)
-    assert prints.wet_expected(29.5, 0.0) == pytest.approx(felt)
+def test_adhesion_that_is_not_there_is_found_within_some_steps():
+    """By hand: 0.41 + 0.39 · 0.8^n is below 1.4 · 0.41 after n = 4 steps."""
+    felt = FrictionFelt(FOOT, LOAD)
+    paid = []
+    for _ in range(30):
+        felt.add(True, 0.05, 0.41)
+        paid.append(felt.flat_pays)
+    assert paid == [True] * 3 + [False] * 27
 
 
-def test_a_floor_that_has_changed_is_learnt_anew():
-    prints = Footprints()
-    for step in range(400):
-        prints.add(0.5 * step, 0.0, 0.97 if step < 300 else 0.03, walked=0.5)
-    assert prints.wet_share < 0.2
+@pytest.mark.parametrize(('flat', 'wet'), [(False, 0.05), (True, 0.4)])
+def test_only_flat_feet_on_dry_ground_show_it(flat, wet):
+    felt = FrictionFelt(FOOT, LOAD)
+    for _ in range(100):
+        felt.add(flat, wet, 0.41)
+    assert felt.flat_pays
+
+
+def test_feet_do_not_change_their_mind_between_the_factors():
+    felt = FrictionFelt(FOOT, LOAD)
+    for friction, pays in ((0.59, True), (0.41, False), (0.63, False), (0.69, True)):
+        for _ in range(100):
+            felt.add(True, 0.05, friction)
+        assert felt.flat_pays is pays
+
+
+@pytest.mark.parametrize('friction', [math.nan, math.inf, -0.1])
+def test_friction_that_is_not_known_counts_nothing(friction):
+    felt = FrictionFelt(FOOT, LOAD)
+    for _ in range(100):
+        felt.add(False, 0.05, friction)
+        felt.add(True, 0.05, friction)
+    assert felt.flat_pays
+    felt.add(True, 0.05, 0.8)
+    assert felt.flat_pays

@@ -20,7 +20,6 @@ from ros_pad.control import first_morphologies
 from ros_pad.control import flat
 from ros_pad.control import oracle
 from ros_pad.control import policy_named
-from ros_pad.control.probing import Plan
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.errors import PadError
@@ -33,14 +32,9 @@ STRIDE = 0.16  # m
 def lift_off(**changes):
     step = LiftOff(
         leg=1, morphology='flat', steps=5, probing=False, wet_ahead=0.5,
-        next_position=(1.0, 0.0), others_probing=False, wet_expected=0.5, plan=Plan(),
+        next_position=(1.0, 0.0), others_probing=False,
     )  # fmt: skip
-    changes = {'wet_expected': changes.get('wet_ahead', 0.5)} | changes
     return dataclasses.replace(step, **changes)
-
-
-def by_threshold(**options):
-    return adaptive(probing='threshold', **options)
 
 
 # --- policies ------------------------------------------------------------------------------------
@@ -67,10 +61,10 @@ def test_fixed_policies_are_fixed(wet_ahead, morphology):
         # A domed foot becomes flat below P(wet) = 0.35.
         ({'morphology': 'dome', 'wet_ahead': 0.34}, Choice('flat')),
         ({'morphology': 'dome', 'wet_ahead': 0.34, 'steps': 1}, Choice('dome')),
-        # In between domed feet probe, up to 0.75 and one leg at a time.
+        # In between domed feet probe, up to 0.8 and one leg at a time.
         ({'morphology': 'dome', 'wet_ahead': 0.36}, Choice('flat', probe=True)),
-        ({'morphology': 'dome', 'wet_ahead': 0.74}, Choice('flat', probe=True)),
-        ({'morphology': 'dome', 'wet_ahead': 0.76}, Choice('dome')),
+        ({'morphology': 'dome', 'wet_ahead': 0.79}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'wet_ahead': 0.81}, Choice('dome')),
         ({'morphology': 'dome', 'wet_ahead': 0.5, 'others_probing': True}, Choice('dome')),
         ({'morphology': 'dome', 'wet_ahead': 0.34, 'others_probing': True}, Choice('flat')),
         ({'morphology': 'dome', 'wet_ahead': 0.5, 'steps': 1}, Choice('dome')),
@@ -78,42 +72,17 @@ def test_fixed_policies_are_fixed(wet_ahead, morphology):
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.9}, Choice('dome')),
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.1}, Choice('flat')),
         ({'probing': True, 'steps': 1, 'wet_ahead': 0.5}, Choice('flat')),
+        # If flat feet do not pay, feet are domes on dry ground, too, and seldom probe.
+        ({'wet_ahead': 0.0, 'flat_pays': False}, Choice('dome')),
+        ({'wet_ahead': 0.0, 'steps': 1, 'flat_pays': False}, Choice('flat')),
+        ({'morphology': 'dome', 'wet_ahead': 0.0, 'flat_pays': False}, Choice('dome')),
+        ({'morphology': 'dome', 'steps': 63, 'flat_pays': False}, Choice('dome')),
+        ({'morphology': 'dome', 'steps': 64, 'flat_pays': False}, Choice('flat', probe=True)),
+        ({'morphology': 'dome', 'steps': math.inf, 'flat_pays': False}, Choice('dome')),
     ],
 )
 def test_adaptive_step_by_step(step, expected):
-    assert by_threshold()(lift_off(**step)) == expected
-
-
-@pytest.mark.parametrize(
-    ('step', 'expected'),
-    [
-        # The expectation from the floor so far counts, not the probability with the prior.
-        ({'wet_ahead': 0.5, 'wet_expected': 0.66}, Choice('dome')),
-        ({'morphology': 'dome', 'wet_ahead': 0.5, 'wet_expected': 0.34}, Choice('flat')),
-        # Planned probes are made by one leg at a time, and not during a dwell.
-        ({'morphology': 'dome', 'plan': Plan(probe=True)}, Choice('flat', probe=True)),
-        ({'morphology': 'dome', 'wet_ahead': 0.9, 'plan': Plan()}, Choice('dome')),
-        ({'morphology': 'dome', 'others_probing': True, 'plan': Plan(probe=True)}, Choice('dome')),
-        ({'morphology': 'dome', 'steps': 1, 'plan': Plan(probe=True)}, Choice('dome')),
-        # If flat feet do not pay, feet are domes on dry ground, too.
-        ({'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
-        ({'wet_ahead': 0.0, 'steps': 1, 'plan': Plan(flat_pays=False)}, Choice('flat')),
-        ({'morphology': 'dome', 'wet_ahead': 0.0, 'plan': Plan(flat_pays=False)}, Choice('dome')),
-        # A dome test is made on dry ground only and ends after one step.
-        ({'wet_ahead': 0.1, 'plan': Plan(trial=True)}, Choice('dome', probe=True)),
-        ({'wet_ahead': 0.5, 'plan': Plan(trial=True)}, Choice('flat')),
-        ({'morphology': 'dome', 'steps': 1, 'probing': True, 'wet_ahead': 0.1}, Choice('flat')),
-    ],
-)
-def test_adaptive_follows_the_plan(step, expected):
     assert adaptive()(lift_off(**step)) == expected
-
-
-def test_a_fixed_count_of_steps_between_probes():
-    policy = adaptive(probing='count', probe_every=7)
-    for steps in range(2, 12):
-        step = lift_off(morphology='dome', wet_ahead=0.6, steps=steps, plan=Plan(probe=True))
-        assert policy(step).probe == (steps >= 7)
 
 
 def test_first_morphologies():
@@ -134,7 +103,7 @@ def test_first_morphologies():
 
 def test_between_the_thresholds_each_shape_stays():
     """Hysteresis: without probes a P(wet) between 0.35 and 0.65 changes nothing."""
-    policy = by_threshold(probe_below=0.0)
+    policy = adaptive(probe_below=0.0)
     for wet_ahead in (0.36, 0.5, 0.64):
         for shape in ('flat', 'dome'):
             assert policy(lift_off(morphology=shape, wet_ahead=wet_ahead)) == Choice(shape)
@@ -148,8 +117,6 @@ def test_between_the_thresholds_each_shape_stays():
         {'dry_below': 0.7},
         {'probe_below': math.nan},
         {'dwell': 0},
-        {'probing': 'luck'},
-        {'probe_every': 0},
     ],
 )
 def test_bad_thresholds_are_named(bad):
@@ -199,43 +166,53 @@ class Walk:
 
 
 def test_a_flat_foot_turns_to_dome_on_wet_ground():
-    walk = Walk(by_threshold(), is_wet=lambda x: x > 0.5)
-    shapes = [walk.step(1) for _ in range(7)]
+    walk = Walk(adaptive(), is_wet=lambda x: x > 0.5)
+    shapes = [walk.step(1) for _ in range(6)]
     # The fifth footprint, at 0.64 m, is the first wet one.
-    assert shapes == ['flat'] * 4 + ['dome'] * 3
+    assert shapes == ['flat'] * 4 + ['dome'] * 2
     assert walk.controller.setpoint(1) > 52e3
     assert walk.controller.switches == {1: 1}
 
 
 def test_on_wet_ground_a_lone_foot_probes_and_goes_back_to_dome():
-    walk = Walk(by_threshold(), is_wet=lambda x: True)
+    walk = Walk(adaptive(), is_wet=lambda x: True)
     shapes = [walk.step(1) for _ in range(40)]
     probes = [k for k in range(1, 40) if shapes[k] == 'flat' and shapes[k - 1] == 'dome']
     assert len(probes) >= 4
     assert all(shapes[k + 1] == 'dome' for k in probes if k < 39)  # probes last one step
-    # P(wet) fades from 0.97 to 0.75 in ln(0.47/0.25) = 0.63 m: four strides.
-    assert {b - a for a, b in itertools.pairwise(probes)} == {4}
+    # P(wet) fades from 0.97 to 0.8 in ln(0.47/0.3) = 0.45 m: three strides.
+    assert {b - a for a, b in itertools.pairwise(probes)} == {3}
 
 
 def test_a_probe_that_finds_dry_ground_stays_flat():
-    walk = Walk(by_threshold(), is_wet=lambda x: x < 1.0)
+    walk = Walk(adaptive(), is_wet=lambda x: x < 1.0)
     shapes = [walk.step(1) for _ in range(30)]
     assert 'dome' in shapes[:5]
-    # The next probe is at most five strides beyond the edge at 1 m, and finds dry ground.
-    assert shapes[6 + 5 :] == ['flat'] * (30 - 11)
+    # The next probe is at most four strides beyond the edge at 1 m, and finds dry ground.
+    assert shapes[6 + 4 :] == ['flat'] * (30 - 10)
 
 
 def test_the_information_trap():
     """Without probes a foot that was once on wet ground stays a dome: domes observe no ground."""
-    trapped = Walk(by_threshold(probe_below=0.0), is_wet=lambda x: x < 1.0)
+    trapped = Walk(adaptive(probe_below=0.0), is_wet=lambda x: x < 1.0)
     shapes = [trapped.step(1) for _ in range(300)]
     assert shapes[1:] == ['dome'] * 299
     assert trapped.x[1] > 45.0
 
 
+@pytest.mark.parametrize(('friction', 'last'), [(0.8, 'flat'), (0.41, 'dome'), (math.nan, 'flat')])
+def test_feet_stay_domes_on_dry_ground_where_flat_feet_have_no_more_friction(friction, last):
+    controller = MorphologyController(FOOT, (1,), adaptive(), LOAD)
+    for step in range(12):
+        at = (STRIDE * step, 0.0)
+        controller.update(1, LOAD, 0.03, at, friction)
+        controller.update(1, 0.0, 0.03, at, friction)
+    assert controller.morphology(1) == last
+
+
 def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
     legs = (1, 2, 3, 4, 5, 6)
-    walk = Walk(by_threshold(), legs=legs, is_wet=lambda x: True)
+    walk = Walk(adaptive(), legs=legs, is_wet=lambda x: True)
     flats = []
     for _ in range(40):
         for leg in legs:
@@ -243,13 +220,13 @@ def test_one_leg_probes_at_a_time_and_its_footprint_serves_all():
             flats.append([n for n in legs if walk.controller.morphology(n) == 'flat'])
     settled = flats[3 * len(legs) :]
     assert max(map(len, settled)) == 1
-    # Six legs together probe hardly more often than one leg alone, every fourth stride.
+    # Six legs together probe hardly more often than one leg alone, every third stride.
     probes = sum(bool(now) and now != before for before, now in itertools.pairwise(settled))
     assert 5 <= probes <= 12
 
 
 def test_a_leg_that_is_held_up_keeps_no_other_from_probing():
-    walk = Walk(by_threshold(), legs=(1, 2), is_wet=lambda x: True)
+    walk = Walk(adaptive(), legs=(1, 2), is_wet=lambda x: True)
     for _ in range(3):
         walk.step(1)
         walk.step(2)
@@ -420,15 +397,14 @@ def test_a_foot_that_lands_lightly_has_not_stepped():
 
 @pytest.mark.parametrize('seed', range(20))
 def test_never_more_switches_than_the_dwell_allows(seed):
-    """For any input there are two steps between switches, except for probes and dome tests."""
+    """For any input there are two steps between switches, except for probes."""
     random = np.random.default_rng(seed)
     policy, dwell = adaptive(), 2
     morphology, probing, steps, kept = 'flat', False, math.inf, []
     for _ in range(500):
         step = lift_off(
             morphology=morphology, probing=probing, steps=steps,
-            wet_ahead=float(random.random()),
-            plan=Plan(*(bool(each) for each in random.random(3) < 0.5)),
+            wet_ahead=float(random.random()), flat_pays=bool(random.random() < 0.7),
         )  # fmt: skip
         choice = policy(step)
         if choice.morphology != morphology:

@@ -19,10 +19,12 @@ class Watched(MorphologyController):
     def __init__(self):
         super().__init__(Foot.load('large37'), (1, 2), flat, 6.83)
         self.updates, self.observed, self.faults_of_sensors = [], [], []
+        self.frictions = []
 
-    def update(self, leg, load, wet_probability, position):
+    def update(self, leg, load, wet_probability, position, friction):
         self.updates.append((leg, load, wet_probability, position))
-        return super().update(leg, load, wet_probability, position)
+        self.frictions.append(friction)
+        return super().update(leg, load, wet_probability, position, friction)
 
     def observe(self, leg, time, pressure, sensor_fault=''):
         self.observed.append((time, pressure))
@@ -35,8 +37,9 @@ def staged(reject=None):
     return controller, DecisionStage(controller, 1, reject)
 
 
-def emission(load, position, wet_probability=0.5):
-    return Emission(0, ESTIMATE._replace(wet_probability=wet_probability), load, position)
+def emission(load, position, wet_probability=0.5, friction=0.4):
+    estimate = ESTIMATE._replace(wet_probability=wet_probability, friction_mean=friction)
+    return Emission(0, estimate, load, position)
 
 
 def test_the_largest_load_since_the_last_estimate_counts():
@@ -111,9 +114,10 @@ def test_a_morphology_is_new_once():
 
 def test_an_emission_has_all_that_a_decision_needs():
     controller, leg = staged()
-    decision = leg.take(0.02, emission(5.0, (0.1, 0.2), 0.25))
+    decision = leg.take(0.02, emission(5.0, (0.1, 0.2), 0.25, 0.8))
     assert decision == (0.0, 'flat')
-    assert leg.take(0.04, emission(2.0, (0.3, 0.4), 0.75)) == (0.0, None)
+    assert leg.take(0.04, emission(2.0, (0.3, 0.4), 0.75, 0.1)) == (0.0, None)
+    assert controller.frictions == [0.8, 0.1]
     assert controller.updates == [(1, 5.0, 0.25, (0.1, 0.2)), (1, 2.0, 0.75, (0.3, 0.4))]
     assert [time for time, _ in controller.observed] == [0.02, 0.04]
 

@@ -493,7 +493,10 @@ def test_the_controller_survives_and_commands_no_more_than_the_ceiling(
         ],
         st.floats(-1.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0),
     )  # fmt: skip
-    bytes_of = broken('contact_load', 'contact_position', 'pressure', 'wetness', 'doubt')
+    frictions = st.tuples(st.just('friction'), numbers)
+    bytes_of = broken(
+        'contact_load', 'contact_position', 'pressure', 'friction', 'wetness', 'doubt'
+    )
 
     def receive(kind, *values):
         if isinstance(values[0], bytes):
@@ -513,7 +516,7 @@ def test_the_controller_survives_and_commands_no_more_than_the_ceiling(
     @given(
         st.lists(
             st.one_of(
-                *(loads, points, pressures, wetnesses, doubts, estimates, bytes_of),
+                *(loads, points, pressures, frictions, wetnesses, doubts, estimates, bytes_of),
                 st.just(('tick',)),
             ),
             max_size=25,

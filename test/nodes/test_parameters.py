@@ -208,10 +208,8 @@ LIVE = {
         'command_timeout': 0.3,
         'policy.wet_above': 0.7,
         'policy.dry_below': 0.3,
-        'policy.probe_below': 0.8,
+        'policy.probe_below': 0.85,
         'policy.dwell': 3,
-        'policy.probing': 'count',
-        'policy.probe_every': 15,
     },
 }
 CLASSES = {name: f'{name.title().replace("_", "")}Node' for name in NODES}

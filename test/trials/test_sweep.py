@@ -92,14 +92,6 @@ def test_policies_without_parameters_are_walked_once():
     ]
 
 
-def test_ways_of_probing_are_swept_by_name():
-    words = ['value', 'count', 'threshold']
-    jobs = Sweep(['hexapod_patches'], ['adaptive'], [0], {'policy.probing': words}).jobs()
-    assert [job.policy_parameters for job in jobs] == [{'probing': word} for word in words]
-    with pytest.raises(InvalidInput, match=r'probing = .*luck.* one of value, count'):
-        Sweep(['hexapod_patches'], ['adaptive'], [0], {'policy.probing': ['luck']}).jobs()
-
-
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
