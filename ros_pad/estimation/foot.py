@@ -50,7 +50,7 @@ NOT_YET = 'not yet: has not stood'
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
 
-EAGER, PAUSE = 10, 4
+EAGER, PAUSE = 20, 4
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
 
@@ -398,17 +398,12 @@ class FootEstimator:
         self._axes.restart()
         self._block, self._earlier, self._block_end = [], 0, -math.inf
 
-    def _look(self) -> None:
-        """Decide whether readings are looked at in a stance, or in the next second of a long one.
-
-        Noise and axes hardly ever change during a walk.
-        """
-        self._looked += 1
-        self._looks = self._looked <= LOOKED or self._looked % PAUSE == 0
-        self._look_end = self._time + LONGEST
-
     def _end_block(
-        self, time: float, z: float, force: tuple[float, float, float], motion: ContactMotion | None
+        self,
+        time: float,
+        z: float,
+        force: tuple[float, float, float],
+        motion: ContactMotion | None,
     ) -> None:
         """Look for turned axes, and measure noise, in the readings of a block that ends now."""
         axes, block, earlier = self._axes, self._block, self._earlier
@@ -460,6 +455,7 @@ class FootEstimator:
         self._looks = self._looked <= EAGER or self._looked % PAUSE == 0
         self._look_end = time + LONGEST
         self._block, self._earlier = [], 0
+        self.noise.begin()
 
     def _forget(self) -> None:
         """Forget what was learnt in wrong axes."""
@@ -485,7 +481,6 @@ class FootEstimator:
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._alarm.reset()
-        self.noise.begin()
         self._look(time)
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
