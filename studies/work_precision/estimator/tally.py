@@ -6,7 +6,6 @@ from __future__ import annotations
 import bisect
 import math
 import statistics
-import time
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from typing import TypedDict
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation import estimators_of
 from studies.work_precision.estimator.walks import LOADED
 from studies.work_precision.estimator.walks import SETTLED
 from studies.work_precision.estimator.walks import Flags
@@ -63,8 +62,8 @@ class Estimates:
     slipping, standing, fresh : array of bool
     wet, mean, sd, margin, speed : array
         P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
-    seconds, updates : float, int
-        Computing time, s, and number of samples.
+    updates : int
+        Number of samples.
     axes : array of bool
         Whether turned axes are in doubt.
     """
@@ -77,23 +76,21 @@ class Estimates:
     sd: Floats
     margin: Floats
     speed: Floats
-    seconds: float
     updates: int
     axes: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def replay(walk: Recording) -> Estimates:
-    """Return the results of an estimator for the readings of each leg."""
-    shape = walk.load.shape
-    out = np.empty((*shape, 9))
-    seconds, updates = 0.0, 0
-    stamps, rows, arrived = walk.stamps.tolist(), walk.rows, walk.arrived.tolist()
-    for leg in range(shape[1]):
-        estimator = FootEstimator(*walk.settings)
-        found, mine = [], rows[leg]
-        start = time.perf_counter()
-        for sample, stamp in enumerate(stamps):
-            new = arrived[sample][leg]
+    """Return the results for the readings of a robot, whose feet learn together."""
+    legs = walk.load.shape[1]
+    estimators, _ = estimators_of(legs, *walk.settings)
+    out = np.empty((*walk.load.shape, 9))
+    rows = walk.rows
+    for sample, (stamp, arrived) in enumerate(
+        zip(walk.stamps.tolist(), walk.arrived.tolist(), strict=True)
+    ):
+        found = []
+        for estimator, mine, new in zip(estimators, rows, arrived, strict=True):
             if new:
                 row = mine[sample]
                 try:
@@ -106,9 +103,7 @@ def replay(walk: Recording) -> Estimates:
                  now.friction_mean, now.friction_sd, now.margin, now.slip_speed,
                  now.doubt.startswith('axes'))
             )  # fmt: skip
-        seconds += time.perf_counter() - start
-        updates += sum(each[leg] for each in arrived)
-        out[:, leg] = found
+        out[sample] = found
     return Estimates(
         slipping=out[..., 0] > 0.5,
         standing=out[..., 1] > 0.5,
@@ -118,8 +113,7 @@ def replay(walk: Recording) -> Estimates:
         sd=out[..., 5],
         margin=out[..., 6],
         speed=out[..., 7],
-        seconds=seconds,
-        updates=updates,
+        updates=int(walk.arrived.sum()),
         axes=out[..., 8] > 0.5,
     )
 
@@ -278,7 +272,7 @@ class Row:
     Attributes
     ----------
     part : str
-        ``methods`` or ``robustness``.
+        ``methods``, ``robustness`` or ``walks``.
     name : str
         Method, or changed condition.
     variant : str
