@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from operator import add
 
 LOADED, UNLOADED = 0.5, 0.3
 """Size of the force from which on, and below which, a foot counts as loaded, share of the expected
@@ -207,8 +208,8 @@ class Axes:
             return
         force = 0.5 * (fx + c), 0.5 * (fy + d)
         pulled = math.hypot(*force) > self._pull
-        for turn, (_, matrix) in enumerate(TURNS):
-            self._said[turn] += likelihood(matrix, move, change, force, sd, duration, pulled)
+        found = likelihoods(move, change, force, sd, duration, pulled)
+        self._said = [*map(add, self._said, found)]
 
     def _end_stance(self, time: float, lifts: bool) -> None:
         """Hear a witness; when the foot ``lifts``, a swing begins."""
@@ -262,21 +263,18 @@ def _wrong_normal(mean: Sequence[float]) -> str:
     return f'axes: the normal force is along {sign}{"xyz"[axis]} of the sensor, not z'
 
 
-def likelihood(
-    matrix: Matrix,
+def likelihoods(
     move: tuple[float, float],
     change: tuple[float, float],
     force: tuple[float, float],
     sd: float,
     duration: float,
     pulled: bool,
-) -> float:
-    """Return the log likelihood of a motion if the force was measured in turned axes.
+) -> list[float]:
+    """Return the log likelihood of a motion for each of :data:`TURNS`.
 
     Parameters
     ----------
-    matrix : tuple of float
-        From the true force to the measured one.
     move, change : tuple of float
         Change of the position, and of the measured force times softness, m.
     force : tuple of float
@@ -288,19 +286,25 @@ def likelihood(
     pulled : bool
         Whether the force has a direction.
     """
-    a, b, c, d = matrix
-    x = move[0] + a * change[0] + c * change[1]
-    y = move[1] + b * change[0] + d * change[1]
-    square, variance = x * x + y * y, sd * sd
-    stick, slip = math.exp(-0.5 * square / variance) / variance, 0.0
-    size = math.hypot(*force)
-    fx, fy = (a * force[0] + c * force[1]) / size, (b * force[0] + d * force[1]) / size
-    along = -x * fx - y * fy
-    if pulled and along > 0.0:
-        spread = math.hypot(sd, CROSSWISE * along)
-        length, across = SLIP * duration, x * fy - y * fx
-        slip = along / length**2 * math.exp(-along / length - 0.5 * (across / spread) ** 2)
-        slip *= math.sqrt(2.0 * math.pi) / spread
-    wide = (3.0 * SLIP * duration) ** 2
-    stray = STRAY * math.exp(-0.5 * square / wide) / wide
-    return math.log(0.5 * (stick + slip) + stray + 1e-9 / wide)
+    (move_x, move_y), (bend_x, bend_y), (fx, fy) = move, change, force
+    size = math.sqrt(fx * fx + fy * fy) or 1.0
+    fx, fy = fx / size, fy / size
+    variance, length = sd * sd, SLIP * duration
+    wide = (3.0 * length) ** 2
+    sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
+    found = []
+    for _, (a, b, c, d) in TURNS:
+        x, y = move_x + a * bend_x + c * bend_y, move_y + b * bend_x + d * bend_y
+        half = 0.5 * (x * x + y * y)
+        total = (STRAY * math.exp(-half / wide) + 1e-9) / wide
+        total += sticks * math.exp(-half / variance)
+        if pulled:
+            pull_x, pull_y = a * fx + c * fy, b * fx + d * fy
+            along = -x * pull_x - y * pull_y
+            if along > 0.0:
+                across = x * pull_y - y * pull_x
+                spread = variance + (CROSSWISE * along) ** 2
+                less = along / length + 0.5 * across * across / spread
+                total += slips * along * math.exp(-less) / math.sqrt(spread)
+        found.append(math.log(total))
+    return found

@@ -50,7 +50,7 @@ NOT_YET = 'not yet: has not stood'
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
 
-EAGER, PAUSE = 20, 4
+EAGER, PAUSE = 10, 4
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
 
@@ -435,8 +435,7 @@ class FootEstimator:
         count = len(block) - earlier
         means = [sum(each[earlier:]) / count for each in columns[1:]]
         noise, offset = self.noise, self._offset
-        if self._gate.standing:
-            noise.add(columns, means, count)
+        if self._gate.standing and noise.add(columns, means, count):
             self._use_noise()
         if loaded and offset.known:
             x, y, fx, fy, _ = means

@@ -33,6 +33,9 @@ FEWEST_CHANGES = 16
 LAG = 2
 """Blocks between those that are compared: noise that is correlated over one of them counts."""
 
+EAGER, PAUSE = 12, 3
+"""Windows that are all measured at first, and of how many one is measured later."""
+
 STEADY = 0.03
 """Change of the force over blocks up to which a foot is at rest, share of the expected load."""
 
@@ -144,42 +147,47 @@ class SensorNoise:
         Noise of a coordinate, m, and of a component of the force, N.
     """
 
-    __slots__ = ('_blocks', '_steady', '_step', '_steps', 'force', 'position')
+    __slots__ = ('_blocks', '_steady', '_step', '_steps', '_windows', 'force', 'position')
 
     def __init__(self, position: float, force: float, load: float) -> None:
         self.position, self.force = Meter(position), Meter(force)
         self._steady = STEADY * load
         self._blocks: deque[tuple[Sequence[float], int]] = deque(maxlen=2 * LAG + 1)
+        self._windows = 0
         self._step, self._steps = math.inf, 0  # smallest change of a coordinate; number of changes
 
     def begin(self) -> None:
         """Begin a stance."""
         self._blocks.clear()
 
-    def add(self, readings: Sequence[Sequence[float]], means: Sequence[float], count: int) -> None:
-        """Process a block of a standing foot.
+    def add(self, readings: Sequence[Sequence[float]], means: Sequence[float], count: int) -> bool:
+        """Process a block of a standing foot; return whether noise was measured in it.
 
         ``readings`` has a column each of times, s, positions x and y, m, and forces x, y and z, N,
         which may begin before the block; ``means`` are those of so many readings of the block
         itself, without the times.
         """
         self._blocks.append((means, count))
+        self._windows += 1
         times, x, y, *forces = readings
+        moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
+        self._steps += len(moves)
+        self._step = min(self._step, *moves, math.inf)
+        if self._windows > EAGER and self._windows % PAUSE:
+            return False
         steps = _changes(times)
         even = [abs(b - a) <= _UNEVEN * b for a, b in pairwise(steps)]
         bends = sum(even)
         if bends < 2:
-            return
+            return False
         if self.position.configured:
-            moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
-            self._steps += len(moves)
-            self._step = min(self._step, *moves, math.inf)
             least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
             self.position.add_window(_bent(x, even) + _bent(y, even), 2 * bends, least)
         if self.force.configured:
             self.force.add_window(sum(_bent(each, even) for each in forces), 3 * bends)
         if len(self._blocks) > 2 * LAG:
             self._compare_blocks()
+        return True
 
     def _compare_blocks(self) -> None:
         """Compare means over blocks, if the foot was at rest in them."""

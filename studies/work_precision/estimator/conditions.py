@@ -355,13 +355,15 @@ def rows_by_walk(
 
 
 def stress(change: Change, count: int | None) -> list[Row]:
-    """Return a row for the shipped estimator under a change with each value, on some walks or all.
+    """Return a row for the shipped estimator under a change with each value.
 
+    With a ``count`` of walks only the ends and the ordinary value are taken, None for all.
     In the rows ``not configured`` of the shear stiffness, the value is the configured stiffness
     over the true one.
     """
     rows = []
-    for value in change.values:
+    ends = {change.values[0], change.ordinary, change.values[-1]}
+    for value in sorted(ends) if count else change.values:
         plain = change.disturb is not rate and value == change.ordinary and not change.level
         world = None if plain or change.world is None else change.world(value)
         walks = few_recordings(world, change.level, count)

@@ -214,9 +214,12 @@ Case = tuple[str, str, str, int]
 
 
 def cases(count: int | None) -> list[Case]:
-    """Return scene, sensing, part of the floors and seed of each walk; ``count`` floors or all."""
-    joints = [(scene, 'joints') for scene in SCENES[:2]]
-    plan = joints + [(scene, 'markers') for scene in SCENES]
+    """Return scene, sensing, part of the floors and seed of each walk.
+
+    ``count`` is the number of floors, and of scenes with markers and with joints; None for all.
+    """
+    plan = [(scene, 'markers') for scene in SCENES[:count]]
+    plan += [(scene, 'joints') for scene in SCENES[:2][:count]]
     return [
         (scene, sensing, part, seed)
         for part, seeds in FLOORS.items()
@@ -251,7 +254,10 @@ def found_of(all_cases: Sequence[Case], results: Sequence[dict[str, Any]]) -> li
 
 
 def honest_cases(count: int | None) -> list[tuple[str, str, str, float, str, int]]:
-    """Return scene, level, sensing, slope, fault and seed of walks in right axes."""
+    """Return scene, level, sensing, slope, fault and seed of walks in right axes.
+
+    With a ``count`` of floors one of eight of them, None for all.
+    """
     plan = [
         (scene, level, 'markers', 0.0, '') for scene in SCENES for level in dict.fromkeys(
             ('L1', full())
@@ -267,7 +273,8 @@ def honest_cases(count: int | None) -> list[tuple[str, str, str, float, str, int
             for sensing in (('joints',) if 'silent,' in fault else ('markers', 'joints'))
         ]
     seeds = [seed for each in FLOORS.values() for seed in each][:count]
-    return [(*each, seed) for each in plan for seed in seeds]
+    found = [(*each, seed) for each in plan for seed in seeds]
+    return found[::8] if count else found
 
 
 def check(
