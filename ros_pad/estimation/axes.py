@@ -297,7 +297,8 @@ def likelihoods(
         x, y = move_x + a * bend_x + c * bend_y, move_y + b * bend_x + d * bend_y
         half = 0.5 * (x * x + y * y)
         total = (STRAY * math.exp(-half / wide) + 1e-9) / wide
-        total += sticks * math.exp(-half / variance)
+        if half < 40.0 * variance:
+            total += sticks * math.exp(-half / variance)
         if pulled:
             pull_x, pull_y = a * fx + c * fy, b * fx + d * fy
             along = -x * pull_x - y * pull_y

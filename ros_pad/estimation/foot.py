@@ -50,7 +50,7 @@ NOT_YET = 'not yet: has not stood'
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
 
-EAGER, PAUSE = 10, 4
+EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
 

@@ -27,6 +27,9 @@ KEPT_WINDOWS = 101
 COARSE = 0.5
 """Least noise of a sensor with steps, share of a step: one step is then no alarm for fast slip."""
 
+FINE = 0.1
+"""Change of a reading, share of the noise, from which on a sensor has no steps that count."""
+
 FEWEST_CHANGES = 16
 """Changes of a reading from which on the smallest of them is the step of the sensor."""
 
@@ -35,6 +38,9 @@ LAG = 2
 
 EAGER, PAUSE = 12, 3
 """Windows that are all measured at first, and of how many one is measured later."""
+
+READINGS = 8
+"""Last readings of a window in which second differences are taken."""
 
 STEADY = 0.03
 """Change of the force over blocks up to which a foot is at rest, share of the expected load."""
@@ -169,12 +175,14 @@ class SensorNoise:
         """
         self._blocks.append((means, count))
         self._windows += 1
-        times, x, y, *forces = readings
-        moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
-        self._steps += len(moves)
-        self._step = min(self._step, *moves, math.inf)
+        _, x, y, *_ = readings
+        if self._step > FINE * self.position.white:
+            moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
+            self._steps += len(moves)
+            self._step = min(self._step, *moves, math.inf)
         if self._windows > EAGER and self._windows % PAUSE:
             return False
+        times, x, y, *forces = (each[-READINGS:] for each in readings)
         steps = _changes(times)
         even = [abs(b - a) <= _UNEVEN * b for a, b in pairwise(steps)]
         bends = sum(even)
