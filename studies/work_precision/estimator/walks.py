@@ -59,6 +59,8 @@ class Recording:
         Whether the estimator gets the sample.
     load, tangential, grip, speed : array, (samples, legs)
         Truth: normal force, tangential force and capacity, N, and speed of the contact, m/s.
+    place : array, (samples, legs, 2)
+        Truth: place of the contact, m.
     wet : array of bool, (samples, legs)
         Whether the ground under each foot is wet.
     sticks_only : bool
@@ -80,6 +82,7 @@ class Recording:
     tangential: Floats
     grip: Floats
     speed: Floats
+    place: Floats
     wet: Flags
     sticks_only: bool = False
 
@@ -161,6 +164,7 @@ def record(
         tangential=np.hypot(truth[..., 3], truth[..., 4]),
         grip=truth[..., 6],
         speed=truth[..., 7],
+        place=truth[..., :2] + truth[..., 3:5] / scene.foot.shear_stiffness,
         wet=truth[..., 8] > 0.5,
         sticks_only=level == 'L1' and scene.floor.kind == 'dry',
     )
@@ -202,6 +206,7 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
         tangential=tangential,
         grip=friction * load * ones,
         speed=0.0 * ones,
+        place=np.zeros((*shape[:2], 2)),
         wet=ones < 0.0,
         sticks_only=True,
     )
