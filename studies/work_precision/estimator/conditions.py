@@ -276,20 +276,20 @@ class Noise(NamedTuple):
     name: str
     marker: float = 1.0
     force: float = 1.0
-    told_marker: float = 1.0
-    told_force: float = 1.0
+    set_marker: float = 1.0
+    set_force: float = 1.0
 
 
 NOISE_CASES = (
     Noise('right'),
-    Noise('configured: a quarter', told_marker=0.25, told_force=0.25),
-    Noise('configured: four times', told_marker=4.0, told_force=4.0),
+    Noise('configured: a quarter', set_marker=0.25, set_force=0.25),
+    Noise('configured: four times', set_marker=4.0, set_force=4.0),
     Noise('marker 0.3 mm', marker=2.0),
-    Noise('marker 0.3 mm, configured', marker=2.0, told_marker=2.0),
+    Noise('marker 0.3 mm, configured', marker=2.0, set_marker=2.0),
     Noise('marker 0.6 mm', marker=4.0),
-    Noise('marker 0.6 mm, configured', marker=4.0, told_marker=4.0),
+    Noise('marker 0.6 mm, configured', marker=4.0, set_marker=4.0),
     Noise('force 0.12 N', force=4.0),
-    Noise('force 0.12 N, configured', force=4.0, told_force=4.0),
+    Noise('force 0.12 N, configured', force=4.0, set_force=4.0),
 )
 """The ordinary noise is 0.15 mm and 0.03 N, and so is the configured one."""
 
@@ -300,8 +300,8 @@ def noisy(walk: Recording, noise: Noise, generator: np.random.Generator) -> Reco
     more = math.sqrt(noise.force**2 - 1.0) * tuning.force_noise
     changed = replace(
         tuning,
-        position_noise=noise.told_marker * tuning.position_noise,
-        force_noise=noise.told_force * tuning.force_noise,
+        position_noise=noise.set_marker * tuning.position_noise,
+        force_noise=noise.set_force * tuning.force_noise,
     )
     return replace(
         walk,

@@ -359,7 +359,7 @@ def test_walks_have_a_row_of_the_table(rows):
 
 
 def test_noise_is_changed_and_configured(plain):
-    noise = conditions.Noise('', marker=2.0, force=4.0, told_marker=0.25, told_force=4.0)
+    noise = conditions.Noise('', marker=2.0, force=4.0, set_marker=0.25, set_force=4.0)
     loud = conditions.noisy(plain, noise, generator())
     assert loud.position - plain.position == pytest.approx(plain.noise)
     ordinary = plain.settings[2]
