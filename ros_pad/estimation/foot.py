@@ -50,6 +50,9 @@ NOT_YET = 'not yet: has not stood'
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
 
+FAR = 1e6
+"""Distance from which nothing is known here, m. Ways are added up, so it is not infinite."""
+
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
@@ -460,7 +463,7 @@ class FootEstimator:
         """Forget what was learnt in wrong axes."""
         self._looks = True
         self._history.clear()
-        self.ground.fade(math.inf)
+        self.ground.fade(FAR)
         mean, sd = self.ground.friction
         self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
