@@ -136,7 +136,6 @@ class Meter:
         return f'{self.noise:.2g} {unit}, configured {self.configured:.2g} {unit}'
 
 
-
 class SensorNoise:
     """Measure the noise of the marker and of the force sensor of a foot.
 
