@@ -313,14 +313,14 @@ def honest_of(
 
 def table(rows: Sequence[Found]) -> str:
     """Return a table for the docs: faults, and for each scene what was found."""
-    columns = list(dict.fromkeys((row.scene, row.sensing) for row in rows))
     lines = []
     for part in dict.fromkeys(row.part for row in rows):
         mine = {(row.scene, row.sensing, row.fault): row for row in rows if row.part == part}
+        columns = list(dict.fromkeys((scene, sensing) for scene, sensing, _ in mine))
         heads = []
         for column in columns:
             feet = mine[(*column, next(iter(FAULTS)))].feet
-            name = column[0].replace('hexapod_', '').replace('_', ' ').replace(' patches', '')
+            name = column[0].replace('_', ' ')
             heads.append(f'{name}{", joints" * (column[1] == "joints")} ({feet})')
         lines += [f'| fault, {part} | {" | ".join(heads)} |', '|---' * (len(heads) + 1) + '|']
         for fault in FAULTS:
