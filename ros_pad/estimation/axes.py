@@ -3,19 +3,22 @@
 
 The ground pushes a foot up, and against its slip; a foot that sticks moves back by force over
 shear stiffness; a foot swings above the heights at which it stands. What is measured in other axes
-does none of these. Each stance is a witness, and no single one decides.
+does none of these. Each stance is a witness, and no single one decides. A driver turns the axes of
+all feet alike: the feet of a robot hear each other's witnesses.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
+from operator import add
 
 LOADED, UNLOADED = 0.5, 0.3
 """Size of the force from which on, and below which, a foot counts as loaded, share of the expected
 load: whatever its direction."""
 
-BLOCK = 0.02
+BLOCK = 0.04
 """Time over which positions and forces are averaged before they are compared, s."""
 
 SHORTEST, LONGEST = 0.08, 1.0
@@ -46,10 +49,18 @@ MOST, LEAST = 4.0, -6.0
 """Bounds of what one stance says for a turn, nats."""
 
 SURE = 6.0
-"""Sum over stances from which on axes are in doubt until it is below 0, nats: of two at least."""
+"""Sum over stances from which on axes are in doubt until it is below half of it, nats: of two
+stances at least."""
 
 STANCES = 2
 """Stances with a wrong normal axis, or with a swing below them, that make a doubt."""
+
+SEVERAL = 2.0 * MOST
+"""Most that all other feet together say, nats: a foot that is sure of its own axes keeps them."""
+
+DELAY = 0.1
+"""Age from which on feet hear each other's stances, s, so that results do not depend on which of
+two feet is read first."""
 
 Matrix = tuple[float, float, float, float]
 
@@ -65,10 +76,36 @@ TURNS: tuple[tuple[str, Matrix], ...] = (
 )
 """For each turn, the matrix (by rows) from the true horizontal force to the measured one."""
 
-Values = tuple[float, float, float, float]
-"""Position x and y, m, and force x and y, N."""
+Vector = tuple[float, float, float]
 
-_NOTHING: Values = (0.0, 0.0, 0.0, 0.0)
+
+class SharedAxes:
+    """What the stances of each foot of a robot say about turned axes."""
+
+    def __init__(self) -> None:
+        self._said: list[deque[tuple[float, list[float], list[float]]]] = []
+
+    def join(self) -> int:
+        """Return the number of one more foot."""
+        self._said.append(deque(maxlen=4))
+        return len(self._said) - 1
+
+    def add(self, time: float, foot: int, sure: list[float], raw: list[float]) -> None:
+        """Keep the bounded and the plain sums of a foot, nats by turn, from a time on, s."""
+        self._said[foot].append((time, sure, raw))
+
+    def others(self, time: float, foot: int) -> tuple[list[float], list[float]]:
+        """Return the sums of all other feet, bounded and plain, as heard at a time, s."""
+        sure, raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
+        for number, said in enumerate(self._said):
+            heard = [each for each in said if each[0] <= time - DELAY]
+            if number == foot or not heard:
+                continue
+            _, more, plain = heard[-1]
+            for turn in range(len(TURNS)):
+                sure[turn] += min(MOST, more[turn])
+                raw[turn] += plain[turn]
+        return [min(SEVERAL, each) for each in sure], raw
 
 
 class Axes:
@@ -82,6 +119,8 @@ class Axes:
         Motion of the position against the contact, per tangential force, m/N.
     memory : float
         Time over which errors of the motion are the same, s.
+    shared : SharedAxes or None
+        What other feet of the robot say; None: this one is alone.
 
     Attributes
     ----------
@@ -90,18 +129,25 @@ class Axes:
     """
 
     __slots__ = (
-        '_below', '_block', '_count', '_duration', '_force', '_height', '_heights', '_highest',
-        '_last', '_loaded', '_lowest', '_pull', '_raw', '_said', '_softness', '_steep', '_sums',
+        '_below', '_duration', '_foot', '_force', '_height', '_heights', '_highest', '_last',
+        '_loaded', '_lowest', '_pull', '_raw', '_said', '_shared', '_softness', '_steep',
         '_sure', '_touch', '_unload', '_weight', 'doubt',
     )  # fmt: skip
 
-    def __init__(self, expected_load: float, softness: float, memory: float = BLOCK) -> None:
+    def __init__(
+        self,
+        expected_load: float,
+        softness: float,
+        memory: float = BLOCK,
+        shared: SharedAxes | None = None,
+    ) -> None:
         self._touch, self._unload = LOADED * expected_load, UNLOADED * expected_load
         self._pull, self._softness = PULL * expected_load, softness
         self._weight = 0.5 * BLOCK / memory  # blocks that follow each other agree
+        self._shared = shared or SharedAxes()
+        self._foot = self._shared.join()
         self._steep = self._below = 0
         self._sure, self._raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
-        self._sums, self._count, self._block = _NOTHING, 0, 0.0
         self.doubt = ''
         self.restart()
 
@@ -115,63 +161,57 @@ class Axes:
     def _begin_stance(self) -> None:
         self._force, self._heights, self._duration = (0.0, 0.0, 0.0), 0.0, 0.0
         self._said = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
-        self._last: tuple[Values, float] | None = None
-        self._begin_block()
+        self._last: tuple[float, ...] | None = None
 
-    def update(
-        self, dt: float, force: Sequence[float], x: float, y: float, z: float, sd: float
+    def update(self, time: float, duration: float, height: float, force: Vector) -> bool:
+        """Process a position's height, m, and a force without offset, N, about every `BLOCK`.
+
+        ``duration``, s, is the time since the last one. Return whether the foot has been loaded
+        since then.
+        """
+        x, y, z = force
+        size = math.sqrt(x * x + y * y + z * z)
+        if not self._loaded:
+            if height < self._lowest:
+                self._lowest = height
+            if height > self._highest:
+                self._highest = height
+            if size > self._touch:
+                self._loaded = True
+                self._begin_stance()
+                self._judge(time)
+            return False
+        if size < self._unload or self._duration > LONGEST:
+            self._end_stance(time, lifts=size < self._unload)
+            return False
+        a, b, c = self._force
+        self._force = a + x * duration, b + y * duration, c + z * duration
+        self._heights += height * duration
+        self._duration += duration
+        return True
+
+    def compare(
+        self, time: float, duration: float, x: float, y: float, fx: float, fy: float, sd: float
     ) -> None:
-        """Process a force, N, without offset, and a position, m, dt seconds after the last ones.
+        """Compare means of position, m, and force, N, over a block with those of the last one.
 
-        ``sd`` is the standard deviation of a change of the position over a block, m; it is
+        ``sd`` is the standard deviation of a change of the position between blocks, m; it is
         infinite if the direction of the force or the motion is not known.
         """
-        fx, fy, fz = force
-        size = math.sqrt(fx * fx + fy * fy + fz * fz)
-        if not self._loaded:
-            self._lowest, self._highest = min(self._lowest, z), max(self._highest, z)
-            if size <= self._touch:
-                return
-            self._loaded = True
-            self._begin_stance()
-        elif size < self._unload or self._duration > LONGEST:
-            self._end_stance(lifts=size < self._unload)
+        last, self._last = self._last, (time, x, y, fx, fy)
+        if not last or time - last[0] > 1.5 * duration:
             return
-        a, b, c = self._force
-        self._force = a + fx * dt, b + fy * dt, c + fz * dt
-        self._heights += z * dt
-        self._duration += dt
-        d, e, f, g = self._sums
-        self._sums = d + x, e + y, f + fx, g + fy
-        self._count += 1
-        self._block += dt
-        if self._block > BLOCK - 1e-9:
-            self._end_block(sd)
-
-    def _begin_block(self) -> None:
-        self._sums = _NOTHING
-        self._count, self._block = 0, 0.0
-
-    def _end_block(self, sd: float) -> None:
-        """Compare positions and forces with those of the block before."""
-        count, (x, y, fx, fy) = self._count, self._sums
-        x, y, fx, fy = x / count, y / count, fx / count, fy / count
-        last, self._last = self._last, ((x, y, fx, fy), self._block)
-        self._begin_block()
-        if not last or sd == math.inf:
-            return
-        (a, b, c, d), block = last
-        duration = 0.5 * (block + self._last[1])
+        _, a, b, c, d = last
         sd = math.hypot(sd, MODEL_SPEED * duration)
         move, change = (x - a, y - b), (self._softness * (fx - c), self._softness * (fy - d))
         if max(math.hypot(*move), math.hypot(*change)) < 2.0 * sd:
             return
         force = 0.5 * (fx + c), 0.5 * (fy + d)
         pulled = math.hypot(*force) > self._pull
-        for turn, (_, matrix) in enumerate(TURNS):
-            self._said[turn] += likelihood(matrix, move, change, force, sd, duration, pulled)
+        found = likelihoods(move, change, force, sd, duration, pulled)
+        self._said = [*map(add, self._said, found)]
 
-    def _end_stance(self, lifts: bool) -> None:
+    def _end_stance(self, time: float, lifts: bool) -> None:
         """Hear a witness; when the foot ``lifts``, a swing begins."""
         self._loaded = False
         if self._duration < SHORTEST:
@@ -192,39 +232,49 @@ class Axes:
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
             sure = self._sure[turn] + min(MOST, max(LEAST, more))
             self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
-        self.doubt = self._reason(mean)
+        self._shared.add(time, self._foot, [*self._sure], [*self._raw])
+        self._judge(time, mean)
 
-    def _reason(self, mean: Sequence[float]) -> str:
-        """Return the doubt after a stance with a mean force, N."""
+    def _judge(self, time: float, mean: Sequence[float] = ()) -> None:
+        """Set the doubt at a time, s; after a stance with its mean force, N."""
         if self._steep >= STANCES:
-            axis = max(range(3), key=lambda each: abs(mean[each]))
-            if axis == 2:
-                return 'axes: the sign of the force is turned, it pulls the foot down'
-            sign = '-' if mean[axis] < 0.0 else ''
-            return f'axes: the normal force is along {sign}{"xyz"[axis]} of the sensor, not z'
+            if mean:
+                self.doubt = _wrong_normal(mean)
+            return
         if self._below >= STANCES:
-            return 'axes: z of the position is turned, the foot swings below its stances'
-        turn = max(range(len(TURNS)), key=self._raw.__getitem__)
-        if not turn or max(self._sure) < (1e-9 if self.doubt else SURE):
-            return ''
-        return f'axes: {TURNS[turn][0]}'
+            self.doubt = 'axes: z of the position is turned, the foot swings below its stances'
+            return
+        sure, raw = self._shared.others(time, self._foot)
+        turns = range(len(TURNS))
+        turn = max(turns, key=lambda each: self._raw[each] + raw[each])
+        most = max(self._sure[each] + sure[each] for each in turns)
+        if not turn or most < (0.5 * SURE if self.doubt else SURE):
+            self.doubt = ''
+        else:
+            self.doubt = f'axes: {TURNS[turn][0]}'
 
 
-def likelihood(
-    matrix: Matrix,
+def _wrong_normal(mean: Sequence[float]) -> str:
+    """Return the doubt of a mean force, N, that is not along z."""
+    axis = max(range(3), key=lambda each: abs(mean[each]))
+    if axis == 2:
+        return 'axes: the sign of the force is turned, it pulls the foot down'
+    sign = '-' if mean[axis] < 0.0 else ''
+    return f'axes: the normal force is along {sign}{"xyz"[axis]} of the sensor, not z'
+
+
+def likelihoods(
     move: tuple[float, float],
     change: tuple[float, float],
     force: tuple[float, float],
     sd: float,
     duration: float,
     pulled: bool,
-) -> float:
-    """Return the log likelihood of a motion if the force was measured in turned axes.
+) -> list[float]:
+    """Return the log likelihood of a motion for each of :data:`TURNS`.
 
     Parameters
     ----------
-    matrix : tuple of float
-        From the true force to the measured one.
     move, change : tuple of float
         Change of the position, and of the measured force times softness, m.
     force : tuple of float
@@ -236,19 +286,26 @@ def likelihood(
     pulled : bool
         Whether the force has a direction.
     """
-    a, b, c, d = matrix
-    x = move[0] + a * change[0] + c * change[1]
-    y = move[1] + b * change[0] + d * change[1]
-    square, variance = x * x + y * y, sd * sd
-    stick, slip = math.exp(-0.5 * square / variance) / variance, 0.0
-    size = math.hypot(*force)
-    fx, fy = (a * force[0] + c * force[1]) / size, (b * force[0] + d * force[1]) / size
-    along = -x * fx - y * fy
-    if pulled and along > 0.0:
-        spread = math.hypot(sd, CROSSWISE * along)
-        length, across = SLIP * duration, x * fy - y * fx
-        slip = along / length**2 * math.exp(-along / length - 0.5 * (across / spread) ** 2)
-        slip *= math.sqrt(2.0 * math.pi) / spread
-    wide = (3.0 * SLIP * duration) ** 2
-    stray = STRAY * math.exp(-0.5 * square / wide) / wide
-    return math.log(0.5 * (stick + slip) + stray + 1e-9 / wide)
+    (move_x, move_y), (bend_x, bend_y), (fx, fy) = move, change, force
+    size = math.sqrt(fx * fx + fy * fy) or 1.0
+    fx, fy = fx / size, fy / size
+    variance, length = sd * sd, SLIP * duration
+    wide = (3.0 * length) ** 2
+    sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
+    found = []
+    for _, (a, b, c, d) in TURNS:
+        x, y = move_x + a * bend_x + c * bend_y, move_y + b * bend_x + d * bend_y
+        half = 0.5 * (x * x + y * y)
+        total = (STRAY * math.exp(-half / wide) + 1e-9) / wide
+        if half < 40.0 * variance:
+            total += sticks * math.exp(-half / variance)
+        if pulled:
+            pull_x, pull_y = a * fx + c * fy, b * fx + d * fy
+            along = -x * pull_x - y * pull_y
+            if along > 0.0:
+                across = x * pull_y - y * pull_x
+                spread = variance + (CROSSWISE * along) ** 2
+                less = along / length + 0.5 * across * across / spread
+                total += slips * along * math.exp(-less) / math.sqrt(spread)
+        found.append(math.log(total))
+    return found

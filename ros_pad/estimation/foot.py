@@ -16,7 +16,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarms
 from ros_pad.estimation.axes import BLOCK
+from ros_pad.estimation.axes import LONGEST
 from ros_pad.estimation.axes import Axes
+from ros_pad.estimation.axes import SharedAxes
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.load_gate import LoadGate
 from ros_pad.estimation.noise import SensorNoise
@@ -47,6 +49,13 @@ NOT_YET = 'not yet: has not stood'
 
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
+
+FAR = 1e6
+"""Distance from which nothing is known here, m. Ways are added up, so it is not infinite."""
+
+EAGER, PAUSE = 10, 8
+"""Stances in which noise is measured and axes are checked at first, and of how many one is later.
+Stances are counted anew each second."""
 
 HINDSIGHT = DEAD + LONGEST_GAP
 """Time for which earlier posteriors are kept, s: no sensor fault stays undetected for longer."""
@@ -130,6 +139,9 @@ class Estimate(NamedTuple):
     sound: bool
 
 
+Reading = tuple[float, ...]
+"""Time, s, position x and y, m, and force x, y and z, N."""
+
 _estimate: Callable[[tuple[object, ...]], Estimate] = partial(tuple.__new__, Estimate)
 """``Estimate(...)`` without the check of its arguments, which takes longer than all the rest."""
 
@@ -166,6 +178,8 @@ class FootEstimator:
     shared : FrictionScales or None
         What this foot learns of friction together with others, see :func:`estimators_of`; None:
         it learns alone.
+    shared_axes : SharedAxes or None
+        What the feet say of turned axes, likewise.
 
     Attributes
     ----------
@@ -188,6 +202,7 @@ class FootEstimator:
         expected_load: float,
         tuning: Tuning | None = None,
         shared: FrictionScales | None = None,
+        shared_axes: SharedAxes | None = None,
     ) -> None:
         expected_load = number('expected_load', expected_load, 'N', above=True)
         self.tuning = tuning = tuning or Tuning()
@@ -203,7 +218,7 @@ class FootEstimator:
         self._softness = 1.0 / foot.shear_stiffness if tuning.pads_shear else 0.0
         # An estimated position never stops, and its noise is not that of a marker.
         marker_noise = 0.0 if self._joints else tuning.position_noise
-        self.noise = SensorNoise(marker_noise, tuning.force_noise, expected_load, tuning.smoothing)
+        self.noise = SensorNoise(marker_noise, tuning.force_noise, expected_load)
         self._speed_noise = self._set_noise()
         self._alarm = SlipAlarms(
             self._speed_noise,
@@ -218,10 +233,16 @@ class FootEstimator:
         )
         self._sensing = Sensing(tuning.force_noise, marker_noise, tuning.force_range or math.inf)
         self._axes = (
-            Axes(expected_load, self._softness, BODY_CORRELATION)
+            Axes(expected_load, self._softness, BODY_CORRELATION, shared_axes)
             if self._joints
-            else Axes(expected_load, 1.0 / foot.shear_stiffness)
+            else Axes(expected_load, 1.0 / foot.shear_stiffness, shared=shared_axes)
         )
+        self._block: list[Reading] = []  # readings since the last block, and two before them
+        self._earlier = 0  # how many are before them
+        self._block_end = -math.inf
+        self._looked = 0  # stances, and seconds in long ones
+        self._looks = False  # whether this one is looked at
+        self._look_end = math.inf
         self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._offset = Offset(expected_load)
         self._motion = Motion(tuning.smoothing)  # of the contact; of the pads' shear with joints
@@ -300,7 +321,7 @@ class FootEstimator:
         leaps = stood and not (motion and motion.doubt)
         fault = self._sensing.update(time, force, position, age, leaps, not z <= air < math.inf)
         if fault:
-            self._axes.restart()
+            self._restart_blocks()
             return self._without_sensors(time, dt, x, y, fault)
         load = fz - offset.z
         if stood and z > self._stance.height + AIRBORNE:
@@ -309,7 +330,16 @@ class FootEstimator:
         if z > air and load < self._least_load:
             offset.update(dt, fx, fy, fz, yaw)
             load = 0.0
-        self._check_axes(dt, (fx - offset.x, fy - offset.y, fz - offset.z), x, y, z, motion)
+        if motion:
+            slid_x, slid_y = self._slid
+            vx, vy = motion.velocity
+            slid = self._slid = slid_x + vx * min(dt, BLOCK), slid_y + vy * min(dt, BLOCK)
+            if self._looks:
+                self._block.append((time, *slid, fx, fy, fz))
+        elif self._looks:
+            self._block.append((time, x, y, fx, fy, fz))
+        if time >= self._block_end:
+            self._end_block(time, z, (fx - offset.x, fy - offset.y, fz - offset.z), motion)
         if self._axes.doubt:
             return self._without_sensors(time, dt, x, y, self._axes.doubt)
         if not gate.update(load):
@@ -334,7 +364,6 @@ class FootEstimator:
         else:
             velocity = self._motion.update(contact_x, contact_y, dt)
             self._place = self._motion.x, self._motion.y
-        self.noise.add(dt, x, y, fx, fy, fz)
         # On the ellipsoidal limit surface, friction used by turning is not available to the pull.
         turning = 0.0 if moment is None else abs(moment - offset.moment) / self._lever
         return self._stand(time, dt, (fx, fy, fz), velocity, turning, pressure, moment is not None)
@@ -367,37 +396,76 @@ class FootEstimator:
         if motion:
             _check_motion(time, motion)
 
-    def _check_axes(
+    def _restart_blocks(self) -> None:
+        """Forget the last readings, and the height of the last stance."""
+        self._axes.restart()
+        self._block, self._earlier, self._block_end = [], 0, -math.inf
+
+    def _end_block(
         self,
-        dt: float,
-        force: tuple[float, float, float],
-        x: float,
-        y: float,
+        time: float,
         z: float,
+        force: tuple[float, float, float],
         motion: ContactMotion | None,
     ) -> None:
-        """Look for turned axes; from the first sample with a doubt on, only the prior holds."""
-        axes, was = self._axes, self._axes.doubt
-        dt = min(dt, BLOCK)  # at the first sample, and in gaps
-        if motion and motion.doubt:
+        """Look for turned axes, and measure noise, in the readings of a block that ends now."""
+        axes, block, earlier = self._axes, self._block, self._earlier
+        duration = time - self._block_end + BLOCK
+        self._block, self._earlier = block[-2:], min(2, len(block))
+        self._block_end = time + BLOCK - 1e-9
+        if duration > BLOCK + LONGEST_GAP or (motion and motion.doubt):
             axes.restart()
             return
-        if motion:
-            x, y = self._slid = (
-                self._slid[0] + motion.velocity[0] * dt,
-                self._slid[1] + motion.velocity[1] * dt,
-            )
-            sd = motion.sd * BLOCK
-        else:
-            sd = self.noise.position.noise * math.sqrt(2.0 * dt / BLOCK)
-        if not self._offset.known:
-            sd = math.inf
-        axes.update(dt, force, x, y, z, sd)
+        was = axes.doubt
+        loaded = axes.update(time, duration, z, force)
         if axes.doubt and not was:
-            self._history.clear()
-            self.ground.fade(math.inf)
-            mean, sd = self.ground.friction
-            self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
+            self._forget()
+        if self._looks and len(block) > earlier:
+            self._look_at(block, earlier, duration, loaded, motion)
+        if self._gate.standing and time > self._look_end:
+            self._look(time)
+
+    def _look_at(
+        self,
+        block: Sequence[Reading],
+        earlier: int,
+        duration: float,
+        loaded: bool,
+        motion: ContactMotion | None,
+    ) -> None:
+        """Measure noise and compare motions in a block, which follows on ``earlier`` readings."""
+        columns = [*zip(*block, strict=True)]
+        count = len(block) - earlier
+        means = [sum(each[earlier:]) / count for each in columns[1:]]
+        noise, offset = self.noise, self._offset
+        if self._gate.standing and noise.add(columns, means, count):
+            self._use_noise()
+        if loaded and offset.known:
+            x, y, fx, fy, _ = means
+            sd = noise.position.noise * math.sqrt(2.0 / count)
+            if motion:
+                sd = motion.sd * BLOCK
+            time = columns[0][-1]
+            self._axes.compare(time, duration, x, y, fx - offset.x, fy - offset.y, sd)
+
+    def _look(self, time: float) -> None:
+        """Decide whether to look at the readings of a stance, or of a second of a long one.
+
+        Noise and axes hardly ever change during a walk.
+        """
+        self._looked += 1
+        self._looks = self._looked <= EAGER or self._looked % PAUSE == 0
+        self._look_end = time + LONGEST
+        self._block, self._earlier = [], 0
+        self.noise.begin()
+
+    def _forget(self) -> None:
+        """Forget what was learnt in wrong axes."""
+        self._looks = True
+        self._history.clear()
+        self.ground.fade(FAR)
+        mean, sd = self.ground.friction
+        self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
     def _set_back(self, time: float) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
@@ -410,12 +478,12 @@ class FootEstimator:
         self._path.restart()
         self._history.clear()
         self._sensing.restart()
-        self._axes.restart()
+        self._restart_blocks()
         return math.inf
 
     def _touch_down(self, time: float, x: float, y: float, z: float, pressure: float) -> None:
         self._alarm.reset()
-        self.noise.begin()
+        self._look(time)
         self._motion.begin(x, y)
         self._stance = Stance(z, self._share_on_domes(pressure))
         self.ground.touch_down(
@@ -450,7 +518,6 @@ class FootEstimator:
         if fresh:
             self._follow_pressure(pressure)
             self._filter(time - window.start, turning_known)
-            self._measure_noise()
             window.begin(time, first=False)
             friction_mean, friction_sd = self.ground.friction
             wet = self.ground.wet_probability
@@ -477,10 +544,9 @@ class FootEstimator:
         )
         return self._sensor_speed_noise
 
-    def _measure_noise(self) -> None:
-        """Use the noise that the sensors have shown until the end of this window."""
+    def _use_noise(self) -> None:
+        """Use the noise that the sensors have shown until now."""
         noise = self.noise
-        noise.end_window()
         self._sensing.set_noise(noise.force.white, noise.position.white)
         speed_noise = self._set_noise()
         if not self._joints:
@@ -503,6 +569,7 @@ class FootEstimator:
 
     def _swing(self, time: float, stood: bool) -> Estimate:
         """Return the estimate of a foot in the air."""
+        self._looks = False
         _, _, _, _, _, _, wet, mean, sd, margin, _, reason, sound = self.estimate
         estimate = self.estimate = _estimate((
             time, False, False, (0.0, 0.0), 0.0, self._speed_noise, wet, mean, sd, margin,
@@ -605,8 +672,9 @@ def estimators_of(
 ) -> tuple[list[FootEstimator], FrictionScales]:
     """Return the estimators of all feet of a robot, and what they share of friction."""
     expected_load = number('expected_load', expected_load, 'N', above=True)
-    shared = shared_friction(foot, expected_load, tuning)
-    return [FootEstimator(foot, expected_load, tuning, shared) for _ in range(count)], shared
+    shared, axes = shared_friction(foot, expected_load, tuning), SharedAxes()
+    feet = [FootEstimator(foot, expected_load, tuning, shared, axes) for _ in range(count)]
+    return feet, shared
 
 
 def _check_motion(time: float, motion: ContactMotion) -> None:

@@ -12,22 +12,35 @@ import math
 from bisect import bisect_left
 from bisect import insort
 from collections import deque
+from collections.abc import Sequence
+from itertools import compress
+from itertools import pairwise
+from operator import mul
 from operator import sub
 
 PRIOR_WINDOWS = 5
 """Windows of 40 ms that the configured noise is worth."""
 
-KEPT_WINDOWS = 301
+KEPT_WINDOWS = 101
 """Windows over which noise is measured: those of about half a minute of walking."""
 
 COARSE = 0.5
 """Least noise of a sensor with steps, share of a step: one step is then no alarm for fast slip."""
+
+FINE = 0.1
+"""Change of a reading, share of the noise, from which on a sensor has no steps that count."""
 
 FEWEST_CHANGES = 16
 """Changes of a reading from which on the smallest of them is the step of the sensor."""
 
 LAG = 2
 """Blocks between those that are compared: noise that is correlated over one of them counts."""
+
+EAGER, PAUSE = 12, 3
+"""Windows that are all measured at first, and of how many one is measured later."""
+
+READINGS = 8
+"""Last readings of a window in which second differences are taken."""
 
 STEADY = 0.03
 """Change of the force over blocks up to which a foot is at rest, share of the expected load."""
@@ -123,12 +136,6 @@ class Meter:
         return f'{self.noise:.2g} {unit}, configured {self.configured:.2g} {unit}'
 
 
-Values = tuple[float, float, float, float, float]
-"""Position x and y, m, and force, N, or their changes."""
-
-_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 class SensorNoise:
     """Measure the noise of the marker and of the force sensor of a foot.
 
@@ -138,9 +145,6 @@ class SensorNoise:
         Configured standard deviations of a component, m and N; 0: not measured.
     load : float
         Expected normal force in stance, N.
-    smoothing : float
-        Time constant of the slip speed, s. Blocks are twice as long: white noise has the same
-        standard deviation in their means as in the smoothed position.
 
     Attributes
     ----------
@@ -148,84 +152,72 @@ class SensorNoise:
         Noise of a coordinate, m, and of a component of the force, N.
     """
 
-    __slots__ = (
-        '_bends', '_block', '_blocks', '_changes', '_dt', '_elapsed', '_force_squares', '_last',
-        '_run', '_samples', '_squares', '_steady', '_step', '_steps', '_sums', 'force', 'position',
-    )  # fmt: skip
+    __slots__ = ('_blocks', '_steady', '_step', '_steps', '_windows', 'force', 'position')
 
-    def __init__(self, position: float, force: float, load: float, smoothing: float) -> None:
+    def __init__(self, position: float, force: float, load: float) -> None:
         self.position, self.force = Meter(position), Meter(force)
-        self._block = 2.0 * smoothing - 1e-9
         self._steady = STEADY * load
-        self._blocks: deque[tuple[Values, int]] = deque(maxlen=2 * LAG + 1)
-        self._squares = self._force_squares = 0.0  # of second differences in this window
-        self._bends = 0
+        self._blocks: deque[tuple[Sequence[float], int]] = deque(maxlen=2 * LAG + 1)
+        self._windows = 0
         self._step, self._steps = math.inf, 0  # smallest change of a coordinate; number of changes
-        self.begin()
 
     def begin(self) -> None:
         """Begin a stance."""
-        self._last = self._changes = self._sums = _NOTHING
-        self._dt = self._elapsed = 0.0
-        self._samples = self._run = 0
         self._blocks.clear()
 
-    def add(self, dt: float, x: float, y: float, fx: float, fy: float, fz: float) -> None:
-        """Process a position, m, and a force, N, dt seconds after the last ones."""
-        x_before, y_before, a, b, c = self._last
-        self._last = x, y, fx, fy, fz
-        change_x, change_y, a, b, c = x - x_before, y - y_before, fx - a, fy - b, fz - c
-        last_x, last_y, d, e, f = self._changes
-        self._changes = change_x, change_y, a, b, c
-        if self._run > 0 and (change_x or change_y):
-            self._steps += 1
-            step = abs(change_x or change_y)
-            if step < self._step:
-                self._step = step
-        if self._run > 1 and abs(dt - self._dt) <= _UNEVEN * dt:
-            self._squares += (change_x - last_x) ** 2 + (change_y - last_y) ** 2
-            self._force_squares += (a - d) ** 2 + (b - e) ** 2 + (c - f) ** 2
-            self._bends += 1
-        self._dt = dt
-        self._run += 1
-        a, b, c, d, e = self._sums
-        self._sums = a + x, b + y, c + fx, d + fy, e + fz
-        self._samples += 1
-        self._elapsed += dt
-        if self._elapsed >= self._block:
-            self._end_block()
+    def add(self, readings: Sequence[Sequence[float]], means: Sequence[float], count: int) -> bool:
+        """Process a block of a standing foot; return whether noise was measured in it.
 
-    def _end_block(self) -> None:
-        """Compare the block that ends with those before, if the foot was at rest in them."""
-        count = self._samples
-        x, y, fx, fy, fz = self._sums
-        block = x / count, y / count, fx / count, fy / count, fz / count
-        self._sums, self._elapsed, self._samples = _NOTHING, 0.0, 0
-        blocks = self._blocks
+        ``readings`` has a column each of times, s, positions x and y, m, and forces x, y and z, N,
+        which may begin before the block; ``means`` are those of so many readings of the block
+        itself, without the times.
+        """
+        self._blocks.append((means, count))
+        self._windows += 1
+        _, x, y, *_ = readings
+        if self._step > FINE * self.position.white:
+            moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
+            self._steps += len(moves)
+            self._step = min(self._step, *moves, math.inf)
+        if self._windows > EAGER and self._windows % PAUSE:
+            return False
+        times, x, y, *forces = (each[-READINGS:] for each in readings)
+        steps = _changes(times)
+        even = [abs(b - a) <= _UNEVEN * b for a, b in pairwise(steps)]
+        bends = sum(even)
+        if bends < 2:
+            return False
+        if self.position.configured:
+            least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
+            self.position.add_window(_bent(x, even) + _bent(y, even), 2 * bends, least)
+        if self.force.configured:
+            self.force.add_window(sum(_bent(each, even) for each in forces), 3 * bends)
+        if len(self._blocks) > 2 * LAG:
+            self._compare_blocks()
+        return True
+
+    def _compare_blocks(self) -> None:
+        """Compare means over blocks, if the foot was at rest in them."""
+        last, count = self._blocks[-1]
         noise = 4.0 / math.sqrt(count)
         steady = self._steady + noise * self.force.noise
         still = STILL + noise * self.position.noise
-        while blocks:
-            a, b, c, d, e = map(sub, block, blocks[0][0])
-            if max(abs(a), abs(b)) <= still and max(abs(c), abs(d), abs(e)) <= steady:
-                break
-            blocks.popleft()
-        blocks.append((block, count))
-        if len(blocks) > 2 * LAG:
-            (first, some), (middle, more) = blocks[0], blocks[LAG]
-            x, y, fx, fy, _ = (a - b - b + c for a, b, c in zip(first, middle, block, strict=True))
-            samples = 6.0 / (1.0 / some + 4.0 / more + 1.0 / count)
-            self.position.add_blocks(x, y, samples)
-            self.force.add_blocks(fx, fy, samples)
+        for means, _ in self._blocks:
+            a, b, c, d, e = map(sub, last, means)
+            if max(abs(a), abs(b)) > still or max(abs(c), abs(d), abs(e)) > steady:
+                return
+        (first, some), (middle, more) = self._blocks[0], self._blocks[LAG]
+        x, y, fx, fy, _ = (a - b - b + c for a, b, c in zip(first, middle, last, strict=True))
+        samples = 6.0 / (1.0 / some + 4.0 / more + 1.0 / count)
+        self.position.add_blocks(x, y, samples)
+        self.force.add_blocks(fx, fy, samples)
 
-    def end_window(self) -> None:
-        """Use the samples since the last window."""
-        count = self._bends
-        if count < 2:
-            return
-        if self.position.configured:
-            least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
-            self.position.add_window(self._squares, 2 * count, least)
-        if self.force.configured:
-            self.force.add_window(self._force_squares, 3 * count)
-        self._squares, self._force_squares, self._bends = 0.0, 0.0, 0
+
+def _changes(values: Sequence[float]) -> list[float]:
+    return list(map(sub, values[1:], values))
+
+
+def _bent(values: Sequence[float], even: Sequence[bool]) -> float:
+    """Return the sum of the squared second differences of values at even times."""
+    bends = _changes(_changes(values))
+    return sum(compress(map(mul, bends, bends), even))

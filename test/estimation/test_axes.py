@@ -9,6 +9,10 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import sensor_fault
+from ros_pad.estimation.axes import DELAY
+from ros_pad.estimation.axes import TURNS
+from ros_pad.estimation.axes import Axes
+from ros_pad.estimation.axes import SharedAxes
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -133,3 +137,70 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     for heading in HEADINGS * 2:
         estimate = walk.step(heading)
     assert not estimate.doubt.startswith('axes')
+    for heading in HEADINGS:  # what is learnt from then on is finite
+        estimate = walk.step(heading)
+    assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
+    scales = walk.estimator.ground._shared.scales
+    assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
+
+
+# --- feet hear each other -----------------------------------------------------------------------
+
+
+def feet(count):
+    shared = SharedAxes()
+    return [Axes(LOAD, 1.0 / FOOT.shear_stiffness, shared=shared) for _ in range(count)]
+
+
+def stance(axes, begin, speed=0.0, blocks=8):
+    """Stand for some blocks on a foot that is pulled along x and slips along y at a speed."""
+    force = (0.3 * LOAD, 0.0, LOAD)
+    for block in range(blocks):
+        time = begin + 0.04 * block
+        if axes.update(time, 0.04, 0.0, force):
+            axes.compare(time, 0.04, 0.0, 0.04 * block * speed, *force[:2], 1e-4)
+    axes.update(begin + 0.04 * blocks, 0.04, 0.03, (0.0, 0.0, 0.0))
+    return axes.doubt
+
+
+def begins_to_stand(axes, time):
+    axes.update(time, 0.04, 0.0, (0.0, 0.0, LOAD))
+    return axes.doubt
+
+
+def test_a_foot_doubts_its_axes_when_two_others_have_slipped_across_their_force():
+    first, second, third = feet(3)
+    assert stance(first, 0.0, 0.05) == stance(second, 0.0, 0.05) == ''  # one stance is not enough
+    # The true force is along -y; it is read along x.
+    assert 'turned by about 90°' in begins_to_stand(third, 0.32 + DELAY + 1e-6)
+
+
+def test_feet_hear_each_other_only_after_a_while_whichever_is_read_first():
+    first, second, third = feet(3)
+    stance(first, 0.0, 0.05)
+    stance(second, 0.0, 0.05)
+    assert begins_to_stand(third, 0.32 + DELAY - 1e-6) == ''
+
+
+def test_a_foot_alone_and_one_that_is_sure_do_not_follow_others():
+    (alone,) = feet(1)
+    assert stance(alone, 0.0, 0.05) == ''
+    assert stance(alone, 1.0, 0.05) != ''
+    *wrong, right = feet(3)
+    force = (0.3 * LOAD, 0.0, LOAD)
+    for begin in (0.0, 1.0, 2.0):
+        for axes in wrong:
+            stance(axes, begin, 0.05)
+        for block in range(8):
+            if right.update(begin + 0.04 * block, 0.04, 0.0, force):
+                right.compare(begin + 0.04 * block, 0.04, -2e-3 * block, 0.0, *force[:2], 1e-4)
+        right.update(begin + 0.32, 0.04, 0.03, (0.0, 0.0, 0.0))
+    assert all(axes.doubt for axes in wrong)
+    assert right.doubt == ''
+
+
+def test_turns_are_those_of_their_names():
+    """Force along x, read in turned axes: by 90° it appears along y."""
+    along = {name: (a, c) for name, (a, _, c, _) in TURNS}
+    assert along['force axes turned by about 90° about z'] == (0.0, 1.0)
+    assert along['left-handed, x of force or position has the wrong sign'] == (-1.0, 0.0)

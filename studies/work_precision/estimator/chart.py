@@ -293,6 +293,42 @@ def unmoved(rows: Sequence[Row]) -> str:
     return '\n'.join(lines)
 
 
+def walks(rows: Sequence[Row]) -> str:
+    """Return a table of noise, right and wrong, with intervals over walks: for the docs."""
+    rows = [row for row in rows if row.part == 'walks']
+    robots = [name for name in dict.fromkeys(row.name for row in rows) if name != 'sticks']
+    heads = [
+        f'{name}: slips missed, % | those that displaced the foot, % | μ within 2σ, %'
+        for name in robots
+    ]
+    lines = [
+        f'| noise | floors | {" | ".join(heads)} | false alarms a minute |',
+        '|---' * (3 * len(robots) + 3) + '|',
+    ]
+    for note, part in dict.fromkeys((row.note, row.variant) for row in rows):
+        mine = {row.name: row for row in rows if (row.note, row.variant) == (note, part)}
+        cells = []
+        for name in robots:
+            row = mine[name]
+            cells.append(f'{_with_ends(row, "misses", 1e2)} of {row.slips}')
+            cells.append(f'{_with_ends(row, "displaced_misses", 1e2)} of {row.displaced}')
+            cells.append(_with_ends(row, 'coverage', 1e2))
+        if 'sticks' in mine:
+            row = mine['sticks']
+            alarms = f'{_with_ends(row, "false_per_minute", 1.0)} in {row.stick_minutes:.1f} min'
+            cells.append(alarms)
+        lines.append(f'| {note} | {part} | {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
+def _with_ends(row: Row, name: str, scale: float) -> str:
+    value = getattr(row, name)
+    if value is None:
+        return '-'
+    ends = [f'{scale * end:.3g}' for end in row.intervals.get(name, ())]
+    return f'{scale * value:.3g}' + (f' ({" to ".join(ends)})' if ends else '')
+
+
 def draw_robustness(rows: Sequence[Row]) -> Figure:
     """Return the picture of the estimator: a panel for each measure that a change moves."""
     rows = [row for row in rows if row.part == 'robustness']

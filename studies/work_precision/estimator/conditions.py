@@ -8,12 +8,11 @@ from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.pace import Progress
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from studies.work_precision.estimator.tally import Row
@@ -21,12 +20,14 @@ from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.tally import counted
 from studies.work_precision.estimator.tally import row_of
 from studies.work_precision.estimator.tally import row_of_walks
+from studies.work_precision.estimator.walks import FEW_CYCLES
 from studies.work_precision.estimator.walks import LOADED
 from studies.work_precision.estimator.walks import SEEDS
 from studies.work_precision.estimator.walks import Recording
 from studies.work_precision.estimator.walks import World
 from studies.work_precision.estimator.walks import few_recordings
 from studies.work_precision.estimator.walks import full
+from studies.work_precision.estimator.walks import pull
 from studies.work_precision.estimator.walks import record
 
 Disturbance = Callable[[Recording, float, np.random.Generator], Recording]
@@ -265,63 +266,116 @@ WALK_SEEDS = {TUNED: (31, 32, 33, 34), HELD_OUT: (121, 122, 123, 124, 125, 126)}
 """Floors on which the settings of measured noise and of the doubt about axes were chosen, and
 others."""
 
-MARKER_NOISES = (1.5e-4, 3e-4, 6e-4)  # m; the estimator is configured for the first
+POLICIES = ('flat', 'dome', 'adaptive')
+STICKS = 'sticks'
 
 
-def by_walk(cycles: int, progress: Progress) -> list[Row]:
-    """Return a row for each robot, part of the floors and marker noise, with intervals."""
+class Noise(NamedTuple):
+    """Noise of marker and force, and configured noise of both, each over the ordinary one."""
+
+    name: str
+    marker: float = 1.0
+    force: float = 1.0
+    set_marker: float = 1.0
+    set_force: float = 1.0
+
+
+NOISE_CASES = (
+    Noise('right'),
+    Noise('configured: a quarter', set_marker=0.25, set_force=0.25),
+    Noise('configured: four times', set_marker=4.0, set_force=4.0),
+    Noise('marker 0.3 mm', marker=2.0),
+    Noise('marker 0.3 mm, configured', marker=2.0, set_marker=2.0),
+    Noise('marker 0.6 mm', marker=4.0),
+    Noise('marker 0.6 mm, configured', marker=4.0, set_marker=4.0),
+    Noise('force 0.12 N', force=4.0),
+    Noise('force 0.12 N, configured', force=4.0, set_force=4.0),
+)
+"""The ordinary noise is 0.15 mm and 0.03 N, and so is the configured one."""
+
+
+def noisy(walk: Recording, noise: Noise, generator: np.random.Generator) -> Recording:
+    """Return the recording with other noise, or other configured noise."""
+    foot, load, tuning = walk.settings
+    more = math.sqrt(noise.force**2 - 1.0) * tuning.force_noise
+    changed = replace(
+        tuning,
+        position_noise=noise.set_marker * tuning.position_noise,
+        force_noise=noise.set_force * tuning.force_noise,
+    )
+    return replace(
+        walk,
+        position=walk.position + (noise.marker - 1.0) * walk.noise,
+        force=walk.force + more * generator.normal(size=walk.force.shape),
+        settings=(foot, load, changed),
+    )
+
+
+def walk_cases(count: int | None) -> list[tuple[str, str, int, str]]:
+    """Return robot, part of the floors, seed and policy of each walk; ``count`` floors or all."""
+    return [
+        (robot, part, seed, policy)
+        for part, seeds in WALK_SEEDS.items()
+        for robot in (*ROBOTS, STICKS)
+        for seed in seeds[:count]
+        for policy in (POLICIES if robot != STICKS else ('flat',))
+    ]
+
+
+def tallies(robot: str, part: str, seed: int, policy: str) -> list[Tally]:
+    """Walk once, and return the counts with each of :data:`NOISE_CASES`."""
+    if robot == STICKS:
+        scene = replace(Scene.load('hexapod_smooth_dry_flat'), cycles=FEW_CYCLES)
+        walks = [record(scene, policy, seed, 'L1'), pull(scene, 2.0 * FEW_CYCLES, seed)]
+    else:
+        scene = replace(Scene.load(f'{robot}_patches'), cycles=FEW_CYCLES)
+        walks = [record(scene, policy, seed, full())]
+    found = []
+    for noise in NOISE_CASES:
+        generator = np.random.default_rng([SEEDS[0], seed])
+        tally = Tally()
+        for walk in walks:
+            tally.add(counted(noisy(walk, noise, generator)))
+        found.append(tally)
+    return found
+
+
+def rows_by_walk(
+    cases: Sequence[tuple[str, str, int, str]], found: Sequence[Sequence[Tally]]
+) -> list[Row]:
+    """Return a row for each robot, part of the floors and noise, with intervals over walks."""
     rows = []
-    for number, robot in enumerate(ROBOTS):
-        for part, seeds in WALK_SEEDS.items():
-            scene = replace(Scene.load(f'{robot}_patches'), cycles=cycles)
-            plan = [(policy, seed) for seed in seeds for policy in ('flat', 'dome', 'adaptive')]
-            walks = [record(scene, policy, seed, full()) for policy, seed in plan]
-            generator = np.random.default_rng(SEEDS)
-            for noise in MARKER_NOISES:
-                tallies = [counted(position_noise(walk, noise, generator)) for walk in walks]
-                names = {'part': 'walks', 'name': robot, 'variant': part, 'unit': 'm'}
-                shipped = noise == MARKER_NOISES[0]
-                rows.append(row_of_walks(tallies, value=noise, shipped=shipped, **names))
-            progress((number + (1.0 if part == HELD_OUT else 0.4)) / len(ROBOTS))
+    for robot, part in dict.fromkeys(case[:2] for case in cases):
+        mine = [each for case, each in zip(cases, found, strict=True) if case[:2] == (robot, part)]
+        for noise, of_walks in zip(NOISE_CASES, zip(*mine, strict=True), strict=True):
+            names = {'part': 'walks', 'name': robot, 'variant': part, 'unit': '', 'value': 0.0}
+            shipped = noise == NOISE_CASES[0]
+            rows.append(row_of_walks(of_walks, shipped=shipped, note=noise.name, **names))
     return rows
 
 
-def stress(changes: Sequence[Change], progress: Progress) -> list[Row]:
-    """Return a row for the shipped estimator under each change with each value.
+def stress(change: Change, count: int | None) -> list[Row]:
+    """Return a row for the shipped estimator under a change with each value.
 
-    Progress, 0 to 1, is reported to ``progress``. In the rows ``not configured`` of the shear
-    stiffness, the value is the configured stiffness over the true one.
+    With a ``count`` of walks only the ends and the ordinary value are taken, None for all.
+    In the rows ``not configured`` of the shear stiffness, the value is the configured stiffness
+    over the true one.
     """
-    base = few_recordings()
-    plain = _try(base)
     rows = []
-    total = sum(len(change.values) for change in changes)
-    # Recordings are kept, so that changes with the same scenes share them.
-    kept: dict[Any, list[Recording]] = {}
-    for change in changes:
-        for value in change.values:
-            ordinary = value == change.ordinary and change.disturb is not rate
-            if ordinary and change.level is None:
-                tally, walks = plain, base
-            else:
-                if change.world is None or (ordinary and change.level is None):
-                    walks = base
-                else:
-                    key = (change.world(value) if change.disturb is rate else
-                           (change.name, value, change.level))  # fmt: skip
-                    if key not in kept:
-                        kept[key] = few_recordings(change.world(value), change.level)
-                    walks = kept[key]
-                generator = np.random.default_rng(SEEDS)
-                tally = _try([change.disturb(walk, value, generator) for walk in walks])
-            rows.append(
-                row_of(
-                    tally, part='robustness', name=change.name, variant=change.variant,
-                    value=value, unit=change.unit, shipped=value == change.ordinary,
-                    note=_shortened(walks),
-                )
-            )  # fmt: skip
-            progress(len(rows) / total)
+    ends = {change.values[0], change.ordinary, change.values[-1]}
+    for value in sorted(ends) if count else change.values:
+        plain = change.disturb is not rate and value == change.ordinary and not change.level
+        world = None if plain or change.world is None else change.world(value)
+        walks = few_recordings(world, change.level, count)
+        generator = np.random.default_rng(SEEDS)
+        tally = _try([change.disturb(walk, value, generator) for walk in walks])
+        rows.append(
+            row_of(
+                tally, part='robustness', name=change.name, variant=change.variant,
+                value=value, unit=change.unit, shipped=value == change.ordinary,
+                note=_shortened(walks),
+            )
+        )  # fmt: skip
     return rows
 
 

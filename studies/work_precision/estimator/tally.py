@@ -6,7 +6,6 @@ from __future__ import annotations
 import bisect
 import math
 import statistics
-import time
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from typing import TypedDict
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation import estimators_of
 from studies.work_precision.estimator.walks import LOADED
 from studies.work_precision.estimator.walks import SETTLED
 from studies.work_precision.estimator.walks import Flags
@@ -63,8 +62,8 @@ class Estimates:
     slipping, standing, fresh : array of bool
     wet, mean, sd, margin, speed : array
         P(wet), friction and its standard deviation, friction margin, slip speed in m/s.
-    seconds, updates : float, int
-        Computing time, s, and number of samples.
+    updates : int
+        Number of samples.
     axes : array of bool
         Whether turned axes are in doubt.
     """
@@ -77,23 +76,21 @@ class Estimates:
     sd: Floats
     margin: Floats
     speed: Floats
-    seconds: float
     updates: int
     axes: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def replay(walk: Recording) -> Estimates:
-    """Return the results of an estimator for the readings of each leg."""
-    shape = walk.load.shape
-    out = np.empty((*shape, 9))
-    seconds, updates = 0.0, 0
-    stamps, rows, arrived = walk.stamps.tolist(), walk.rows, walk.arrived.tolist()
-    for leg in range(shape[1]):
-        estimator = FootEstimator(*walk.settings)
-        found, mine = [], rows[leg]
-        start = time.perf_counter()
-        for sample, stamp in enumerate(stamps):
-            new = arrived[sample][leg]
+    """Return the results for the readings of a robot, whose feet learn together."""
+    legs = walk.load.shape[1]
+    estimators, _ = estimators_of(legs, *walk.settings)
+    out = np.empty((*walk.load.shape, 9))
+    rows = walk.rows
+    for sample, (stamp, arrived) in enumerate(
+        zip(walk.stamps.tolist(), walk.arrived.tolist(), strict=True)
+    ):
+        found = []
+        for estimator, mine, new in zip(estimators, rows, arrived, strict=True):
             if new:
                 row = mine[sample]
                 try:
@@ -106,9 +103,7 @@ def replay(walk: Recording) -> Estimates:
                  now.friction_mean, now.friction_sd, now.margin, now.slip_speed,
                  now.doubt.startswith('axes'))
             )  # fmt: skip
-        seconds += time.perf_counter() - start
-        updates += sum(each[leg] for each in arrived)
-        out[:, leg] = found
+        out[sample] = found
     return Estimates(
         slipping=out[..., 0] > 0.5,
         standing=out[..., 1] > 0.5,
@@ -118,8 +113,7 @@ def replay(walk: Recording) -> Estimates:
         sd=out[..., 5],
         margin=out[..., 6],
         speed=out[..., 7],
-        seconds=seconds,
-        updates=updates,
+        updates=int(walk.arrived.sum()),
         axes=out[..., 8] > 0.5,
     )
 
@@ -132,6 +126,9 @@ class Tally:
     ----------
     slips, missed : int
         Numbers of slips, and of missed ones.
+    displaced, displaced_missed : int
+        The same of slips at whose end the contact was as far away as slips must be long: a foot
+        that lands chatters.
     delays, slip_distances : list of float
         For each slip that did not begin in an alarm, time, s, and slip distance, m, until the
         alarm; infinite if missed.
@@ -149,6 +146,8 @@ class Tally:
 
     slips: int = 0
     missed: int = 0
+    displaced: int = 0
+    displaced_missed: int = 0
     delays: list[float] = field(default_factory=list)
     slip_distances: list[float] = field(default_factory=list)
     false_alarms: int = 0
@@ -162,6 +161,8 @@ class Tally:
         """Add the counts of other walks."""
         self.slips += other.slips
         self.missed += other.missed
+        self.displaced += other.displaced
+        self.displaced_missed += other.displaced_missed
         self.delays += other.delays
         self.slip_distances += other.slip_distances
         self.false_alarms += other.false_alarms
@@ -176,7 +177,7 @@ class Tally:
 def counted(walk: Recording) -> Tally:
     """Return the counts of the estimator on a walk."""
     tally, estimates = Tally(), replay(walk)
-    count_alarms(tally, walk, estimates.slipping)
+    count_alarms(tally, walk, estimates.slipping, walk.place)
     count_estimates(tally, walk, estimates)
     return tally
 
@@ -197,8 +198,13 @@ def slips(speed: Floats, load: Floats, period: float, gate: float) -> Iterator[t
     yield from zip(starts.tolist(), ends.tolist(), strict=True)
 
 
-def count_alarms(tally: Tally, walk: Recording, alarms: Flags) -> None:
-    """Add delays, misses and false alarms of alarms, array (samples, legs), to a tally."""
+def count_alarms(
+    tally: Tally, walk: Recording, alarms: Flags, place: Floats | None = None
+) -> None:
+    """Add delays, misses and false alarms of alarms, array (samples, legs), to a tally.
+
+    With the places of the contacts, m, slips that displaced them are counted as well.
+    """
     period, count = walk.period, len(walk.stamps)
     gate = LOADED * walk.expected_load
     settled, late, before = (round(span / period) for span in (SETTLED, LATE, BEFORE))
@@ -218,17 +224,20 @@ def count_alarms(tally: Tally, walk: Recording, alarms: Flags) -> None:
         for first, last in slips(speed, load, period, gate):
             if first < settled or path[last + 1] - path[first] <= COUNTS:
                 continue
-            place = bisect.bisect_left(alarms_at, first)
-            alarmed = place < len(alarms_at) and alarms_at[place] <= last + late
+            near = bisect.bisect_left(alarms_at, first)
+            alarmed = near < len(alarms_at) and alarms_at[near] <= last + late
             tally.slips += 1
+            if place is not None and math.dist(place[first, leg], place[last, leg]) > COUNTS:
+                tally.displaced += 1
+                tally.displaced_missed += not alarmed
             if not alarmed:
                 tally.missed += 1
                 tally.delays.append(math.inf)
                 tally.slip_distances.append(math.inf)
-            elif alarms_at[place] > first:
-                tally.delays.append((alarms_at[place] - first) * period)
+            elif alarms_at[near] > first:
+                tally.delays.append((alarms_at[near] - first) * period)
                 # If the slip ended before the alarm, this is its whole distance.
-                end = min(alarms_at[place], last + 1)
+                end = min(alarms_at[near], last + 1)
                 tally.slip_distances.append(float(path[end] - path[first]))
 
 
@@ -278,7 +287,7 @@ class Row:
     Attributes
     ----------
     part : str
-        ``methods`` or ``robustness``.
+        ``methods``, ``robustness`` or ``walks``.
     name : str
         Method, or changed condition.
     variant : str
@@ -296,6 +305,9 @@ class Row:
     already : float or None
         Share of slips that began in an alarm.
     slips : int
+    displaced_misses : float or None
+        Share of slips that are missed, of those that displaced the contact by as much as counts.
+    displaced : int
     false_per_minute : float or None
         False alarms in a minute of stick.
     stick_minutes : float
@@ -331,6 +343,8 @@ class Row:
     misses: float | None
     already: float | None
     slips: int
+    displaced_misses: float | None
+    displaced: int
     false_per_minute: float | None
     stick_minutes: float
     us_per_update: float | None
@@ -359,6 +373,8 @@ def row_of(tally: Tally, us_per_update: float | None = None, **names: Any) -> Ro
         misses=tally.missed / tally.slips if tally.slips else None,
         already=1.0 - len(tally.delays) / tally.slips if tally.slips else None,
         slips=tally.slips,
+        displaced_misses=tally.displaced_missed / tally.displaced if tally.displaced else None,
+        displaced=tally.displaced,
         false_per_minute=tally.false_alarms / minutes if minutes else None,
         stick_minutes=minutes,
         us_per_update=us_per_update,
@@ -384,6 +400,7 @@ def row_of_walks(tallies: Sequence[Tally], **names: Any) -> Row:
         whole.add(each)
     parts = {
         'misses': [(each.missed, each.slips) for each in tallies],
+        'displaced_misses': [(each.displaced_missed, each.displaced) for each in tallies],
         'false_per_minute': [(each.false_alarms, each.stick_time / 60.0) for each in tallies],
         'wet_right': [
             (sum((p > 0.5) == wet for wet, p in each.wet_ends), len(each.wet_ends))

@@ -59,6 +59,8 @@ class Recording:
         Whether the estimator gets the sample.
     load, tangential, grip, speed : array, (samples, legs)
         Truth: normal force, tangential force and capacity, N, and speed of the contact, m/s.
+    place : array, (samples, legs, 2)
+        Truth: place of the contact, m.
     wet : array of bool, (samples, legs)
         Whether the ground under each foot is wet.
     sticks_only : bool
@@ -80,6 +82,7 @@ class Recording:
     tangential: Floats
     grip: Floats
     speed: Floats
+    place: Floats
     wet: Flags
     sticks_only: bool = False
 
@@ -161,6 +164,7 @@ def record(
         tangential=np.hypot(truth[..., 3], truth[..., 4]),
         grip=truth[..., 6],
         speed=truth[..., 7],
+        place=truth[..., :2] + truth[..., 3:5] / scene.foot.shear_stiffness,
         wet=truth[..., 8] > 0.5,
         sticks_only=level == 'L1' and scene.floor.kind == 'dry',
     )
@@ -202,6 +206,7 @@ def pull(scene: Scene, duration: float, seed: int) -> Recording:
         tangential=tangential,
         grip=friction * load * ones,
         speed=0.0 * ones,
+        place=np.zeros((*shape[:2], 2)),
         wet=ones < 0.0,
         sticks_only=True,
     )
@@ -215,20 +220,36 @@ def full() -> str:
 World = Callable[[Scene], Scene]
 
 
-def recordings(world: World | None = None, level: str | None = None) -> list[Recording]:
-    """Return the walks for the comparison of methods; ``world`` changes their scenes."""
-    walks = [('patches', policy) for policy in ('flat', 'dome', 'adaptive')]
+def recordings(count: int | None = None) -> list[Recording]:
+    """Return the walks for the comparison of methods, or the first ones of each kind."""
+    plan = [('patches', policy, seed) for policy in ('flat', 'dome', 'adaptive') for seed in SEEDS]
     thesis = [(f'smooth_{name}', name[4:]) for name in ('dry_flat', 'wet_flat', 'wet_dome')]
-    plan = [(name, policy, seed) for name, policy in walks for seed in SEEDS]
-    plan += [(name, policy, SEEDS[0]) for name, policy in thesis]
-    return _record_all(plan, world, level or full(), CYCLES)
+    plan = plan[-2 * (count or len(plan)) :]
+    plan += [(name, policy, SEEDS[0]) for name, policy in thesis[:count]]
+    return _record_all(plan, None, full(), CYCLES)
 
 
-def few_recordings(world: World | None = None, level: str | None = None) -> list[Recording]:
-    """Return the walks for the tests of the estimator under many conditions."""
+def few_recordings(
+    world: World | None = None, level: str | None = None, count: int | None = None
+) -> list[Recording]:
+    """Return the walks for the tests of the estimator under many conditions, or the first ones.
+
+    ``world`` changes their scenes.
+    """
+    if world is None and level is None:
+        return _ordinary_walks(count)
+    return _few(world, level or full(), count)
+
+
+@functools.cache
+def _ordinary_walks(count: int | None) -> list[Recording]:
+    return _few(None, full(), count)
+
+
+def _few(world: World | None, level: str, count: int | None) -> list[Recording]:
     plan = [('patches', 'flat', SEEDS[0]), ('patches', 'dome', SEEDS[1])]
     plan += [('patches', 'adaptive', seed) for seed in SEEDS]
-    return _record_all(plan, world, level or full(), FEW_CYCLES)
+    return _record_all(plan[:count], world, level, FEW_CYCLES)
 
 
 def _record_all(

@@ -17,6 +17,7 @@ from studies.work_precision.estimator import conditions
 from studies.work_precision.estimator import methods
 from studies.work_precision.estimator import study
 from studies.work_precision.estimator import tally
+from studies.work_precision.estimator import turned
 from studies.work_precision.estimator import walks
 from studies.work_precision.estimator.conditions import Change
 from studies.work_precision.estimator.tally import Tally
@@ -57,6 +58,7 @@ def walk(speed, load=None, **values):
         'tangential': np.zeros((count, 1)),
         'grip': 0.5 * loads,
         'speed': true,
+        'place': np.cumsum(true, axis=0)[..., None] * np.array([PERIOD, 0.0]),
         'wet': np.zeros((count, 1), dtype=bool),
     }
     return Recording(**given | values)
@@ -67,7 +69,7 @@ def counted(case, *spans):
     for start, end in spans:
         alarms[round(start / PERIOD) : round(end / PERIOD)] = True
     counts = Tally()
-    tally.count_alarms(counts, case, alarms)
+    tally.count_alarms(counts, case, alarms, case.place)
     return counts
 
 
@@ -85,6 +87,17 @@ def test_delay_and_way_of_a_slip():
     assert (counts.slips, counts.missed, counts.delays, counts.false_alarms) == (1, 0, [], 1)
     row = tally.row_of(counts, part='', name='', variant='', value=0.0, unit='', shipped=False)
     assert (row.misses, row.already, row.delay, row.slip_distance) == (0.0, 1.0, None, None)
+
+
+def test_a_foot_that_chatters_slips_but_is_not_displaced():
+    case = walk([(2.0, 2.2, 0.05)])
+    assert (counted(case).slips, counted(case).displaced) == (1, 1)
+    assert counted(case).displaced_missed == 1
+    assert counted(case, (2.1, 2.4)).displaced_missed == 0
+    back = case.place.copy()
+    back[525:550] = back[500:525][::-1]  # to and fro
+    assert (counted(replace(case, place=back)).slips, counted(case, (2.1, 2.2)).slips) == (1, 1)
+    assert counted(replace(case, place=back)).displaced == 0
 
 
 @pytest.mark.parametrize(('after', 'missed'), [(0.052, 0), (0.068, 1)])
@@ -133,8 +146,7 @@ def test_estimates_are_compared_with_the_truth():
     ones = np.ones((1000, 1))
     found = tally.Estimates(
         slipping=ones < 0, standing=ones > 0, fresh=ones > 0, wet=0.2 * ones, mean=0.4 * ones,
-        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29), speed=ones, seconds=1.0,
-        updates=1000,
+        sd=np.where(wet, 0.04, 0.06), margin=np.where(wet, 0.31, 0.29), speed=ones, updates=1000,
     )  # fmt: skip
     counts = Tally()
     tally.count_estimates(counts, case, found)
@@ -279,37 +291,33 @@ def test_noise_that_is_correlated_or_has_steps_or_is_configured_wrong(plain):
 
 @pytest.fixture(scope='module')
 def rows():
-    noise = conditions.position_noise
-    few = (
-        Change('position noise', 'm', (1.5e-4, 6e-4), 1.5e-4, conditions.NOT_CONFIGURED, noise),
+    changes = (
         Change(
-            'wet friction',
-            '',
-            (0.4,),
-            0.12,
-            conditions.CONFIGURED,
-            world=conditions.with_wet_friction,
+            'position noise', 'm', (1.5e-4, 6e-4), 1.5e-4, conditions.NOT_CONFIGURED,
+            conditions.position_noise,
         ),
-    )
+        Change(
+            'wet friction', '', (0.4,), 0.4, conditions.CONFIGURED,
+            world=conditions.with_wet_friction, level='L1',
+        ),
+    )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(walks, 'CYCLES', 2)
-        patch.setattr(walks, 'FEW_CYCLES', 3)
+        patch.setattr(walks, 'FEW_CYCLES', 2)
+        patch.setattr(conditions, 'FEW_CYCLES', 2)
         patch.setattr(walks, 'SEEDS', (5, 6))
-        patch.setattr(study, 'CHANGES', few)
-        patch.setattr(study, 'FEW_CYCLES', 2)
-        patch.setattr(conditions, 'ROBOTS', ('hexapod',))
-        patch.setattr(
-            conditions, 'WALK_SEEDS', {conditions.TUNED: (5,), conditions.HELD_OUT: (6,)}
-        )
-        patch.setattr(conditions, 'MARKER_NOISES', (1.5e-4,))
+        patch.setattr(walks, '_ordinary_walks', walks._ordinary_walks.__wrapped__)
+        patch.setattr(conditions, 'NOISE_CASES', conditions.NOISE_CASES[:1])
         patch.setattr(methods, 'CUSUM_THRESHOLDS', (4.0,))
-        few_walks = walks.recordings()[::4]
-        patch.setattr(study, 'recordings', lambda: few_walks)
-        shares = []
-        found = study.measure(shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1.0)
-    return found
+        found = methods.compare(walks.recordings(1)[:2], lambda _: None)
+        found += [row for change in changes for row in conditions.stress(change, 1)]
+        cases = [
+            (robot, part, 5, 'flat')
+            for part in conditions.WALK_SEEDS
+            for robot in ('hexapod', conditions.STICKS)
+        ]
+        counts = {robot: conditions.tallies(robot, '', 5, 'flat') for robot, *_ in cases[:2]}
+        return found + conditions.rows_by_walk(cases, [counts[case[0]] for case in cases])
 
 
 def test_higher_thresholds_detect_less(rows):
@@ -337,13 +345,29 @@ def test_noise_that_is_not_configured_is_measured(rows):
     assert quiet.axes == loud.axes == 0.0
 
 
-def test_walks_have_intervals(rows):
-    tuned, held_out = [row for row in rows if row.part == 'walks']
-    assert (tuned.variant, held_out.variant) == (conditions.TUNED, conditions.HELD_OUT)
-    assert tuned.walks == held_out.walks == 3
-    for row in (tuned, held_out):
+def test_walks_have_a_row_of_the_table(rows):
+    found = [row for row in rows if row.part == 'walks']
+    assert {row.variant for row in found} == {conditions.TUNED, conditions.HELD_OUT}
+    for row in found:
         for name, (low, high) in row.intervals.items():
             assert low <= getattr(row, name) <= high, name
+    lines = chart.walks(found).splitlines()
+    assert [line.split(' | ')[1] for line in lines[2:]] == ['tuned on', 'held out']
+    hexapod, sticks = found[:2]
+    assert f'of {hexapod.slips} |' in lines[2] and hexapod.slips > hexapod.displaced > 0
+    assert f'in {sticks.stick_minutes:.1f} min' in lines[2] and sticks.slips == 0
+
+
+def test_noise_is_changed_and_configured(plain):
+    noise = conditions.Noise('', marker=2.0, force=4.0, set_marker=0.25, set_force=4.0)
+    loud = conditions.noisy(plain, noise, generator())
+    assert loud.position - plain.position == pytest.approx(plain.noise)
+    ordinary = plain.settings[2]
+    assert np.std(loud.force - plain.force) == pytest.approx(
+        math.sqrt(15.0) * ordinary.force_noise, rel=0.05
+    )
+    assert loud.settings[2].position_noise == ordinary.position_noise / 4.0
+    assert loud.settings[2].force_noise == 4.0 * ordinary.force_noise
 
 
 def test_intervals_are_those_of_walks_drawn_anew():
@@ -391,9 +415,43 @@ def test_table_and_pictures(rows, tmp_path):
 
 def test_the_docs_list_what_the_file_says_does_not_move():
     docs = pathlib.Path(__file__).resolve().parents[3] / 'docs'
-    found = json.loads((docs / 'charts' / 'estimator.json').read_text())['rows']
-    listed = chart.unmoved([tally.Row(**row) for row in found])
-    assert listed in (docs / 'model' / 'estimation.md').read_text(), listed
+    document = json.loads((docs / 'charts' / 'estimator.json').read_text())
+    page = (docs / 'model' / 'estimation.md').read_text()
+    for name, lines in study.tables(document).items():
+        assert f'<!-- {name}:begin -->\n{lines}\n<!-- {name}:end -->' in page, name
+
+
+# --- turned axes --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('fault', 'force', 'position'),
+    [
+        ('force turned by 90° about z', (-2.0, 1.0, 3.0), (1.0, 2.0, 3.0)),
+        ('x and y of the force exchanged', (2.0, 1.0, 3.0), (1.0, 2.0, 3.0)),
+        ('normal force along y', (1.0, 3.0, -2.0), (1.0, 2.0, 3.0)),
+        ('sign of the force turned', (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)),
+        ('z of the position mirrored', (1.0, 2.0, 3.0), (1.0, 2.0, -3.0)),
+    ],
+)
+def test_faults_of_axes(fault, force, position):
+    forces, positions, _ = turned.FAULTS[fault]
+    assert turned._turned(forces, (1.0, 2.0, 3.0)) == force
+    assert turned._turned(positions, (1.0, 2.0, 3.0)) == position
+
+
+def test_feet_are_counted_by_the_stance_in_which_their_axes_were_found():
+    cases = [('a', 'markers', 'held out', seed) for seed in (1, 2)]
+    feet = {fault: [(2, True), (3, True), (4, False)] for fault in turned.FAULTS}
+    none = {fault: [(None, False)] for fault in turned.FAULTS}
+    found = turned.found_of(cases, [feet, none])
+    row = found[0]
+    assert (row.feet, row.within, row.never, row.named) == (4, 2, 1, 2)
+    assert (row.median, row.most) == (3.0, 4)
+    assert '| 50, 4, never 25 |' in turned.table(found)
+
+
+# --- pictures and tables ------------------------------------------------------------------------
 
 
 def test_the_best_has_few_false_alarms_and_misses():
