@@ -27,7 +27,7 @@ GRID = np.sqrt(EDGES[:-1] * EDGES[1:])
 """Coefficients of friction, each for a cell between two of :data:`EDGES`, 5 % wide."""
 
 CLASSES = ('flat_dry', 'flat_wet', 'dome')
-"""Classes of friction; that of a dome is about the same on dry and wet ground."""
+"""Classes of friction; domes on wet ground share the scale of those on dry ground."""
 
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
 SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
@@ -46,9 +46,13 @@ TAIL = 0.01
 """Probability of friction of another origin, equal for all cells: unexpected ground stays
 possible, and wet or dry never become certain."""
 
-UNDRAINED = 0.3
-"""Share of a stance on wet ground in which the film under a dome has not drained: friction is then
-anywhere between that of a flat sole and that of a dome."""
+DRAINED = 0.75
+"""Least friction of a dome on wet ground, over that on dry ground, once its film has drained; any
+factor from this to one is equally likely. Before, friction is anywhere between that of a flat sole
+and that of a dome."""
+
+REWETTED = 0.05
+"""Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
 
 PERIOD = 0.5
 """Time between updates, s. All stances that begin in a period expect the same friction, so that
@@ -166,6 +170,9 @@ class FrictionScales:
         ends = sorted((prior.flat_wet, prior.dome))
         between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
         self._undrained = between / between.sum()
+        cells = round(math.log(1.0 / DRAINED) / math.log(GRID[1] / GRID[0])) + 1
+        self._films = np.tri(len(GRID)).T - np.tri(len(GRID), k=-cells).T
+        self._films /= self._films.sum(axis=0)
         self._felt: list[Felt] = []
         self._period = -math.inf
         self._now = self._before = self._expected()
@@ -189,8 +196,8 @@ class FrictionScales:
     def expected(self, time: float) -> np.ndarray:
         """Return the probabilities of friction in a stance that begins at a time, s.
 
-        The rows of the array (4, grid) are a flat foot on dry and on wet ground, and a dome on dry
-        and on wet ground.
+        The rows of the array (5, grid) are a flat foot on dry and on wet ground, and a dome on dry
+        ground, on wet ground once the film has drained, and before.
         """
         period = math.floor(time / PERIOD)
         if not self._period - 2 < period <= self._period:
@@ -209,7 +216,8 @@ class FrictionScales:
         dry, wet, dome = (
             weights.dot(table) for weights, table in zip(self._weights, self._tables, strict=True)
         )
-        return np.array([dry, wet, dome, (1.0 - UNDRAINED) * dome + UNDRAINED * self._undrained])
+        drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
+        return np.array([dry, wet, dome, drained, self._undrained])
 
     def _learn_until(self, time: float) -> None:
         """Use the stances before a time, s, in an order that does not depend on who came first."""
@@ -221,11 +229,12 @@ class FrictionScales:
         on_dry, on_wet = np.exp(felt.likelihood - felt.likelihood.max())
         dry, wet = 1.0 - felt.wet, felt.wet
         if felt.dome:
-            films = wet * UNDRAINED
-            either = self._undrained.dot(on_wet)
-            self._multiply(
-                2, (1.0 - films) * self._tables[2].dot(on_dry) + films * either, felt.weight
-            )
+            # What a dome feels does not show the ground: both keep their odds.
+            dries = self._tables[2].dot(on_dry)
+            wets = (1.0 - REWETTED) * self._tables[2].dot(on_wet.dot(self._films))
+            wets += REWETTED * self._undrained.dot(on_wet)
+            if_dry, if_wet = self._weights[2].dot(dries), self._weights[2].dot(wets)
+            self._multiply(2, dry * dries / if_dry + wet * wets / if_wet, felt.weight)
             return
         # The ground is uncertain: what the scale of one class explains, the other need not.
         dries, wets = self._tables[0].dot(on_dry), self._tables[1].dot(on_wet)
