@@ -54,6 +54,11 @@ DRAINING_TIME = 0.05
 """Time in which the film under a dome drains at the start of a stance, s: in walks, friction is
 four fifths of that on dry ground after 0.05 to 0.1 s."""
 
+CREEP, CREEP_SPEED = 0.05, 0.01
+"""Share of the windows of a sticking foot in which it rolls or bends, and the mean of its speed
+then, m/s; the density is assumed exponential. Without creep, ground that holds more than any gait
+demands would be taken for ground that slips at that demand."""
+
 HELD = 0.1
 """Share of demands above its friction that a foot meets without slip, at its limit, because other
 feet hold the body."""
@@ -224,18 +229,19 @@ class GroundFilter:
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick: T/N is the gait's demand, and μ is above it. Held: the demand is above μ, and T/N
-        # is μ. Slip: the same, less the part used by turning.
-        likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
+        # Stick or creep: T/N is the gait's demand, and μ is above it. Held: the demand is above μ,
+        # and T/N is μ. Slip: the same, less the part used by turning.
+        rest = stick
+        if speed > 0.0:
+            rest += CREEP * math.exp(-speed / CREEP_SPEED) / CREEP_SPEED
+        likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
         unmet /= _ROOT_2_PI * ratio_noise
         likelihood += HELD * stick * unmet * np.exp(-0.5 * away * away)
         if slip > 0.0:
             if not turning_known:
-                shown = speed / np.hypot(speed, self._rim_speeds)
-                away = shown * friction[:, None]
-                away -= ratio
-                away /= ratio_noise
+                left = speed / np.hypot(speed, self._rim_speeds)
+                away = (left * friction[:, None] - ratio) / ratio_noise
             likely = np.exp(-0.5 * away * away)
             if not turning_known:
                 likely = _SHARES @ likely
