@@ -395,7 +395,7 @@ class FootEstimator:
         axes.update(dt, force, x, y, z, sd)
         if axes.doubt and not was:
             self._history.clear()
-            self.ground.fade(math.inf)
+            self.ground.forget()
             mean, sd = self.ground.friction
             self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
@@ -549,7 +549,7 @@ class FootEstimator:
             stance.dome_share, ground.log_odds, stance.peak_load, stance.peak_ratio,
             stance.peak_turning, ground.wet_probability, friction_mean, friction_sd,
         )  # fmt: skip
-        return doubt.doubt(evidence, ground.prior, self._expected_load)
+        return doubt.doubt(evidence, ground.expected, self._expected_load)
 
     def _filter(self, duration: float, turning_known: bool) -> None:
         """Update the filter with the means of the window, which has lasted ``duration``, s."""

@@ -22,6 +22,7 @@ from scipy import special
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import GRID
 from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
@@ -54,17 +55,17 @@ DRAINING_TIME = 0.05
 """Time in which the film under a dome drains at the start of a stance, s: in walks, friction is
 four fifths of that on dry ground after 0.05 to 0.1 s."""
 
-CREEP, CREEP_SPEED = 0.05, 0.01
+CREEP, CREEP_SPEED = 0.01, 0.02
 """Share of the windows of a sticking foot in which it rolls or bends, and the mean of its speed
-then, m/s; the density is assumed exponential. Without creep, ground that holds more than any gait
-demands would be taken for ground that slips at that demand."""
+then over T/N, m/s; the density is assumed exponential. Without creep, ground that holds more than
+any gait demands would be taken for ground that slips at that demand."""
 
 HELD = 0.1
 """Share of demands above its friction that a foot meets without slip, at its limit, because other
 feet hold the body."""
 
-MODEL_ERROR = 0.005
-MODEL_SQUARE = 0.05
+MODEL_ERROR = 0.01
+MODEL_SQUARE = 0.08
 """Error of friction measured in slip, mean over a walk: the first, and the second times the square
 of friction. A window may contain some stick, and feet turn more or less than assumed; the more
 they hold, the slower they slip, and the more turning hides."""
@@ -99,6 +100,8 @@ class GroundFilter:
     ----------
     prior : FrictionPrior
         Friction by the contact model.
+    expected : FrictionPrior
+        Friction of new ground, median, by what the feet have learnt up to this stance.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -146,6 +149,8 @@ class GroundFilter:
         expected = self._shared.expected(time)
         self._flat_prior = self._grounds * expected[:2]
         self._priors = {False: expected[:2], True: expected[2:4]}
+        medians = [float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in expected[:3]]
+        self.expected = FrictionPrior(*medians)
         self._undrained = expected[4]
 
     def _begin(self) -> None:
@@ -182,6 +187,12 @@ class GroundFilter:
         """Fade towards the prior over a distance, m, without measurements."""
         self._move(distance)
         self._normalise(self._posterior)
+
+    def forget(self) -> None:
+        """Return to the prior, and take back what this foot has said to the others."""
+        self._shared.forget(self._foot)
+        self.fade(math.inf)
+        self._begin()
 
     @property
     def posterior(self) -> Posterior:
@@ -233,7 +244,8 @@ class GroundFilter:
         # and T/N is μ. Slip: the same, less the part used by turning.
         rest = stick
         if speed > 0.0:
-            rest += CREEP * math.exp(-speed / CREEP_SPEED) / CREEP_SPEED
+            creep = CREEP_SPEED * ratio + speed_noise
+            rest += CREEP * math.exp(-speed / creep) / creep
         likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
         unmet /= _ROOT_2_PI * ratio_noise

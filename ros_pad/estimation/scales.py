@@ -30,8 +30,9 @@ CLASSES = ('flat_dry', 'flat_wet', 'dome')
 """Classes of friction; domes on wet ground share the scale of those on dry ground."""
 
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
-SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
-"""Grid of ln(scale), and of spreads, which are equally likely before a walk."""
+SPREADS = np.array([0.1, 0.2])
+"""Grid of ln(scale), and of spreads, which are equally likely before a walk. What feet feel hardly
+shows a spread: smaller ones would be believed on floors that do not have them."""
 
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
@@ -156,7 +157,7 @@ class FrictionScales:
     ) -> None:
         self.prior = prior
         self._learns = learns
-        self._feet = 0
+        self._fed: list[np.ndarray] = []
         rows, tables = [], []
         for name in CLASSES:
             scale, sd = (scales or {}).get(name, Scale())
@@ -166,7 +167,8 @@ class FrictionScales:
             away = np.log(EDGES / getattr(prior, name)) - LOG_SCALES[:, None, None]
             table = np.diff(special.ndtr(away / SPREADS[:, None]), axis=-1) + TAIL / len(GRID)
             tables.append((table / table.sum(axis=-1, keepdims=True)).reshape(-1, len(GRID)))
-        self._weights, self._tables = rows, tables
+        self._before_walk, self._tables = np.array(rows), tables
+        self._weights = self._before_walk
         ends = sorted((prior.flat_wet, prior.dome))
         between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
         self._undrained = between / between.sum()
@@ -179,8 +181,14 @@ class FrictionScales:
 
     def join(self) -> int:
         """Return the number of one more foot."""
-        self._feet += 1
-        return self._feet - 1
+        self._fed.append(np.zeros_like(self._before_walk))
+        return len(self._fed) - 1
+
+    def forget(self, foot: int) -> None:
+        """Take back all that a foot has felt, from its number: its sensors were wrong."""
+        self._felt = [felt for felt in self._felt if felt.foot != foot]
+        self._fed[foot][:] = 0.0
+        self._weigh()
 
     @property
     def scales(self) -> dict[str, Scale]:
@@ -234,14 +242,19 @@ class FrictionScales:
             wets = (1.0 - REWETTED) * self._tables[2].dot(on_wet.dot(self._films))
             wets += REWETTED * self._undrained.dot(on_wet)
             if_dry, if_wet = self._weights[2].dot(dries), self._weights[2].dot(wets)
-            self._multiply(2, dry * dries / if_dry + wet * wets / if_wet, felt.weight)
+            self._multiply(felt, 2, dry * dries / if_dry + wet * wets / if_wet)
             return
         # The ground is uncertain: what the scale of one class explains, the other need not.
         dries, wets = self._tables[0].dot(on_dry), self._tables[1].dot(on_wet)
         if_dry, if_wet = self._weights[0].dot(dries), self._weights[1].dot(wets)
-        self._multiply(0, dry * dries + wet * if_wet, felt.weight)
-        self._multiply(1, wet * wets + dry * if_dry, felt.weight)
+        self._multiply(felt, 0, dry * dries + wet * if_wet)
+        self._multiply(felt, 1, wet * wets + dry * if_dry)
 
-    def _multiply(self, index: int, likelihood: np.ndarray, weight: float) -> None:
-        weights = self._weights[index] * (likelihood / likelihood.max()) ** weight
-        self._weights[index] = weights / weights.sum()
+    def _multiply(self, felt: Felt, index: int, likelihood: np.ndarray) -> None:
+        self._fed[felt.foot][index] += felt.weight * np.log(likelihood / likelihood.max())
+        self._weigh()
+
+    def _weigh(self) -> None:
+        felt = sum(self._fed)
+        weights = self._before_walk * np.exp(felt - felt.max(axis=1, keepdims=True))
+        self._weights = weights / weights.sum(axis=1, keepdims=True)
