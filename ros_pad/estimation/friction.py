@@ -55,14 +55,10 @@ DRAINING_TIME = 0.05
 """Time in which the film under a dome drains at the start of a stance, s: in walks, friction is
 four fifths of that on dry ground after 0.05 to 0.1 s."""
 
-CREEP, CREEP_SPEED = 0.01, 0.02
-"""Share of the windows of a sticking foot in which it rolls or bends, and the mean of its speed
-then over T/N, m/s; the density is assumed exponential. Without creep, ground that holds more than
+CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
+"""Share of the windows of a sticking foot in which it rolls or bends, the mean of its speed then
+over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground that holds more than
 any gait demands would be taken for ground that slips at that demand."""
-
-HELD = 0.1
-"""Share of demands above its friction that a foot meets without slip, at its limit, because other
-feet hold the body."""
 
 MODEL_ERROR = 0.01
 MODEL_SQUARE = 0.08
@@ -240,16 +236,13 @@ class GroundFilter:
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick or creep: T/N is the gait's demand, and μ is above it. Held: the demand is above μ,
-        # and T/N is μ. Slip: the same, less the part used by turning.
+        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
+        # and T/N is μ less the part used by turning.
         rest = stick
         if speed > 0.0:
-            creep = CREEP_SPEED * ratio + speed_noise
+            creep = CREEP_SPEED * (ratio + LEAST_PULL)
             rest += CREEP * math.exp(-speed / creep) / creep
         likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
-        unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
-        unmet /= _ROOT_2_PI * ratio_noise
-        likelihood += HELD * stick * unmet * np.exp(-0.5 * away * away)
         if slip > 0.0:
             if not turning_known:
                 left = speed / np.hypot(speed, self._rim_speeds)
@@ -257,7 +250,8 @@ class GroundFilter:
             likely = np.exp(-0.5 * away * away)
             if not turning_known:
                 likely = _SHARES @ likely
-            likelihood += slip * unmet * likely
+            unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
+            likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
         before = self.wet_probability
         shown = 1.0
         if slip > 0.0 and not turning_known and self._rim_speed > 0.0:
