@@ -57,8 +57,8 @@ four fifths of that on dry ground after 0.05 to 0.1 s."""
 
 CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
 """Share of the windows of a sticking foot in which it rolls or bends, the mean of its speed then
-over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground that holds more than
-any gait demands would be taken for ground that slips at that demand."""
+over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground
+that holds more than any gait demands would be taken for ground that slips at that demand."""
 
 MODEL_ERROR = 0.01
 MODEL_SQUARE = 0.08

@@ -47,7 +47,7 @@ def test_expected_friction_is_a_probability_with_a_tail():
 
 @pytest.mark.parametrize(('scale', 'sd'), [(1.0, 0.4), (0.7, 0.1)])
 def test_friction_is_expected_log_normally_about_the_contact_model(scale, sd):
-    """Mean and deviation of ln μ; two equally likely spreads of 10 and 20 % widen the deviation."""
+    """Mean and deviation of ln μ; two equally likely spreads, 10 and 20 %, widen the latter."""
     given = {name: Scale(scale, sd) for name in CLASSES}
     rows = FrictionScales(PRIOR, given).expected(0.0)
     spread = np.mean(np.square([0.1, 0.2]))
