@@ -255,6 +255,6 @@ class FrictionScales:
         self._weigh()
 
     def _weigh(self) -> None:
-        felt = sum(self._fed)
+        felt = np.sum(self._fed, axis=0)
         weights = self._before_walk * np.exp(felt - felt.max(axis=1, keepdims=True))
         self._weights = weights / weights.sum(axis=1, keepdims=True)

@@ -137,9 +137,10 @@ CONDITIONS = tuple(_conditions())
 def drawn(seed: int) -> tuple[Condition, str]:
     """Return a floor and a policy, drawn from what the estimator expects before a walk."""
     generator = np.random.default_rng([seed, 9])
-    factors = np.exp(SCALE_SD * generator.normal(size=3)).tolist()
+    dry, wet, dome = np.exp(SCALE_SD * generator.normal(size=3)).tolist()
     scene = 'quadruped_patches' if seed % 4 == 3 else 'hexapod_patches'
-    floor = Condition(DRAWN, *factors, spread=float(generator.choice(SPREADS)), scene=scene)
+    spread = float(generator.choice(SPREADS))
+    floor = Condition(DRAWN, dry, wet, dome, spread, scene=scene)
     return floor, ('flat', 'dome', 'adaptive')[seed % 3]
 
 
