@@ -377,23 +377,26 @@ def _row(
 
 
 def table(rows: Sequence[Row], phases: Sequence[str] = ('whole', 'late')) -> str:
-    """Return the rows of some phases as a table in Markdown."""
+    """Return the filter that learns, beside the scores of the others, as a table in Markdown."""
     lines = [
-        '| condition | class | filter | 95 % interval holds (by walk) | of stances | 2 sd |'
-        ' below 5 % (by walk) | width | CRPS | wrong labels | stances | walks |',
-        '|---' * 12 + '|',
+        '| floor | class | 95 % interval holds (by walk) | below 5 % (by walk) | width |'
+        + ' | '.join(f' CRPS, {name}' for name in FILTERS)
+        + ' | wrong labels | stances, walks |',
+        '|---' * (7 + len(FILTERS)) + '|',
     ]
     for row in rows:
-        if row.phase in phases:
-            low, high = row.coverages
-            least, most = row.belows
-            wrong = '' if row.wrong_labels is None else f'{row.wrong_labels:.3f}'
-            lines.append(
-                f'| {row.condition} | {row.ground} | {row.filter} | {row.coverage:.3f}'
-                f' ({low:.2f} to {high:.2f}) | {row.stance_coverage:.3f} | {row.within_2sd:.3f} |'
-                f' {row.below:.3f} ({least:.2f} to {most:.2f}) | {row.width:.3f} |'
-                f' {row.crps:.4f} | {wrong} | {row.stances} | {row.walks} |'
-            )
+        if row.phase not in phases or row.filter != LEARNS:
+            continue
+        place = (row.condition, row.phase, row.ground)
+        same = [each for each in rows if (each.condition, each.phase, each.ground) == place]
+        scores = ' | '.join(f'{each.crps:.3f}' for each in same)
+        wrong = '' if row.wrong_labels is None else f'{row.wrong_labels:.3f}'
+        lines.append(
+            f'| {row.condition} | {row.ground} | {row.coverage:.3f}'
+            f' ({row.coverages[0]:.2f} to {row.coverages[1]:.2f}) | {row.below:.3f}'
+            f' ({row.belows[0]:.2f} to {row.belows[1]:.2f}) | {row.width:.2f} | {scores} |'
+            f' {wrong} | {row.stances}, {row.walks} |'
+        )
     return '\n'.join(lines)
 
 
