@@ -30,7 +30,7 @@ CLASSES = ('flat_dry', 'flat_wet', 'dome')
 """Classes of friction; domes on wet ground share the scale of those on dry ground."""
 
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
-SPREADS = np.array([0.1, 0.2])
+SPREADS = np.array([0.08, 0.16])
 """Grid of ln(scale), and of spreads, which are equally likely before a walk. What feet feel hardly
 shows a spread: smaller ones would be believed on floors that do not have them."""
 

@@ -47,10 +47,10 @@ def test_expected_friction_is_a_probability_with_a_tail():
 
 @pytest.mark.parametrize(('scale', 'sd'), [(1.0, 0.4), (0.7, 0.1)])
 def test_friction_is_expected_log_normally_about_the_contact_model(scale, sd):
-    """Mean and deviation of ln μ; two equally likely spreads, 10 and 20 %, widen the latter."""
+    """Mean and deviation of ln μ; two equally likely spreads, 8 and 16 %, widen the latter."""
     given = {name: Scale(scale, sd) for name in CLASSES}
     rows = FrictionScales(PRIOR, given).expected(0.0)
-    spread = np.mean(np.square([0.1, 0.2]))
+    spread = np.mean(np.square([0.08, 0.16]))
     for row, mean in zip(rows, (0.8, 0.12, 0.41), strict=False):
         core = row - row.min()  # without the tail
         core /= core.sum()
@@ -89,11 +89,11 @@ def test_what_a_foot_said_is_taken_back():
 def test_slips_at_known_ground_show_the_scale():
     """With a normal prior and slips that differ by a spread, mean and deviation are those of
     Bayes' rule for a normal distribution with a known spread, one of the grid."""
-    logs = np.random.default_rng(1).normal(math.log(0.5), 0.1, 40)
+    logs = np.random.default_rng(1).normal(math.log(0.5), 0.08, 40)
     stances = [felt(slip_at(math.exp(each)), slip_at(math.exp(each)), wet=1e-6) for each in logs]
     found = learnt(shared_by(1), stances)
     scale, sd = found['flat_dry']
-    precision = len(logs) / (0.1**2 + 0.05**2)
+    precision = len(logs) / (0.08**2 + 0.05**2)
     mean = (logs.mean() - math.log(0.8)) * precision / (precision + 1.0 / 0.4**2)
     assert math.log(scale) == pytest.approx(mean, abs=0.02)
     assert sd == pytest.approx(1.0 / math.sqrt(precision), rel=0.5)

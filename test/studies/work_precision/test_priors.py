@@ -66,13 +66,13 @@ def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
 
 
 def test_floors_are_drawn_from_what_the_estimator_expects_before_a_walk():
-    """ln of factors is N(0, 0.4), spreads are 0.1 and 0.2: of 400 floors the mean is within 3.5
+    """ln of factors is N(0, 0.4), spreads are 0.08 and 0.16: of 400 floors the mean is within 3.5
     standard errors, and the deviation."""
     floors = [priors.drawn(seed)[0] for seed in range(400)]
     logs = np.log([(each.dry, each.wet, each.dome) for each in floors])
     assert abs(logs.mean(axis=0)).max() < 3.5 * 0.4 / 20.0
     assert abs(logs.std(axis=0) / 0.4 - 1.0).max() < 3.5 / math.sqrt(800.0)
-    assert {each.spread for each in floors} == {0.1, 0.2}
+    assert {each.spread for each in floors} == {0.08, 0.16}
     assert {priors.drawn(seed)[1] for seed in range(3)} == {'flat', 'dome', 'adaptive'}
 
 
