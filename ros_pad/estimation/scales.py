@@ -234,10 +234,11 @@ class FrictionScales:
             self._learn(self._felt.pop(0))
 
     def _learn(self, felt: Felt) -> None:
-        on_dry, on_wet = np.exp(felt.likelihood - felt.likelihood.max())
+        # What a dome feels does not show the ground: both keep their odds.
+        most = felt.likelihood.max(axis=1 if felt.dome else None, keepdims=True)
+        on_dry, on_wet = np.exp(felt.likelihood - most)
         dry, wet = 1.0 - felt.wet, felt.wet
         if felt.dome:
-            # What a dome feels does not show the ground: both keep their odds.
             dries = self._tables[2].dot(on_dry)
             wets = (1.0 - REWETTED) * self._tables[2].dot(on_wet.dot(self._films))
             wets += REWETTED * self._undrained.dot(on_wet)

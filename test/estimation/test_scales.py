@@ -132,6 +132,13 @@ def test_weights_count_as_parts_of_a_stance():
     assert many['flat_dry'] == pytest.approx(one['flat_dry'], rel=0.01)
 
 
+def test_how_much_less_likely_a_long_stance_of_a_dome_is_on_dry_ground_changes_nothing():
+    """Only the film under a dome on wet ground forgets, so the sums are of different lengths."""
+    short = learnt(shared_by(1), [felt(slip_at(0.3), slip_at(0.3), dome=True)])
+    long = learnt(shared_by(1), [felt(slip_at(0.3) - 1e4, slip_at(0.3), dome=True)])
+    assert long['dome'] == pytest.approx(short['dome'], rel=1e-9)
+
+
 def test_the_order_in_which_feet_are_heard_does_not_matter():
     stances = [
         felt(slip_at(0.4 + 0.1 * foot), slip_at(0.12), 0.1 * step, foot, wet=0.3)
