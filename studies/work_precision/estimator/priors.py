@@ -379,8 +379,8 @@ def _row(
 def table(rows: Sequence[Row], phases: Sequence[str] = ('whole', 'late')) -> str:
     """Return the filter that learns, beside the scores of the others, as a table in Markdown."""
     lines = [
-        '| floor | class | 95 % interval holds (by walk) | below 5 % (by walk) | width |'
-        + ' | '.join(f' CRPS, {name}' for name in FILTERS)
+        '| floor | class | 95 % interval holds (by walk) | below 5 % (by walk) | width | '
+        + ' | '.join(f'CRPS, {name}' for name in FILTERS)
         + ' | wrong labels | stances, walks |',
         '|---' * (7 + len(FILTERS)) + '|',
     ]
