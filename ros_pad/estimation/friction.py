@@ -187,7 +187,7 @@ class GroundFilter:
     def forget(self) -> None:
         """Return to the prior, and take back what this foot has said to the others."""
         self._shared.forget(self._foot)
-        self.fade(math.inf)
+        self._normalise(self._grounds * self._priors[self._dome])
         self._begin()
 
     @property

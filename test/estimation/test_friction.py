@@ -309,3 +309,17 @@ def test_a_thousand_touch_downs_without_a_word_leave_a_belief(dome):
         ground.touch_down(1e-3, dome)
     assert 0.6 < ground.wet_probability < 0.8  # 1 m on; the patch length is 1.5 m
     assert 0.0 < ground.friction[0] < 1.6
+
+
+def test_a_foot_that_has_forgotten_learns_again():
+    shared = FrictionScales(PRIOR)
+    ground = GroundFilter(shared, wet_prior=0.1)
+    before = ground.friction
+    for step in range(6):
+        ground.touch_down(0.5, False, float(step))
+        slip(ground, 0.5)
+        if step == 2:
+            ground.forget()
+            assert ground.friction == pytest.approx(before)
+    shared.expected(20.0)
+    assert shared.scales['flat_dry'].scale == pytest.approx(0.5 / 0.8, rel=0.15)
