@@ -70,7 +70,7 @@ class StanceEvidence(NamedTuple):
 def doubt(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) -> str:
     """Return why the ground is unobservable in a stance; '' if it is observable.
 
-    The expected load is in N.
+    The expected load is in N; the friction is what feet expect of new ground.
     """
     if stance.dome_share > ALL_DOMED:
         return 'domed: wet and dry ground feel alike'

@@ -50,9 +50,6 @@ NOT_YET = 'not yet: has not stood'
 NOT_AGAIN = 'not yet: has not stood since its sensors were in doubt'
 """Doubt of a foot whose sensors can be used again."""
 
-FAR = 1e6
-"""Distance from which nothing is known here, m. Ways are added up, so it is not infinite."""
-
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
@@ -463,7 +460,7 @@ class FootEstimator:
         """Forget what was learnt in wrong axes."""
         self._looks = True
         self._history.clear()
-        self.ground.fade(FAR)
+        self.ground.forget()
         mean, sd = self.ground.friction
         self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
@@ -616,7 +613,7 @@ class FootEstimator:
             stance.dome_share, ground.log_odds, stance.peak_load, stance.peak_ratio,
             stance.peak_turning, ground.wet_probability, friction_mean, friction_sd,
         )  # fmt: skip
-        return doubt.doubt(evidence, ground.prior, self._expected_load)
+        return doubt.doubt(evidence, ground.expected, self._expected_load)
 
     def _filter(self, duration: float, turning_known: bool) -> None:
         """Update the filter with the means of the window, which has lasted ``duration``, s."""

@@ -22,6 +22,7 @@ from scipy import special
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import GRID
 from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
@@ -50,8 +51,17 @@ SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
 only by the speed at which they turn, which is not known and the same all through a stance."""
 
+DRAINING_TIME = 0.05
+"""Time in which the film under a dome drains at the start of a stance, s: in walks, friction is
+four fifths of that on dry ground after 0.05 to 0.1 s."""
+
+CREEP, CREEP_SPEED, LEAST_PULL = 0.01, 0.025, 0.04
+"""Share of the windows of a sticking foot in which it rolls or bends, the mean of its speed then
+over T/N, m/s, and what is added to T/N; the density is assumed exponential. Without creep, ground
+that holds more than any gait demands would be taken for ground that slips at that demand."""
+
 MODEL_ERROR = 0.01
-MODEL_SQUARE = 0.11
+MODEL_SQUARE = 0.08
 """Error of friction measured in slip, mean over a walk: the first, and the second times the square
 of friction. A window may contain some stick, and feet turn more or less than assumed; the more
 they hold, the slower they slip, and the more turning hides."""
@@ -68,8 +78,8 @@ class GroundFilter:
         Prior probability of wet ground, in (0, 1).
     patch_length : float
         Distance over which wet and dry ground are assumed to change, m, above 0.
-    forgetting_time : float
-        Time over which friction under domes may change within a stance, s.
+    draining_time : float
+        Time over which the film under domes drains at the start of a stance, s.
     temper : float
         Weight of a sample, in (0, 1]: successive samples are not independent.
     rim_speed : float
@@ -86,6 +96,8 @@ class GroundFilter:
     ----------
     prior : FrictionPrior
         Friction by the contact model.
+    expected : FrictionPrior
+        Friction of new ground, median, by what the feet have learnt up to this stance.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -100,7 +112,7 @@ class GroundFilter:
         shared: FrictionScales,
         wet_prior: float = Tuning.wet_prior,
         patch_length: float = Tuning.patch_length,
-        forgetting_time: float = 1.0,
+        draining_time: float = DRAINING_TIME,
         temper: float = 0.5,
         rim_speed: float = 0.0,
         model_error: float = MODEL_ERROR,
@@ -109,7 +121,7 @@ class GroundFilter:
         self._shared, self._foot = shared, shared.join()
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self._patch_length = patch_length
-        self._forgetting_time = forgetting_time
+        self._draining_time = draining_time
         self._temper = temper
         self._rim_speed = rim_speed
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
@@ -132,7 +144,10 @@ class GroundFilter:
         """Expect what the feet have learnt up to a time, s."""
         expected = self._shared.expected(time)
         self._flat_prior = self._grounds * expected[:2]
-        self._priors = {False: expected[:2], True: expected[2:]}
+        self._priors = {False: expected[:2], True: expected[2:4]}
+        medians = [float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in expected[:3]]
+        self.expected = FrictionPrior(*medians)
+        self._undrained = expected[4]
 
     def _begin(self) -> None:
         """Begin to note what is felt."""
@@ -159,12 +174,21 @@ class GroundFilter:
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
+        if dome:
+            self._posterior[1] = self._undrained * self.wet_probability
+            self._normalise(self._posterior)
         self._begin()
 
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
         self._move(distance)
         self._normalise(self._posterior)
+
+    def forget(self) -> None:
+        """Return to the prior, and take back what this foot has said to the others."""
+        self._shared.forget(self._foot)
+        self._normalise(self._grounds * self._priors[self._dome])
+        self._begin()
 
     @property
     def posterior(self) -> Posterior:
@@ -212,15 +236,17 @@ class GroundFilter:
         stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
         swift = max(speed, 0.0) / SLIP_SPEED
         slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ, and T/N
-        # is μ less the part used by turning.
-        likelihood = (stick * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
+        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
+        # and T/N is μ less the part used by turning.
+        rest = stick
+        if speed > 0.0:
+            creep = CREEP_SPEED * (ratio + LEAST_PULL)
+            rest += CREEP * math.exp(-speed / creep) / creep
+        likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
         if slip > 0.0:
             if not turning_known:
-                shown = speed / np.hypot(speed, self._rim_speeds)
-                away = shown * friction[:, None]
-                away -= ratio
-                away /= ratio_noise
+                left = speed / np.hypot(speed, self._rim_speeds)
+                away = (left * friction[:, None] - ratio) / ratio_noise
             likely = np.exp(-0.5 * away * away)
             if not turning_known:
                 likely = _SHARES @ likely
@@ -240,11 +266,11 @@ class GroundFilter:
             self._move(speed * dt)
         if self._dome:
             # The film under domes drains during a stance, so friction rises on the same ground.
-            keep = math.exp(-dt / self._forgetting_time)
-            self._posterior = keep * self._posterior + (1.0 - keep) * (
-                self._wet_or_dry() * self._priors[True]
-            )
-            self._felt *= keep
+            keep = math.exp(-dt / self._draining_time)
+            wet = self._posterior[1].dot(_ONES)
+            self._posterior[1] *= keep
+            self._posterior[1] += (1.0 - keep) * wet * self._priors[True][1]
+            self._felt[1] *= keep
         self._normalise(self._posterior)
 
     def _multiply(self, evidence: np.ndarray, shown: float) -> None:

@@ -27,11 +27,12 @@ GRID = np.sqrt(EDGES[:-1] * EDGES[1:])
 """Coefficients of friction, each for a cell between two of :data:`EDGES`, 5 % wide."""
 
 CLASSES = ('flat_dry', 'flat_wet', 'dome')
-"""Classes of friction; that of a dome is about the same on dry and wet ground."""
+"""Classes of friction; domes on wet ground share the scale of those on dry ground."""
 
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
-SPREADS = np.array([0.03, 0.06, 0.12, 0.24])
-"""Grid of ln(scale), and of spreads, which are equally likely before a walk."""
+SPREADS = np.array([0.08, 0.16])
+"""Grid of ln(scale), and of spreads, which are equally likely before a walk. What feet feel hardly
+shows a spread: smaller ones would be believed on floors that do not have them."""
 
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
@@ -46,9 +47,13 @@ TAIL = 0.01
 """Probability of friction of another origin, equal for all cells: unexpected ground stays
 possible, and wet or dry never become certain."""
 
-UNDRAINED = 0.3
-"""Share of a stance on wet ground in which the film under a dome has not drained: friction is then
-anywhere between that of a flat sole and that of a dome."""
+DRAINED = 0.75
+"""Least friction of a dome on wet ground, over that on dry ground, once its film has drained; any
+factor from this to one is equally likely. Before, friction is anywhere between that of a flat sole
+and that of a dome."""
+
+REWETTED = 0.05
+"""Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
 
 PERIOD = 0.5
 """Time between updates, s. All stances that begin in a period expect the same friction, so that
@@ -152,7 +157,7 @@ class FrictionScales:
     ) -> None:
         self.prior = prior
         self._learns = learns
-        self._feet = 0
+        self._fed: list[np.ndarray] = []
         rows, tables = [], []
         for name in CLASSES:
             scale, sd = (scales or {}).get(name, Scale())
@@ -162,18 +167,28 @@ class FrictionScales:
             away = np.log(EDGES / getattr(prior, name)) - LOG_SCALES[:, None, None]
             table = np.diff(special.ndtr(away / SPREADS[:, None]), axis=-1) + TAIL / len(GRID)
             tables.append((table / table.sum(axis=-1, keepdims=True)).reshape(-1, len(GRID)))
-        self._weights, self._tables = rows, tables
+        self._before_walk, self._tables = np.array(rows), tables
+        self._weights = self._before_walk
         ends = sorted((prior.flat_wet, prior.dome))
         between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
         self._undrained = between / between.sum()
+        cells = round(math.log(1.0 / DRAINED) / math.log(GRID[1] / GRID[0])) + 1
+        self._films = np.tri(len(GRID)).T - np.tri(len(GRID), k=-cells).T
+        self._films /= self._films.sum(axis=0)
         self._felt: list[Felt] = []
         self._period = -math.inf
         self._now = self._before = self._expected()
 
     def join(self) -> int:
         """Return the number of one more foot."""
-        self._feet += 1
-        return self._feet - 1
+        self._fed.append(np.zeros_like(self._before_walk))
+        return len(self._fed) - 1
+
+    def forget(self, foot: int) -> None:
+        """Take back all that a foot has felt, from its number: its sensors were wrong."""
+        self._felt = [felt for felt in self._felt if felt.foot != foot]
+        self._fed[foot][:] = 0.0
+        self._weigh()
 
     @property
     def scales(self) -> dict[str, Scale]:
@@ -189,8 +204,8 @@ class FrictionScales:
     def expected(self, time: float) -> np.ndarray:
         """Return the probabilities of friction in a stance that begins at a time, s.
 
-        The rows of the array (4, grid) are a flat foot on dry and on wet ground, and a dome on dry
-        and on wet ground.
+        The rows of the array (5, grid) are a flat foot on dry and on wet ground, and a dome on dry
+        ground, on wet ground once the film has drained, and before.
         """
         period = math.floor(time / PERIOD)
         if not self._period - 2 < period <= self._period:
@@ -209,7 +224,8 @@ class FrictionScales:
         dry, wet, dome = (
             weights.dot(table) for weights, table in zip(self._weights, self._tables, strict=True)
         )
-        return np.array([dry, wet, dome, (1.0 - UNDRAINED) * dome + UNDRAINED * self._undrained])
+        drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
+        return np.array([dry, wet, dome, drained, self._undrained])
 
     def _learn_until(self, time: float) -> None:
         """Use the stances before a time, s, in an order that does not depend on who came first."""
@@ -218,21 +234,28 @@ class FrictionScales:
             self._learn(self._felt.pop(0))
 
     def _learn(self, felt: Felt) -> None:
-        on_dry, on_wet = np.exp(felt.likelihood - felt.likelihood.max())
+        # What a dome feels does not show the ground: both keep their odds.
+        most = felt.likelihood.max(axis=1 if felt.dome else None, keepdims=True)
+        on_dry, on_wet = np.exp(felt.likelihood - most)
         dry, wet = 1.0 - felt.wet, felt.wet
         if felt.dome:
-            films = wet * UNDRAINED
-            either = self._undrained.dot(on_wet)
-            self._multiply(
-                2, (1.0 - films) * self._tables[2].dot(on_dry) + films * either, felt.weight
-            )
+            dries = self._tables[2].dot(on_dry)
+            wets = (1.0 - REWETTED) * self._tables[2].dot(on_wet.dot(self._films))
+            wets += REWETTED * self._undrained.dot(on_wet)
+            if_dry, if_wet = self._weights[2].dot(dries), self._weights[2].dot(wets)
+            self._multiply(felt, 2, dry * dries / if_dry + wet * wets / if_wet)
             return
         # The ground is uncertain: what the scale of one class explains, the other need not.
         dries, wets = self._tables[0].dot(on_dry), self._tables[1].dot(on_wet)
         if_dry, if_wet = self._weights[0].dot(dries), self._weights[1].dot(wets)
-        self._multiply(0, dry * dries + wet * if_wet, felt.weight)
-        self._multiply(1, wet * wets + dry * if_dry, felt.weight)
+        self._multiply(felt, 0, dry * dries + wet * if_wet)
+        self._multiply(felt, 1, wet * wets + dry * if_dry)
 
-    def _multiply(self, index: int, likelihood: np.ndarray, weight: float) -> None:
-        weights = self._weights[index] * (likelihood / likelihood.max()) ** weight
-        self._weights[index] = weights / weights.sum()
+    def _multiply(self, felt: Felt, index: int, likelihood: np.ndarray) -> None:
+        self._fed[felt.foot][index] += felt.weight * np.log(likelihood / likelihood.max())
+        self._weigh()
+
+    def _weigh(self) -> None:
+        felt = np.sum(self._fed, axis=0)
+        weights = self._before_walk * np.exp(felt - felt.max(axis=1, keepdims=True))
+        self._weights = weights / weights.sum(axis=1, keepdims=True)

@@ -67,9 +67,7 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
-    ground: dict[str, Any] = field(
-        default_factory=lambda: defaults(GroundFilter, 'forgetting_time', 'temper')
-    )
+    ground: dict[str, Any] = field(default_factory=lambda: defaults(GroundFilter, 'temper'))
     controller: dict[str, Any] = field(
         default_factory=lambda: defaults(MorphologyController, 'margin', 'lift_off_share')
     )
@@ -185,8 +183,6 @@ ASSUMPTIONS = (
     Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
     Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption(FILTER + 'GroundFilter.forgetting_time',
-               'ground.forgetting_time', 'forgetting time', 's'),
     Assumption(FILTER + 'GroundFilter.temper', 'ground.temper', 'temper', '', 'odds'),
     Assumption(CONTROL + 'margin', 'controller.margin', 'pressure margin', '', 'excess'),
     Assumption(CONTROL + 'lift_off_share',

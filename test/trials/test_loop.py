@@ -336,11 +336,6 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason='domes that stand at their friction limit and are held by the others count as sticking:'
-    ' their scale is learnt too large',
-    strict=True,
-)
 def test_truth_is_seldom_below_the_quantile_under_domes():
     rows, _ = watched('adaptive', 0)
     truth, _, _, quantile, domed = rows.T
