@@ -30,7 +30,7 @@ def test_the_score_is_that_of_a_normal_distribution(away):
     expected = 0.1 * (z * (2.0 * below - 1.0) + 2.0 * density - 1.0 / math.sqrt(math.pi))
     sample = priors._sample(Normal(), 1.0, 1, 0, 0.5 + away)
     assert sample.crps == pytest.approx(expected, abs=0.02 * 0.1)
-    assert sample.covered == (away < 0.196) and sample.within == (away < 0.2)
+    assert sample.covered == (away < 0.196)
     assert sample.width == pytest.approx(2.0 * 1.96 * 0.1, rel=1e-3)
     assert not sample.below
     assert priors._sample(Normal(), 1.0, 1, 0, 0.5 - 0.17).below
@@ -38,18 +38,19 @@ def test_the_score_is_that_of_a_normal_distribution(away):
 
 def test_rows_count_time_and_stances():
     """A stance of one sample counts by stance as much as one of nine."""
-    covered = [Sample(130.0 + 0.1 * k, 1, 0, 0.1, True, False, 0.2, 0.01, True) for k in range(9)]
+    covered = [Sample(130.0 + 0.1 * k, 1, 0, 0.1, True, False, 0.2, 0.01) for k in range(9)]
     missed = [Sample(140.0, 2, 0, 0.9, False, True, 0.2, 0.05)]
-    early = [Sample(10.0, 3, 1, 0.9, True, False, 0.4, 0.02, True)]
+    early = [Sample(10.0, 3, 1, 0.9, True, False, 0.4, 0.02)]
     walk = {name: [] for name in priors.FILTERS} | {priors.LEARNS: early + covered + missed}
     first, _, second, both = priors.rows_of(Condition('any'), [walk])
     assert (first.phase, first.ground, first.samples) == ('early', 'wet', 1)
     assert (second.phase, second.ground, second.stances) == ('late', 'dry', 2)
     assert second.coverage == 0.9 and second.stance_coverage == 0.5
+    assert second.right_coverage == 1.0
     assert second.below == 0.1 and second.wrong_labels == 0.5
     assert second.crps == pytest.approx((9 * 0.01 + 0.05) / 10, abs=1e-4)
     assert (both.ground, both.coverage) == ('all', 0.9)
-    assert '| any | dry | 0.900 (0.90 to 0.90) | 0.100 (' in priors.table([second])
+    assert '| any | dry | 0.900 (0.90 to 0.90) | 1.000 | 0.100 (' in priors.table([second])
 
 
 def test_the_foot_of_a_walk_has_the_friction_of_its_condition():
