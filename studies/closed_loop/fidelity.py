@@ -65,14 +65,6 @@ LEAST_SHARES = {'distance': 0.5, 'slip': 0.02}
 
 SHARES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
-# The bounds before 2026-11-23: by the grip margin, 1.5 times the largest error of 480 scenes.
-FORMER = {
-    'reserves': (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0),
-    'L0': (0.091, 0.09, 0.029, 0.029, 0.004, 0.004, 0.001, 0.001),
-    'L1': (math.inf, 2.151, 1.137, 0.39, 0.246, 0.162, 0.112, 0.053),
-    'L2': (0.074, 0.074, 0.074, 0.016, 0.013, 0.007, 0.006, 0.004),
-}
-
 GROUPS: dict[str, Any] = {
     'grip margin below 0.7': lambda row: row['margin'] < math.log(0.7),
     'grip margin 0.7 to 1.5': lambda row: row['near'] and row['margin'] >= math.log(0.7),
@@ -176,7 +168,7 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
         inside = np.array([belongs(row) for row in own], dtype=bool)
         if inside.any():
             groups[group] = _share(found[inside] <= limits[inside])
-    result = _share(found <= limits) | {
+    return _share(found <= limits) | {
         'scenes': model['scenes'],
         'median_error': float(np.median(found)),
         'median_bound': float(np.median(limits)),
@@ -186,11 +178,6 @@ def checked(model: dict[str, Any], rows: Sequence[dict[str, Any]], name: str) ->
             for share in SHARES
         },
     }
-    if (level := name.removesuffix(' distance')) in FORMER:
-        places = np.searchsorted(FORMER['reserves'], np.exp(known[:, 0]), 'right') - 1
-        former = np.array(FORMER[level])[places]
-        result['former'] = _share(found <= former) | {'median_bound': float(np.median(former))}
-    return result
 
 
 def _share(kept: np.ndarray) -> dict[str, Any]:
@@ -276,8 +263,8 @@ def summary(document: dict[str, Any]) -> str:
     """Return shares, intervals and sharpness as tables in Markdown, the second by group."""
     lines = [
         '| robot, level, metric | scenes of the fit | held out | kept | 95 % interval'
-        ' | median error | median bound | former bound, kept |',
-        '|---|---|---|---|---|---|---|---|',
+        ' | median error | median bound |',
+        '|---|---|---|---|---|---|---|',
     ]
     grouped = {}
     for robot, part in document['robots'].items():
@@ -286,7 +273,6 @@ def summary(document: dict[str, Any]) -> str:
                 continue
             if name.startswith('L') and name.endswith('distance'):
                 grouped[f'`{robot}` {name.removesuffix(" distance")}'] = row['groups']
-            old = row.get('former')
             cells = [
                 f'`{robot}` {name}',
                 str(row['scenes']),
@@ -295,7 +281,6 @@ def summary(document: dict[str, Any]) -> str:
                 ' to '.join(map(_percent, row['interval'])),
                 _percent(row['median_error']),
                 _percent(row['median_bound']),
-                f'{_percent(old["median_bound"])}, {_percent(old["kept"])}' if old else '–',
             ]
             lines.append(f'| {" | ".join(cells)} |')
     for words, levels in (('cheapest level', ('L0', 'L1')), ('L2', ('L2',))):
@@ -312,7 +297,7 @@ def summary(document: dict[str, Any]) -> str:
             share = [_percent(each) for each in conformal.interval(kept, count)]
             lines.append(
                 f'| all, {words} {metric} | | {count} | {_percent(kept / count)}'
-                f' | {" to ".join(share)} | | | |'
+                f' | {" to ".join(share)} | | |'
             )
     lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
     for group in GROUPS:

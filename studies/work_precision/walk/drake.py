@@ -5,7 +5,7 @@ Links, masses, servos, gait, floor, films and the law of resistance are the same
 dynamics and contact are Drake's. Drake's friction is that of a point and has no yaw moment, so
 there are two ways to bring in the feet:
 
-- ``sap``, ``similar``, ``lagged``, ``tamsi``: Drake finds the forces; before each step the
+- ``sap``, ``lagged``, ``tamsi``: Drake finds the forces; before each step the
   coefficient of a foot is set from its load in the last one. Soles do not resist turning.
 - ``bristles``: force elements. The ground is a stiff damped spring; along it a foot shears
   elastically up to its cap, which sliding and turning share, as on L1 and L2.
@@ -52,7 +52,7 @@ class Contact:
     Attributes
     ----------
     kind : str
-        ``bristles``, ``sap``, ``lagged``, ``similar`` or ``tamsi``, see above.
+        ``bristles``, ``sap``, ``lagged`` or ``tamsi``, see above.
     stiffness : float
         Of the ground, and of bristles in shear, N/m.
     damping : float
