@@ -291,14 +291,14 @@ def _write_names(panel: Axes, part: Sequence[WalkResult]) -> None:
             .replace(f', {LEGS} legs', '')
             .removeprefix('solve_ivp, '),
             (result.ms_per_second, 1e2 * result.errors['distance']),
-            xytext={'RailLeg': (-40, -16)}.get(
-                family, (-6, -18) if 'walk_many' in family else (8, -3)
+            xytext={'RailLeg': (2, 9)}.get(
+                family, (-56, -18) if 'walk_many' in family else (8, -3)
             ),
             textcoords='offset points',
             fontsize=8,
             color=_LOOKS[family]['color'],
         )
-    panel.set_xlim(right=8.0 * max(result.ms_per_second for result in part))
+    panel.set_xlim(right=60.0 * max(result.ms_per_second for result in part))
 
 
 def _strips(panel: Axes, part: Sequence[WalkResult], title: str) -> None:
