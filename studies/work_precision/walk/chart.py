@@ -292,7 +292,7 @@ def _write_names(panel: Axes, part: Sequence[WalkResult]) -> None:
             .removeprefix('solve_ivp, '),
             (result.ms_per_second, 1e2 * result.errors['distance']),
             xytext={'RailLeg': (2, 9)}.get(
-                family, (-56, -18) if 'walk_many' in family else (8, -3)
+                family, (-34, -18) if 'walk_many' in family else (8, -3)
             ),
             textcoords='offset points',
             fontsize=8,
