@@ -34,7 +34,7 @@ def figure(document: dict[str, Any]) -> Figure:
     with matplotlib.rc_context(STYLE):
         drawn = Figure(figsize=(9.0, 4.4), layout='constrained')
         work, kept = drawn.subplots(1, 2, width_ratios=(1.7, 1.0))
-        names = []
+        names: list[str] = []
         for (robot, level), look in LOOKS.items():
             part = document['robots'].get(robot)
             if part and f'{level} distance' in part['bounds']:
