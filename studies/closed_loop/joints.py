@@ -32,7 +32,7 @@ from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.tally import count_alarms
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
-FIRST_SEED = 201  # earlier ones were used while the code was written
+FIRST_SEED = 401  # earlier ones were used while the code was written and mended
 GATE = 0.3
 """Share of the expected load above which a foot stands."""
 
