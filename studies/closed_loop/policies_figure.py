@@ -65,7 +65,7 @@ def _by_ground(panel: Axes, document: Mapping[str, Any], tuned_on: Sequence[str]
     _finish(panel, names)
     for head in heads:
         panel.get_yticklabels()[head].set_fontweight('bold')
-    panel.set_title('adaptive, by ground (floors; of one no interval)')
+    panel.set_title('adaptive, by ground (floors; one floor has no interval)', loc='right')
 
 
 def _ratio(
