@@ -512,7 +512,9 @@ def main(words: Sequence[str]) -> int:
     document = measure(
         options.floors, options.cycles, options.walks, options.processes, options.short
     )
-    document = command.write(options.out, 'policies', document, {'policies': draw(document)})
+    document = command.write(
+        options.out, 'policies', document, {'policies': draw(document, TUNED_ON)}
+    )
     if options.out == command.CHARTS:
         PAGE.write_text(written(PAGE.read_text(), table(document)))
     command.show(options, document, table(document))

@@ -19,7 +19,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.figure import SubFigure
-from matplotlib.lines import Line2D
 
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
@@ -37,9 +36,8 @@ REPEATS = 5
 _REFUSALS = (ArithmeticError, ValueError, RuntimeError, PadError)
 _FLOOR = 1e-17  # smaller errors are drawn here: the resolution of a double
 _CAPTION = (
-    'Disc: median error; whisker: worst of the answers that are no failures. An error of 0 is'
-    ' drawn at 1e-17. Green: ros_pad; blue: others; orange: others that are wrong without a'
-    ' warning.'
+    'Green: ros_pad; blue: others; orange: others that are wrong without a warning.\n'
+    'The worst error is that of the answers that are no failures; an error of 0 is drawn at 1e-17.'
 )
 
 
@@ -260,93 +258,60 @@ def table(results: Sequence[Result]) -> str:
     return '\n'.join(lines)
 
 
-WIDTH, HEIGHT = 5.2, 6.6
-"""Of a panel with the names of its methods, in."""
+WIDTH = 9.0
+"""Of a picture, in."""
+
+
+def inches(results: Sequence[Result]) -> float:
+    """Return the height, in, of the picture of results: a line for each, and each problem."""
+    return 0.19 * (len(results) + len({result.problem for result in results})) + 1.2
 
 
 def chart(results: Sequence[Result]) -> Figure:
-    """Return the log-log picture of time against error, a panel for each problem."""
-    problems = len({result.problem for result in results})
-    figure = Figure(figsize=(WIDTH * problems, HEIGHT), layout='constrained')
+    """Return the picture of times and errors, a block of lines for each problem."""
+    figure = Figure(figsize=(WIDTH, inches(results)), layout='constrained')
     draw(results, figure)
     return figure
 
 
 def draw(results: Sequence[Result], figure: Figure | SubFigure) -> None:
-    """Draw time against error, a panel for each problem.
+    """Draw times and errors side by side, a line for each method, by problem and rising time.
 
-    A disc is the median error of a method; its whisker ends at the worst error. The list below the
-    panel has the names of the methods, by rising time, and their numbers of failures.
+    A disc is the time or median error of a method; a whisker ends at its worst error.
     """
-    problems = list(dict.fromkeys(result.problem for result in results))
-    panels = figure.subplots(1, len(problems), squeeze=False)[0]
-    numbers = []
-    for panel, name in zip(panels, problems, strict=True):
-        part = sorted(
-            (result for result in results if result.problem == name),
-            key=lambda result: result.us_per_solve,
-        )
-        panel.set(xscale='log', yscale='log', title=name, xlabel='time for one solution, µs')
-        panel.set_ylabel('relative error')
-        handles = []
-        for number, result in enumerate(part, start=1):
-            colour = GREEN if result.ours else VERMILION if result.wrong else BLUE
-            low, high = max(result.median_error, _FLOOR), max(result.error, _FLOOR)
-            panel.plot(
-                [result.us_per_solve] * 2, [low, high], '-_', color=colour, lw=1.2, alpha=0.7
-            )
-            disc = {'marker': 'o', 'color': colour, 'ms': 7, 'ls': '', 'mec': 'white'}
-            panel.plot(result.us_per_solve, low, **disc, zorder=3)
-            numbers.append((panel, f'{number}', result.us_per_solve, low, colour))
-            text = f'{number}  {result.method}'
-            if result.failures:
-                text += f': {result.failures} of {result.cases} fail'
-                text += f', {result.wrong} silently' if result.wrong else ''
-            handles.append(Line2D([], [], marker='o', color=colour, ls='', ms=7, label=text))
+    times, errors = figure.subplots(1, 2, sharey=True)
+    names: list[str] = []
+    heads = []
+    for problem in dict.fromkeys(result.problem for result in results):
+        heads.append(len(names))
+        names.append(problem)
+        part = [result for result in results if result.problem == problem]
+        for result in sorted(part, key=lambda result: result.us_per_solve):
+            _line(times, errors, len(names), result)
+            names.append(result.method)
+    times.set_yticks(range(len(names)), names, fontsize=9.0)
+    for head in heads:
+        times.get_yticklabels()[head].set_fontweight('bold')
+    times.set(xscale='log', xlabel='time for one solution, µs', ylim=(len(names) - 0.4, -0.6))
+    errors.set(xscale='log', xlabel='error, relative: median to worst')
+    for panel in (times, errors):
+        panel.tick_params(axis='y', length=0)
         panel.grid(color=PALE, alpha=0.3, lw=0.5)
         panel.spines[['top', 'right']].set_visible(False)
-        panel.margins(x=0.1, y=0.1)
-        panel.legend(
-            handles=handles,
-            loc='upper left',
-            bbox_to_anchor=(-0.12, -0.13),
-            frameon=False,
-            fontsize=8.5,
-            handletextpad=0.2,
-        )
-    figure.supxlabel(_CAPTION, fontsize=8.5)
-    _write_numbers(figure, numbers)
+    figure.supxlabel(_CAPTION, fontsize=9.0)
 
 
-def _write_numbers(
-    figure: Figure | SubFigure, numbers: Sequence[tuple[Axes, str, float, float, str]]
-) -> None:
-    """Write each number beside its disc, where it covers no disc and no other number."""
-    figure.figure.draw_without_rendering()  # positions are final only after this call
-    places = [panel.transData.transform((x, y)) for panel, _, x, y, _ in numbers]
-    points = figure.dpi / 72.0
-    taken = list(places)
-    for (panel, text, x, y, colour), place in zip(numbers, places, strict=True):
-        around = [
-            (reach * math.cos(angle), reach * math.sin(angle))
-            for reach in (9.0, 14.0, 20.0)
-            for angle in np.radians((-90.0, 0.0, 180.0, -45.0, -135.0, 45.0, 135.0))
-        ]
-
-        def room(shift: tuple[float, float], place: Array = place) -> float:
-            there = place + points * np.array(shift)
-            return min(math.dist(there, other) for other in taken)
-
-        shift = next((each for each in around if room(each) > 8.5 * points), max(around, key=room))
-        taken.append(place + points * np.array(shift))
-        panel.annotate(
-            text,
-            (x, y),
-            xytext=shift,
-            textcoords='offset points',
-            ha='center',
-            va='center',
-            fontsize=8.5,
+def _line(times: Axes, errors: Axes, place: int, result: Result) -> None:
+    colour = GREEN if result.ours else VERMILION if result.wrong else BLUE
+    disc: dict[str, Any] = {'marker': 'o', 'color': colour, 'ms': 6.5, 'mec': 'white', 'zorder': 3}
+    low, high = max(result.median_error, _FLOOR), max(result.error, _FLOOR)
+    times.plot(result.us_per_solve, place, **disc)
+    errors.plot([low, high], [place] * 2, '-|', color=colour, lw=1.4)
+    errors.plot(low, place, **disc)
+    if result.failures:
+        text = f'{result.failures} of {result.cases} fail'
+        text += f', {result.wrong} silently' if result.wrong else ''
+        errors.text(
+            1.01, place, text, transform=errors.get_yaxis_transform(), va='center', fontsize=9.0,
             color=colour,
-            zorder=4,
-        )
+        )  # fmt: skip

@@ -39,12 +39,12 @@ from studies.drawing import GREEN
 from studies.drawing import PALE
 from studies.drawing import VERMILION
 from studies.work_precision import measured
-from studies.work_precision.comparison import HEIGHT
 from studies.work_precision.comparison import WIDTH
 from studies.work_precision.comparison import Method
 from studies.work_precision.comparison import Problem
 from studies.work_precision.comparison import Result
 from studies.work_precision.comparison import draw
+from studies.work_precision.comparison import inches
 from studies.work_precision.comparison import run
 
 PAD = LARGE_PAD
@@ -84,13 +84,17 @@ def measure(progress: Progress) -> list[Result]:
 def figures(results: list[Result], progress: Progress | None = None) -> dict[str, Figure]:
     """Return the pictures by name: the chart, and the map of where methods fail."""
     maps = failure_maps(progress=progress)
-    panels = len({result.problem for result in results})
-    size = (WIDTH * panels, HEIGHT + 4.4)
-    whole = Figure(figsize=size, layout='constrained')
-    parts: Any = whole.subfigures(2, 1, height_ratios=(HEIGHT, 4.4))
-    measured.draw(parts[1])
+    return {'contact': figure(results), 'contact_failures': draw_maps(maps)}
+
+
+def figure(results: list[Result]) -> Figure:
+    """Return the chart: times and errors of the methods, and below errors of the laws."""
+    above, below = inches(results), 3.7
+    whole = Figure(figsize=(WIDTH, above + below), layout='constrained')
+    parts: Any = whole.subfigures(2, 1, height_ratios=(above, below))
     draw(results, parts[0])
-    return {'contact': whole, 'contact_failures': draw_maps(maps)}
+    measured.draw(parts[1])
+    return whole
 
 
 # --- free dome -----------------------------------------------------------------------------------

@@ -214,7 +214,7 @@ def draw(figure: SubFigure) -> None:
         low, high = np.fmin.reduce(errors), np.fmax.reduce(errors)
         panel.vlines(places + shift, low, high, color=model.colour, lw=2.0, alpha=0.5)
         gone = np.isnan(errors).any(axis=0) & ~np.isnan(errors[0])
-        panel.plot((places + shift)[gone], high[gone] + 4.0, '^', color=model.colour, ms=6)
+        panel.plot((places + shift)[gone], high[gone] + 9.0, '^', color=model.colour, ms=6)
         panel.plot(
             places + shift, errors[0], 'o', color=model.colour, ms=6, mec='white', label=model.name
         )
@@ -230,10 +230,10 @@ def draw(figure: SubFigure) -> None:
     panel.set_ylabel('error of the law, %')
     panel.grid(axis='y', color=PALE, alpha=0.3, lw=0.5)
     panel.spines[['top', 'right']].set_visible(False)
-    panel.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8.5)
+    figure.legend(loc='outside upper center', ncols=3, frameon=False, fontsize=9.0)
     figure.supxlabel(
         'Error against each measured point of the thesis. Bars: 95 % interval of the constant that'
-        ' is fitted to the heights (cap: disc at the 40 N/m of the thesis); triangle: it has no'
-        ' state at one end. Force limits: gap of a sheet.',
-        fontsize=8.5,
+        ' is fitted\nto the heights (cap: disc at the 40 N/m of the thesis); triangle: it has no'
+        ' state at one end.\nForce limits: gap of a sheet.',
+        fontsize=9.0,
     )

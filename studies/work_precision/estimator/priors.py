@@ -39,6 +39,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from scipy import ndimage
 
 from ros_pad.estimation import estimators_of
@@ -405,40 +406,53 @@ def table(rows: Sequence[Row], phases: Sequence[str] = ('whole', 'late')) -> str
     return '\n'.join(lines)
 
 
-def draw(rows: Sequence[Row]) -> Figure:
-    """Return the picture: coverage, share below the 5 % quantile and CRPS by condition."""
-    looks = dict(zip(FILTERS, zip((GREEN, BLUE, BLACK, ORANGE, PURPLE), 'osxv^', strict=True),
-                     strict=True))  # fmt: skip
-    names = list(dict.fromkeys(row.condition for row in rows))
-    panels = (('coverage', (0.9, 0.98)), ('below', (0.03, 0.08)), ('crps', None))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(12.0, 0.34 * len(names) * 3 + 1.5))
-        figure.set_layout_engine('constrained')
-        axes = figure.subplots(len(panels), len(CLASSES), squeeze=False, sharey=True)
-        for line, (key, band) in zip(axes, panels, strict=True):
-            for axis, ground in zip(line, CLASSES, strict=True):
-                if band:
-                    axis.axvspan(*band, color='0.9', lw=0)
-                for name, (colour, marker) in looks.items():
-                    mine = [row for row in rows if row.phase != 'early' and row.filter == name]
-                    mine = [row for row in mine if row.ground == ground]
-                    axis.plot(
-                        [getattr(row, key) for row in mine],
-                        [names.index(row.condition) for row in mine],
-                        ls='', marker=marker, color=colour, ms=4.5, label=name,
-                    )  # fmt: skip
-                axis.set_title(f'{ground}: {LABELS[key]}', fontsize=8)
-                axis.set_yticks(range(len(names)), names, fontsize=6)
-                axis.invert_yaxis() if ground == CLASSES[0] else None
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside lower center', ncol=5)
-    return figure
-
-
-LABELS = {
-    'coverage': 'in 95 % interval',
-    'below': 'below 5 % quantile',
-    'crps': 'CRPS of friction',
+_LOOKS = dict(
+    zip(FILTERS, zip((GREEN, BLUE, BLACK, ORANGE, PURPLE), 'osxv^', strict=True), strict=True)
+)
+# Name of the axis, key of the interval, nominal value, target.
+_PANELS = {
+    'coverage': ('time in the 95 % interval, share', 'coverages', 0.95, (0.9, 0.98)),
+    'below': ('time below the 5 % quantile, share', 'belows', 0.05, (0.03, 0.08)),
+    'crps': ('CRPS, units of friction', '', None, None),
 }
+
+
+def draw(document: dict[str, Any]) -> Figure:
+    """Return the picture of a document: scores of each filter by floor, on all ground together."""
+    rows = [row for row in document['rows'] if row['phase'] != 'early' and row['ground'] == 'all']
+    names = list(dict.fromkeys(row['condition'] for row in rows))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 0.4 * len(names) + 1.4), layout='constrained')
+        panels = figure.subplots(1, len(_PANELS), sharey=True)
+        for panel, (key, (label, ends, nominal, target)) in zip(
+            panels, _PANELS.items(), strict=True
+        ):
+            if target:
+                panel.axvspan(*target, color='0.9', lw=0, zorder=0, label='target')
+                panel.axvline(nominal, color='0.6', lw=0.8, zorder=0, label='nominal')
+            for row in rows:
+                colour, marker = _LOOKS[row['filter']]
+                place = names.index(row['condition']) + 0.15 * (FILTERS.index(row['filter']) - 2)
+                if ends and row['walks'] > 1:
+                    panel.plot(row[ends], [place, place], color=colour, lw=0.9)
+                panel.plot(row[key], place, marker, color=colour, ms=4.0, clip_on=False)
+            for place in range(len(names) - 1):
+                panel.axhline(place + 0.5, color='0.9', lw=0.5, zorder=0)
+            panel.set_xlabel(label)
+            panel.tick_params(axis='y', length=0)
+        walks = {row['condition']: row['walks'] for row in rows}
+        panels[0].set_yticks(range(len(names)), [f'{name} ({walks[name]})' for name in names])
+        panels[0].set_ylim(max(1, len(names)) - 0.5, -0.5)
+        title = f'Dry, wet and domes together (walks). Bars: 95 % by walk; range below {FEW} walks'
+        figure.suptitle(title, fontsize=9.5)
+        panels[-1].set_xlim(left=0.0)
+        handles = [
+            Line2D([], [], color=colour, marker=marker, ms=4.0, lw=0.9, label=name)
+            for name, (colour, marker) in _LOOKS.items()
+        ]
+        handles += panels[0].get_legend_handles_labels()[0]
+        figure.legend(handles=handles, loc='outside lower center', ncols=4)
+    return figure
 
 
 def main(words: Sequence[str]) -> int:
@@ -495,6 +509,6 @@ def main(words: Sequence[str]) -> int:
         'seeds_drawn': list(draws),
         'rows': [asdict(row) for row in rows],
     }
-    written = command.write(options.out, NAME, document, {NAME: draw(rows)})
+    written = command.write(options.out, NAME, document, {NAME: draw(document)})
     command.show(options, written, table(rows))
     return 0

@@ -90,7 +90,7 @@ def tables(document: dict[str, Any]) -> dict[str, str]:
     return {
         'walks': chart.walks(rows),
         'axes': f'{turned.table(axes)}\n\n{turned.honest_table(right)}',
-        'unmoved': chart.unmoved(rows),
+        'robustness': chart.robustness(rows),
     }
 
 

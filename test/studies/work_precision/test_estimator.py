@@ -385,20 +385,33 @@ def test_intervals_are_those_of_walks_drawn_anew():
     assert 'coverage' not in row.intervals
 
 
-def test_what_moves_is_drawn_and_what_does_not_is_listed():
+def test_targets_that_a_change_breaks_are_bold():
     cases = [
         replace(
-            BLANK, part='robustness', name='force bias', unit='N', value=value, misses=misses,
-            wet_right=0.99, shipped=not value,
+            BLANK, part='robustness', name='position late', unit='s', value=value, misses=misses,
+            wet_right=0.97, false_per_minute=1.0, coverage=coverage, slips=slips, stances=20,
+            stick_minutes=2.0, shipped=not value,
         )
-        for value, misses in ((0.0, 0.001), (2.0, 0.2))
+        for value, misses, coverage, slips in ((0.0, 0.01, 0.9, 100), (0.04, 0.0101, 0.899, 99))
     ]  # fmt: skip
-    panels = [each for each in chart.draw_robustness(cases).axes if each.axison]
-    assert [(each.get_title('left'), each.get_ylabel()) for each in panels] == [
-        ('force bias', 'slips missed, %')
-    ]
-    assert '| force bias | 0 to 2, N | wet or dry right, %: 99 |' in chart.unmoved(cases)
-    assert 'missed' not in chart.unmoved(cases)
+    table = chart.robustness(cases)
+    assert '| position late by, ms | *0*, 40 | 1, **1.01** | 1 | 97 | 90, **89.9** | – |' in table
+    assert 'Each value: 99 to 100 slips, 20 to 20 stances, 2.0 to 2.0 minutes' in table
+    assert 'In 0 of 2 cases' in table and 'Axes in doubt: never.' in table
+    doubted = chart.robustness([replace(cases[1], axes=0.2, coverage=0.995)])
+    assert 'Axes in doubt: position late 0.04 s (20 % of the time).' in doubted
+    assert 'In 1 of 1 cases' in doubted
+
+
+def test_intervals_of_counts():
+    """Of 0 in 20 and 8 in 20 by Clopper and Pearson; of 0 and 10 by the table of Garwood, 1936."""
+    none = replace(BLANK, misses=0.0, wet_right=0.4, slips=20, stances=20)
+    assert chart._ends(none, 'misses') == pytest.approx((0.0, 0.1684), abs=1e-4)
+    assert chart._ends(none, 'wet_right') == pytest.approx((0.1912, 0.6395), abs=1e-4)
+    for count, ends in ((0, (0.0, 3.69)), (10, (4.80, 18.39))):
+        row = replace(BLANK, false_per_minute=count / 2.0, stick_minutes=2.0)
+        found = [2.0 * end for end in chart._ends(row, 'false_per_minute')]
+        assert found == pytest.approx(ends, abs=0.01)
 
 
 def test_table_and_pictures(rows, tmp_path):
@@ -413,12 +426,16 @@ def test_table_and_pictures(rows, tmp_path):
         assert (tmp_path / f'{name}.png').stat().st_size > 20_000
 
 
-def test_the_docs_list_what_the_file_says_does_not_move():
+def test_the_docs_have_the_tables_of_the_file():
     docs = pathlib.Path(__file__).resolve().parents[3] / 'docs'
     document = json.loads((docs / 'charts' / 'estimator.json').read_text())
     page = (docs / 'model' / 'estimation.md').read_text()
     for name, lines in study.tables(document).items():
         assert f'<!-- {name}:begin -->\n{lines}\n<!-- {name}:end -->' in page, name
+    rows = [tally.Row(**row) for row in document['rows']]
+    for change, measure in chart._DRAWN:
+        mine = [row for row in rows if (row.part, row.name) == ('robustness', change)]
+        assert any('**' in chart._cell(row, measure) for row in mine), change
 
 
 # --- turned axes --------------------------------------------------------------------------------
