@@ -279,7 +279,7 @@ def rise_times(force: np.ndarray, period: float) -> list[tuple[float, float]]:
 
 def landings() -> list[dict[str, Any]]:
     """Return how fast simulated walks load their feet on domes: 5, 50 and 95 % of stances."""
-    rows = []
+    rows, hexapod = [], Scene.load(WALKS[0])
     for name in command.each(WALKS, 'landings', 'scene'):
         scene = replace(Scene.load(name), cycles=CYCLES)
         scene = replace(scene, sensors=replace(scene.sensors, rate=RATE))
@@ -291,7 +291,10 @@ def landings() -> list[dict[str, Any]]:
             for leg in force.T:
                 found += rise_times(leg, 1.0 / RATE)
         half, most = np.quantile(found, (0.05, 0.5, 0.95), axis=0).T.tolist()
-        rows.append({'scene': name, 'stances': len(found), 'half_s': half, 'rise_s': most})
+        dry = [dry_dome(hexapod.foot, DEPTH, rise / 0.8) for rise in most]
+        rows.append(
+            {'scene': name, 'stances': len(found), 'half_s': half, 'rise_s': most, 'dry': dry}
+        )
     return rows
 
 
@@ -387,6 +390,7 @@ def _texts(document: dict[str, Any]) -> list[str]:
     lines.append('walks, L2: ms from 10 to 50 % and to 90 % of the load (5, 50, 95 % of stances)')
     lines += [
         f'  {row["scene"]:18} {_ms(row["half_s"])}  {_ms(row["rise_s"])}  n = {row["stances"]}'
+        f'  dome dry {_share(row["dry"])}'
         for row in document['landings']
     ]
     lines.append('largest error of any ring in time, by tolerance (50 rings)')
