@@ -138,7 +138,7 @@ def walk(scene: str, policy: str, criterion: str, seed: int) -> dict[str, Any]:
     for _ in loops.samples(loop, world):
         samples += len(world.legs)
         domed += [p for p in map(loop.controller.setpoint, world.legs) if p > 0.0]
-    cycles = loop.robot.time / world.gait.cycle if loop.robot.time else world.cycles
+    cycles = (loop.robot.time - world.settle) / world.gait.cycle
     return {
         'mm_a_cycle': 1e3 * loop.robot.body[0] / cycles,
         'domed': len(domed) / samples,

@@ -24,12 +24,9 @@ from matplotlib.figure import Figure
 
 from ros_pad import configuration
 from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Membrane
 from ros_pad.contact import film_thickness
 from ros_pad.contact import force_limit
 from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import squeeze
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
@@ -47,10 +44,11 @@ from ros_pad.simulation.terms import terms
 from ros_pad.trials import Trial
 from ros_pad.trials import run
 from studies import command
+from studies.work_precision.film import STANCE_DOME
+from studies.work_precision.film import dry_dome
 
 SCENE, SEED = 'hexapod_patches', 0
-DOME = 0.185, 70e3, 0.3  # N, Pa and s: a dome of the scene in mid-stance
-RISE = 0.03  # s in which its load comes
+RISE = 0.03  # s in which the load of a dome in mid-stance comes
 
 
 def lead_picture(
@@ -153,25 +151,14 @@ def _soft_film(scene: Scene) -> dict[str, float]:
         for term in terms(Scene.load(name))
         if term.term.startswith('dimple')
     ]
-    load, pressure, time = DOME
-    foot, floor = scene.foot, scene.floor
-    contact = math.sqrt(load / (math.pi * pressure))
-    sphere = float(press(foot.pad, pressure, load).sphere_radius)
-    surface = Membrane(1.51 * contact, 0.5 * pressure * sphere, pressure)
-    soft = squeeze(
-        surface, floor.film_thickness, [time], load=load, rise=RISE, rings=150, tolerance=1e-4
-    )
-    inside = soft.radius < contact
-    rigid = film_thickness(floor.film_thickness, pressure, contact, time)
-
-    def dry(film: Any) -> Any:
-        return np.exp(-((np.asarray(film) / foot.critical_film) ** foot.film_exponent))
-
+    load, pressure, time = STANCE_DOME
+    foot, depth = scene.foot, scene.floor.film_thickness
+    rigid = film_thickness(depth, pressure, math.sqrt(load / (math.pi * pressure)), time)
     return {
         'largest_loss': max(losses),
         'rise_s': RISE,
-        'dry_soft': float(np.average(dry(soft.thickness[0, inside]), weights=soft.area[inside])),
-        'dry_rigid': float(dry(rigid)),
+        'dry_soft': dry_dome(foot, depth, RISE),
+        'dry_rigid': math.exp(-((float(rigid) / foot.critical_film) ** foot.film_exponent)),
     }
 
 

@@ -14,11 +14,12 @@ from ros_pad.reports.style import Drawn
 MINIMAL = 0.10  # relative difference up to which one counts as "minimal"; not from the thesis
 
 REPRODUCED = 'reproduced'
+SAME = 'same formula'
 REFUTED = 'refuted'
 TUNED = 'tuned to agree'
 OPEN = 'underdetermined'
 NOT_MODELLED = 'not modelled'
-VERDICTS = (REPRODUCED, REFUTED, TUNED, OPEN, NOT_MODELLED)
+VERDICTS = (REPRODUCED, SAME, REFUTED, TUNED, OPEN, NOT_MODELLED)
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Claim:
         Numbers which the thesis lacks, where that leaves the statement open.
     see : str
         Derivation: a page of docs with its anchor.
+    same : bool
+        Whether the number of the thesis comes from the formula that it is compared with.
     """
 
     figure: int
@@ -60,6 +63,7 @@ class Claim:
     tuned: str = ''
     missing: str = ''
     see: str = ''
+    same: bool = False
 
     @property
     def verdict(self) -> str:
@@ -68,7 +72,7 @@ class Claim:
             return OPEN if self.missing else NOT_MODELLED
         if not self.holds:
             return REFUTED
-        return TUNED if self.tuned else REPRODUCED
+        return TUNED if self.tuned else SAME if self.same else REPRODUCED
 
     @property
     def where(self) -> str:

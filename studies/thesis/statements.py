@@ -416,8 +416,10 @@ def _walks() -> tuple[Claim, ...]:
         Claim(
             0,
             'Uneven liquid still adds capillary force, which helps the leg to walk.',
-            f'Walks leave it out. At rest it is at most {100.0 * bound:.1f} % of the friction of '
-            'a loaded foot on domes: pull of the liquid and pinned lines, ground that stays wet.',
+            f'Walks leave it out. On ground that stays {1e3 * FILM:g} mm deep, at rest, it is at '
+            f'most {100.0 * bound:.1f} % of the friction of a loaded foot on domes (pull of the '
+            'liquid and pinned lines); where the liquid round the sole has thinned there is no '
+            'such bound.',
             (bound,),
             None,
             '5.2',

@@ -57,7 +57,7 @@ STRAIGHT = 0.02  # "straight": m aside for each metre of distance; "firmly": sli
 
 _RAIL_SECTION, _RAIL_NUMBERS = '5.2', 'assumptions.md#the-leg-on-its-rail-thesis-52'
 _RAIL_TUNED = 'mass, rolling drag and load of the leg, friction and film of its foot'
-_DEMAND = 'Holds while dry friction is above the demand of the gait, as is assumed.'
+_DEMAND = 'Dry friction is assumed above the demand of the gait.'
 _HEXAPOD_SECTION, _HEXAPOD_NUMBERS = '5.3', 'model/thesis_walks.md'
 _HEXAPOD_TUNED = (
     'friction and film of the feet, drag of the hoses, share and length of wet patches'
@@ -184,6 +184,7 @@ def _claims_38(slips: Mapping[str, float], stroke: float) -> tuple[Claim, ...]:
             dry <= STRAIGHT * stroke,
             _RAIL_SECTION,
             rule=f'Up to {100.0 * STRAIGHT:g} % of the stroke. {_DEMAND}',
+            tuned=_RAIL_TUNED,
             see=_RAIL_NUMBERS,
         ),
         Claim(
@@ -396,6 +397,7 @@ def _slip_claims(number: int, middle: Slips, others: Slips, stride: float) -> tu
             bool(largest <= MINIMAL * stride),
             _HEXAPOD_SECTION,
             rule=f'Up to {100.0 * MINIMAL:g} % of the stride. {_DEMAND}',
+            tuned=_HEXAPOD_TUNED,
             see=_HEXAPOD_NUMBERS,
         ),
         Claim(

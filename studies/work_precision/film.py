@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Soft squeeze films beside Stefan's and Reynolds': time against error, shapes, and a rule.
 
-Writes film.png and .json, and prints tables. The pad is the thesis' (1.5 mm), in water 0.3 mm
+Writes film.png and .json, and prints tables, the last of how fast simulated walks load their feet
+(L2, needs mujoco). The pad is the thesis' (1.5 mm), in water 0.3 mm
 deep: flat under 0.3 N, and as a dome of 75 kPa under 0.08 to 0.285 N. True films are extrapolated
 from 150 and 300 rings with a tolerance of 1e-8.
 """
@@ -12,6 +13,7 @@ import math
 from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import asdict
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
@@ -24,16 +26,22 @@ from ros_pad.contact import Membrane
 from ros_pad.contact import Squeezed
 from ros_pad.contact import film_thickness
 from ros_pad.contact import inflate
+from ros_pad.contact import press
 from ros_pad.contact import squeeze
 from ros_pad.contact import trapped_film
+from ros_pad.contact.resistance import Foot
 from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.simulation import Scene
+from ros_pad.trials.loop import ClosedLoop
 from studies import command
+from studies.closed_loop import loops
 from studies.drawing import BLUE
 from studies.drawing import GREEN
 from studies.drawing import ORANGE
 from studies.drawing import PALE
 from studies.drawing import STYLE
 from studies.drawing import VERMILION
+from studies.samples import runs
 from studies.work_precision.comparison import Method
 from studies.work_precision.comparison import Problem
 from studies.work_precision.comparison import Result
@@ -55,6 +63,10 @@ SOLES = {
     '400 MPa': 4e8,
 }
 """Reduced moduli, Pa."""
+
+WALKS, SEEDS, CYCLES, RATE = ('hexapod_patches', 'quadruped_patches'), (0, 1, 2), 20, 1000.0  # Hz
+BOUNCE, SHORTEST = 0.05, 0.2  # s off the floor within a stance, s that a stance lasts at least
+STANCE_DOME = 0.185, 70e3, 0.3  # N, Pa and s: a dome of hexapod_patches in mid-stance
 
 TIMES = (1.0, 3.0)  # s, of the thesis' drag
 RIM = np.geomspace(1e-6, 10.0, 141)
@@ -234,6 +246,58 @@ def rises() -> list[dict[str, Any]]:
     return rows
 
 
+def dry_dome(foot: Foot, depth: float, rise: float) -> float:
+    """Return the dry share under ``STANCE_DOME`` when its load has grown in a time, s."""
+    load, pressure, time = STANCE_DOME
+    b = math.sqrt(load / (math.pi * pressure))
+    sphere = float(press(foot.pad, pressure, load).sphere_radius)
+    surface = Membrane(1.51 * b, 0.5 * pressure * sphere, pressure)
+    soft = squeeze(surface, depth, [time], load=load, rise=rise, rings=150, tolerance=1e-4)
+    inside = soft.radius < b
+    dry = np.exp(-((soft.thickness[0, inside] / foot.critical_film) ** foot.film_exponent))
+    return float(np.average(dry, weights=soft.area[inside]))
+
+
+def rise_times(force: np.ndarray, period: float) -> list[tuple[float, float]]:
+    """Return for each whole stance of a foot the times from 10 to 50 and to 90 % of its load, s.
+
+    The load of a stance is its median; between samples it is taken as linear.
+    """
+    found = []
+    for start, stop in runs(force > 0.0, round(BOUNCE / period)):
+        if start == 0 or stop == len(force) or (stop - start) * period < SHORTEST:
+            continue
+        own = force[start - 1 : stop] / np.median(force[start:stop])
+        after = [int(np.argmax(own >= share)) for share in (0.1, 0.5, 0.9)]
+        at = [
+            period * (k - 1 + (share - own[k - 1]) / (own[k] - own[k - 1]))
+            for k, share in zip(after, (0.1, 0.5, 0.9), strict=True)
+        ]
+        found.append((at[1] - at[0], at[2] - at[0]))
+    return found
+
+
+def landings() -> list[dict[str, Any]]:
+    """Return how fast simulated walks load their feet on domes: 5, 50 and 95 % of stances."""
+    rows, hexapod = [], Scene.load(WALKS[0])
+    for name in command.each(WALKS, 'landings', 'scene'):
+        scene = replace(Scene.load(name), cycles=CYCLES)
+        scene = replace(scene, sensors=replace(scene.sensors, rate=RATE))
+        found = []
+        for seed in SEEDS:
+            loop = ClosedLoop(scene, 'dome', seed, fidelity='L2')
+            feet = loop.robot.feet
+            force = np.array([[f.force[2] for f in feet] for _ in loops.samples(loop, scene)])
+            for leg in force.T:
+                found += rise_times(leg, 1.0 / RATE)
+        half, most = np.quantile(found, (0.05, 0.5, 0.95), axis=0).T.tolist()
+        dry = [dry_dome(hexapod.foot, DEPTH, rise / 0.8) for rise in most]
+        rows.append(
+            {'scene': name, 'stances': len(found), 'half_s': half, 'rise_s': most, 'dry': dry}
+        )
+    return rows
+
+
 def rule(rings: int = 100) -> list[dict[str, float]]:
     """Return by how much the mean film exceeds the rigid one, by dimple over rigid film."""
     rows, times = [], np.geomspace(1e-3, 1.0, 4)
@@ -323,6 +387,12 @@ def _texts(document: dict[str, Any]) -> list[str]:
         f'  {_um([row["dome_mean_m"]])}  {_share([row["dome_dry"]])}'
         for row in document['rises']
     ]
+    lines.append('walks, L2: ms from 10 to 50 % and to 90 % of the load (5, 50, 95 % of stances)')
+    lines += [
+        f'  {row["scene"]:18} {_ms(row["half_s"])}  {_ms(row["rise_s"])}  n = {row["stances"]}'
+        f'  dome dry {_share(row["dry"])}'
+        for row in document['landings']
+    ]
     lines.append('largest error of any ring in time, by tolerance (50 rings)')
     lines += [f'  {row["tolerance"]:g}  {row["error"]:.1e}' for row in document['tolerances']]
     lines.append('excess of the mean film over Stefan-Reynolds, by mean dimple over that film')
@@ -335,6 +405,10 @@ def _texts(document: dict[str, Any]) -> list[str]:
 
 def _um(values: Sequence[float]) -> str:
     return ' '.join(f'{1e6 * value:.3g}' for value in values)
+
+
+def _ms(values: Sequence[float]) -> str:
+    return ' '.join(f'{1e3 * value:.2g}' for value in values)
 
 
 def _share(values: Sequence[float]) -> str:
@@ -352,6 +426,7 @@ def main(words: Sequence[str]) -> int:
         'soles': sensitivity(),
         'domes': domes(),
         'rises': rises(),
+        'landings': landings(),
         'tolerances': tolerances(),
         'rule': rule(),
     }

@@ -12,6 +12,7 @@ from studies.thesis.explained import NOT_MODELLED
 from studies.thesis.explained import OPEN
 from studies.thesis.explained import REFUTED
 from studies.thesis.explained import REPRODUCED
+from studies.thesis.explained import SAME
 from studies.thesis.explained import TUNED
 from studies.thesis.explained import VERDICTS
 from studies.thesis.explained import Claim
@@ -26,6 +27,8 @@ CLAIM = Claim(20, 'more', 'less', (1.0,), True, '3.2.2')
     [
         ({}, REPRODUCED),
         ({'tuned': 'friction'}, TUNED),
+        ({'same': True}, SAME),
+        ({'same': True, 'holds': False}, REFUTED),
         ({'tuned': 'friction', 'holds': False}, REFUTED),
         ({'holds': None, 'missing': 'loads'}, OPEN),
         ({'holds': None}, NOT_MODELLED),

@@ -3,6 +3,7 @@ import json
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from ros_pad.contact.squeeze import STIFF
@@ -47,6 +48,21 @@ def test_kept_errors_fall_with_rings(document):
         errors = [rows[problem, f'{rings} rings'] for rings in (25, 50, 100, 200)]
         assert all(b < 0.4 * a for a, b in pairwise(errors))
         assert rows[problem, 'Stefan-Reynolds'] > 0.9
+
+
+def test_rise_of_a_load_by_hand():
+    """A ramp of 20 ms to 8 N, and a jump to half of it that reaches the rest 0.1 s later."""
+    time = np.arange(0.0, 0.4, 1e-3)
+    ramp = np.minimum(time / 0.02, 1.0) * 8.0
+    jump = np.where(time < 0.1, 4.0, 8.0)
+    off, bounce = np.zeros(100), np.array([5.0, 0.0, 0.0])
+    short = np.full(150, 8.0)  # no whole stance
+    force = np.concatenate([jump, off, ramp, off, short, off, bounce, jump, off, ramp])
+    found = film.rise_times(force, 1e-3)
+    assert found[0] == pytest.approx((8e-3, 16e-3), abs=1e-9)
+    # From 0 to 5 N in one sample: 10 and 50 % are within it. Of 8 N, 90 % is between 4 and 8 N.
+    assert found[1] == pytest.approx((0.64e-3, 103e-3 - 0.16e-3 + 0.8e-3), abs=1e-9)
+    assert len(found) == 2  # the first and the last stance are cut off
 
 
 def test_films_of_the_thesis_pad():
