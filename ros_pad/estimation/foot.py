@@ -655,7 +655,11 @@ class FootEstimator:
         kernel, prior = self._foot.resistance_of, self.ground.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
-        return dry / prior.flat_dry, wet / prior.flat_wet
+        # Friction that is zero at one load is zero at all.
+        return (
+            dry / prior.flat_dry if prior.flat_dry else 1.0,
+            wet / prior.flat_wet if prior.flat_wet else 1.0,
+        )
 
 
 def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:

@@ -55,6 +55,10 @@ and that of a dome."""
 REWETTED = 0.05
 """Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
 
+BEYOND = 0.1
+"""Distance of ln(expected friction) from the grid from which on it is moved to the end of the grid:
+farther away the tail would be most of what is left. A foot may have no friction at all."""
+
 PERIOD = 0.5
 """Time between updates, s. All stances that begin in a period expect the same friction, so that
 results do not depend on which of two feet is heard first."""
@@ -164,7 +168,9 @@ class FrictionScales:
             row = np.exp(-0.5 * ((LOG_SCALES - math.log(scale)) / sd) ** 2)
             row = np.repeat(row, len(SPREADS))
             rows.append(row / row.sum())
-            away = np.log(EDGES / getattr(prior, name)) - LOG_SCALES[:, None, None]
+            away = np.log(EDGES / max(getattr(prior, name), 1e-9)) - LOG_SCALES[:, None, None]
+            first, last = away[..., :1], away[..., -1:]
+            away = away - np.where(first > BEYOND, first, np.where(last < -BEYOND, last, 0.0))
             table = np.diff(special.ndtr(away / SPREADS[:, None]), axis=-1) + TAIL / len(GRID)
             tables.append((table / table.sum(axis=-1, keepdims=True)).reshape(-1, len(GRID)))
         self._before_walk, self._tables = np.array(rows), tables

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import math
 
 import numpy as np
@@ -68,6 +69,15 @@ def test_domes_on_wet_ground_hold_less_than_on_dry_and_least_before_the_film_dra
     mean = 0.95 * (on_dry - 0.137) + 0.05 * math.log(math.sqrt(0.12 * 0.41))
     assert drained == pytest.approx(mean, abs=0.02)  # 0.137: mean of -ln over 0.75 to 1
     assert before == pytest.approx(math.log(math.sqrt(0.12 * 0.41)), abs=0.05)
+
+
+@pytest.mark.parametrize(('friction', 'row'), [(0.0, 1), (0.01, 1), (3.5, 0)])
+def test_friction_beyond_the_grid_is_expected_at_its_end(friction, row):
+    """All but the tail is within two of the larger spreads, 16 %, of the end."""
+    end = 0.025 if friction < 1.0 else 2.5
+    prior = dataclasses.replace(PRIOR, **{CLASSES[row]: friction})
+    expected = FrictionScales(prior).expected(0.0)[row]
+    assert expected[abs(np.log(GRID / end)) < 0.32].sum() > 0.9
 
 
 def test_what_a_foot_said_is_taken_back():
