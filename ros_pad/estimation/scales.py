@@ -176,8 +176,11 @@ class FrictionScales:
         self._before_walk, self._tables = np.array(rows), tables
         self._weights = self._before_walk
         ends = sorted((prior.flat_wet, prior.dome))
-        between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
-        self._undrained = between / between.sum()
+        between = np.digitize(GRID, ends) % 2
+        if not between.any():
+            between[np.abs(GRID - ends[0]).argmin()] = 1
+        undrained = np.clip(between, 1e-3, 1.0)
+        self._undrained = undrained / undrained.sum()
         cells = round(math.log(1.0 / DRAINED) / math.log(GRID[1] / GRID[0])) + 1
         self._films = np.tri(len(GRID)).T - np.tri(len(GRID), k=-cells).T
         self._films /= self._films.sum(axis=0)

@@ -69,6 +69,9 @@ def test_domes_on_wet_ground_hold_less_than_on_dry_and_least_before_the_film_dra
     mean = 0.95 * (on_dry - 0.137) + 0.05 * math.log(math.sqrt(0.12 * 0.41))
     assert drained == pytest.approx(mean, abs=0.02)  # 0.137: mean of -ln over 0.75 to 1
     assert before == pytest.approx(math.log(math.sqrt(0.12 * 0.41)), abs=0.05)
+    same = dataclasses.replace(PRIOR, dome=PRIOR.flat_wet)
+    before = FrictionScales(same).expected(0.0)[-1]
+    assert before[abs(np.log(GRID / 0.12)) < 0.05].sum() > 0.9
 
 
 @pytest.mark.parametrize(('friction', 'row'), [(0.0, 1), (0.01, 1), (3.5, 0)])
