@@ -416,7 +416,7 @@ class FootEstimator:
         was = axes.doubt
         loaded = axes.update(time, duration, z, force)
         if axes.doubt and not was:
-            self._forget()
+            self._forget(time)
         if self._looks and len(block) > earlier:
             self._look_at(block, earlier, duration, loaded, motion)
         if self._gate.standing and time > self._look_end:
@@ -456,11 +456,11 @@ class FootEstimator:
         self._block, self._earlier = [], 0
         self.noise.begin()
 
-    def _forget(self) -> None:
-        """Forget what was learnt in wrong axes."""
+    def _forget(self, time: float) -> None:
+        """Forget what was learnt in wrong axes until a time, s."""
         self._looks = True
         self._history.clear()
-        self.ground.forget()
+        self.ground.forget(time)
         mean, sd = self.ground.friction
         self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 

@@ -184,9 +184,11 @@ class GroundFilter:
         self._move(distance)
         self._normalise(self._posterior)
 
-    def forget(self) -> None:
-        """Return to the prior, and take back what this foot has said to the others."""
+    def forget(self, time: float) -> None:
+        """Return to the prior, and take back what the foot has shown to others, at a time, s."""
         self._shared.forget(self._foot)
+        self._expect(time)
+        self._counted = {False: -math.inf, True: -math.inf}
         self._normalise(self._grounds * self._priors[self._dome])
         self._begin()
 

@@ -194,10 +194,15 @@ class FrictionScales:
         return len(self._fed) - 1
 
     def forget(self, foot: int) -> None:
-        """Take back all that a foot has felt, from its number: its sensors were wrong."""
+        """Take back all that a foot has felt, from its number: its sensors were wrong.
+
+        Stances that begin later expect nothing that rests on it, also those of the same period:
+        in it, results depend on which foot is read first.
+        """
         self._felt = [felt for felt in self._felt if felt.foot != foot]
         self._fed[foot][:] = 0.0
         self._weigh()
+        self._now = self._before = self._expected()
 
     @property
     def scales(self) -> dict[str, Scale]:

@@ -2,6 +2,7 @@
 """Turned and mirrored axes of force and position are found in a few stances; right ones never."""
 
 import math
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -120,13 +121,23 @@ def test_right_axes_are_never_in_doubt(slip, ratio, bias):
     assert 'axes' not in walk.kinds
 
 
-def test_what_was_learnt_in_turned_axes_is_forgotten():
-    prior = FootEstimator(FOOT, LOAD).estimate
-    walk = Walk(turn(180))
-    for heading in HEADINGS:
-        estimate = walk.step(heading)
-    assert estimate.wet_probability == pytest.approx(prior.wet_probability)
-    assert estimate.friction_mean == pytest.approx(prior.friction_mean, abs=0.01)
+def test_what_was_learnt_is_forgotten_when_axes_turn():
+    """A foot slips at T/N = 0.35, less than half of what the contact model expects if dry."""
+    walk = Walk(slip=0.2, ratio=0.35)
+    prior = walk.estimator.ground.expected
+    for step in range(20):
+        walk._contact[0] += 0.14
+        walk.step(0.2 + 0.7 * step)
+    assert walk.estimator.ground.expected.flat_dry < 0.9 * prior.flat_dry
+    walk._axes = RIGHT, np.diag([1.0, 1.0, -1.0])
+    for step in range(3):
+        estimate = walk.step(0.7 * step)
+    new = FootEstimator(FOOT, LOAD).estimate
+    assert estimate.doubt.startswith('axes')
+    expected = walk.estimator.ground.expected
+    assert astuple(expected) == pytest.approx(astuple(prior))
+    assert estimate.wet_probability == pytest.approx(new.wet_probability)
+    assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
 
 
 def test_the_doubt_ends_when_the_axes_are_mended():
