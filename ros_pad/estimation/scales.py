@@ -222,12 +222,17 @@ class FrictionScales:
         ground, on wet ground once the film has drained, and before.
         """
         period = math.floor(time / PERIOD)
-        if not self._period - 2 < period <= self._period:
-            back = period < self._period  # the clock has been set back: all evidence is old
-            self._learn_until(math.inf if back else period * PERIOD - DELAY)
-            self._before, self._now = self._now, self._expected()
-            self._period = period
-        return self._now if period == self._period else self._before
+        if period <= self._period - 2:  # the clock has been set back: what is later is old
+            self._update(time, math.inf)
+            self._before = self._now
+        elif period > self._period:
+            if period > self._period + 1:  # a late foot may begin in the one before
+                self._update(-math.inf, (period - 1) * PERIOD - DELAY)
+            self._update(-math.inf, period * PERIOD - DELAY)
+        else:
+            return self._now if period == self._period else self._before
+        self._period = period
+        return self._now
 
     def add(self, felt: Felt) -> None:
         """Add what a foot felt in a stance."""
@@ -241,11 +246,15 @@ class FrictionScales:
         drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
         return np.array([dry, wet, dome, drained, self._undrained])
 
-    def _learn_until(self, time: float) -> None:
-        """Use the stances before a time, s, in an order that does not depend on who came first."""
-        self._felt.sort(key=lambda felt: felt[:2])
-        while self._felt and self._felt[0].time < time:
-            self._learn(self._felt.pop(0))
+    def _update(self, begin: float, end: float) -> None:
+        """Use the stances between two times, s, in an order that does not depend on that of feet."""
+        felt, self._felt = self._felt, []
+        for each in sorted(felt, key=lambda felt: felt[:2]):
+            if begin < each.time < end:
+                self._learn(each)
+            else:
+                self._felt.append(each)
+        self._before, self._now = self._now, self._expected()
 
     def _learn(self, felt: Felt) -> None:
         # What a dome feels does not show the ground: both keep their odds.

@@ -174,6 +174,26 @@ def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
     assert np.array_equal(shared.expected(1.0), after)
 
 
+@pytest.mark.parametrize(
+    ('last', 'times'),
+    [(8.1, (9.501, 9.499)), (20.0, (1.0, 0.999)), (20.0, (1.0, 1.0))],
+    ids=['a period without touch-downs', 'clock set back', 'clock set back, same time'],
+)
+def test_after_a_leap_of_time_feet_expect_the_same_whichever_is_read_first(last, times):
+    def expectations(order):
+        shared = shared_by(3)
+        shared.expected(last)
+        shared.add(felt(slip_at(0.6), slip_at(0.6), last, 2, wet=1e-6))
+        found = {}
+        for foot in order:
+            each = slip_at((0.4, 0.9)[foot])
+            shared.add(felt(each, each, times[foot], foot, wet=1e-6))
+            found[foot] = shared.expected(times[foot])
+        return found[0], found[1], shared.expected(25.0)
+
+    assert np.array_equal(expectations((0, 1)), expectations((1, 0)))
+
+
 def test_without_learning_the_expectation_stays():
     shared = FrictionScales(PRIOR, learns=False)
     before = shared.expected(0.0)
