@@ -37,8 +37,11 @@ shows a spread: smaller ones would be believed on floors that do not have them."
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
 
-SCALE_RANGE = 0.3, 3.4
+SCALE_RANGE = 0.3012, 3.3201
 """Range of a scale that may be expected: that of the grid."""
+
+SCALE_SD_RANGE = 0.01, 1.0
+"""Range of its standard deviation; the grid shows no smaller ones."""
 
 NEXT_FLOOR = 0.1
 """Standard deviation of ln(scale) from one floor to the next, for what is kept for later walks."""
@@ -56,7 +59,7 @@ REWETTED = 0.05
 """Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
 
 BEYOND = 0.1
-"""Distance of ln(expected friction) from the grid from which on it is moved to the end of the grid:
+"""Distance of ln(expected friction) from the grid from which on it is moved to the grid's end:
 farther away the tail would be most of what is left. A foot may have no friction at all."""
 
 PERIOD = 0.5
@@ -247,7 +250,7 @@ class FrictionScales:
         return np.array([dry, wet, dome, drained, self._undrained])
 
     def _update(self, begin: float, end: float) -> None:
-        """Use the stances between two times, s, in an order that does not depend on that of feet."""
+        """Use the stances between two times, s, sorted: feet may be read in any order."""
         felt, self._felt = self._felt, []
         for each in sorted(felt, key=lambda felt: felt[:2]):
             if begin < each.time < end:
