@@ -3,8 +3,8 @@
 
 The ground pushes a foot up, and against its slip; a foot that sticks moves back by force over
 shear stiffness; a foot swings above the heights at which it stands. What is measured in other axes
-does none of these. Each stance is a witness, and no single one decides. A driver turns the axes of
-all feet alike: the feet of a robot hear each other's witnesses.
+does none of these. Each stance, or second of a long one, is a witness, and no single one decides. A
+driver turns the axes of all feet alike: the feet of a robot share their witnesses.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BLOCK = 0.04
 """Time over which positions and forces are averaged before they are compared, s."""
 
 SHORTEST, LONGEST = 0.08, 1.0
-"""Shortest stance that is looked at, and longest that is one witness, s."""
+"""Shortest stance that is looked at, and longest that is one witness, s: the rest is another."""
 
 STEEPEST = 0.5
 """Share of its size that the normal force has at the least: else T/N is 1.7."""
@@ -46,17 +46,17 @@ STRAY = 0.1
 """Share of motions that follow no rule."""
 
 MOST, LEAST = 4.0, -6.0
-"""Bounds of what one stance says for a turn, nats."""
+"""Bounds of the evidence of one witness for a turn, nats."""
 
 SURE = 6.0
-"""Sum over stances from which on axes are in doubt until it is below half of it, nats: of two
-stances at least."""
+"""Sum over witnesses from which on axes are in doubt until it is below half of it, nats: of two at
+least."""
 
 STANCES = 2
-"""Stances with a wrong normal axis, or with a swing below them, that make a doubt."""
+"""Witnesses of a wrong normal axis, or swings below stances, that make a doubt."""
 
 SEVERAL = 2.0 * MOST
-"""Most that all other feet together say, nats: a foot that is sure of its own axes keeps them."""
+"""Most evidence of all other feet together, nats: a foot that is sure of its own axes keeps them."""
 
 DELAY = 0.1
 """Age from which on feet hear each other's stances, s, so that results do not depend on which of
@@ -182,7 +182,7 @@ class Axes:
                 self._judge(time)
             return False
         if size < self._unload or self._duration > LONGEST:
-            self._end_stance(time, lifts=size < self._unload)
+            self._end_stance(time)
             return False
         a, b, c = self._force
         self._force = a + x * duration, b + y * duration, c + z * duration
@@ -211,8 +211,8 @@ class Axes:
         found = likelihoods(move, change, force, sd, duration, pulled)
         self._said = [*map(add, self._said, found)]
 
-    def _end_stance(self, time: float, lifts: bool) -> None:
-        """Hear a witness; when the foot ``lifts``, a swing begins."""
+    def _end_stance(self, time: float) -> None:
+        """Use a witness."""
         self._loaded = False
         if self._duration < SHORTEST:
             return
@@ -220,13 +220,13 @@ class Axes:
         steep = mean[2] < STEEPEST * math.hypot(*mean)
         self._steep = min(STANCES, self._steep + 1) if steep else 0
         height = self._heights / self._duration
-        lowest, highest = min(height, self._height), max(height, self._height)
+        last = height if math.isnan(self._height) else self._height
+        lowest, highest = min(height, last), max(height, last)
         if self._lowest < lowest - BELOW and self._highest < lowest + BELOW:
             self._below = min(STANCES, self._below + 1)
         elif self._highest > highest + BELOW:
             self._below = 0
-        if lifts:
-            self._height, self._lowest, self._highest = height, math.inf, -math.inf
+        self._height, self._lowest, self._highest = height, math.inf, -math.inf
         for turn, said in enumerate(self._said):
             more = self._weight * (said - self._said[0])
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)

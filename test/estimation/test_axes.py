@@ -140,6 +140,18 @@ def test_what_was_learnt_is_forgotten_when_axes_turn():
     assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
 
 
+def test_a_swing_counts_once_however_long_the_foot_stands_after_it():
+    axes, doubts, time = Axes(LOAD, 1.0 / FOOT.shear_stiffness), [], 0.0
+    for _ in range(3):  # stand for 3.2 s, swing 20 mm below
+        for height, load, blocks in ((0.0, LOAD, 80), (-0.02, 0.0, 5)):
+            for _ in range(blocks):
+                time += 0.04
+                axes.update(time, 0.04, height, (0.0, 0.0, load))
+        doubts.append(axes.doubt)
+    assert doubts[:2] == ['', '']
+    assert 'z of the position is turned' in doubts[2]
+
+
 def test_the_doubt_ends_when_the_axes_are_mended():
     walk = Walk(turn(90))
     for heading in HEADINGS:
