@@ -3,8 +3,8 @@
 
 The ground pushes a foot up, and against its slip; a foot that sticks moves back by force over
 shear stiffness; a foot swings above the heights at which it stands. What is measured in other axes
-does none of these. Each stance, or second of a long one, is a witness, and no single one decides. A
-driver turns the axes of all feet alike: the feet of a robot share their witnesses.
+does none of these. Each stance, or second of a long one, is a witness, and no single one decides.
+A driver turns the axes of all feet alike: the feet of a robot share their witnesses.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ STANCES = 2
 """Witnesses of a wrong normal axis, or swings below stances, that make a doubt."""
 
 SEVERAL = 2.0 * MOST
-"""Most evidence of all other feet together, nats: a foot that is sure of its own axes keeps them."""
+"""Most evidence of all other feet together, nats: one that is sure of its own axes keeps them."""
 
 DELAY = 0.1
 """Age from which on feet hear each other's stances, s, so that results do not depend on which of
