@@ -163,7 +163,7 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     for heading in HEADINGS:  # what is learnt from then on is finite
         estimate = walk.step(heading)
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
-    scales = walk.estimator.ground._shared.scales
+    scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
 
 
