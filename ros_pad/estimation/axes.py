@@ -14,6 +14,9 @@ from collections import deque
 from collections.abc import Sequence
 from operator import add
 
+from ros_pad.estimation.friction import SLIP_SPEED
+from ros_pad.estimation.scales import DELAY
+
 LOADED, UNLOADED = 0.5, 0.3
 """Size of the force from which on, and below which, a foot counts as loaded, share of the expected
 load: whatever its direction."""
@@ -32,9 +35,6 @@ BELOW = 0.01
 
 CROSSWISE = 0.5
 """Standard deviation of the direction of slip against the force, rad: feet also turn."""
-
-SLIP = 0.04
-"""Most frequent slip speed, m/s."""
 
 MODEL_SPEED = 4e-3
 """Speed by which the contact of a foot that sticks moves, m/s: feet roll and bend."""
@@ -58,10 +58,6 @@ STANCES = 2
 SEVERAL = 2.0 * MOST
 """Most evidence of all other feet together, nats: one that is sure of its own axes keeps them."""
 
-DELAY = 0.1
-"""Age from which on feet hear each other's stances, s, so that results do not depend on which of
-two feet is read first."""
-
 Matrix = tuple[float, float, float, float]
 
 TURNS: tuple[tuple[str, Matrix], ...] = (
@@ -80,28 +76,32 @@ Vector = tuple[float, float, float]
 
 
 class SharedAxes:
-    """What the stances of each foot of a robot say about turned axes."""
+    """Evidence of turned axes in the stances of each foot of a robot."""
 
     def __init__(self) -> None:
-        self._said: list[deque[tuple[float, list[float], list[float]]]] = []
+        self._sums: list[deque[tuple[float, list[float], list[float]]]] = []
 
     def join(self) -> int:
         """Return the number of one more foot."""
-        self._said.append(deque(maxlen=4))
-        return len(self._said) - 1
+        self._sums.append(deque(maxlen=4))
+        return len(self._sums) - 1
 
     def add(self, time: float, foot: int, sure: list[float], raw: list[float]) -> None:
         """Keep the bounded and the plain sums of a foot, nats by turn, from a time on, s."""
-        self._said[foot].append((time, sure, raw))
+        self._sums[foot].append((time, sure, raw))
 
     def others(self, time: float, foot: int) -> tuple[list[float], list[float]]:
-        """Return the sums of all other feet, bounded and plain, as heard at a time, s."""
+        """Return the sums of all other feet, bounded and plain, at a time, s.
+
+        Only those that are older by :data:`DELAY` count: results must not depend on which of two
+        feet is read first.
+        """
         sure, raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
-        for number, said in enumerate(self._said):
-            heard = [each for each in said if each[0] <= time - DELAY]
-            if number == foot or not heard:
+        for number, sums in enumerate(self._sums):
+            old = [each for each in sums if each[0] <= time - DELAY]
+            if number == foot or not old:
                 continue
-            _, more, plain = heard[-1]
+            _, more, plain = old[-1]
             for turn in range(len(TURNS)):
                 sure[turn] += min(MOST, more[turn])
                 raw[turn] += plain[turn]
@@ -120,7 +120,7 @@ class Axes:
     memory : float
         Time over which errors of the motion are the same, s.
     shared : SharedAxes or None
-        What other feet of the robot say; None: this one is alone.
+        Evidence of the other feet of the robot; None: this one is alone.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Axes:
 
     __slots__ = (
         '_below', '_duration', '_foot', '_force', '_height', '_heights', '_highest', '_last',
-        '_loaded', '_lowest', '_pull', '_raw', '_said', '_shared', '_softness', '_steep',
+        '_likely', '_loaded', '_lowest', '_pull', '_raw', '_shared', '_softness', '_steep',
         '_sure', '_touch', '_unload', '_weight', 'doubt',
     )  # fmt: skip
 
@@ -160,7 +160,7 @@ class Axes:
 
     def _begin_stance(self) -> None:
         self._force, self._heights, self._duration = (0.0, 0.0, 0.0), 0.0, 0.0
-        self._said = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
+        self._likely = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
         self._last: tuple[float, ...] | None = None
 
     def update(self, time: float, duration: float, height: float, force: Vector) -> bool:
@@ -209,10 +209,10 @@ class Axes:
         force = 0.5 * (fx + c), 0.5 * (fy + d)
         pulled = math.hypot(*force) > self._pull
         found = likelihoods(move, change, force, sd, duration, pulled)
-        self._said = [*map(add, self._said, found)]
+        self._likely = [*map(add, self._likely, found)]
 
     def _end_stance(self, time: float) -> None:
-        """Use a witness."""
+        """Add the evidence of a stance, or of a second of one."""
         self._loaded = False
         if self._duration < SHORTEST:
             return
@@ -227,8 +227,8 @@ class Axes:
         elif self._highest > highest + BELOW:
             self._below = 0
         self._height, self._lowest, self._highest = height, math.inf, -math.inf
-        for turn, said in enumerate(self._said):
-            more = self._weight * (said - self._said[0])
+        for turn, likely in enumerate(self._likely):
+            more = self._weight * (likely - self._likely[0])
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
             sure = self._sure[turn] + min(MOST, max(LEAST, more))
             self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
@@ -289,7 +289,7 @@ def likelihoods(
     (move_x, move_y), (bend_x, bend_y), (fx, fy) = move, change, force
     size = math.sqrt(fx * fx + fy * fy) or 1.0
     fx, fy = fx / size, fy / size
-    variance, length = sd * sd, SLIP * duration
+    variance, length = sd * sd, SLIP_SPEED * duration
     wide = (3.0 * length) ** 2
     sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
     found = []

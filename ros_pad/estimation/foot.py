@@ -176,7 +176,7 @@ class FootEstimator:
         What this foot learns of friction together with others, see :func:`estimators_of`; None:
         it learns alone.
     shared_axes : SharedAxes or None
-        What the feet say of turned axes, likewise.
+        Evidence of turned axes that the feet share, likewise.
 
     Attributes
     ----------

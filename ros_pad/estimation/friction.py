@@ -131,8 +131,8 @@ class GroundFilter:
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
-        self._way = 0.0  # of the foot so far, m
-        self._counted = {False: -math.inf, True: -math.inf}  # way at the last evidence, by dome
+        self._travelled = 0.0  # of the foot so far, m
+        self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
         self._expect(0.0)
         self._posterior: np.ndarray = self._flat_prior
         self.wet_probability = wet_prior
@@ -158,9 +158,9 @@ class GroundFilter:
         """Begin a stance at a distance, m, from the last one, as a dome or flat, at a time, s."""
         if self._has_felt:
             # Stances on the same patch are no new evidence of what all patches have in common.
-            way = self._way - self._counted[self._dome]
-            self._counted[self._dome] = self._way
-            weight = -math.expm1(-way / self._patch_length)
+            since = self._travelled - self._counted[self._dome]
+            self._counted[self._dome] = self._travelled
+            weight = -math.expm1(-since / self._patch_length)
             self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
@@ -296,7 +296,7 @@ class GroundFilter:
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
-        self._way += distance
+        self._travelled += distance
         stay = math.exp(-distance / self._patch_length)
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet

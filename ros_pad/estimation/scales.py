@@ -32,7 +32,7 @@ CLASSES = ('flat_dry', 'flat_wet', 'dome')
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
 SPREADS = np.array([0.08, 0.16])
 """Grid of ln(scale), and of spreads, which are equally likely before a walk. What feet feel hardly
-shows a spread: smaller ones would be believed on floors that do not have them."""
+shows a spread: smaller ones would seem likely on floors that do not have them."""
 
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
@@ -64,10 +64,10 @@ farther away the tail would be most of what is left. A foot may have no friction
 
 PERIOD = 0.5
 """Time between updates, s. All stances that begin in a period expect the same friction, so that
-results do not depend on which of two feet is heard first."""
+results do not depend on which of two feet is read first."""
 
 DELAY = 0.1
-"""Least time between the end of a stance and the update that uses it, s."""
+"""Least time between the end of a stance and its use for other feet, s, likewise."""
 
 
 @dataclass(frozen=True)

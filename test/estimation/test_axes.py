@@ -10,10 +10,10 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import sensor_fault
-from ros_pad.estimation.axes import DELAY
 from ros_pad.estimation.axes import TURNS
 from ros_pad.estimation.axes import Axes
 from ros_pad.estimation.axes import SharedAxes
+from ros_pad.estimation.scales import DELAY
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
