@@ -3,8 +3,8 @@
 
 The ground pushes a foot up, and against its slip; a foot that sticks moves back by force over
 shear stiffness; a foot swings above the heights at which it stands. What is measured in other axes
-does none of these. Each stance is a witness, and no single one decides. A driver turns the axes of
-all feet alike: the feet of a robot hear each other's witnesses.
+does none of these. Each stance, or second of a long one, is a witness, and no single one decides.
+A driver turns the axes of all feet alike: the feet of a robot share their witnesses.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from collections import deque
 from collections.abc import Sequence
 from operator import add
 
+from ros_pad.estimation.friction import SLIP_SPEED
+from ros_pad.estimation.scales import DELAY
+
 LOADED, UNLOADED = 0.5, 0.3
 """Size of the force from which on, and below which, a foot counts as loaded, share of the expected
 load: whatever its direction."""
@@ -22,7 +25,7 @@ BLOCK = 0.04
 """Time over which positions and forces are averaged before they are compared, s."""
 
 SHORTEST, LONGEST = 0.08, 1.0
-"""Shortest stance that is looked at, and longest that is one witness, s."""
+"""Shortest stance that is looked at, and longest that is one witness, s: the rest is another."""
 
 STEEPEST = 0.5
 """Share of its size that the normal force has at the least: else T/N is 1.7."""
@@ -32,9 +35,6 @@ BELOW = 0.01
 
 CROSSWISE = 0.5
 """Standard deviation of the direction of slip against the force, rad: feet also turn."""
-
-SLIP = 0.04
-"""Most frequent slip speed, m/s."""
 
 MODEL_SPEED = 4e-3
 """Speed by which the contact of a foot that sticks moves, m/s: feet roll and bend."""
@@ -46,21 +46,17 @@ STRAY = 0.1
 """Share of motions that follow no rule."""
 
 MOST, LEAST = 4.0, -6.0
-"""Bounds of what one stance says for a turn, nats."""
+"""Bounds of the evidence of one witness for a turn, nats."""
 
 SURE = 6.0
-"""Sum over stances from which on axes are in doubt until it is below half of it, nats: of two
-stances at least."""
+"""Sum over witnesses from which on axes are in doubt until it is below half of it, nats: of two at
+least."""
 
 STANCES = 2
-"""Stances with a wrong normal axis, or with a swing below them, that make a doubt."""
+"""Witnesses of a wrong normal axis, or swings below stances, that make a doubt."""
 
 SEVERAL = 2.0 * MOST
-"""Most that all other feet together say, nats: a foot that is sure of its own axes keeps them."""
-
-DELAY = 0.1
-"""Age from which on feet hear each other's stances, s, so that results do not depend on which of
-two feet is read first."""
+"""Most evidence of all other feet together, nats: one that is sure of its own axes keeps them."""
 
 Matrix = tuple[float, float, float, float]
 
@@ -80,28 +76,32 @@ Vector = tuple[float, float, float]
 
 
 class SharedAxes:
-    """What the stances of each foot of a robot say about turned axes."""
+    """Evidence of turned axes in the stances of each foot of a robot."""
 
     def __init__(self) -> None:
-        self._said: list[deque[tuple[float, list[float], list[float]]]] = []
+        self._sums: list[deque[tuple[float, list[float], list[float]]]] = []
 
     def join(self) -> int:
         """Return the number of one more foot."""
-        self._said.append(deque(maxlen=4))
-        return len(self._said) - 1
+        self._sums.append(deque(maxlen=4))
+        return len(self._sums) - 1
 
     def add(self, time: float, foot: int, sure: list[float], raw: list[float]) -> None:
         """Keep the bounded and the plain sums of a foot, nats by turn, from a time on, s."""
-        self._said[foot].append((time, sure, raw))
+        self._sums[foot].append((time, sure, raw))
 
     def others(self, time: float, foot: int) -> tuple[list[float], list[float]]:
-        """Return the sums of all other feet, bounded and plain, as heard at a time, s."""
+        """Return the sums of all other feet, bounded and plain, at a time, s.
+
+        Only those that are older by :data:`DELAY` count: results must not depend on which of two
+        feet is read first.
+        """
         sure, raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
-        for number, said in enumerate(self._said):
-            heard = [each for each in said if each[0] <= time - DELAY]
-            if number == foot or not heard:
+        for number, sums in enumerate(self._sums):
+            old = [each for each in sums if each[0] <= time - DELAY]
+            if number == foot or not old:
                 continue
-            _, more, plain = heard[-1]
+            _, more, plain = old[-1]
             for turn in range(len(TURNS)):
                 sure[turn] += min(MOST, more[turn])
                 raw[turn] += plain[turn]
@@ -120,7 +120,7 @@ class Axes:
     memory : float
         Time over which errors of the motion are the same, s.
     shared : SharedAxes or None
-        What other feet of the robot say; None: this one is alone.
+        Evidence of the other feet of the robot; None: this one is alone.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Axes:
 
     __slots__ = (
         '_below', '_duration', '_foot', '_force', '_height', '_heights', '_highest', '_last',
-        '_loaded', '_lowest', '_pull', '_raw', '_said', '_shared', '_softness', '_steep',
+        '_likely', '_loaded', '_lowest', '_pull', '_raw', '_shared', '_softness', '_steep',
         '_sure', '_touch', '_unload', '_weight', 'doubt',
     )  # fmt: skip
 
@@ -160,7 +160,7 @@ class Axes:
 
     def _begin_stance(self) -> None:
         self._force, self._heights, self._duration = (0.0, 0.0, 0.0), 0.0, 0.0
-        self._said = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
+        self._likely = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
         self._last: tuple[float, ...] | None = None
 
     def update(self, time: float, duration: float, height: float, force: Vector) -> bool:
@@ -182,7 +182,7 @@ class Axes:
                 self._judge(time)
             return False
         if size < self._unload or self._duration > LONGEST:
-            self._end_stance(time, lifts=size < self._unload)
+            self._end_stance(time)
             return False
         a, b, c = self._force
         self._force = a + x * duration, b + y * duration, c + z * duration
@@ -209,10 +209,10 @@ class Axes:
         force = 0.5 * (fx + c), 0.5 * (fy + d)
         pulled = math.hypot(*force) > self._pull
         found = likelihoods(move, change, force, sd, duration, pulled)
-        self._said = [*map(add, self._said, found)]
+        self._likely = [*map(add, self._likely, found)]
 
-    def _end_stance(self, time: float, lifts: bool) -> None:
-        """Hear a witness; when the foot ``lifts``, a swing begins."""
+    def _end_stance(self, time: float) -> None:
+        """Add the evidence of a stance, or of a second of one."""
         self._loaded = False
         if self._duration < SHORTEST:
             return
@@ -220,15 +220,15 @@ class Axes:
         steep = mean[2] < STEEPEST * math.hypot(*mean)
         self._steep = min(STANCES, self._steep + 1) if steep else 0
         height = self._heights / self._duration
-        lowest, highest = min(height, self._height), max(height, self._height)
+        last = height if math.isnan(self._height) else self._height
+        lowest, highest = min(height, last), max(height, last)
         if self._lowest < lowest - BELOW and self._highest < lowest + BELOW:
             self._below = min(STANCES, self._below + 1)
         elif self._highest > highest + BELOW:
             self._below = 0
-        if lifts:
-            self._height, self._lowest, self._highest = height, math.inf, -math.inf
-        for turn, said in enumerate(self._said):
-            more = self._weight * (said - self._said[0])
+        self._height, self._lowest, self._highest = height, math.inf, -math.inf
+        for turn, likely in enumerate(self._likely):
+            more = self._weight * (likely - self._likely[0])
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
             sure = self._sure[turn] + min(MOST, max(LEAST, more))
             self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
@@ -289,7 +289,7 @@ def likelihoods(
     (move_x, move_y), (bend_x, bend_y), (fx, fy) = move, change, force
     size = math.sqrt(fx * fx + fy * fy) or 1.0
     fx, fy = fx / size, fy / size
-    variance, length = sd * sd, SLIP * duration
+    variance, length = sd * sd, SLIP_SPEED * duration
     wide = (3.0 * length) ** 2
     sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
     found = []

@@ -176,7 +176,7 @@ class FootEstimator:
         What this foot learns of friction together with others, see :func:`estimators_of`; None:
         it learns alone.
     shared_axes : SharedAxes or None
-        What the feet say of turned axes, likewise.
+        Evidence of turned axes that the feet share, likewise.
 
     Attributes
     ----------
@@ -416,7 +416,7 @@ class FootEstimator:
         was = axes.doubt
         loaded = axes.update(time, duration, z, force)
         if axes.doubt and not was:
-            self._forget()
+            self._forget(time)
         if self._looks and len(block) > earlier:
             self._look_at(block, earlier, duration, loaded, motion)
         if self._gate.standing and time > self._look_end:
@@ -456,11 +456,11 @@ class FootEstimator:
         self._block, self._earlier = [], 0
         self.noise.begin()
 
-    def _forget(self) -> None:
-        """Forget what was learnt in wrong axes."""
+    def _forget(self, time: float) -> None:
+        """Forget what was learnt in wrong axes until a time, s."""
         self._looks = True
         self._history.clear()
-        self.ground.forget()
+        self.ground.forget(time)
         mean, sd = self.ground.friction
         self.estimate = self.estimate._replace(friction_mean=mean, friction_sd=sd)
 
@@ -655,7 +655,11 @@ class FootEstimator:
         kernel, prior = self._foot.resistance_of, self.ground.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
-        return dry / prior.flat_dry, wet / prior.flat_wet
+        # Friction that is zero at one load is zero at all.
+        return (
+            dry / prior.flat_dry if prior.flat_dry else 1.0,
+            wet / prior.flat_wet if prior.flat_wet else 1.0,
+        )
 
 
 def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> FrictionScales:

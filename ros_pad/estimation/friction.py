@@ -47,6 +47,7 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
 only by the speed at which they turn, which is not known and the same all through a stance."""
@@ -78,8 +79,6 @@ class GroundFilter:
         Prior probability of wet ground, in (0, 1).
     patch_length : float
         Distance over which wet and dry ground are assumed to change, m, above 0.
-    draining_time : float
-        Time over which the film under domes drains at the start of a stance, s.
     temper : float
         Weight of a sample, in (0, 1]: successive samples are not independent.
     rim_speed : float
@@ -94,6 +93,8 @@ class GroundFilter:
 
     Attributes
     ----------
+    shared : FrictionScales
+        As given.
     prior : FrictionPrior
         Friction by the contact model.
     expected : FrictionPrior
@@ -112,16 +113,14 @@ class GroundFilter:
         shared: FrictionScales,
         wet_prior: float = Tuning.wet_prior,
         patch_length: float = Tuning.patch_length,
-        draining_time: float = DRAINING_TIME,
         temper: float = 0.5,
         rim_speed: float = 0.0,
         model_error: float = MODEL_ERROR,
     ) -> None:
         self.prior = shared.prior
-        self._shared, self._foot = shared, shared.join()
+        self.shared, self._foot = shared, shared.join()
         self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self._patch_length = patch_length
-        self._draining_time = draining_time
         self._temper = temper
         self._rim_speed = rim_speed
         self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
@@ -132,8 +131,8 @@ class GroundFilter:
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
-        self._way = 0.0  # of the foot so far, m
-        self._counted = {False: -math.inf, True: -math.inf}  # way at the last evidence, by shape
+        self._travelled = 0.0  # of the foot so far, m
+        self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
         self._expect(0.0)
         self._posterior: np.ndarray = self._flat_prior
         self.wet_probability = wet_prior
@@ -142,7 +141,7 @@ class GroundFilter:
 
     def _expect(self, time: float) -> None:
         """Expect what the feet have learnt up to a time, s."""
-        expected = self._shared.expected(time)
+        expected = self.shared.expected(time)
         self._flat_prior = self._grounds * expected[:2]
         self._priors = {False: expected[:2], True: expected[2:4]}
         medians = [float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in expected[:3]]
@@ -150,7 +149,7 @@ class GroundFilter:
         self._undrained = expected[4]
 
     def _begin(self) -> None:
-        """Begin to note what is felt."""
+        """Begin to collect evidence of a stance."""
         self._felt = np.zeros_like(self._posterior)
         self._has_felt = False
         self._wet_before = self.wet_probability
@@ -159,10 +158,10 @@ class GroundFilter:
         """Begin a stance at a distance, m, from the last one, as a dome or flat, at a time, s."""
         if self._has_felt:
             # Stances on the same patch are no new evidence of what all patches have in common.
-            way = self._way - self._counted[self._dome]
-            self._counted[self._dome] = self._way
-            weight = -math.expm1(-way / self._patch_length)
-            self._shared.add(
+            since = self._travelled - self._counted[self._dome]
+            self._counted[self._dome] = self._travelled
+            weight = -math.expm1(-since / self._patch_length)
+            self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
         self._expect(time)
@@ -184,15 +183,17 @@ class GroundFilter:
         self._move(distance)
         self._normalise(self._posterior)
 
-    def forget(self) -> None:
-        """Return to the prior, and take back what this foot has said to the others."""
-        self._shared.forget(self._foot)
+    def forget(self, time: float) -> None:
+        """Return to the prior, and take back what the foot has shown to others, at a time, s."""
+        self.shared.forget(self._foot)
+        self._expect(time)
+        self._counted = {False: -math.inf, True: -math.inf}
         self._normalise(self._grounds * self._priors[self._dome])
         self._begin()
 
     @property
     def posterior(self) -> Posterior:
-        """Whole state of the filter; set it to an earlier one to undo the samples since then."""
+        """What is known of the ground; set it to an earlier one to undo the samples since then."""
         return self._posterior, self._dome
 
     @posterior.setter
@@ -266,7 +267,7 @@ class GroundFilter:
             self._move(speed * dt)
         if self._dome:
             # The film under domes drains during a stance, so friction rises on the same ground.
-            keep = math.exp(-dt / self._draining_time)
+            keep = math.exp(-dt / DRAINING_TIME)
             wet = self._posterior[1].dot(_ONES)
             self._posterior[1] *= keep
             self._posterior[1] += (1.0 - keep) * wet * self._priors[True][1]
@@ -295,7 +296,7 @@ class GroundFilter:
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
-        self._way += distance
+        self._travelled += distance
         stay = math.exp(-distance / self._patch_length)
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet

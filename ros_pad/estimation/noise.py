@@ -104,12 +104,13 @@ class Meter:
         `white`, or more if noise is correlated in time or the sensor has steps.
     """
 
-    __slots__ = ('_ratios', '_variances', 'configured', 'noise', 'white')
+    __slots__ = ('_ratios', '_step', '_steps', '_variances', 'configured', 'noise', 'white')
 
     def __init__(self, configured: float) -> None:
         self.configured = self.white = self.noise = configured
         self._variances = Pool(configured * configured)
         self._ratios = Pool(1.0)
+        self._step, self._steps = math.inf, 0  # smallest change of a component; number of changes
 
     def add_blocks(self, bend_x: float, bend_y: float, samples: float) -> None:
         """Process the second difference of means over blocks of so many samples."""
@@ -118,15 +119,20 @@ class Meter:
             square = samples * (bend_x * bend_x + bend_y * bend_y) / 12.0
             self._ratios.add(square / (_MEDIAN * variance))
 
-    def add_window(self, squares: float, count: int, least: float = 0.0) -> None:
-        """Process the second differences of a window: their sum of squares and their number.
+    def add_changes(self, *components: Sequence[float]) -> None:
+        """Look for the steps of the sensor in the readings of each component."""
+        if self.configured and self._step > FINE * self.white:
+            moves = [abs(each) for values in components for each in _changes(values) if each]
+            self._steps += len(moves)
+            self._step = min(self._step, *moves, math.inf)
 
-        ``least`` is the least noise of a sensor with steps.
-        """
+    def add_window(self, squares: float, count: int) -> None:
+        """Process the second differences of a window: their sum of squares and their number."""
         # The median of chi-square over its mean; half of the differences are independent.
         median = (1.0 - 4.0 / (9.0 * count)) ** 3
         self._variances.add(squares / (6.0 * count * median))
         self.white = math.sqrt(self._variances.median)
+        least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
         self.noise = max(least, self.white * math.sqrt(max(1.0, self._ratios.median)))
 
     def text(self, unit: str) -> str:
@@ -152,14 +158,13 @@ class SensorNoise:
         Noise of a coordinate, m, and of a component of the force, N.
     """
 
-    __slots__ = ('_blocks', '_steady', '_step', '_steps', '_windows', 'force', 'position')
+    __slots__ = ('_blocks', '_steady', '_windows', 'force', 'position')
 
     def __init__(self, position: float, force: float, load: float) -> None:
         self.position, self.force = Meter(position), Meter(force)
         self._steady = STEADY * load
         self._blocks: deque[tuple[Sequence[float], int]] = deque(maxlen=2 * LAG + 1)
         self._windows = 0
-        self._step, self._steps = math.inf, 0  # smallest change of a coordinate; number of changes
 
     def begin(self) -> None:
         """Begin a stance."""
@@ -174,11 +179,9 @@ class SensorNoise:
         """
         self._blocks.append((means, count))
         self._windows += 1
-        _, x, y, *_ = readings
-        if self._step > FINE * self.position.white:
-            moves = [abs(a or b) for a, b in zip(_changes(x), _changes(y), strict=True) if a or b]
-            self._steps += len(moves)
-            self._step = min(self._step, *moves, math.inf)
+        _, x, y, *forces = readings
+        self.position.add_changes(x, y)
+        self.force.add_changes(*forces)
         if self._windows > EAGER and self._windows % PAUSE:
             return False
         times, x, y, *forces = (each[-READINGS:] for each in readings)
@@ -188,8 +191,7 @@ class SensorNoise:
         if bends < 2:
             return False
         if self.position.configured:
-            least = COARSE * self._step if self._steps >= FEWEST_CHANGES else 0.0
-            self.position.add_window(_bent(x, even) + _bent(y, even), 2 * bends, least)
+            self.position.add_window(_bent(x, even) + _bent(y, even), 2 * bends)
         if self.force.configured:
             self.force.add_window(sum(_bent(each, even) for each in forces), 3 * bends)
         if len(self._blocks) > 2 * LAG:

@@ -32,13 +32,16 @@ CLASSES = ('flat_dry', 'flat_wet', 'dome')
 LOG_SCALES = np.linspace(-1.2, 1.2, 49)
 SPREADS = np.array([0.08, 0.16])
 """Grid of ln(scale), and of spreads, which are equally likely before a walk. What feet feel hardly
-shows a spread: smaller ones would be believed on floors that do not have them."""
+shows a spread: smaller ones would seem likely on floors that do not have them."""
 
 SCALE_SD = 0.4
 """Standard deviation of ln(scale) before a walk: factors of 0.5 to 2 are no surprise."""
 
-SCALE_RANGE = 0.3, 3.4
+SCALE_RANGE = 0.3012, 3.3201
 """Range of a scale that may be expected: that of the grid."""
+
+SCALE_SD_RANGE = 0.01, 1.0
+"""Range of its standard deviation; the grid shows no smaller ones."""
 
 NEXT_FLOOR = 0.1
 """Standard deviation of ln(scale) from one floor to the next, for what is kept for later walks."""
@@ -55,12 +58,16 @@ and that of a dome."""
 REWETTED = 0.05
 """Share of the time after that in which it is so again: the foot has slipped onto fresh liquid."""
 
+BEYOND = 0.1
+"""Distance of ln(expected friction) from the grid from which on it is moved to the grid's end:
+farther away the tail would be most of what is left. A foot may have no friction at all."""
+
 PERIOD = 0.5
 """Time between updates, s. All stances that begin in a period expect the same friction, so that
-results do not depend on which of two feet is heard first."""
+results do not depend on which of two feet is read first."""
 
 DELAY = 0.1
-"""Least time between the end of a stance and the update that uses it, s."""
+"""Least time between the end of a stance and its use for other feet, s, likewise."""
 
 
 @dataclass(frozen=True)
@@ -164,14 +171,19 @@ class FrictionScales:
             row = np.exp(-0.5 * ((LOG_SCALES - math.log(scale)) / sd) ** 2)
             row = np.repeat(row, len(SPREADS))
             rows.append(row / row.sum())
-            away = np.log(EDGES / getattr(prior, name)) - LOG_SCALES[:, None, None]
+            away = np.log(EDGES / max(getattr(prior, name), 1e-9)) - LOG_SCALES[:, None, None]
+            first, last = away[..., :1], away[..., -1:]
+            away = away - np.where(first > BEYOND, first, np.where(last < -BEYOND, last, 0.0))
             table = np.diff(special.ndtr(away / SPREADS[:, None]), axis=-1) + TAIL / len(GRID)
             tables.append((table / table.sum(axis=-1, keepdims=True)).reshape(-1, len(GRID)))
         self._before_walk, self._tables = np.array(rows), tables
         self._weights = self._before_walk
         ends = sorted((prior.flat_wet, prior.dome))
-        between = np.clip(np.digitize(GRID, ends) % 2, 1e-3, 1.0)
-        self._undrained = between / between.sum()
+        between = np.digitize(GRID, ends) % 2
+        if not between.any():
+            between[np.abs(GRID - ends[0]).argmin()] = 1
+        undrained = np.clip(between, 1e-3, 1.0)
+        self._undrained = undrained / undrained.sum()
         cells = round(math.log(1.0 / DRAINED) / math.log(GRID[1] / GRID[0])) + 1
         self._films = np.tri(len(GRID)).T - np.tri(len(GRID), k=-cells).T
         self._films /= self._films.sum(axis=0)
@@ -185,10 +197,15 @@ class FrictionScales:
         return len(self._fed) - 1
 
     def forget(self, foot: int) -> None:
-        """Take back all that a foot has felt, from its number: its sensors were wrong."""
+        """Take back all that a foot has felt, from its number: its sensors were wrong.
+
+        Stances that begin later expect nothing that rests on it, also those of the same period:
+        in it, results depend on which foot is read first.
+        """
         self._felt = [felt for felt in self._felt if felt.foot != foot]
         self._fed[foot][:] = 0.0
         self._weigh()
+        self._now = self._before = self._expected()
 
     @property
     def scales(self) -> dict[str, Scale]:
@@ -208,12 +225,17 @@ class FrictionScales:
         ground, on wet ground once the film has drained, and before.
         """
         period = math.floor(time / PERIOD)
-        if not self._period - 2 < period <= self._period:
-            back = period < self._period  # the clock has been set back: all evidence is old
-            self._learn_until(math.inf if back else period * PERIOD - DELAY)
-            self._before, self._now = self._now, self._expected()
-            self._period = period
-        return self._now if period == self._period else self._before
+        if period <= self._period - 2:  # the clock has been set back: what is later is old
+            self._update(time, math.inf)
+            self._before = self._now
+        elif period > self._period:
+            if period > self._period + 1:  # a late foot may begin in the one before
+                self._update(-math.inf, (period - 1) * PERIOD - DELAY)
+            self._update(-math.inf, period * PERIOD - DELAY)
+        else:
+            return self._now if period == self._period else self._before
+        self._period = period
+        return self._now
 
     def add(self, felt: Felt) -> None:
         """Add what a foot felt in a stance."""
@@ -227,11 +249,15 @@ class FrictionScales:
         drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
         return np.array([dry, wet, dome, drained, self._undrained])
 
-    def _learn_until(self, time: float) -> None:
-        """Use the stances before a time, s, in an order that does not depend on who came first."""
-        self._felt.sort(key=lambda felt: felt[:2])
-        while self._felt and self._felt[0].time < time:
-            self._learn(self._felt.pop(0))
+    def _update(self, begin: float, end: float) -> None:
+        """Use the stances between two times, s, sorted: feet may be read in any order."""
+        felt, self._felt = self._felt, []
+        for each in sorted(felt, key=lambda felt: felt[:2]):
+            if begin < each.time < end:
+                self._learn(each)
+            else:
+                self._felt.append(each)
+        self._before, self._now = self._now, self._expected()
 
     def _learn(self, felt: Felt) -> None:
         # What a dome feels does not show the ground: both keep their odds.

@@ -12,6 +12,7 @@ from ros_pad.estimation.load_gate import CONTACT_SHARE
 from ros_pad.estimation.scales import CLASSES
 from ros_pad.estimation.scales import SCALE_RANGE
 from ros_pad.estimation.scales import SCALE_SD
+from ros_pad.estimation.scales import SCALE_SD_RANGE
 from ros_pad.estimation.scales import Scale
 
 EXPECTED_LOAD = Setting(
@@ -104,7 +105,7 @@ SETTINGS = (
     *(
         Setting(
             f'scale_sd.{name}', SCALE_SD,
-            f'Standard deviation of the logarithm of scale.{name}.', '', 0.01, 1.0,
+            f'Standard deviation of the logarithm of scale.{name}.', '', *SCALE_SD_RANGE,
         )
         for name in CLASSES
     ),

@@ -61,7 +61,7 @@ PARAMETERS = (
     Parameter(
         'learnt', '',
         'File in which what feet learn of friction is kept; empty: none. If it exists at the'
-        ' start, its values are those of scale and scale_sd.',
+        ' start, scale and scale_sd follow from it.',
     ),
 )  # fmt: skip
 
@@ -219,6 +219,7 @@ class EstimatorNode(Node):
         estimators, self.shared = estimators_of(
             len(values['legs']), self._foot, values['expected_load'], tuning
         )
+        self._kept = learnt.settings_of(self.shared)
         period_ns, ambient = round(1e9 / values['publish_rate']), values['ambient_pressure']
         self.legs = {
             leg: _LegTopics(self, leg, estimator, period_ns, ambient)
@@ -253,11 +254,12 @@ class EstimatorNode(Node):
             self.declare_parameter(name, value, ignore_override=True)
 
     def keep_learnt(self) -> None:
-        """Write what feet have learnt of friction, if there is a file for it."""
-        if not self._learnt:
+        """Write what feet have learnt of friction, if it is new and there is a file for it."""
+        if not self._learnt or (settings := learnt.settings_of(self.shared)) == self._kept:
             return
         try:
-            learnt.save(self._learnt, learnt.settings_of(self.shared), self._foot)
+            learnt.save(self._learnt, settings, self._foot)
+            self._kept = settings
         except PadError as error:
             self.get_logger().warning(f'parameter learnt: {error}', throttle_duration_sec=60.0)
 

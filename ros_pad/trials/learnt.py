@@ -15,6 +15,7 @@ from ros_pad.errors import PadError
 from ros_pad.estimation.scales import CLASSES
 from ros_pad.estimation.scales import NEXT_FLOOR
 from ros_pad.estimation.scales import SCALE_SD
+from ros_pad.estimation.scales import SCALE_SD_RANGE
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import SETTINGS
 
@@ -23,19 +24,16 @@ FILE = 'learnt.yaml'
 
 _HEAD = """\
 # Friction of feet on their floor over that of the contact model, learnt by ros_pad; sd is of its
-# logarithm. `pad run --learnt` and the parameter learnt of the estimator read it.
+# logarithm, on this floor. `pad run --learnt` and the parameter learnt of the estimator read it.
 """
 
 
 def settings_of(shared: FrictionScales) -> dict[str, float]:
-    """Return settings of an estimator that begin where these feet are, by name.
-
-    The next floor may be another one, so the deviations are larger, up to those before any walk.
-    """
+    """Return settings of an estimator that is where these feet are, on the same floor, by name."""
     found = {}
     for name, (scale, sd) in shared.scales.items():
         found[f'scale.{name}'] = round(scale, 4)
-        found[f'scale_sd.{name}'] = round(min(math.hypot(sd, NEXT_FLOOR), SCALE_SD), 4)
+        found[f'scale_sd.{name}'] = round(max(sd, SCALE_SD_RANGE[0]), 4)
     return found
 
 
@@ -63,6 +61,9 @@ def save(path: str | os.PathLike[str], settings: dict[str, float], foot: Foot) -
 def load(path: str | os.PathLike[str], foot: str) -> dict[str, Any]:
     """Read the settings from a file.
 
+    The next floor may be another one, so the deviations are larger than in the file, up to those
+    before any walk.
+
     Parameters
     ----------
     path : path
@@ -88,5 +89,7 @@ def load(path: str | os.PathLike[str], foot: str) -> dict[str, Any]:
         with table.table(name) as part:
             for key, setting in (('scale', f'scale.{name}'), ('sd', f'scale_sd.{name}')):
                 found[setting] = part.number(key, '', *ranges[setting])
+        sd = found[f'scale_sd.{name}']
+        found[f'scale_sd.{name}'] = max(sd, min(math.hypot(sd, NEXT_FLOOR), SCALE_SD))
     table.finish()
     return found

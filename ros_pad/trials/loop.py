@@ -226,8 +226,6 @@ class ClosedLoop:
         None with markers.
     estimators : list of FootEstimator
         One for each leg; see :meth:`connect`.
-    shared : FrictionScales
-        What they share of friction.
     controller : MorphologyController
     legs : list of LegStages
     pads : list of float
@@ -265,9 +263,7 @@ class ClosedLoop:
         if sensing == 'joints':
             assert isinstance(self.robot, FullRobot)
             self.body = BodySensing(scene, seed, self.robot, self._doubt_body)
-        estimators, self.shared = estimators_of(
-            len(scene.legs), scene.foot, scene.expected_load, tuning
-        )
+        estimators, _ = estimators_of(len(scene.legs), scene.foot, scene.expected_load, tuning)
         controller = MorphologyController(
             scene.foot,
             scene.legs,
@@ -446,5 +442,5 @@ def run(
         loop.close()
     wall = time.perf_counter() - started
     trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
-    trial.settings['learnt'] = settings_of(loop.shared)
+    trial.settings['learnt'] = settings_of(loop.estimators[0].ground.shared)
     return trial

@@ -29,9 +29,6 @@ from ros_pad.trials.replay_player import ReplayedLeg
 LONGER = 1.6
 """A time between two messages that is longer than their median time by this factor is a gap."""
 
-OF_FRICTION = ('wetness', 'friction', 'friction_margin', 'doubt')
-"""Kinds of topics that depend on what feet expect of friction."""
-
 EARLY_NS = 20_000_000
 """Longest time by which a text may be recorded before the estimate of the same sample, ns."""
 
@@ -55,20 +52,19 @@ def compare_topics(
     settings : NodeSettings
         Settings of the replay.
     """
-    gaps = {leg: gap[0] for leg, each in player.legs.items() if (gap := first_gap(each))}
-    # The controller's decision for one leg depends on the inputs of all legs, and so does friction
-    # where they learn it together.
-    together = DECISIONS + (OF_FRICTION if settings.tuning.learn_friction else ())
-    of_all = min(gaps.values(), default=None)
+    # Feet learn friction together and doubt their axes together, and the controller decides for
+    # all of them: each topic depends on the inputs of all legs.
+    gap_ns = min(
+        (gap[0] for each in player.legs.values() if (gap := first_gap(each))), default=None
+    )
     if absent(player, there, settings):
-        of_all = -1
+        gap_ns = -1
     period_ns = round(1e9 / settings.publish_rate)
     found = []
     for leg in player.legs:
         for kind in ESTIMATES + DECISIONS:
             if (leg, kind) not in there:
                 continue
-            gap_ns = of_all if kind in together else gaps.get(leg)
             one, other = _matched(player, leg, kind)
             found.append(
                 compare(

@@ -2,6 +2,7 @@
 """Turned and mirrored axes of force and position are found in a few stances; right ones never."""
 
 import math
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import sensor_fault
-from ros_pad.estimation.axes import DELAY
 from ros_pad.estimation.axes import TURNS
 from ros_pad.estimation.axes import Axes
 from ros_pad.estimation.axes import SharedAxes
+from ros_pad.estimation.scales import DELAY
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -120,13 +121,35 @@ def test_right_axes_are_never_in_doubt(slip, ratio, bias):
     assert 'axes' not in walk.kinds
 
 
-def test_what_was_learnt_in_turned_axes_is_forgotten():
-    prior = FootEstimator(FOOT, LOAD).estimate
-    walk = Walk(turn(180))
-    for heading in HEADINGS:
-        estimate = walk.step(heading)
-    assert estimate.wet_probability == pytest.approx(prior.wet_probability)
-    assert estimate.friction_mean == pytest.approx(prior.friction_mean, abs=0.01)
+def test_what_was_learnt_is_forgotten_when_axes_turn():
+    """A foot slips at T/N = 0.35, less than half of what the contact model expects if dry."""
+    walk = Walk(slip=0.2, ratio=0.35)
+    prior = walk.estimator.ground.expected
+    for step in range(20):
+        walk._contact[0] += 0.14
+        walk.step(0.2 + 0.7 * step)
+    assert walk.estimator.ground.expected.flat_dry < 0.9 * prior.flat_dry
+    walk._axes = RIGHT, np.diag([1.0, 1.0, -1.0])
+    for step in range(3):
+        estimate = walk.step(0.7 * step)
+    new = FootEstimator(FOOT, LOAD).estimate
+    assert estimate.doubt.startswith('axes')
+    expected = walk.estimator.ground.expected
+    assert astuple(expected) == pytest.approx(astuple(prior))
+    assert estimate.wet_probability == pytest.approx(new.wet_probability)
+    assert estimate.friction_mean == pytest.approx(new.friction_mean, rel=1e-3)
+
+
+def test_a_swing_counts_once_however_long_the_foot_stands_after_it():
+    axes, doubts, time = Axes(LOAD, 1.0 / FOOT.shear_stiffness), [], 0.0
+    for _ in range(3):  # stand for 3.2 s, swing 20 mm below
+        for height, load, blocks in ((0.0, LOAD, 80), (-0.02, 0.0, 5)):
+            for _ in range(blocks):
+                time += 0.04
+                axes.update(time, 0.04, height, (0.0, 0.0, load))
+        doubts.append(axes.doubt)
+    assert doubts[:2] == ['', '']
+    assert 'z of the position is turned' in doubts[2]
 
 
 def test_the_doubt_ends_when_the_axes_are_mended():
@@ -140,7 +163,7 @@ def test_the_doubt_ends_when_the_axes_are_mended():
     for heading in HEADINGS:  # what is learnt from then on is finite
         estimate = walk.step(heading)
     assert 0.01 < estimate.friction_mean < 2.0 and 0.0 < estimate.wet_probability < 1.0
-    scales = walk.estimator.ground._shared.scales
+    scales = walk.estimator.ground.shared.scales
     assert all(math.isfinite(each.scale + each.sd) for each in scales.values())
 
 

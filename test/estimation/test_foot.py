@@ -306,6 +306,19 @@ def test_ten_times_heavier_without_retuning(seed):
 GROUND = 0.5  # m: the floor need not be at zero
 
 
+@pytest.mark.parametrize(
+    ('change', 'wet'),
+    [({'boundary_friction': 0.0}, True), ({'friction': 0.0, 'shear_strength': 0.0}, False)],
+)
+def test_a_foot_without_friction_on_one_ground_slips_there(change, wet):
+    """It slips for half a second at T/N = 0.01, below all friction that an estimate can have."""
+    stance = Stance(dataclasses.replace(FOOT, **change), tuning=Tuning(turning_rate=0.0))
+    for _ in range(125):
+        estimate = stance.sample(0.01, 0.1)
+    assert estimate.friction_mean < 0.06
+    assert (estimate.wet_probability > 0.5) == wet
+
+
 def test_friction_is_given_for_the_load_that_a_foot_stands_under():
     """Adhesion of a whole sole, 4700 Pa on 908 mm², is the same at any load, so that T/N falls
     with the load."""

@@ -311,15 +311,19 @@ def test_a_thousand_touch_downs_without_a_word_leave_a_belief(dome):
     assert 0.0 < ground.friction[0] < 1.6
 
 
-def test_a_foot_that_has_forgotten_learns_again():
-    shared = FrictionScales(PRIOR)
-    ground = GroundFilter(shared, wet_prior=0.1)
-    before = ground.friction
-    for step in range(6):
-        ground.touch_down(0.5, False, float(step))
-        slip(ground, 0.5)
-        if step == 0:
-            ground.forget()
-            assert ground.friction == pytest.approx(before)
-    shared.expected(20.0)
+def test_a_foot_that_has_forgotten_learns_again_like_a_new_one():
+    def walk(ground, begin, friction):
+        for step in range(6):
+            ground.touch_down(0.5, False, begin + step)
+            slip(ground, friction)
+
+    shared, other = FrictionScales(PRIOR), FrictionScales(PRIOR)
+    ground, new = (GroundFilter(each, wet_prior=0.1) for each in (shared, other))
+    walk(ground, 0.0, 0.3)
+    ground.forget(5.1)
+    assert ground.friction == pytest.approx(new.friction)
+    for each in ground, new:
+        walk(each, 6.0, 0.5)
+        each.touch_down(0.5, False, 20.0)
+    assert shared.scales['flat_dry'] == pytest.approx(other.scales['flat_dry'])
     assert shared.scales['flat_dry'].scale == pytest.approx(0.5 / 0.8, rel=0.15)

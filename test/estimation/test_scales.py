@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import math
 
 import numpy as np
@@ -68,6 +69,18 @@ def test_domes_on_wet_ground_hold_less_than_on_dry_and_least_before_the_film_dra
     mean = 0.95 * (on_dry - 0.137) + 0.05 * math.log(math.sqrt(0.12 * 0.41))
     assert drained == pytest.approx(mean, abs=0.02)  # 0.137: mean of -ln over 0.75 to 1
     assert before == pytest.approx(math.log(math.sqrt(0.12 * 0.41)), abs=0.05)
+    same = dataclasses.replace(PRIOR, dome=PRIOR.flat_wet)
+    before = FrictionScales(same).expected(0.0)[-1]
+    assert before[abs(np.log(GRID / 0.12)) < 0.05].sum() > 0.9
+
+
+@pytest.mark.parametrize(('friction', 'row'), [(0.0, 1), (0.01, 1), (3.5, 0)])
+def test_friction_beyond_the_grid_is_expected_at_its_end(friction, row):
+    """All but the tail is within two of the larger spreads, 16 %, of the end."""
+    end = 0.025 if friction < 1.0 else 2.5
+    prior = dataclasses.replace(PRIOR, **{CLASSES[row]: friction})
+    expected = FrictionScales(prior).expected(0.0)[row]
+    assert expected[abs(np.log(GRID / end)) < 0.32].sum() > 0.9
 
 
 def test_what_a_foot_said_is_taken_back():
@@ -159,6 +172,26 @@ def test_a_period_has_one_expectation_even_for_a_foot_that_is_late():
     assert np.array_equal(shared.expected(9.99), before)
     # After the clock was set back, nothing that was learnt is lost.
     assert np.array_equal(shared.expected(1.0), after)
+
+
+@pytest.mark.parametrize(
+    ('last', 'times'),
+    [(8.1, (9.501, 9.499)), (20.0, (1.0, 0.999)), (20.0, (1.0, 1.0))],
+    ids=['a period without touch-downs', 'clock set back', 'clock set back, same time'],
+)
+def test_after_a_leap_of_time_feet_expect_the_same_whichever_is_read_first(last, times):
+    def expectations(order):
+        shared = shared_by(3)
+        shared.expected(last)
+        shared.add(felt(slip_at(0.6), slip_at(0.6), last, 2, wet=1e-6))
+        found = {}
+        for foot in order:
+            each = slip_at((0.4, 0.9)[foot])
+            shared.add(felt(each, each, times[foot], foot, wet=1e-6))
+            found[foot] = shared.expected(times[foot])
+        return found[0], found[1], shared.expected(25.0)
+
+    assert np.array_equal(expectations((0, 1)), expectations((1, 0)))
 
 
 def test_without_learning_the_expectation_stays():

@@ -2,6 +2,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -12,6 +13,8 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure
 
 from ros_pad.errors import ConfigError
+from ros_pad.estimation.scales import GRID
+from ros_pad.estimation.scales import Felt
 from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.messages import Hooks
@@ -519,16 +522,24 @@ def test_what_is_learnt_is_kept_and_reported(context, tmp_path):
 
     node = made()
     assert node.get_parameter('scale.flat_dry').value == 0.7
-    assert node.get_parameter('scale_sd.flat_wet').value == 0.3
+    assert node.get_parameter('scale_sd.flat_wet').value == pytest.approx(math.hypot(0.3, 0.1))
     status = node._learnt_status()
     values = {each.key: each.value for each in status.values}
-    assert values['flat_dry'] == '0.70 (0.63 to 0.77)'  # 0.7 exp(±1.96 × 0.05)
+    assert values['flat_dry'] == '0.70 (0.56 to 0.87)'  # 0.7 exp(±1.96 × √(0.05² + 0.1²))
+    node.destroy_node()
+    assert path.read_text() == 'foot: large37\n' + given  # nothing was learnt
+    node = made()
+    slips = -0.5 * (np.log(GRID / 0.6) / 0.05) ** 2
+    for step in range(9):
+        node.shared.add(Felt(step, 0, False, 1e-6, np.array([slips, slips]), 1.0))
+    node.shared.expected(10.0)
     path.unlink()
     node.destroy_node()
     kept = yaml.safe_load(path.read_text())
     assert kept['foot'] == 'large37'
-    assert kept['flat_dry']['scale'] == pytest.approx(0.7, abs=0.005)
-    assert kept['flat_dry']['sd'] == pytest.approx(0.112, abs=0.005)  # √(0.05² + 0.1²)
+    assert kept['flat_dry']['scale'] == pytest.approx(0.75, abs=0.05)  # 0.6 over 0.8 of large37
+    assert kept['flat_dry']['sd'] < 0.06
+    assert kept['dome']['sd'] == pytest.approx(0.4, abs=0.01)
     path.write_text('foot: small19\n' + given)
     with pytest.raises(ConfigError, match="foot = 'small19' is not allowed"):
         made()

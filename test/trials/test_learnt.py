@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
+import math
 
 import pytest
+import yaml
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.foot import shared_friction
+from ros_pad.estimation.scales import SCALE_RANGE
 from ros_pad.estimation.scales import Scale
 from ros_pad.trials import learnt
 
@@ -30,24 +33,34 @@ def file(tmp_path):
     return write
 
 
-def test_a_file_gives_the_settings_of_an_estimator(file):
+def test_a_file_gives_the_settings_of_an_estimator_on_the_next_floor(file):
     known = learnt.load(file(GOOD), 'large37')
     tuning = Tuning(**{name.replace('.', '_'): value for name, value in known.items()})
     assert tuning.scales == {
-        'flat_dry': Scale(0.7, 0.1), 'flat_wet': Scale(1.2, 0.2), 'dome': Scale(1.0, 0.4),
-    }  # fmt: skip
+        'flat_dry': Scale(0.7, pytest.approx(math.hypot(0.1, 0.1))),
+        'flat_wet': Scale(1.2, pytest.approx(math.hypot(0.2, 0.1))),
+        'dome': Scale(1.0, 0.4),
+    }
 
 
-def test_what_is_saved_is_what_was_known_and_less_certain(file, tmp_path):
-    tuning = Tuning(scale_flat_dry=0.7, scale_sd_flat_dry=0.1)
-    settings = learnt.settings_of(shared_friction(FOOT, 6.83, tuning))
+def test_what_was_less_certain_than_before_a_walk_stays_so(file):
+    assert learnt.load(file(GOOD.replace('0.4', '0.9')), 'large37')['scale_sd.dome'] == 0.9
+
+
+@pytest.mark.parametrize(
+    ('scale', 'sd', 'scale_error', 'sd_error'),
+    # Where scales end, half of the distribution remains.
+    [(0.7, 0.1, 0.01, 0.02), (SCALE_RANGE[0], 0.1, 0.1, 0.5), (SCALE_RANGE[1], 0.01, 0.01, 0.01)],
+)
+def test_what_is_saved_is_what_is_known(tmp_path, scale, sd, scale_error, sd_error):
+    tuning = Tuning(scale_flat_dry=scale, scale_sd_flat_dry=sd, scale_sd_dome=1.0)
     path = tmp_path / 'new.yaml'
-    learnt.save(path, settings, FOOT)
-    known = learnt.load(path, 'large37')
-    assert known == settings
-    assert known['scale.flat_dry'] == pytest.approx(0.7, rel=0.01)
-    assert known['scale_sd.flat_dry'] == pytest.approx(0.1414, rel=0.02)  # √(0.1² + 0.1²)
-    assert known['scale_sd.dome'] <= 0.4
+    learnt.save(path, learnt.settings_of(shared_friction(FOOT, 6.83, tuning)), FOOT)
+    kept = yaml.safe_load(path.read_text())
+    assert kept['flat_dry']['scale'] == pytest.approx(scale, rel=scale_error)
+    assert kept['flat_dry']['sd'] == pytest.approx(sd, rel=sd_error)
+    assert kept['dome']['sd'] > 0.5
+    assert learnt.load(path, 'large37')['scale.flat_dry'] == kept['flat_dry']['scale']
     assert [each.name for each in tmp_path.iterdir()] == ['new.yaml']
 
 
@@ -61,7 +74,7 @@ def test_the_name_of_a_foot_may_have_quotes(tmp_path):
     ('old', 'new', 'words'),
     [
         ('large37', 'small19', "foot = 'small19' is not allowed"),
-        ('0.7', '7', 'flat_dry: scale = 7 is not allowed: a number from 0.3 to 3.4'),
+        ('0.7', '7', 'flat_dry: scale = 7 is not allowed: a number from 0.3012 to 3.3201'),
         ('sd: 0.2', 'sd: .nan', 'flat_wet: sd = nan is not allowed'),
         ('sd: 0.1}', 'sd: 0.1, more: 1}', 'more'),
         ('dome:', 'domes:', "key 'dome' is missing"),
