@@ -46,7 +46,7 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
     policy = scene.policy if policy is None else policy
     grip, (gait, load, slope) = least_grip(scene, policy), demands(scene)
     demand = gait + load + slope
-    margin = math.log(grip / demand)
+    margin = math.log(max(grip / demand, 1e-9))  # feet without friction have no grip at all
     wet = {'dry': 0.0, 'wet': 1.0}.get(scene.floor.kind, scene.floor.wet_fraction)
     found = {
         'margin': margin,

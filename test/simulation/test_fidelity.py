@@ -365,6 +365,7 @@ def test_the_effect_of_a_term_is_that_of_friction_in_proportion(monkeypatch):
         (term,) = (t for t in terms.terms(scene) if 'capillary' in t.term)
         assert term.effect == pytest.approx(4.0 * line, rel=1e-3)
         assert term.taken == added and not term.exceeds
+        assert bool(terms.with_terms(scene).foot.capillary_force) == added
     (pull,) = (t for t in terms.terms(scene, policy='dome') if 'pull' in t.term)
     assert pull.effect == pytest.approx(4.0 * pull.bound) and pull.exceeds
     # A metric of its own: five per cent of friction change the slip by 10 %.
@@ -384,6 +385,30 @@ def test_contact_lines_that_matter_are_added_to_the_robot(monkeypatch):
     assert terms.with_terms(dry).foot.capillary_force == 0.0
     own = dataclasses.replace(strict, foot=dataclasses.replace(strict.foot, capillary_force=1e-4))
     assert terms.with_terms(own).foot.capillary_force == 1e-4
+
+
+def test_with_an_accuracy_of_one_nothing_is_added(monkeypatch):
+    """The effect of contact lines, 0.68 % of friction times 400, is all of the distance."""
+    with_bounds(monkeypatch, L2=(0.01, 0.1), friction=(20.0, 0.1))
+    for accuracy, added in [(0.999, True), (1.0, False)]:
+        scene = dataclasses.replace(HEXAPOD, accuracy=accuracy)
+        (line,) = (t for t in terms.terms(scene) if t.term == terms.LINES)
+        assert (line.taken, line.exceeds) == (added, not added)
+        assert bool(terms.with_terms(scene).foot.capillary_force) == added
+
+
+@pytest.mark.parametrize('name', ['hexapod_patches', 'hexapod_dry_slow', 'leg_wet_dome_75'])
+def test_feet_without_friction_have_terms_without_bounds(name):
+    """Of no friction nothing is a share; loads have theirs."""
+    scene = Scene.load(name)
+    none = dict.fromkeys(('friction', 'shear_strength', 'boundary_friction'), 0.0)
+    scene = dataclasses.replace(scene, foot=dataclasses.replace(scene.foot, **none))
+    assert terms.with_terms(scene) == scene
+    assert 'foot.friction = 0, drawn from 0.35' in fidelity.choose(scene).note
+    found = {term.term: term.bound for term in terms.terms(scene, policy='dome')}
+    assert found['air in hose and pads'] is None
+    assert found.get(terms.LINES) is None
+    assert ('suction of the film at lift-off' in found) == (scene.floor.kind != 'dry')
 
 
 def test_outside_the_ranges_effects_are_not_known():
