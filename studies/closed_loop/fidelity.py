@@ -296,8 +296,8 @@ def summary(document: dict[str, Any]) -> str:
             count = sum(row['held_out'] for row in own)
             share = [_percent(each) for each in conformal.interval(kept, count)]
             lines.append(
-                f'| all, {words} {metric} | | {count} | {_percent(kept / count)}'
-                f' | {" to ".join(share)} | | |'
+                f'| all, {words} {metric} |  | {count} | {_percent(kept / count)}'
+                f' | {" to ".join(share)} |  |  |'
             )
     lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
     for group in GROUPS:
