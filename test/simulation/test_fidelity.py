@@ -8,6 +8,7 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
+from ros_pad.contact import MeasuredLimit
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
@@ -105,30 +106,35 @@ def test_without_mujoco_auto_takes_l1_and_names_the_extra(monkeypatch):
     assert 'ros_pad[mujoco]' in choice.note
 
 
+def changed(owner, name, value):
+    """Return a scene or a part of it with another value, by dotted name."""
+    part, _, rest = name.partition('.')
+    if isinstance(owner, dict):
+        return owner | {name: value}
+    value = changed(getattr(owner, part), rest, value) if rest else value
+    return dataclasses.replace(owner, **{part: value})
+
+
 @pytest.mark.parametrize('robot', ['ch3r', 'go2', 'rail_leg'])
 def test_no_promise_outside_the_ranges_drawn(robot):
     """Outside the ranges errors are unknown: no level has a bound, and the best one is chosen."""
     names = {'ch3r': 'hexapod_patches', 'go2': 'quadruped_patches', 'rail_leg': 'leg_wet_dome_75'}
     scene = Scene.load(names[robot])
     assert fidelity.choose(scene).bound < math.inf
-    for name, (low, high) in fidelity.Promises.load().ranges[robot].items():
-        part, _, key = name.rpartition('.')
-        if part == 'foot' and key != 'friction':
-            continue  # other soles need other feet
-
-        def changed(value, part=part, key=key):
-            if not part:
-                return dataclasses.replace(scene, **{key: value})
-            owner = dataclasses.replace(getattr(scene, part), **{key: value})
-            return dataclasses.replace(scene, **{part: owner})
-
-        beyond = high + 0.01 * max(abs(high), 1e-6)
-        choice = fidelity.choose(changed(beyond))
+    ranges = fidelity.Promises.load().ranges[robot]
+    for name, (low, high) in ranges.items():
+        whole = name == 'foot.pads'
+        beyond = int(high) + 1 if whole else high + 0.01 * max(abs(high), 1e-6)
+        choice = fidelity.choose(changed(scene, name, beyond))
         assert choice.bound == math.inf
         assert f'{name} = {beyond:.4g}, drawn from {low:.4g} to {high:.4g}' in choice.note
-        assert f'{name} = ' not in fidelity.Promises.load().beyond(changed(high))
+        drawn = changed(scene, name, int(high) if whole else high)
+        assert f'{name} = ' not in fidelity.Promises.load().beyond(drawn)
         if robot != 'rail_leg' and importlib.util.find_spec('mujoco'):
             assert choice.level == 'L2'
+    foot = {key.name: getattr(scene.foot, key.name) for key in dataclasses.fields(scene.foot)}
+    numbers = {f'foot.{key}' for key, value in foot.items() if isinstance(value, (int, float))}
+    assert numbers - {'foot._limit_cell'} <= ranges.keys()
 
 
 def test_no_promise_with_what_was_not_drawn():
@@ -137,10 +143,14 @@ def test_no_promise_with_what_was_not_drawn():
     gait = dataclasses.replace(HEXAPOD.gait, pushes=False)
     sticky = dataclasses.replace(HEXAPOD.gait, cycle=0.8, stride=0.15)
     slope = dataclasses.replace(HEXAPOD.floor, slope=0.08)
+    limit = MeasuredLimit(0.3, 75e3, 4e-6)
     for scene, words in [
         (silent, 'faults, of which none were drawn'),
         (dataclasses.replace(HEXAPOD, floor=floor), 'a floor as in a drawing'),
         (dataclasses.replace(HEXAPOD, gait=gait), 'phases or pushes of the gait'),
+        (changed(HEXAPOD, 'foot.pad.measured_limit', limit), 'pads, drawn were large ones'),
+        (changed(HEXAPOD, 'foot.limit', 'flattening'), 'pads, drawn were large ones'),
+        (changed(HEXAPOD, 'regulator.hose_conductance', 1e-8), 'a measured conductance'),
         (dataclasses.replace(HEXAPOD, robot='mine.yaml'), 'robot = mine.yaml, drawn were ch3r'),
     ]:
         choice = fidelity.choose(scene)
