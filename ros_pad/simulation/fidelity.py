@@ -44,7 +44,7 @@ FRICTION = 'friction'
 """Not a level: how much five per cent more friction changes a walk on the cheapest level."""
 
 LEAST = 1e-4
-"""Error that is added to every error, so that its logarithm is finite."""
+"""Error that is added to every error, so that its logarithm is finite; no bound is below it."""
 
 _REMEDY = ': write the file again with python -m studies fidelity'
 
@@ -135,13 +135,13 @@ class Promises:
         return found
 
     def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
-        """Return the bound on the error of a level; infinite if none was drawn."""
+        """Return the bound on the error of a level, at least LEAST; infinite if none was drawn."""
         line = self.lines.get(scene.robot, {}).get(f'{level} {scene.metric}')
         if line is None:
             return math.inf
         known = self._features(scene, policy)
         power = line['constant'] + sum(line[name] * value for name, value in known.items())
-        return math.exp(min(power, 700.0)) - LEAST
+        return max(LEAST, math.exp(min(power, 700.0)) - LEAST)
 
     def beyond(self, scene: Scene, policy: str | None = None) -> str:
         """Return as text what of a scene is outside the ranges drawn; empty if nothing is."""
@@ -286,12 +286,10 @@ def _grip(scene: Scene, policy: str | None) -> str:
 def _within(bound: float) -> str:
     """Return a bound in words, rounded up to two digits."""
     percent = 100.0 * bound
+    if percent > 99.0:
+        return f'off by up to {max(percent, 100.0):.0f} %'
     unit = 10.0 ** (math.floor(math.log10(max(percent, 1e-3))) - 1)
-    return (
-        f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
-        if percent < 99.5
-        else (f'off by up to {percent:.0f} %')
-    )
+    return f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
 
 
 def level(

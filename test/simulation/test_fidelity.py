@@ -98,6 +98,16 @@ def test_the_answer_without_slip_is_named_where_it_suffices(monkeypatch):
         assert ('no slip at all, without a simulation, is within 19 %' in choice.note) == named
 
 
+@pytest.mark.parametrize(
+    'bound, words',
+    [(0.0999, 'within 10 %'), (0.99, 'within 99 %'), (0.9901, 'off by up to 100 %'),
+     (0.995, 'off by up to 100 %'), (1.62, 'off by up to 162 %')],
+)  # fmt: skip
+def test_bounds_in_words_are_rounded_up(monkeypatch, bound, words):
+    with_bounds(monkeypatch, L1=(bound, 1.0))
+    assert f'the distance on L1 is {words} of the top level' in fidelity.choose(HEXAPOD, 'L1').note
+
+
 def test_without_mujoco_auto_takes_l1_and_names_the_extra(monkeypatch):
     monkeypatch.setattr(fidelity.importlib.util, 'find_spec', lambda name: None)
     with_bounds(monkeypatch, L1=(0.5, 1.0), L2=(0.2, 0.1))
@@ -224,6 +234,8 @@ def test_a_bound_by_hand(monkeypatch):
     expected = math.exp(-3.0 - 0.5 * math.log(margin) + 0.1 * math.log(margin / 2.0)) - 1e-4
     assert promises.bound('L1', scene, 'flat') == pytest.approx(expected, rel=1e-3)
     assert promises.bound('L2', scene, 'flat') == math.inf
+    line['constant'] = -20.0  # a bound below 1e-4, which was added to all errors, is not known
+    assert promises.bound('L1', scene, 'flat') == pytest.approx(1e-4)
 
 
 def test_features_by_hand():
