@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
     if options.fidelity == 'auto' and not joints and (promise := levels.answer(scene, policy)):
-        return _answer(scene, promise, options.json)
+        return _answer(options, scene, policy, promise)
     level = levels.level(scene, options.fidelity, policy, joints)
     if level != 'L0':
         check_reach(scene)  # before there is a folder
@@ -164,23 +164,37 @@ def run(options: argparse.Namespace) -> int:
             folder.rmdir()
 
 
-def _answer(scene: Scene, known: levels.ChosenLevel, as_json: bool) -> int:
-    """Print the distance of a scene that needs no walk."""
+def _answer(
+    options: argparse.Namespace, scene: Scene, policy: str, known: levels.ChosenLevel
+) -> int:
+    """Print the distance of a scene that needs no walk; refuse options of a walk."""
+    walks = f'--fidelity {levels.level(scene, policy=policy)} walks it'
+    for name in ('seed', 'learnt', 'no_ros', 'no_compare', 'live', 'out'):
+        if getattr(options, name):
+            raise InvalidInput(
+                f'{_flag(name)} is not allowed: {scene.name} requires its {scene.metric} alone,'
+                f' for which nothing is simulated; {walks}'
+            )
     far = levels.sticking_distance(scene)
-    if as_json:
+    if options.json:
         found = {'distance_m': far, 'bound': known.bound, 'note': known.note}
         print(json.dumps({'scene': scene.source, 'fidelity': known.level} | found))
         return 0
     print(f'{scene.name}, {known.level}: {far:.3g} m in {scene.cycles} cycles')
-    print(f'fidelity: {known.note}; --fidelity {levels.level(scene)} walks it')
+    print(f'fidelity: {known.note}; {walks}')
     return 0
+
+
+def _flag(name: str) -> str:
+    return '--' + name.replace('_', '-')
 
 
 def _run_bench(options: argparse.Namespace) -> int:
     for name, (default, why) in _ONLY_WALKS.items():
         if getattr(options, name) != default:
-            flag = '--' + name.replace('_', '-')
-            raise InvalidInput(f'{flag} is not allowed: {options.scene} is a bench scene, {why}')
+            raise InvalidInput(
+                f'{_flag(name)} is not allowed: {options.scene} is a bench scene, {why}'
+            )
     words = ['--json'] if options.json else []
     words += ['--foot', options.foot] if options.foot else []
     words += ['--out', str(options.out)] if options.out else []
