@@ -215,7 +215,7 @@ def _run_in(
 ) -> int:
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
-    others = Others(scene, compared, options.seed, level, options.sensing)
+    others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
     # Real regulators may wait for set-points: nothing else takes their time.
     with contextlib.nullcontext() if options.live else others.beside():
         return _run_beside(others, folder, options, scene, policy, level)

@@ -3,6 +3,8 @@ import dataclasses
 
 import pytest
 
+from ros_pad import cli
+from ros_pad.commands import run
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
@@ -36,6 +38,19 @@ def test_a_file_gives_the_settings_of_an_estimator(file):
     assert tuning.scales == {
         'flat_dry': Scale(0.7, 0.1), 'flat_wet': Scale(1.2, 0.2), 'dome': Scale(1.0, 0.4),
     }  # fmt: skip
+
+
+def test_all_policies_of_a_run_begin_with_it(file, tmp_path, monkeypatch):
+    found = []
+
+    def others(*given):
+        found.extend(each.scales['flat_wet'] for each in given if isinstance(each, Tuning))
+        raise PadError('enough')
+
+    monkeypatch.setattr(run, 'Others', others)
+    words = ['--learnt', str(file(GOOD)), '--out', str(tmp_path / 'walk')]
+    assert cli.main(['run', 'hexapod_patches', '--no-ros', *words]) != 0
+    assert found == [Scale(1.2, 0.2)]
 
 
 def test_what_is_saved_is_what_was_known_and_less_certain(file, tmp_path):
