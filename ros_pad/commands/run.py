@@ -336,12 +336,12 @@ def _at_most(term: dict[str, Any]) -> str:
     """Return a bound, of what it is a share, and whether its effect is too large."""
     if term['bound'] is None:
         return 'no bound known'
-    word = {'bound': 'at most', 'promise': '95 of 100 times at most', 'estimate': 'about'}
-    text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
+    often = '95 of 100 times ' if term['kind'] == 'promise' else ''
+    text = f'{often}at most {100.0 * term["bound"]:.1f} %'
     text += f' {re.split("[:;,]", term["reason"])[0]}'
     if term['exceeds']:
         share = f'about {100.0 * term["effect"]:.0f} %' if term['effect'] <= 1.0 else 'all'
-        text += f', {share} of the result: exceeds the accuracy asked'
+        text += f', {share} of the result: exceeds the accuracy required'
     return text
 
 

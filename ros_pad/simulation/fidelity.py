@@ -254,9 +254,9 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
 
 
 def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
-    """Return the promise of the distance without slip; None if a scene asks for more.
+    """Return the promise of the distance without slip; None if a scene requires more.
 
-    It asks for more if it wants the walk itself, not only the metric, or more accuracy.
+    It requires more if it wants the walk itself, not only the metric, or more accuracy.
     """
     promises = Promises.load()
     if scene.wanted != 'metric' or promises.beyond(scene, policy):

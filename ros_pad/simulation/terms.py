@@ -56,8 +56,7 @@ class Term:
     reason : str
         To what the bound is relative, and its source.
     kind : str
-        ``bound`` if the term cannot change more, ``promise`` if it does not in 95 of 100 scenes,
-        ``estimate`` if it can.
+        ``bound`` if the term cannot change more, ``promise`` if it does not in 95 of 100 scenes.
     taken : bool
         Whether the trial has the term.
     effect : float or None
