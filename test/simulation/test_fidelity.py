@@ -9,6 +9,7 @@ import pytest
 from ros_pad import configuration
 from ros_pad.contact import Foot
 from ros_pad.contact import MeasuredLimit
+from ros_pad.control.morphology import MARGIN
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
@@ -313,6 +314,14 @@ def test_reserve_on_a_film_in_mid_stance():
     expected = touching * dry + (1.0 - touching) * foot.boundary_friction
     assert expected < 0.95 * dry
     assert margin.mid_stance_grip(scene, True, True) == pytest.approx(expected, rel=1e-3)
+
+
+def test_domes_above_the_ceiling_leave_the_rest_to_the_sole():
+    """10 kg: of 32.7 N, 37 pads carry 0.2833 N + 12.5 uN/Pa · 15 kPa each at 90 kPa."""
+    heavy = margin.Stand(changed(HEXAPOD, 'body.mass', 10.0), True)
+    assert heavy.pressure == HEXAPOD.foot.ceiling == 90e3
+    assert heavy.on_sole == pytest.approx(10.0 * 9.81 / 3.0 - 37 * 0.4708, rel=1e-3)
+    assert MARGIN.default == margin._MARGIN
 
 
 def test_reserve_is_least_where_feet_hold_least():
