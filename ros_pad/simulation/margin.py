@@ -24,8 +24,8 @@ from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 
 SOLE_MODULUS = 3.95e5
-"""Reduced modulus of a sole whose foot names no material, Pa: Dragon Skin 10, four times 2 C1 of
-``config/materials``, times 1.88."""
+"""Reduced modulus of a sole whose foot names no material, Pa: of Dragon Skin 10, four times its
+shear modulus, 2 C1 of ``config/materials``, times 1.88 by which that is too soft for the domes."""
 
 NEAR = 1.5
 """Grip margin below which feet may slip: bounds may step there."""

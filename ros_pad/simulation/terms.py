@@ -28,11 +28,10 @@ from ros_pad.simulation.margin import dome_pressure
 from ros_pad.simulation.margin import grounds
 from ros_pad.simulation.margin import mid_stance_grip
 from ros_pad.simulation.margin import stance
+from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
-
-ATMOSPHERE = 101325.0  # Pa
 
 ADVANCING, RECEDING = 2.0944, 1.5708
 """Contact angles of water on the pads, rad, with which the force of contact lines is added."""
@@ -273,8 +272,8 @@ def _joints(scene: Scene, policy: str) -> Term:
     return Term(
         'joints, servos, scuffing at touch-down, swinging legs, pitch and roll',
         known,
-        f'of the {scene.metric}: L1 against L2; on dry flat ground feet slip 3 to 4 mm a cycle on'
-        ' L2, 0.1 mm on L1',
+        f'of the {scene.metric}: L1 against the top level, on which feet slip by millimetres where'
+        ' those of L1 stick',
         kind='promise',
         effect=known,
     )
