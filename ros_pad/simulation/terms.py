@@ -322,7 +322,7 @@ def _soft_film(scene: Scene, policy: str) -> Term | None:
     most = stand.resistance(*stand.films(time))
     return Term(
         'dimple of the film under a soft foot',
-        _share(most - stand.resistance(THICK_FILM, THICK_FILM), most),
+        _share(abs(most - stand.resistance(THICK_FILM, THICK_FILM)), most),
         'of the friction on wet ground in mid-stance: no dry contact at all' + ''.join(found),
     )
 

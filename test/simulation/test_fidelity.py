@@ -440,6 +440,8 @@ def test_feet_without_friction_have_terms_without_bounds(name):
     assert found['air in hose and pads'] is None
     assert found.get(terms.LINES) is None
     assert ('suction of the film at lift-off' in found) == (scene.floor.kind != 'dry')
+    slippery = changed(scene, 'foot.boundary_friction', 0.12)  # a film is better than none
+    assert all(each.bound is None or each.bound >= 0.0 for each in terms.terms(slippery))
 
 
 def test_outside_the_ranges_effects_are_not_known():
