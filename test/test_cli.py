@@ -117,6 +117,31 @@ def test_auto_takes_the_answer_without_a_simulation(
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.parametrize(
+    'words',
+    [['--live'], ['--seed', '3'], ['--out', 'walk'], ['--no-compare'], ['--no-ros']],
+    ids=' '.join,
+)
+def test_without_a_simulation_options_of_a_walk_are_refused(
+    words: list[str],
+    tmp_path: pathlib.Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The level that is offered is that of the policy: domes need L2 for this accuracy."""
+    pytest.importorskip('mujoco')
+    monkeypatch.chdir(tmp_path)
+    shipped = SCENE.with_name('hexapod_dry_distance.yaml').read_text()
+    scene = pathlib.Path('strict.yaml')
+    scene.write_text(shipped.replace('accuracy: 0.1 ', 'accuracy: 0.0511 '))
+    for policy, level in (('flat', 'L1'), ('dome', 'L2')):
+        assert cli.main(['run', str(scene), '--policy', policy, *words]) == 2
+        said = capsys.readouterr().err
+        assert f'{words[0]} is not allowed: strict requires its distance alone' in said
+        assert f'--fidelity {level} walks it' in said
+    assert [*tmp_path.iterdir()] == [tmp_path / scene]
+
+
 def test_a_run_without_ros_writes_report_and_summary(
     tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
     if options.fidelity == 'auto' and not joints and (promise := levels.answer(scene, policy)):
-        return _answer(scene, promise, options.json)
+        return _answer(options, scene, policy, promise)
     level = levels.level(scene, options.fidelity, policy, joints)
     if level != 'L0':
         check_reach(scene)  # before there is a folder
@@ -164,23 +164,37 @@ def run(options: argparse.Namespace) -> int:
             folder.rmdir()
 
 
-def _answer(scene: Scene, known: levels.ChosenLevel, as_json: bool) -> int:
-    """Print the distance of a scene that needs no walk."""
+def _answer(
+    options: argparse.Namespace, scene: Scene, policy: str, known: levels.ChosenLevel
+) -> int:
+    """Print the distance of a scene that needs no walk; refuse options of a walk."""
+    walks = f'--fidelity {levels.level(scene, policy=policy)} walks it'
+    for name in ('seed', 'learnt', 'no_ros', 'no_compare', 'live', 'out'):
+        if getattr(options, name):
+            raise InvalidInput(
+                f'{_flag(name)} is not allowed: {scene.name} requires its {scene.metric} alone,'
+                f' for which nothing is simulated; {walks}'
+            )
     far = levels.sticking_distance(scene)
-    if as_json:
+    if options.json:
         found = {'distance_m': far, 'bound': known.bound, 'note': known.note}
         print(json.dumps({'scene': scene.source, 'fidelity': known.level} | found))
         return 0
     print(f'{scene.name}, {known.level}: {far:.3g} m in {scene.cycles} cycles')
-    print(f'fidelity: {known.note}; --fidelity {levels.level(scene)} walks it')
+    print(f'fidelity: {known.note}; {walks}')
     return 0
+
+
+def _flag(name: str) -> str:
+    return '--' + name.replace('_', '-')
 
 
 def _run_bench(options: argparse.Namespace) -> int:
     for name, (default, why) in _ONLY_WALKS.items():
         if getattr(options, name) != default:
-            flag = '--' + name.replace('_', '-')
-            raise InvalidInput(f'{flag} is not allowed: {options.scene} is a bench scene, {why}')
+            raise InvalidInput(
+                f'{_flag(name)} is not allowed: {options.scene} is a bench scene, {why}'
+            )
     words = ['--json'] if options.json else []
     words += ['--foot', options.foot] if options.foot else []
     words += ['--out', str(options.out)] if options.out else []
@@ -201,7 +215,7 @@ def _run_in(
 ) -> int:
     policies = () if options.no_compare or policy != 'adaptive' else POLICIES
     compared = [each for each in policies if each != policy]
-    others = Others(scene, compared, options.seed, level, options.sensing)
+    others = Others(scene, compared, options.seed, level, options.sensing, options.tuning)
     # Real regulators may wait for set-points: nothing else takes their time.
     with contextlib.nullcontext() if options.live else others.beside():
         return _run_beside(others, folder, options, scene, policy, level)
@@ -322,12 +336,12 @@ def _at_most(term: dict[str, Any]) -> str:
     """Return a bound, of what it is a share, and whether its effect is too large."""
     if term['bound'] is None:
         return 'no bound known'
-    word = {'bound': 'at most', 'promise': '95 of 100 times at most', 'estimate': 'about'}
-    text = f'{word[term["kind"]]} {100.0 * term["bound"]:.1f} %'
+    often = '95 of 100 times ' if term['kind'] == 'promise' else ''
+    text = f'{often}at most {100.0 * term["bound"]:.1f} %'
     text += f' {re.split("[:;,]", term["reason"])[0]}'
     if term['exceeds']:
         share = f'about {100.0 * term["effect"]:.0f} %' if term['effect'] <= 1.0 else 'all'
-        text += f', {share} of the result: exceeds the accuracy asked'
+        text += f', {share} of the result: exceeds the accuracy required'
     return text
 
 

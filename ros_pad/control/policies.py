@@ -92,7 +92,8 @@ SETTINGS = (
 """The settings of :func:`adaptive`, each named ``policy.`` and its argument."""
 
 SELDOM = 64
-"""Steps as a dome after which a foot probes where flat feet do not pay: perhaps they do again."""
+"""Steps as a dome, since a foot was flat, after which it probes where flat feet do not pay:
+perhaps they do again."""
 
 PREFIX = 'policy.'
 _DEFAULTS = {each.name.removeprefix(PREFIX): each.default for each in SETTINGS}
@@ -119,7 +120,8 @@ def adaptive(
     The friction of a dome hardly depends on whether the ground is wet, so under domes the estimate
     only fades: without probes, feet would stay domes for ever after the first wet ground. A probe
     is one flat step of a foot that is otherwise a dome. One leg probes at a time. Where flat feet
-    do not pay, feet are domes on dry ground, too, and probe after :data:`SELDOM` steps.
+    do not pay, feet are domes on dry ground, too, and probe :data:`SELDOM` steps after they were
+    flat; those that were domes from the start do not.
 
     Parameters
     ----------

@@ -191,27 +191,29 @@ def _terms_table(settings: Mapping[str, Any]) -> str:
         [
             html.escape(str(each['term'])),
             'yes' if each.get('taken') else 'no',
-            'not known'
-            if each['bound'] is None
-            else f'{_sign(each)} {100.0 * each["bound"]:.1f} %',
+            _bound(each),
             _effect(each),
             html.escape(str(each['reason'])),
         ]
         for each in terms
     ]
-    head = ['term', 'modelled', 'bound (≤) or estimate (≈)', 'effect on the result']
-    return table([*head, 'quantity, and source'], rows, range(2, 4))
+    head = ['term', 'modelled', 'bound', 'effect on the result', 'quantity, and source']
+    return table(head, rows, range(2, 4))
 
 
-def _sign(term: dict[str, Any]) -> str:
-    return '≈' if term.get('kind') == 'estimate' else '≤'
+def _bound(term: dict[str, Any]) -> str:
+    """Return the bound of a term, and how often it is kept if that is not always."""
+    if term['bound'] is None:
+        return 'not known'
+    often = ' in 95 of 100 scenes' if term.get('kind') == 'promise' else ''
+    return f'≤ {100.0 * term["bound"]:.1f} %{often}'
 
 
 def _effect(term: dict[str, Any]) -> str:
     """Return the effect of a term, and whether it is above the accuracy of the scene."""
     if term.get('effect') is None:  # as in bags of versions that did not estimate it
         return 'not known'
-    note = ', exceeds the accuracy asked' if term['exceeds'] else ''
+    note = ', exceeds the accuracy required' if term['exceeds'] else ''
     share = 100.0 * term['effect']
     return (f'≈ {share:.1f} %' if share <= 100.0 else 'all of it') + note
 

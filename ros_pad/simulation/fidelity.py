@@ -12,13 +12,14 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
-import operator
 import pathlib
 from dataclasses import dataclass
+from typing import Any
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.configuration import choice
+from ros_pad.contact import LARGE_PAD
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.full_robot import FullRobot
@@ -43,7 +44,7 @@ FRICTION = 'friction'
 """Not a level: how much five per cent more friction changes a walk on the cheapest level."""
 
 LEAST = 1e-4
-"""Error that is added to every error, so that its logarithm is finite."""
+"""Error that is added to every error, so that its logarithm is finite; no bound is below it."""
 
 _REMEDY = ': write the file again with python -m studies fidelity'
 
@@ -61,7 +62,7 @@ class ChosenLevel:
         The error is that of the scene's metric. That of the distance is relative to the distance
         on the top level, or to half of the distance without slip if that is more; that of the slip
         relative to the slip on the top level, or to 2 % of the distance without slip. Infinite for
-        scenes outside the ranges of those drawn.
+        scenes outside the ranges of those drawn. Contact lines that a trial adds are left out.
     note : str
         Bound and grip margin in words, and whether the scene requires a smaller error.
     """
@@ -134,23 +135,26 @@ class Promises:
         return found
 
     def bound(self, level: str, scene: Scene, policy: str | None = None) -> float:
-        """Return the bound on the error of a level; infinite if none was drawn."""
+        """Return the bound on the error of a level, at least LEAST; infinite if none was drawn."""
         line = self.lines.get(scene.robot, {}).get(f'{level} {scene.metric}')
         if line is None:
             return math.inf
         known = self._features(scene, policy)
         power = line['constant'] + sum(line[name] * value for name, value in known.items())
-        return math.exp(min(power, 700.0)) - LEAST
+        return max(LEAST, math.exp(min(power, 700.0)) - LEAST)
 
     def beyond(self, scene: Scene, policy: str | None = None) -> str:
         """Return as text what of a scene is outside the ranges drawn; empty if nothing is."""
         if scene.robot not in self.ranges:
             return f'robot = {scene.robot}, drawn were {", ".join(self.ranges)}'
+        unused: tuple[str, ...] = () if scene.tow.weight else ('tow.',)
+        if scene.floor.kind != 'patches':
+            unused += ('floor.wet_fraction', 'floor.patch_length')
         try:
             rows = [
-                (name, operator.attrgetter(name)(scene), ends)
+                (name, value_of(scene, name), ends)
                 for name, ends in self.ranges[scene.robot].items()
-                if scene.tow.weight or not name.startswith('tow.')
+                if not name.startswith(unused)
             ]
         except AttributeError as error:
             raise ConfigError(
@@ -163,6 +167,10 @@ class Promises:
             for name, value, (low, high) in rows
             if value is not None and not low - 1e-9 * abs(low) <= value <= high + 1e-9 * abs(high)
         ]
+        if (scene.foot.pad, scene.foot.limit) != (LARGE_PAD, 'measured'):
+            found.append('pads, drawn were large ones with the force limit as measured')
+        if 'hose_conductance' in scene.regulator:
+            found.append('a measured conductance of the hose, of which none were drawn')
         if scene.faults:
             found.append('faults, of which none were drawn')
         if scene.floor.kind == 'drawn':
@@ -174,6 +182,14 @@ class Promises:
 
 def _file() -> pathlib.Path:
     return configuration.shared_folder() / 'fidelity.yaml'
+
+
+def value_of(scene: Scene, name: str) -> Any:
+    """Return a value of a scene by its dotted name, which may end in an option of its air line."""
+    found: Any = scene
+    for key in name.split('.'):
+        found = found.get(key) if isinstance(found, dict) else getattr(found, key)
+    return found
 
 
 def _walks_as_usual(scene: Scene) -> bool:
@@ -238,9 +254,9 @@ def choose(scene: Scene, fidelity: str = 'auto', policy: str | None = None) -> C
 
 
 def answer(scene: Scene, policy: str | None = None) -> ChosenLevel | None:
-    """Return the promise of the distance without slip; None if a scene asks for more.
+    """Return the promise of the distance without slip; None if a scene requires more.
 
-    It asks for more if it wants the walk itself, not only the metric, or more accuracy.
+    It requires more if it wants the walk itself, not only the metric, or more accuracy.
     """
     promises = Promises.load()
     if scene.wanted != 'metric' or promises.beyond(scene, policy):
@@ -270,12 +286,10 @@ def _grip(scene: Scene, policy: str | None) -> str:
 def _within(bound: float) -> str:
     """Return a bound in words, rounded up to two digits."""
     percent = 100.0 * bound
+    if percent > 99.0:
+        return f'off by up to {max(percent, 100.0):.0f} %'
     unit = 10.0 ** (math.floor(math.log10(max(percent, 1e-3))) - 1)
-    return (
-        f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
-        if percent < 99.5
-        else (f'off by up to {percent:.0f} %')
-    )
+    return f'within {math.ceil(percent / unit - 1e-9) * unit:.2g} %'
 
 
 def level(

@@ -24,13 +24,13 @@ from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
 
 SOLE_MODULUS = 3.95e5
-"""Reduced modulus of a sole whose foot names no material, Pa: Dragon Skin 10, four times 2 C1 of
-``config/materials``, times 1.88."""
+"""Reduced modulus of a sole whose foot names no material, Pa: of Dragon Skin 10, four times its
+shear modulus, 2 C1 of ``config/materials``, times 1.88 by which that is too soft for the domes."""
 
 NEAR = 1.5
 """Grip margin below which feet may slip: bounds may step there."""
 
-_MARGIN = 1.2  # pressure margin with which a controller chooses the pressure of a dome by default
+_MARGIN = 1.2  # the default of a controller, which may not be imported here
 
 
 def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
@@ -46,7 +46,7 @@ def features(scene: Scene, policy: str | None = None) -> dict[str, float]:
     policy = scene.policy if policy is None else policy
     grip, (gait, load, slope) = least_grip(scene, policy), demands(scene)
     demand = gait + load + slope
-    margin = math.log(grip / demand)
+    margin = math.log(max(grip / demand, 1e-9))  # feet without friction have no grip at all
     wet = {'dry': 0.0, 'wet': 1.0}.get(scene.floor.kind, scene.floor.wet_fraction)
     found = {
         'margin': margin,
@@ -185,10 +185,15 @@ class Stand:
 
 
 def dome_pressure(scene: Scene) -> float:
-    """Return the pressure of a dome, Pa: the scene's, or what a controller would choose."""
-    foot, load = scene.foot, scene.expected_load
+    """Return the pressure of a dome, Pa: the scene's, or what carries the expected load.
+
+    The latter is a feature of the scene, not what a controller commands: that begins with a larger
+    load, then takes the measured one, and leaves feet flat for which the ceiling does not suffice.
+    Here they are domes at the ceiling, whose sole carries the rest.
+    """
     if scene.dome_pressure:
         return scene.dome_pressure
+    foot, load = scene.foot, scene.expected_load
     try:
         wanted = pressure_for(foot.pad, load / foot.pads, foot.limit, margin=_MARGIN)
     except NoEquilibrium:

@@ -28,11 +28,10 @@ from ros_pad.simulation.margin import dome_pressure
 from ros_pad.simulation.margin import grounds
 from ros_pad.simulation.margin import mid_stance_grip
 from ros_pad.simulation.margin import stance
+from ros_pad.simulation.pneumatics import ATMOSPHERE
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import RailGait
 from ros_pad.simulation.scene import Scene
-
-ATMOSPHERE = 101325.0  # Pa
 
 ADVANCING, RECEDING = 2.0944, 1.5708
 """Contact angles of water on the pads, rad, with which the force of contact lines is added."""
@@ -56,8 +55,7 @@ class Term:
     reason : str
         To what the bound is relative, and its source.
     kind : str
-        ``bound`` if the term cannot change more, ``promise`` if it does not in 95 of 100 scenes,
-        ``estimate`` if it can.
+        ``bound`` if the term cannot change more, ``promise`` if it does not in 95 of 100 scenes.
     taken : bool
         Whether the trial has the term.
     effect : float or None
@@ -118,7 +116,7 @@ def with_terms(scene: Scene) -> Scene:
     This is the hysteresis of the contact lines of domes on wet ground. To a scene with an accuracy
     of 1 nothing is added.
     """
-    if scene.foot.capillary_force or scene.accuracy >= 1.0 or not _lines(scene).taken:
+    if scene.foot.capillary_force or not _lines(scene).taken:
         return scene
     force = float(
         hysteresis_force(scene.foot.pad.radius, WATER.surface_tension, ADVANCING, RECEDING)
@@ -133,18 +131,21 @@ def _lines(scene: Scene) -> Term:
         return Term(LINES, None, 'the file of the foot has it', taken=True)
     # At most γ w (cos θ_rec - cos θ_adv) <= 2 γ w, with w = 2 r0 for each pad.
     most = foot.pads * 2.0 * WATER.surface_tension * 2.0 * foot.pad.radius
-    share = most / (foot.friction * scene.expected_load)
+    share = _share(most, foot.friction * scene.expected_load)
     worth = None if scene.floor.kind == 'dry' else _worth_of_friction(scene, 'dome')
-    effect = None if worth is None else share * worth
-    taken = effect is not None and effect > scene.accuracy
-    return Term(
-        LINES,
-        share,
-        'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0 degrees)'
-        f' on every pad{"; added, since its effect is above the accuracy asked" if taken else ""}',
-        effect=effect,
-        taken=taken,
+    term = _by_friction(
+        Term(
+            LINES,
+            share,
+            'of the friction of a loaded foot: full hysteresis of the contact angle (180 to 0'
+            ' degrees) on every pad',
+        ),
+        worth,
     )
+    if term.effect is None or not scene.accuracy < min(1.0, term.effect):
+        return term
+    reason = f'{term.reason}; added, since its effect is above the accuracy required'
+    return replace(term, taken=True, reason=reason)
 
 
 def _worth_of_friction(scene: Scene, policy: str) -> float | None:
@@ -154,6 +155,11 @@ def _worth_of_friction(scene: Scene, policy: str) -> float | None:
         return None
     effect = promises.bound(levels.FRICTION, scene, policy)
     return effect / _STEP if effect < math.inf else None
+
+
+def _share(part: float, whole: float) -> float | None:
+    """Return a part over the whole; None if that is nothing, as the friction of some feet is."""
+    return part / whole if whole else None
 
 
 def _by_friction(term: Term, worth: float | None) -> Term:
@@ -171,7 +177,7 @@ def _of_friction(scene: Scene, policy: str) -> list[Term]:
     found = [
         Term(
             'film that drains',
-            max(abs(each - now) for each in ends) / now,
+            _share(max(abs(each - now) for each in ends), now),
             'of the friction on wet ground in mid-stance: a film that never drains, or none; it'
             ' costs no time',
             taken=True,
@@ -226,14 +232,14 @@ def _always(scene: Scene, level: str, policy: str) -> list[Term]:
     """Return the terms that a level always has, and pads that balloon, which none has."""
     found = []
     if policy != 'flat':
-        changed = (
-            mid_stance_grip(scene, False, wet) / mid_stance_grip(scene, True, wet)
-            for wet in grounds(scene)
+        grips = (
+            [mid_stance_grip(scene, dome, wet) for dome in (True, False)] for wet in grounds(scene)
         )
+        shares = [_share(abs(dome - flat), dome) for dome, flat in grips]
         found.append(
             Term(
                 'air in hose and pads',
-                max(abs(1.0 - share) for share in changed),
+                None if None in shares else max(each or 0.0 for each in shares),
                 'of the friction in mid-stance: pads that never fill; it costs no time',
                 taken=True,
             )
@@ -266,8 +272,8 @@ def _joints(scene: Scene, policy: str) -> Term:
     return Term(
         'joints, servos, scuffing at touch-down, swinging legs, pitch and roll',
         known,
-        f'of the {scene.metric}: L1 against L2; on dry flat ground feet slip 3 to 4 mm a cycle on'
-        ' L2, 0.1 mm on L1',
+        f'of the {scene.metric}: L1 against the top level, on which feet slip by millimetres where'
+        ' those of L1 stick',
         kind='promise',
         effect=known,
     )
@@ -313,10 +319,10 @@ def _soft_film(scene: Scene, policy: str) -> Term | None:
             )
     if not found:
         return None
-    least = stand.resistance(THICK_FILM, THICK_FILM)
+    most = stand.resistance(*stand.films(time))
     return Term(
         'dimple of the film under a soft foot',
-        1.0 - least / stand.resistance(*stand.films(time)),
+        _share(abs(most - stand.resistance(THICK_FILM, THICK_FILM)), most),
         'of the friction on wet ground in mid-stance: no dry contact at all' + ''.join(found),
     )
 

@@ -19,6 +19,7 @@ from contextlib import suppress
 from typing import TypeAlias
 
 from ros_pad import workers
+from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import Progress
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
@@ -44,12 +45,18 @@ def _share(reached: MutableSequence[float]) -> None:
 
 
 def _walk(
-    scene: Scene, policy: str, seed: int, level: str, sensing: str, place: int
+    scene: Scene,
+    policy: str,
+    seed: int,
+    level: str,
+    sensing: str,
+    tuning: Tuning | None,
+    place: int,
 ) -> Metrics | None:
     def progress(seconds: float) -> None:
         _reached[place] = seconds
 
-    return loop.run(scene, policy, seed, level, progress, sensing=sensing).metrics
+    return loop.run(scene, policy, seed, level, progress, tuning, sensing=sensing).metrics
 
 
 class Others:
@@ -62,8 +69,9 @@ class Others:
         seed: int,
         level: str,
         sensing: str = 'markers',
+        tuning: Tuning | None = None,
     ) -> None:
-        self._given = scene, seed, level, sensing
+        self._given = scene, seed, level, sensing, tuning
         self._policies = policies
         self._left: deque[str] = deque()  # not begun
         self._reached: MutableSequence[float] = []
@@ -91,10 +99,10 @@ class Others:
             policy = self._left.popleft()
         except IndexError:
             return
-        scene, seed, level, sensing = self._given
+        scene, seed, level, sensing, tuning = self._given
         place = self._policies.index(policy)
         with suppress(RuntimeError):  # the executor has ended, or its processes were killed
-            walk = executor.submit(_walk, scene, policy, seed, level, sensing, place)
+            walk = executor.submit(_walk, scene, policy, seed, level, sensing, tuning, place)
             self._walks[policy] = walk
             walk.add_done_callback(lambda _: self._begin(executor))
 
@@ -122,9 +130,9 @@ class Others:
         return {policy: each for policy in self._policies if (each := found[policy]) is not None}
 
     def _here(self, policy: str, bar: Bar) -> Metrics | None:
-        scene, seed, level, sensing = self._given
+        scene, seed, level, sensing, tuning = self._given
         with bar(_text(policy), scene.duration) as progress:
-            return loop.run(scene, policy, seed, level, progress, sensing=sensing).metrics
+            return loop.run(scene, policy, seed, level, progress, tuning, sensing=sensing).metrics
 
     def _awaited(self, policy: str, place: int, bar: Bar) -> Metrics | None:
         walk = self._walks[policy]

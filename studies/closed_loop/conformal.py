@@ -81,7 +81,7 @@ def shift(line: Array, features: Array, errors: Array, promise: float) -> float:
 
 def bounds(line: Array, features: Array) -> Array:
     """Return the bounds of errors on a line."""
-    found: Array = np.exp(line[0] + features @ line[1:]) - LEAST
+    found: Array = np.maximum(LEAST, np.exp(line[0] + features @ line[1:]) - LEAST)
     return found
 
 

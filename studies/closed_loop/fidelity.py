@@ -233,8 +233,8 @@ def text_of(config: dict[str, Any], scenes: dict[str, int]) -> str:
     """Return the text of fidelity.yaml."""
     lines = [
         '# Made by python -m studies fidelity. Bound of the error of a level and metric: exp of',
-        '# constant + slopes times features, less 1e-4. The promise: the error of 95 of 100',
-        '# scenes drawn in these ranges is within it.',
+        '# constant + slopes times features, less 1e-4; at least 1e-4. The promise: the error of',
+        '# 95 of 100 scenes drawn in these ranges is within it.',
         f'machine: {{{", ".join(f"{key}: {value!r}" for key, value in machine().items())}}}',
         f'scenes: {{{", ".join(f"{key}: {value}" for key, value in scenes.items())}}}'
         '  # for fit and calibration',
@@ -296,8 +296,8 @@ def summary(document: dict[str, Any]) -> str:
             count = sum(row['held_out'] for row in own)
             share = [_percent(each) for each in conformal.interval(kept, count)]
             lines.append(
-                f'| all, {words} {metric} | | {count} | {_percent(kept / count)}'
-                f' | {" to ".join(share)} | | |'
+                f'| all, {words} {metric} |  | {count} | {_percent(kept / count)}'
+                f' | {" to ".join(share)} |  |  |'
             )
     lines += ['', f'| kept, of | {" | ".join(grouped)} |', '|---' * (1 + len(grouped)) + '|']
     for group in GROUPS:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import functools
 import math
-import operator
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.contact.resistance import FOOT_SETTINGS
+from ros_pad.simulation.fidelity import value_of
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.rail_leg import RailLeg
@@ -64,21 +65,21 @@ RAIL = {
     'gait.swing': (0.3, 1.0),
     'dome_pressure': (40e3, 85e3),
 }
+PATCHES = {'floor.wet_fraction': (0.2, 0.85), 'floor.patch_length': (0.3, 2.0)}
 CYCLES = {'ch3r': (4, 60), 'go2': (4, 60), RAIL_LEG: (8, 80)}
 SHORT = {'ch3r': 10, 'go2': 10}  # cycles of 14 walks in 15 are no more, to save time
 # What every drawn scene has as the scene that it was made from.
+_SAME = (
+    *('floor.film_thickness', 'floor.viscosity', 'regulator.hose_diameter'),
+    *('regulator.hose_length', 'sensors.rate', 'sensors.force', 'sensors.position'),
+    *(f'foot.{each.name}' for each in FOOT_SETTINGS),
+)
+_LEGGED = ('body.height', 'body.leg_stiffness', 'tow.stiffness', *_SAME)
 FIXED = {
-    'ch3r': (
-        *('body.height', 'body.leg_stiffness', 'tow.stiffness', 'floor.film_thickness'),
-        *('floor.viscosity', 'foot.friction', 'foot.shear_strength', 'foot.boundary_friction'),
-        *('foot.sole_radius', 'foot.pads', 'foot.capillary_force', 'sensors.rate'),
-    ),
-    RAIL_LEG: (
-        *('floor.film_thickness', 'floor.viscosity', 'foot.friction', 'foot.shear_strength'),
-        *('foot.boundary_friction', 'foot.sole_radius', 'foot.pads', 'foot.capillary_force'),
-    ),
+    'ch3r': _LEGGED,
+    'go2': _LEGGED,
+    RAIL_LEG: ('gait.lift', 'floor.slope', 'floor.roughness', 'floor.unevenness', *_SAME),
 }
-FIXED['go2'] = FIXED['ch3r']
 
 
 @functools.cache
@@ -108,13 +109,14 @@ def draw(robot: str, seed: int) -> tuple[Scene, str]:
         values[name] *= float(random.random() < 0.5)
     if random.random() < 0.4:
         values['tow.weight'] = 0.0
-    share = random.uniform(0.2, 0.85)
+    share = random.uniform(*PATCHES['floor.wet_fraction'])
     shortest, longest = patch_lengths(share)
+    ends = PATCHES['floor.patch_length']
     floor = replace(
         scene.floor,
         kind=str(random.choice(['dry', 'wet', 'patches'])),
         wet_fraction=share,
-        patch_length=random.uniform(max(0.3, shortest), min(2.0, longest)),
+        patch_length=random.uniform(max(ends[0], shortest), min(ends[1], longest)),
     )
     scene = _with(replace(scene, floor=floor), values)
     return scene, str(random.choice(['flat', 'dome', 'adaptive']))
@@ -137,14 +139,14 @@ def _with(scene: Scene, values: dict[str, float]) -> Scene:
 def ranges(robot: str) -> dict[str, tuple[float, float]]:
     """Return lowest and highest value, by dotted name, of all that scenes of a robot have."""
     scene = _base(robot)
-    found = dict(RAIL) if robot == RAIL_LEG else WALKS[robot] | GROUND
+    found = dict(RAIL) if robot == RAIL_LEG else WALKS[robot] | GROUND | PATCHES
     found['cycles'] = CYCLES[robot]
     if isinstance(scene.body, LeggedBody):
         found |= {'heading_gain': (0.0, 1.0), 'dome_pressure': (60e3, 85e3)}
         share = scene.body.inertia / scene.body.mass
         low, high = found['body.mass']
         found['body.inertia'] = share * low, share * high
-    return found | {name: (operator.attrgetter(name)(scene),) * 2 for name in FIXED[robot]}
+    return found | {name: (value_of(scene, name),) * 2 for name in FIXED[robot]}
 
 
 Walk = tuple[float, float, float] | None

@@ -8,6 +8,8 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
+from ros_pad.contact import MeasuredLimit
+from ros_pad.control.morphology import MARGIN
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import Scene
@@ -97,6 +99,16 @@ def test_the_answer_without_slip_is_named_where_it_suffices(monkeypatch):
         assert ('no slip at all, without a simulation, is within 19 %' in choice.note) == named
 
 
+@pytest.mark.parametrize(
+    'bound, words',
+    [(0.0999, 'within 10 %'), (0.99, 'within 99 %'), (0.9901, 'off by up to 100 %'),
+     (0.995, 'off by up to 100 %'), (1.62, 'off by up to 162 %')],
+)  # fmt: skip
+def test_bounds_in_words_are_rounded_up(monkeypatch, bound, words):
+    with_bounds(monkeypatch, L1=(bound, 1.0))
+    assert f'the distance on L1 is {words} of the top level' in fidelity.choose(HEXAPOD, 'L1').note
+
+
 def test_without_mujoco_auto_takes_l1_and_names_the_extra(monkeypatch):
     monkeypatch.setattr(fidelity.importlib.util, 'find_spec', lambda name: None)
     with_bounds(monkeypatch, L1=(0.5, 1.0), L2=(0.2, 0.1))
@@ -105,30 +117,35 @@ def test_without_mujoco_auto_takes_l1_and_names_the_extra(monkeypatch):
     assert 'ros_pad[mujoco]' in choice.note
 
 
+def changed(owner, name, value):
+    """Return a scene or a part of it with another value, by dotted name."""
+    part, _, rest = name.partition('.')
+    if isinstance(owner, dict):
+        return owner | {name: value}
+    value = changed(getattr(owner, part), rest, value) if rest else value
+    return dataclasses.replace(owner, **{part: value})
+
+
 @pytest.mark.parametrize('robot', ['ch3r', 'go2', 'rail_leg'])
 def test_no_promise_outside_the_ranges_drawn(robot):
     """Outside the ranges errors are unknown: no level has a bound, and the best one is chosen."""
     names = {'ch3r': 'hexapod_patches', 'go2': 'quadruped_patches', 'rail_leg': 'leg_wet_dome_75'}
     scene = Scene.load(names[robot])
     assert fidelity.choose(scene).bound < math.inf
-    for name, (low, high) in fidelity.Promises.load().ranges[robot].items():
-        part, _, key = name.rpartition('.')
-        if part == 'foot' and key != 'friction':
-            continue  # other soles need other feet
-
-        def changed(value, part=part, key=key):
-            if not part:
-                return dataclasses.replace(scene, **{key: value})
-            owner = dataclasses.replace(getattr(scene, part), **{key: value})
-            return dataclasses.replace(scene, **{part: owner})
-
-        beyond = high + 0.01 * max(abs(high), 1e-6)
-        choice = fidelity.choose(changed(beyond))
+    ranges = fidelity.Promises.load().ranges[robot]
+    for name, (low, high) in ranges.items():
+        whole = name == 'foot.pads'
+        beyond = int(high) + 1 if whole else high + 0.01 * max(abs(high), 1e-6)
+        choice = fidelity.choose(changed(scene, name, beyond))
         assert choice.bound == math.inf
         assert f'{name} = {beyond:.4g}, drawn from {low:.4g} to {high:.4g}' in choice.note
-        assert f'{name} = ' not in fidelity.Promises.load().beyond(changed(high))
+        drawn = changed(scene, name, int(high) if whole else high)
+        assert f'{name} = ' not in fidelity.Promises.load().beyond(drawn)
         if robot != 'rail_leg' and importlib.util.find_spec('mujoco'):
             assert choice.level == 'L2'
+    foot = {key.name: getattr(scene.foot, key.name) for key in dataclasses.fields(scene.foot)}
+    numbers = {f'foot.{key}' for key, value in foot.items() if isinstance(value, (int, float))}
+    assert numbers - {'foot._limit_cell'} <= ranges.keys()
 
 
 def test_no_promise_with_what_was_not_drawn():
@@ -137,10 +154,14 @@ def test_no_promise_with_what_was_not_drawn():
     gait = dataclasses.replace(HEXAPOD.gait, pushes=False)
     sticky = dataclasses.replace(HEXAPOD.gait, cycle=0.8, stride=0.15)
     slope = dataclasses.replace(HEXAPOD.floor, slope=0.08)
+    limit = MeasuredLimit(0.3, 75e3, 4e-6)
     for scene, words in [
         (silent, 'faults, of which none were drawn'),
         (dataclasses.replace(HEXAPOD, floor=floor), 'a floor as in a drawing'),
         (dataclasses.replace(HEXAPOD, gait=gait), 'phases or pushes of the gait'),
+        (changed(HEXAPOD, 'foot.pad.measured_limit', limit), 'pads, drawn were large ones'),
+        (changed(HEXAPOD, 'foot.limit', 'flattening'), 'pads, drawn were large ones'),
+        (changed(HEXAPOD, 'regulator.hose_conductance', 1e-8), 'a measured conductance'),
         (dataclasses.replace(HEXAPOD, robot='mine.yaml'), 'robot = mine.yaml, drawn were ch3r'),
     ]:
         choice = fidelity.choose(scene)
@@ -214,6 +235,8 @@ def test_a_bound_by_hand(monkeypatch):
     expected = math.exp(-3.0 - 0.5 * math.log(margin) + 0.1 * math.log(margin / 2.0)) - 1e-4
     assert promises.bound('L1', scene, 'flat') == pytest.approx(expected, rel=1e-3)
     assert promises.bound('L2', scene, 'flat') == math.inf
+    line['constant'] = -20.0  # a bound below 1e-4, which was added to all errors, is not known
+    assert promises.bound('L1', scene, 'flat') == pytest.approx(1e-4)
 
 
 def test_features_by_hand():
@@ -293,6 +316,14 @@ def test_reserve_on_a_film_in_mid_stance():
     assert margin.mid_stance_grip(scene, True, True) == pytest.approx(expected, rel=1e-3)
 
 
+def test_domes_above_the_ceiling_leave_the_rest_to_the_sole():
+    """10 kg: of 32.7 N, 37 pads carry 0.2833 N + 12.5 uN/Pa · 15 kPa each at 90 kPa."""
+    heavy = margin.Stand(changed(HEXAPOD, 'body.mass', 10.0), True)
+    assert heavy.pressure == HEXAPOD.foot.ceiling == 90e3
+    assert heavy.on_sole == pytest.approx(10.0 * 9.81 / 3.0 - 37 * 0.4708, rel=1e-3)
+    assert MARGIN.default == margin._MARGIN
+
+
 def test_reserve_is_least_where_feet_hold_least():
     patches = {
         policy: fidelity.reserve(HEXAPOD, policy) for policy in ('flat', 'dome', 'adaptive')
@@ -319,7 +350,7 @@ def test_what_is_left_out(name):
         assert term.term and term.reason
         assert term.bound is None or 0.0 <= term.bound < 1.0
         assert term.bound is None or term.reason.startswith('of the ')
-        assert term.kind in ('bound', 'promise', 'estimate')
+        assert term.kind == ('promise' if term.term.startswith('joints') else 'bound')
 
 
 def test_pads_of_a_material_leave_ballooning_out():
@@ -365,6 +396,7 @@ def test_the_effect_of_a_term_is_that_of_friction_in_proportion(monkeypatch):
         (term,) = (t for t in terms.terms(scene) if 'capillary' in t.term)
         assert term.effect == pytest.approx(4.0 * line, rel=1e-3)
         assert term.taken == added and not term.exceeds
+        assert bool(terms.with_terms(scene).foot.capillary_force) == added
     (pull,) = (t for t in terms.terms(scene, policy='dome') if 'pull' in t.term)
     assert pull.effect == pytest.approx(4.0 * pull.bound) and pull.exceeds
     # A metric of its own: five per cent of friction change the slip by 10 %.
@@ -384,6 +416,32 @@ def test_contact_lines_that_matter_are_added_to_the_robot(monkeypatch):
     assert terms.with_terms(dry).foot.capillary_force == 0.0
     own = dataclasses.replace(strict, foot=dataclasses.replace(strict.foot, capillary_force=1e-4))
     assert terms.with_terms(own).foot.capillary_force == 1e-4
+
+
+def test_with_an_accuracy_of_one_nothing_is_added(monkeypatch):
+    """The effect of contact lines, 0.68 % of friction times 400, is all of the distance."""
+    with_bounds(monkeypatch, L2=(0.01, 0.1), friction=(20.0, 0.1))
+    for accuracy, added in [(0.999, True), (1.0, False)]:
+        scene = dataclasses.replace(HEXAPOD, accuracy=accuracy)
+        (line,) = (t for t in terms.terms(scene) if t.term == terms.LINES)
+        assert (line.taken, line.exceeds) == (added, not added)
+        assert bool(terms.with_terms(scene).foot.capillary_force) == added
+
+
+@pytest.mark.parametrize('name', ['hexapod_patches', 'hexapod_dry_slow', 'leg_wet_dome_75'])
+def test_feet_without_friction_have_terms_without_bounds(name):
+    """Of no friction nothing is a share; loads have theirs."""
+    scene = Scene.load(name)
+    none = dict.fromkeys(('friction', 'shear_strength', 'boundary_friction'), 0.0)
+    scene = dataclasses.replace(scene, foot=dataclasses.replace(scene.foot, **none))
+    assert terms.with_terms(scene) == scene
+    assert 'foot.friction = 0, drawn from 0.35' in fidelity.choose(scene).note
+    found = {term.term: term.bound for term in terms.terms(scene, policy='dome')}
+    assert found['air in hose and pads'] is None
+    assert found.get(terms.LINES) is None
+    assert ('suction of the film at lift-off' in found) == (scene.floor.kind != 'dry')
+    slippery = changed(scene, 'foot.boundary_friction', 0.12)  # a film is better than none
+    assert all(each.bound is None or each.bound >= 0.0 for each in terms.terms(slippery))
 
 
 def test_outside_the_ranges_effects_are_not_known():

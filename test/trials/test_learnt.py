@@ -5,6 +5,8 @@ import math
 import pytest
 import yaml
 
+from ros_pad import cli
+from ros_pad.commands import run
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
@@ -41,6 +43,19 @@ def test_a_file_gives_the_settings_of_an_estimator_on_the_next_floor(file):
         'flat_wet': Scale(1.2, pytest.approx(math.hypot(0.2, 0.1))),
         'dome': Scale(1.0, 0.4),
     }
+
+
+def test_all_policies_of_a_run_begin_with_it(file, tmp_path, monkeypatch):
+    found = []
+
+    def others(*given):
+        found.extend(each.scales['flat_wet'] for each in given if isinstance(each, Tuning))
+        raise PadError('enough')
+
+    monkeypatch.setattr(run, 'Others', others)
+    words = ['--learnt', str(file(GOOD)), '--out', str(tmp_path / 'walk')]
+    assert cli.main(['run', 'hexapod_patches', '--no-ros', *words]) != 0
+    assert found == [Scale(1.2, pytest.approx(math.hypot(0.2, 0.1)))]
 
 
 def test_what_was_less_certain_than_before_a_walk_stays_so(file):

@@ -13,6 +13,7 @@ from ros_pad import workers
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials import others
+from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.others import Others
 
 SCENE = dataclasses.replace(Scene.load('hexapod_patches'), cycles=2)
@@ -38,16 +39,20 @@ def short(monkeypatch):
     monkeypatch.setattr(others, 'SHORTEST', 0.0)
 
 
-def expected():
-    return {policy: loop.run(SCENE, policy, 1, 'L1').metrics for policy in POLICIES}
+def expected(tuning=None):
+    return {p: loop.run(SCENE, p, 1, 'L1', tuning=tuning).metrics for p in POLICIES}
 
 
 @pytest.mark.parametrize('cores', [1, 2, 8])
 def test_results_and_their_order_do_not_depend_on_the_cores(monkeypatch, shown, cores):
+    """They have the tuning given: with another friction on wet ground feet find more of it."""
+    tuning = tuning_for(SCENE, 'markers')
+    tuning = dataclasses.replace(tuning, scale_flat_wet=3.0, scale_sd_flat_wet=0.01)
     monkeypatch.setattr(workers, 'cores', lambda: cores)
-    with Others(SCENE, POLICIES, 1, 'L1').beside() as walks:
+    with Others(SCENE, POLICIES, 1, 'L1', tuning=tuning).beside() as walks:
         found = walks.metrics(shown)
-    assert found == expected()
+    assert found == expected(tuning)
+    assert found['flat'].wet_accuracy > loop.run(SCENE, 'flat', 1, 'L1').metrics.wet_accuracy
     assert list(found) == list(POLICIES)
     assert sorted(shown.texts) == sorted(POLICIES)
 
