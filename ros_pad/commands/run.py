@@ -377,7 +377,8 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         print(f'stayed flat: {refusal}')
     for fault in fault_lines(own.faults):
         print(f'fault: {fault}')
-    print(f'modelled: {", ".join(term["term"] for term in trial.settings["taken"])}')
+    taken = ', '.join(term['term'] for term in trial.settings['taken'])
+    print(f'modelled: {taken or "none of the terms that may be left out"}')
     for term in trial.settings['omitted']:
         print(f'left out: {term["term"]} ({_at_most(term)})')
     if bag:
