@@ -92,7 +92,7 @@ def lead_picture(
         bars.tick_params(axis='y', labelsize=14.0)
         for x, title in (
             (0.95, 'Feet feel the ground and turn into domes where it is wet'),
-            (11.1, 'What that is worth'),
+            (11.1, 'One walk, a floor used for tuning'),
         ):
             figure.text(
                 x / wide, 1.0 - 0.12 / tall, title, va='top', fontsize=16.0, fontweight='bold'
