@@ -9,6 +9,7 @@ from setuptools import setup
 
 NAME = 'ros_pad'
 NODES = ['body_estimator', 'controller', 'estimator', 'recorder', 'regulator', 'simulator']
+DOCS = ['furo>=2024.8', 'myst-parser>=4.0', 'sphinx>=8.1']
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
@@ -45,7 +46,7 @@ def ros(distribution: str) -> list[str]:
 
 setup(
     name=NAME,
-    version='0.1.0',
+    version='0.2.0',
     description='Shape-changing feet for legged robots on ROS 2: model, simulation, nodes',
     license='Apache-2.0',
     maintainer='ros_pad maintainers',
@@ -78,6 +79,10 @@ setup(
         'sweep': ['distributed>=2024.1', 'pyarrow>=14'],
         # Meshes of pads from STL, OBJ, PLY and MSH files.
         'mesh': ['meshio>=5.3'],
+        # `pad explore`: pads designed in the browser.
+        'explore': ['nicegui>=3.0'],
+        # The site: `make docs`.
+        'docs': DOCS,
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
         'test': [
             'colcon-common-extensions',
@@ -89,13 +94,16 @@ setup(
             'mpmath>=1.2',
             'mujoco>=3.3.6',
             'mypy==2.4.*',
+            'nicegui>=3.0',
             'numba>=0.60',
+            'playwright>=1.49',
             'pyarrow>=14',
             'pytest>=7.4',
             'pytest-xdist',
             'ruff==0.17.*',
             'scikit-fem>=9',
             'types-PyYAML',
+            *DOCS,
         ],
     },
     entry_points={
