@@ -16,8 +16,7 @@ PACKAGE = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
 URLS = {each.get('type'): each.text for each in PACKAGE.iter('url')}
 NAME = 'ros_pad'
 NODES = ['body_estimator', 'controller', 'estimator', 'recorder', 'regulator', 'simulator']
-PLOT = ['matplotlib>=3.6']
-DOCS = ['furo>=2024.8', 'myst-parser>=4.0', 'sphinx>=8.1']
+DOCS = ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4.0', 'sphinx>=8.1']
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
@@ -108,7 +107,7 @@ setup(
         'ros': ros('jazzy'),
         'kilted': ros('kilted'),
         # Pictures and reports.
-        'plot': PLOT,
+        'plot': ['matplotlib>=3.6'],
         # The hexapod with joints (L2), and compiled loops of the planar one.
         'mujoco': ['mujoco>=3.3.6'],
         'fast': ['numba>=0.60'],
@@ -117,9 +116,9 @@ setup(
         # Meshes of pads from STL, OBJ, PLY and MSH files.
         'mesh': ['meshio>=5.3'],
         # `pad explore`: pads designed in the browser.
-        'explore': ['nicegui>=3.0', *PLOT],
+        'explore': ['matplotlib>=3.6', 'nicegui>=3.0'],
         # The site: `make docs`.
-        'docs': [*DOCS, *PLOT],
+        'docs': DOCS,
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
         'test': [
             'colcon-common-extensions',
@@ -141,7 +140,6 @@ setup(
             'scikit-fem>=9',
             'types-PyYAML',
             *DOCS,
-            *PLOT,
         ],
     },
     entry_points={

@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import yaml
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
@@ -146,6 +145,15 @@ def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     return value
 
 
+def refuse(path: str | os.PathLike[str], force: bool) -> None:
+    """Raise InvalidInput if a path exists, unless it is a regular file and ``force`` is True."""
+    path = pathlib.Path(path)
+    if path.exists() and not path.is_file():
+        raise InvalidInput(f'{path}: is no regular file, and only regular files are replaced')
+    if not force and path.exists():
+        raise InvalidInput(f'{path}: exists already; --force (force=True) replaces it')
+
+
 @dataclass(frozen=True)
 class Setting:
     """Description of one setting, from which checks, ROS descriptors and documentation are made.
@@ -226,24 +234,28 @@ def shared_folder() -> pathlib.Path:
     """Return the folder with ``feet/``, ``scenes/`` and ``params.yaml``.
 
     In a source tree (also an editable install) this is ``config/`` beside the package. Otherwise
-    it is ``share/ros_pad/config`` in the first folder of ``AMENT_PREFIX_PATH`` that has it, or
-    else in ``sys.prefix``.
+    it is ``share/ros_pad/config`` under the prefix into which the package is installed (a virtual
+    environment, a colcon workspace, ``pip install --user`` or ``--target``), or else in a folder
+    of ``AMENT_PREFIX_PATH`` or in ``sys.prefix``.
 
     Raises
     ------
     ConfigError
         When no such folder is found.
     """
-    source = pathlib.Path(__file__).resolve().parent.parent / 'config'
-    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
-    installed = [pathlib.Path(p) / 'share' / 'ros_pad' / 'config' for p in prefixes if p]
-    for folder in [source, *installed]:
+    package = pathlib.Path(__file__).absolute().parent
+    source = package.resolve().parent / 'config'
+    # From the folder of the package (--target) to three above it (lib/python3.12/site-packages).
+    prefixes: list[str | pathlib.Path] = [*package.parents[:4]]
+    prefixes += filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    folders = [source]
+    folders += [pathlib.Path(p) / 'share' / 'ros_pad' / 'config' for p in [*prefixes, sys.prefix]]
+    for folder in folders:
         if (folder / 'scenes').is_dir():
             return folder
-    looked = ', '.join(str(f) for f in [source, *installed])
     raise ConfigError(
-        f'no config folder of ros_pad found; looked in {looked}: source setup.bash of the'
-        ' workspace in which ros_pad is installed'
+        f'no config folder of ros_pad found; looked in {", ".join(map(str, folders))}: install'
+        ' ros_pad with pip or colcon, which put it there; a copy of the package alone lacks it'
     )
 
 
@@ -283,54 +295,6 @@ def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
     )
 
 
-SAFE_LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-"""The safe loader of libyaml, six times as fast as that of PyYAML, where PyYAML has it."""
-
-DEEPEST_YAML = 100
-"""Most levels of nesting of a YAML text."""
-
-
-def read_yaml(text: str, loader: Any = SAFE_LOADER) -> Any:
-    """Return the content of a YAML text.
-
-    Raises
-    ------
-    yaml.YAMLError
-        When the text is not valid, or nested more than 100 deep.
-    Exception
-        Of other kinds, for text that only looks like a date or number (2026-99-99, !!int '').
-    """
-    depth = 0
-    # The functions that make objects from events call themselves for each level of nesting; those
-    # of libyaml end the process when the stack is full.
-    for event in yaml.parse(text, Loader=SAFE_LOADER):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > DEEPEST_YAML:
-                problem = f'nested more than {DEEPEST_YAML} deep'
-                mark: Any = event.start_mark  # libyaml has a class of its own
-                raise yaml.MarkedYAMLError(None, None, problem, mark)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-    return yaml.load(text, Loader=loader)
-
-
-class _Loader(SAFE_LOADER):
-    """A safe loader that raises an error for a key that occurs twice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                continue
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'key {key.value!r} occurs twice', key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
 class Table:
     """One mapping of a YAML file, read key by key.
 
@@ -367,17 +331,16 @@ class Table:
     @classmethod
     def parse(cls, text: str, origin: str) -> Table:
         """Read YAML from a text; raise `ConfigError`, with line and column, if it is not valid."""
+        from ros_pad import yaml_text  # here, because a pad made of numbers needs no PyYAML
+
         try:
-            values = read_yaml(text, _Loader)
-        except yaml.YAMLError as error:
+            values = yaml_text.read_yaml(text, yaml_text.StrictLoader)
+        except Exception as error:
+            # YAMLError, or others: see read_yaml; a chain of aliases may still be too deep.
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-            problem = getattr(error, 'problem', None) or str(error)
+            problem = getattr(error, 'problem', None) or str(error) or type(error).__name__
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
-        except Exception as error:
-            # See read_yaml; a chain of aliases may still be too deep.
-            problem = str(error) or type(error).__name__
-            raise ConfigError(f'{origin}: not valid YAML: {problem}') from error
         return cls(values, origin)
 
     def __contains__(self, key: str) -> bool:

@@ -16,10 +16,10 @@ from mcap.records import Channel
 from mcap.records import Schema
 
 from ros_pad.bags.storage import Contents
-from ros_pad.configuration import SAFE_LOADER
-from ros_pad.configuration import read_yaml
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.yaml_text import SAFE_LOADER
+from ros_pad.yaml_text import read_yaml
 
 _NAME = 'metadata.yaml'
 _ROOT = 'rosbag2_bagfile_information'

@@ -13,6 +13,9 @@ from typing import Any
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.command import complain
+from ros_pad.commands.folder import check_pictures
+from ros_pad.configuration import refuse
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
 from ros_pad.contact import Pad
@@ -21,9 +24,8 @@ from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.calibrate import calibrate
 from ros_pad.contact.calibrate import foot_file
 from ros_pad.contact.measurements import Measurements
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
-from ros_pad.reports.calibration import draw
-from ros_pad.reports.files import refuse
 
 
 def add(commands: Commands) -> None:
@@ -106,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
         )
     for path in (foot_path, figure_path):
         refuse(path, options.force)
+    check_pictures(options.figure)
     foot = Foot.load(options.foot)
     found = calibrate(
         Measurements.read(options.csv),
@@ -115,15 +118,27 @@ def run(options: argparse.Namespace) -> int:
         fit=options.fit,
         rubber=_rubber(options, foot),
     )
-    picture = io.BytesIO()
-    draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
-    _write({figure_path: picture.getvalue(), foot_path: foot_file(found).encode()})
+    picture = _picture(found, figure_path)
+    _write({**picture, foot_path: foot_file(found).encode()})
+    drawn = figure_path if picture else None
     if options.json:
-        print(json.dumps(_values(found, foot_path, figure_path)))
+        print(json.dumps(_values(found, foot_path, drawn)))
     else:
         _show(found)
-        print(f'\nfoot:    {foot_path}\npicture: {figure_path}')
+        print(f'\nfoot:    {foot_path}\npicture: {drawn or "none: it needs Matplotlib"}')
     return 0
+
+
+def _picture(found: Calibration, path: pathlib.Path) -> dict[pathlib.Path, bytes]:
+    """Draw a fit; return the content of its file by path, nothing without Matplotlib."""
+    try:
+        from ros_pad.reports.calibration import draw
+    except ConfigError as error:
+        complain(error, 0)
+        return {}
+    picture = io.BytesIO()
+    draw(found).savefig(picture, format=path.suffix[1:], dpi=150)
+    return {path: picture.getvalue()}
 
 
 def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
@@ -155,7 +170,7 @@ def _write(contents: dict[pathlib.Path, bytes]) -> None:
 
 
 def _values(
-    found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path
+    found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path | None
 ) -> dict[str, Any]:
     def plain(values: dict[str, Any]) -> dict[str, Any]:
         """Replace NaN, which JSON does not have, by None."""
@@ -183,7 +198,7 @@ def _values(
         'comparisons': [plain(asdict(each)) | {'says': str(each)} for each in found.comparisons],
         'warnings': list(found.warnings),
         'foot': str(foot_path),
-        'figure': str(figure_path),
+        'figure': str(figure_path) if figure_path else None,
     }
 
 

@@ -18,6 +18,7 @@ from ros_pad import configuration
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.folder import refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
@@ -136,6 +137,7 @@ def _add_materials(part: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
     refuse_existing('--figure', options.figure)
+    check_pictures(options.figure)
     foot = None if options.foot is None else Foot.load(options.foot)
     if options.material is not None or (foot is not None and foot.pad.material is not None):
         return _compare_materials(options, foot)

@@ -39,9 +39,10 @@ from ros_pad.pace import Progress
 
 OLDEST, NEWEST = (3, 11), (3, 13)  # versions of Python with which ros_pad is tested
 DISTRIBUTION = 'jazzy'  # distribution of ROS 2 with which ros_pad is tested
-NEEDED = ('numpy', 'scipy', 'yaml', 'matplotlib', 'tqdm', 'mcap', 'rosbags', 'serial')
+NEEDED = ('numpy', 'scipy', 'yaml', 'tqdm', 'mcap', 'rosbags', 'serial')
 # Optional modules, each with the extra of ros_pad that installs it, and its purpose.
 EXTRAS = {
+    'matplotlib': ('plot', 'pictures and reports; without it, pad run writes no report'),
     'mujoco': ('mujoco', 'robots with joints, L2; without it, L1 is used'),
     'numba': ('fast', 'compiled L1; without it, L1 is ten times slower, with the same results'),
     'distributed': ('sweep', 'sweeps on a Dask cluster'),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Create the new folder that a command writes into, and refuse existing paths."""
+"""Check where a command is to write: a new folder, existing paths, pictures."""
 
 from __future__ import annotations
 
@@ -29,3 +29,9 @@ def refuse_existing(option: str, path: pathlib.Path | None) -> None:
     """Raise InvalidInput if the path that an option gives exists."""
     if path is not None and path.exists():
         raise InvalidInput(f'{option} {path}: exists already: give another name')
+
+
+def check_pictures(*paths: object) -> None:
+    """Raise ConfigError if the path of a picture is given and Matplotlib is missing."""
+    if any(path is not None for path in paths):
+        import ros_pad.reports  # noqa: F401

@@ -12,6 +12,7 @@ from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.folder import refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import parameters
@@ -102,6 +103,7 @@ def run(options: argparse.Namespace) -> int:
     remaps = _remaps(options.remap)
     values = _values(options.set)
     refuse_existing('--figure', options.figure)
+    check_pictures(options.figure)
     refuse_existing('--out', options.out)
     try:
         bag = replays.open_bag(options.bag)

@@ -22,6 +22,7 @@ from ros_pad.capillary.layers import BALANCES
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.folder import check_pictures
 from ros_pad.configuration import number
 from ros_pad.contact import THESIS_LIQUID
 from ros_pad.contact import WATER
@@ -189,6 +190,7 @@ def _add_method(part: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Find the height of the liquid on the mesh and print it; return the exit status."""
     number('--direction', options.direction, 'degrees', low=-math.inf)
+    check_pictures(options.figure, options.html)
     liquid = _liquid(options)
     try:
         mesh = _mesh(options)

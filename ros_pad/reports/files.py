@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import matplotlib
 from matplotlib.figure import Figure
 
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.reports.style import DPI
@@ -20,15 +21,6 @@ from ros_pad.reports.style import Drawn
 from ros_pad.reports.style import rendered
 
 _PICTURES = ('.png', '.svg', '.pdf')
-
-
-def refuse(path: str | os.PathLike[str], force: bool) -> None:
-    """Raise InvalidInput if a path exists, unless it is a regular file and ``force`` is True."""
-    path = pathlib.Path(path)
-    if path.exists() and not path.is_file():
-        raise InvalidInput(f'{path}: is no regular file, and only regular files are replaced')
-    if not force and path.exists():
-        raise InvalidInput(f'{path}: exists already; --force (force=True) replaces it')
 
 
 def save(path: str | os.PathLike[str], data: bytes, new_folder: bool = True) -> None:

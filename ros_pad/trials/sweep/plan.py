@@ -31,6 +31,7 @@ from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.node_settings import tuning_for
+from ros_pad.yaml_text import read_yaml
 
 _ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 _POLICY = [each.name for each in POLICY_SETTINGS]
@@ -224,7 +225,7 @@ def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> S
     """
     path = configuration.locate('scenes', source)
     Table.load(path)  # reports errors of the file itself without naming the values
-    content = configuration.read_yaml(path.read_text(encoding='utf-8'))
+    content = read_yaml(path.read_text(encoding='utf-8'))
     with _errors_naming(values):
         for name, value in values.items():
             *folders, key = name.split('.')
