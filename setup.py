@@ -138,6 +138,7 @@ setup(
             'pytest-xdist',
             'ruff==0.17.*',
             'scikit-fem>=9',
+            'setuptools>=77',
             'types-PyYAML',
             *DOCS,
         ],
