@@ -61,7 +61,8 @@ NONE_CHOSEN := [ $$? -eq 5 ]
 
 # A row is a version of Python, alone or with what it is to run on. Rows without ROS test the core,
 # and so that it needs none; `oldest` is the NumPy and SciPy of Ubuntu 24.04; `jazzy` and `kilted`
-# test the nodes. `make test-matrix MATRIX=3.12-kilted` runs one row.
+# test the nodes; `wheel` installs the wheel with its libraries into an empty environment.
+# `make test-matrix MATRIX=3.12-kilted` runs one row.
 # `test-all` runs CI_ROW on physics, estimation, control and drivers: what Ubuntu 24.04 has, the home
 # of ROS 2 Jazzy. Where its Python is missing, the summary says so.
 CI_ROW := 3.12-oldest
@@ -83,6 +84,8 @@ define MATRIX_ROW
     *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
     *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
     *-kilted) packages='.[kilted,test]'; tests='$(NODE_TESTS)' ;; \
+    *-wheel) packages='. pytest pytest-xdist setuptools'; tests=test/test_wheel.py; \
+      export WHEEL_LIBRARIES=index ;; \
     *) packages='.[test]' ;; \
   esac; \
   if ! PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \

@@ -2,7 +2,8 @@
 """The sdist has the whole source, and the wheel made of it works outside of a checkout.
 
 Nothing is fetched: the virtual environment in which the wheel is installed takes its libraries
-from the one that runs the tests. ``make test-matrix MATRIX=3.12-wheel`` installs them anew.
+from the one that runs the tests. With ``WHEEL_LIBRARIES=index`` they are installed anew, as
+``make test-matrix MATRIX=3.12-wheel`` does.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ print(getattr(build_meta, f'build_{kind}')(folder))
 def run(*command: str | pathlib.Path, status: int = 0, **options: object) -> str:
     """Run a command, which must end with a status; return its output."""
     child = subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, timeout=120, **options
+        list(map(str, command)), capture_output=True, text=True, timeout=300, **options
     )
     assert child.returncode == status, child.stdout + child.stderr
     return child.stdout + child.stderr * bool(status)
@@ -77,6 +78,10 @@ def programs(wheel: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> p
     """Return the folder of the programs of an environment in which the wheel is installed."""
     place = tmp_path_factory.mktemp('environment')
     venv.create(place)
+    if os.environ.get('WHEEL_LIBRARIES') == 'index':
+        own = place / 'bin' / 'python'
+        run(sys.executable, '-m', 'pip', '--python', own, 'install', '--quiet', f'{wheel}[plot]')
+        return place / 'bin'
     (packages,) = place.glob('lib/python*/site-packages')
     (packages / 'libraries.pth').write_text(f'{LIBRARIES}\n', encoding='utf-8')
     pip('--prefix', place, wheel)
