@@ -80,6 +80,7 @@ test-matrix:
 # Where Pythons are managed by pyenv, PYENV_VERSION makes python3.13 mean what it says.
 define MATRIX_ROW
   version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='$(CORE_TESTS)'; \
+  export WHEEL_LIBRARIES=; \
   case $$row in \
     *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
     *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
