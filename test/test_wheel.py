@@ -228,6 +228,8 @@ def test_without_matplotlib_pad_does_the_rest(pad, tmp_path: pathlib.Path):
     for words in ([*design, '--figure', 'a.png'], [*fit, '--force', '--figure', 'a.png']):
         assert remedy in pad(*words, status=2, **without)
     assert not (tmp_path / 'a.png').exists()
+    study = (sys.executable, '-m', 'studies', 'contact')
+    assert remedy in run(*study, status=2, cwd=ROOT, env=outside(**without))
 
 
 def test_pip_install_target(wheel: pathlib.Path, tmp_path: pathlib.Path):
