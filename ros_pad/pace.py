@@ -25,6 +25,19 @@ time, s.
 """
 
 
+def part(progress: Progress | None, start: float, end: float) -> Progress:
+    """Return the callback of a part of a task, which takes the task from one share to another.
+
+    Parameters
+    ----------
+    progress : callable or None
+        Callback of the whole task.
+    start, end : float
+        Shares that are done at the beginning and the end of the part, 0 to 1.
+    """
+    return lambda share: progress(start + (end - start) * share) if progress else None
+
+
 class Pace:
     """Decide at which time stamps a slower task is due: at the first stamp in each of its periods.
 

@@ -65,7 +65,8 @@ def _recorded(
     options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
 ) -> dict[str, str]:
     """Collect the messages of the first seconds of a bag; return the types of all its topics."""
-    reader = BagReader(options.bag)
+    with bar('opening', 1.0, 'bag', delay=1.0) as progress:
+        reader = BagReader(options.bag, progress)
     prefix = f'/{options.namespace.strip("/")}/' if options.namespace else '/'
     names = {
         name: source.topic
