@@ -13,6 +13,7 @@ from typing import Any
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.progress import bar
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
 from ros_pad.contact import Pad
@@ -107,16 +108,19 @@ def run(options: argparse.Namespace) -> int:
     for path in (foot_path, figure_path):
         refuse(path, options.force)
     foot = Foot.load(options.foot)
-    found = calibrate(
-        Measurements.read(options.csv),
-        foot,
-        options.film_thickness,
-        options.viscosity,
-        fit=options.fit,
-        rubber=_rubber(options, foot),
-    )
     picture = io.BytesIO()
-    draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
+    with bar('fitting', 2.0, 'steps', delay=1.0) as progress:
+        found = calibrate(
+            Measurements.read(options.csv),
+            foot,
+            options.film_thickness,
+            options.viscosity,
+            fit=options.fit,
+            rubber=_rubber(options, foot),
+        )
+        progress(1.0)
+        draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
+        progress(2.0)
     _write({figure_path: picture.getvalue(), foot_path: foot_file(found).encode()})
     if options.json:
         print(json.dumps(_values(found, foot_path, figure_path)))

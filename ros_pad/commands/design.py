@@ -176,7 +176,7 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.design import draw
 
         radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
-        with bar('radii', 1.0, 'figure') as progress:
+        with bar('radii', 1.0, 'figure', delay=1.0) as progress:
             draw(options.figure, *_over(radii, options.load, area, pad, others, progress))
     if options.json:
         summary = {
