@@ -4,9 +4,11 @@ import os
 import pathlib
 import pty
 import re
+import select
 import signal
 import subprocess
 import sys
+import termios
 import time
 
 import pytest
@@ -114,6 +116,7 @@ def test_long_tasks_report_their_progress(
         'ros_pad.commands.progress.tqdm',
         lambda **given: tqdm(**given | {'delay': 0.0, 'mininterval': 0.0}),
     )
+    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', 100_000)
     monkeypatch.chdir(tmp_path)
     pathlib.Path('free.csv').write_text(
         'pressure [kPa],height [mm]\n55,1.25\n65,1.6\n75,2.0\n85,2.4\n'
@@ -130,6 +133,7 @@ def test_ctrl_c_leaves_the_terminal_clean(tmp_path: pathlib.Path):
     """The message stands on a line of its own, below the bar; nothing of it is on stdout."""
     words = ['run', 'hexapod_patches', '--no-ros', '--no-compare', '--cycles', '9999', '--json']
     own, other = pty.openpty()
+    termios.tcsetwinsize(other, (24, 100))
     child = subprocess.Popen(
         [sys.executable, '-m', 'ros_pad', *words],
         stdout=subprocess.PIPE,
@@ -140,12 +144,17 @@ def test_ctrl_c_leaves_the_terminal_clean(tmp_path: pathlib.Path):
     )
     os.close(other)
     said = b''
-    with contextlib.suppress(OSError):  # how a pseudo-terminal reports its end
-        while data := os.read(own, 4096):
-            said += data
-            if b'without ROS   0%' in said and child.poll() is None:
-                child.send_signal(signal.SIGINT)
-    os.close(own)
+    try:
+        # A pseudo-terminal reports its end as an error; silence for a minute is a failure.
+        with contextlib.suppress(OSError):
+            while select.select([own], [], [], 60.0)[0] and (data := os.read(own, 4096)):
+                said += data
+                if b'without ROS   0%' in said and b'^' not in said:
+                    child.send_signal(signal.SIGINT)
+                    said += b'^'
+    finally:
+        os.close(own)
+        child.kill()
     assert child.communicate()[0] == '' and child.returncode == 130
     rows = said.decode().split('\r\n')
     assert rows[-2:] == ['pad: stopped', ''] and rows[-3].endswith(']')
