@@ -58,7 +58,9 @@ class Pace:
 
     def __init__(self, period_ns: int) -> None:
         if not isinstance(period_ns, int) or period_ns < 1:
-            raise InvalidInput(f'period = {period_ns!r} ns: a whole number from 1 is needed')
+            raise InvalidInput(
+                f'period = {period_ns!r} ns is not allowed: a whole number from 1 is needed'
+            )
         self._period = period_ns
         self._last: int | None = None
 

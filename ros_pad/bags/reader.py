@@ -33,6 +33,7 @@ from ros_pad.bags.storage import scan
 from ros_pad.bags.storage import shares
 from ros_pad.errors import BagError
 from ros_pad.errors import UnknownEncoding
+from ros_pad.errors import reason
 from ros_pad.pace import Progress
 
 _RowReader: TypeAlias = Callable[[bytes, np.ndarray, np.ndarray], np.ndarray]
@@ -123,7 +124,7 @@ class BagReader:
             self.custom_data = dict(information.get('custom_data') or {})
         except (KeyError, TypeError, ValueError) as error:
             raise BagError(
-                f'{self.path / "metadata.yaml"}: is not the metadata of a bag: {error!r}'
+                f'{self.path / "metadata.yaml"}: is not the metadata of a bag: {reason(error)}'
             ) from error
         if storage != 'mcap' or compression.lower() not in ('', 'none'):
             raise BagError(

@@ -124,7 +124,7 @@ def repair(
     source = pathlib.Path(source)
     files, found = _examine(source, part(progress, 0.0, 0.5))
     if not found.messages:
-        raise BagError(f'{source}: none of its messages can be read')
+        raise BagError(f'{source}: none of its messages can be read: nothing can be repaired')
     done, reach = 0, part(progress, 0.5, 1.0)
     with BagWriter(folder, _custom_data(source)) as writer:
         for name, (channel, schema) in _topics(source, files).items():

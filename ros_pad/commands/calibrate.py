@@ -140,7 +140,8 @@ def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
     thickness = foot.pad.thickness if options.thickness is None else options.thickness
     if material is None or thickness is None:
         raise InvalidInput(
-            f'--material and --thickness are both needed: the foot {foot.source} has not both'
+            f'--material and --thickness are both needed: the foot {foot.source} has'
+            f' material {material} and thickness {thickness} m'
         )
     return Pad.of(material, foot.pad.radius, thickness, foot.pad.measured_limit)
 

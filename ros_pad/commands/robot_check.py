@@ -52,7 +52,8 @@ def _live(
         from ros_pad.nodes.listening import receive
     except ImportError as error:
         raise ConfigError(
-            f'live topics need ROS 2 ({error}): install it, or give a recording with --bag'
+            f'live topics need ROS 2 ({error}): source its setup.bash, or'
+            ' pip install "ros_pad[ros]", or give a recording with --bag'
         ) from error
     with bar('listening', seconds) as progress:
         messages, topics = receive(mapping.sources, seconds, options.namespace, progress)

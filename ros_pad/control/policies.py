@@ -240,5 +240,7 @@ def policy_named(
         return oracle(is_wet)
     policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive(**(parameters or {}))}
     if name not in policies:
-        raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
+        raise InvalidInput(
+            f'policy = {name!r} is not allowed: one of {", ".join(POLICIES)} is needed'
+        )
     return policies[name]

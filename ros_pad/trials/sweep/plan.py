@@ -121,12 +121,15 @@ class Sweep:
                     raise InvalidInput(f'{name} = {value!r} is given twice')
         for policy in self.policies:
             if policy not in POLICIES:
-                raise InvalidInput(f'policy = {policy!r}: one of {", ".join(POLICIES)} is needed')
+                raise InvalidInput(
+                    f'policy = {policy!r} is not allowed: one of {", ".join(POLICIES)} is needed'
+                )
         for seed in self.seeds:
             whole = isinstance(seed, int) and not isinstance(seed, bool)
             if not whole or not 0 <= seed <= LARGEST_SEED:
                 raise InvalidInput(
-                    f'seed = {seed!r}: a whole number from 0 to {LARGEST_SEED} is needed'
+                    f'seed = {seed!r} is not allowed: a whole number from 0 to'
+                    f' {LARGEST_SEED} is needed'
                 )
         for name in self.parameters:
             _check_name(name)
