@@ -72,8 +72,8 @@ def test_a_gait_that_no_leg_reaches_leaves_no_folder(
 @pytest.mark.parametrize(
     ('arguments', 'part'),
     [
-        (['--cycles', '0'], '--cycles 0: a whole number from 1'),
-        (['--seed', '-1'], '--seed -1: a whole number from 0'),
+        (['--cycles', '0'], '--cycles = 0 is not allowed: a whole number from 1 to 100000'),
+        (['--seed', '-1'], '--seed = -1 is not allowed: a whole number from 0 to 2147483647'),
         (['--seed', '2147483648'], 'from 0 to 2147483647'),
         (['--fidelity', 'L0'], "fidelity = 'L0'"),
     ],

@@ -328,7 +328,7 @@ def test_dry_share_under_a_paraboloid(middle, exponent):
     [
         ({'initial': 0.0}, 'initial = 0.0 .* m'),
         ({'load': -1.0}, 'load = -1.0 .* N'),
-        ({'load': None}, 'load or velocity is needed'),
+        ({'load': None}, 'exactly one of load and velocity is needed, but none is given'),
         ({'velocity': 1e-3}, 'not both'),
         ({'load': None, 'velocity': 0.0}, 'velocity = 0 m/s'),
         ({'load': None, 'velocity': math.nan}, 'velocity = nan .* m/s'),
