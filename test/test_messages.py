@@ -18,10 +18,9 @@ def raised() -> list[tuple[str, ast.expr]]:
     found = []
     for path in sorted(PACKAGE.rglob('*.py')):
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-                if getattr(node.exc.func, 'id', '') in ERRORS:
-                    place = f'{path.relative_to(PACKAGE)}:{node.lineno}'
-                    found.append((place, node.exc.args[0]))
+            call = node.exc if isinstance(node, ast.Raise) else None
+            if isinstance(call, ast.Call) and getattr(call.func, 'id', '') in ERRORS:
+                found.append((f'{path.relative_to(PACKAGE)}:{node.lineno}', call.args[0]))
     return found
 
 

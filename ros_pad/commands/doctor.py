@@ -263,8 +263,7 @@ def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
     for name in names:
         extra, purpose = EXTRAS[name]
         if name not in here:
-            advice = f'pip install "ros_pad[{extra}]", or --editable ".[{extra}]" in its folder'
-            yield Finding(name, 'warning', f'not installed: {purpose}', advice)
+            yield Finding(name, 'warning', f'not installed: {purpose}', _install(extra))
         elif errors[name]:
             advice = f'pip install --force-reinstall {name}, or pip uninstall {name} if not needed'
             yield Finding(name, 'warning', f'{errors[name]}; {purpose}', advice)
@@ -272,6 +271,13 @@ def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
             with contextlib.suppress(metadata.PackageNotFoundError):
                 purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
             yield Finding(name, 'ok', purpose)
+
+
+def _install(extra: str, checkout: pathlib.Path = pathlib.Path(__file__).parents[2]) -> str:
+    """Return the command that installs an extra of ros_pad."""
+    if (checkout / 'setup.py').is_file():
+        return f'pip install --editable "{checkout}[{extra}]"'
+    return f'pip install "ros_pad[{extra}]"'
 
 
 def _import_error(name: str) -> str:

@@ -111,7 +111,8 @@ def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch)
     assert {each.status for each in found} == {'warning'}
     pip = {each.what: each.advice for each in found}
     for name, extra in (('mujoco', 'mujoco'), ('numba', 'fast'), ('pyarrow', 'sweep')):
-        assert f'pip install "ros_pad[{extra}]"' in pip[name]
+        assert pip[name] == f'pip install --editable "{ROOT}[{extra}]"'
+    assert doctor._install('fast', ROOT / 'ros_pad') == 'pip install "ros_pad[fast]"'
 
 
 def test_extras_that_cannot_be_imported_say_why(
