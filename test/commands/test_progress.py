@@ -145,9 +145,9 @@ def test_ctrl_c_leaves_the_terminal_clean(tmp_path: pathlib.Path):
     os.close(other)
     said = b''
     try:
-        # A pseudo-terminal reports its end as an error; silence for a minute is a failure.
+        # A pseudo-terminal reports its end as an error; silence for minutes is a failure.
         with contextlib.suppress(OSError):
-            while select.select([own], [], [], 60.0)[0] and (data := os.read(own, 4096)):
+            while select.select([own], [], [], 300.0)[0] and (data := os.read(own, 4096)):
                 said += data
                 if b'without ROS   0%' in said and b'^' not in said:
                     child.send_signal(signal.SIGINT)
