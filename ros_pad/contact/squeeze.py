@@ -397,8 +397,8 @@ def _checked(
     if times.ndim > 1 or not times.size or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
         raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
     if (load is None) == (velocity is None):
-        given = 'none' if load is None else 'both'
-        raise InvalidInput(f'exactly one of load and velocity is needed, but {given} is given')
+        given = 'none is' if load is None else 'both are'
+        raise InvalidInput(f'exactly one of load and velocity is needed, but {given} given')
     if load is not None:
         number('load', load, 'N', above=True)
     elif velocity is not None:

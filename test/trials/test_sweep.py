@@ -99,7 +99,7 @@ def test_policies_without_parameters_are_walked_once():
         ({'scenes': ['bench_press']}, 'is a bench'),
         ({'scenes': []}, 'scene: at least one'),
         ({'scenes': [LEG, LEG]}, f"scene = '{LEG}' is given twice"),
-        ({'policies': ['brave']}, "policy = 'brave' is not allowed: one of flat, dome, adaptive, oracle"),
+        ({'policies': ['brave']}, "policy = 'brave' is not allowed: one of flat, dome, adaptive"),
         ({'seeds': []}, 'seed: at least one'),
         ({'seeds': [-1]}, 'seed = -1 is not allowed: a whole number from 0 to 2147483647'),
         ({'seeds': [True]}, 'seed = True'),
