@@ -26,6 +26,7 @@ import numpy.typing as npt
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import reason
 
 _REQUIRED: Any = object()
 
@@ -40,8 +41,14 @@ def shown(value: Any) -> str:
     return _REPR.repr(value)
 
 
-def _not_allowed(name: str, value: Any, allowed: str) -> InvalidInput:
-    return InvalidInput(f'{name} = {shown(value)} is not allowed: {allowed} is needed')
+def nearest(value: Any, known: Sequence[str]) -> str:
+    """Return a question that ends an error message if a value may be a misspelling."""
+    near = difflib.get_close_matches(str(value), known, n=1)
+    return f'. Did you mean {near[0]!r}?' if near else ''
+
+
+def _not_allowed(name: str, value: Any, allowed: str, hint: str = '') -> InvalidInput:
+    return InvalidInput(f'{name} = {shown(value)} is not allowed: {allowed} is needed{hint}')
 
 
 def _range(what: str, low: float, high: float, unit: str, above: bool = False) -> str:
@@ -141,7 +148,7 @@ def text(name: str, value: str) -> str:
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     """Check that a value is one of the allowed words; raise `InvalidInput` if not."""
     if not isinstance(value, str) or value not in allowed:
-        raise _not_allowed(name, value, f'one of {", ".join(allowed)}')
+        raise _not_allowed(name, value, f'one of {", ".join(allowed)}', nearest(value, allowed))
     return value
 
 
@@ -287,11 +294,10 @@ def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
     known = names(kind)
     if text in known:
         return shared_folder() / kind / f'{text}.yaml'
-    near = difflib.get_close_matches(text, known, n=1, cutoff=0.4)
-    hint = f' Did you mean {near[0]!r}?' if near else ''
     raise ConfigError(
-        f'no {kind[:-1] if kind != "feet" else "foot"} named {text!r}.{hint}'
-        f' There are: {", ".join(known)}; a path to a .yaml file works too.'
+        f'no {kind[:-1] if kind != "feet" else "foot"} named {text!r}'
+        f'{nearest(text, known) or "."} There are:'
+        f' {", ".join(known)}; a path to a .yaml file works too.'
     )
 
 
@@ -313,7 +319,8 @@ class Table:
 
     def __init__(self, values: Any, origin: str) -> None:
         if not isinstance(values, dict):
-            raise ConfigError(f'{origin}: expected a table of keys, found {shown(values)}')
+            found = 'nothing' if values is None else shown(values)
+            raise ConfigError(f'{origin}: expected a table of keys, found {found}')
         self._values = dict(values)
         self._taken: set[str] = set()
         self._known: set[str] = set()
@@ -325,7 +332,7 @@ class Table:
         try:
             text = pathlib.Path(path).read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f'{os.fspath(path)}: cannot be read: {error}') from error
+            raise ConfigError(f'{os.fspath(path)}: cannot be read: {reason(error)}') from error
         return cls.parse(text, os.fspath(path))
 
     @classmethod
@@ -340,6 +347,8 @@ class Table:
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
             problem = getattr(error, 'problem', None) or str(error) or type(error).__name__
+            if mark and any('\t' in row for row in text.splitlines()[mark.line : mark.line + 1]):
+                problem += ' (a tab: YAML is indented with spaces)'
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
         return cls(values, origin)
 
@@ -354,7 +363,7 @@ class Table:
             return self._values[key]
         if default is _REQUIRED:
             others = [str(each) for each in self._values if each not in self._taken]
-            near = difflib.get_close_matches(key, others, n=1)
+            near = difflib.get_close_matches(key, others, n=1, cutoff=0.7)
             hint = f'; is {near[0]!r} a misspelling of it?' if near else ''
             raise ConfigError(f'{self.origin}: key {key!r} is missing{hint}')
         return default

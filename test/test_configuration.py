@@ -275,7 +275,7 @@ def test_unknown_key_in_a_nested_table(tmp_path):
         ('a: !!timestamp soon', 'not valid YAML: '),
         ('a: ' + '[' * 5000, 'line 1, column 103: not valid YAML: nested more than 100 deep'),
         ('- ' * 5000, 'line 1, column 201: not valid YAML: nested more than 100 deep'),
-        ('', 'expected a table of keys, found None'),
+        ('', 'expected a table of keys, found nothing'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),
     ],

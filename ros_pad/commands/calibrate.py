@@ -15,6 +15,7 @@ from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.folder import check_pictures
+from ros_pad.commands.progress import bar
 from ros_pad.configuration import refuse
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
@@ -110,15 +111,18 @@ def run(options: argparse.Namespace) -> int:
         refuse(path, options.force)
     check_pictures(options.figure)
     foot = Foot.load(options.foot)
-    found = calibrate(
-        Measurements.read(options.csv),
-        foot,
-        options.film_thickness,
-        options.viscosity,
-        fit=options.fit,
-        rubber=_rubber(options, foot),
-    )
-    picture = _picture(found, figure_path)
+    with bar('fitting', 2.0, 'steps', delay=1.0) as progress:
+        found = calibrate(
+            Measurements.read(options.csv),
+            foot,
+            options.film_thickness,
+            options.viscosity,
+            fit=options.fit,
+            rubber=_rubber(options, foot),
+        )
+        progress(1.0)
+        picture = _picture(found, figure_path)
+        progress(2.0)
     _write({**picture, foot_path: foot_file(found).encode()})
     drawn = figure_path if picture else None
     if options.json:
@@ -151,7 +155,8 @@ def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
     thickness = foot.pad.thickness if options.thickness is None else options.thickness
     if material is None or thickness is None:
         raise InvalidInput(
-            f'--material and --thickness are both needed: the foot {foot.source} has not both'
+            f'--material and --thickness are both needed: the foot {foot.source} has'
+            f' material {material} and thickness {thickness} m'
         )
     return Pad.of(material, foot.pad.radius, thickness, foot.pad.measured_limit)
 

@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
             report.write(trial, out, force=options.force, progress=progress)
 
     def drawn() -> dict[str, Drawn]:
-        with bar('figures', 1.0, 'trial') as progress:
+        with bar('drawing', 1.0, 'trial') as progress:
             return report.drawn(trial, progress=progress)
 
     return write_all(options, page, write, drawn)
@@ -141,6 +141,9 @@ def write_all(
         write(page)
         print(page)
     if options.figures is not None:
-        for path in write_figures(drawn(), options.figures, options.force):
+        found = drawn()
+        with bar('figures', 1.0, 'folder') as progress:
+            paths = write_figures(found, options.figures, options.force, progress)
+        for path in paths:
             print(path)
     return 0

@@ -126,7 +126,8 @@ def run(options: argparse.Namespace) -> int:
     if options.cycles is not None:
         if not 1 <= options.cycles <= 100000:
             raise InvalidInput(
-                f'--cycles {options.cycles}: a whole number from 1 to 100000 is needed'
+                f'--cycles = {options.cycles} is not allowed: a whole number from 1 to 100000 is'
+                ' needed'
             )
         scene = dataclasses.replace(scene, cycles=options.cycles)
     if options.foot is not None:
@@ -138,7 +139,8 @@ def run(options: argparse.Namespace) -> int:
         options.tuning = dataclasses.replace(options.tuning, **changes)
     if not 0 <= options.seed < 2**31:
         raise InvalidInput(
-            f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
+            f'--seed = {options.seed} is not allowed: a whole number from 0 to {2**31 - 1} is'
+            ' needed'
         )
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'

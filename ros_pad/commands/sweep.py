@@ -205,7 +205,8 @@ def seeds(text: str) -> list[int]:
         first, last = int(ends[0]), int(ends[-1])
         if not 0 <= last - first < MOST:
             raise InvalidInput(
-                f'--seed {text}: {part!r}: LAST must be from FIRST to FIRST + {MOST - 1}'
+                f'--seed {text}: {part!r} is not allowed: LAST from FIRST to'
+                f' FIRST + {MOST - 1} is needed'
             )
         found += range(first, last + 1)
     return found

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.pace import Progress
 from ros_pad.reports.style import DPI
 from ros_pad.reports.style import PAPER_STYLE
 from ros_pad.reports.style import Drawn
@@ -72,7 +73,10 @@ def write_picture(
 
 
 def write_figures(
-    drawn: Mapping[str, Drawn], folder: str | os.PathLike[str], force: bool = False
+    drawn: Mapping[str, Drawn],
+    folder: str | os.PathLike[str],
+    force: bool = False,
+    progress: Progress | None = None,
 ) -> list[pathlib.Path]:
     """Write figures for a paper, each as PDF and as PNG of 300 dpi, and return the files.
 
@@ -86,6 +90,8 @@ def write_figures(
         Created if it is missing.
     force : bool
         Replace existing files.
+    progress : callable or None
+        Called with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -102,6 +108,8 @@ def write_figures(
     for path in files:
         refuse(path, force)
     with matplotlib.rc_context(PAPER_STYLE):
-        for path, (figure, kind) in files.items():
+        for done, (path, (figure, kind)) in enumerate(files.items(), 1):
             save(path, rendered(figure, kind, dpi=DPI))
+            if progress:
+                progress(done / len(files))
     return list(files)
