@@ -14,7 +14,7 @@ unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help run test test-all lint studies test-matrix clean FORCE
+.PHONY: help run test test-all lint studies examples test-matrix clean FORCE
 
 help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
@@ -22,6 +22,7 @@ help:
 	@echo 'make test-all  ruff, mypy, every test, one row of the matrix; what CI runs'
 	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
 	@echo 'make studies  the evidence: charts and tables, written to runs'
+	@echo 'make examples  the pictures of docs/examples.md, anew'
 	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
 	@echo 'All make .venv if need be; PYTHON=python3.12 chooses its Python.'
 
@@ -54,6 +55,10 @@ studies: .venv/test.stamp
 	@for study in $(STUDIES); do \
 	  $(BIN)/python -m studies $$study --out runs/studies || exit; done
 	@$(BIN)/python -m studies thesis --out runs/studies/thesis.html --force
+
+examples: .venv/test.stamp
+	@for each in examples/*.py; do \
+	  $(BIN)/python $$each docs/charts/example_$$(basename $$each .py).png || exit; done
 
 # pytest's status when ARGS chose tests of one of the two runs only. What is measured against the
 # clock has the processors to itself.
