@@ -14,7 +14,7 @@ unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help run test test-all lint studies test-matrix clean FORCE
+.PHONY: help run test test-all lint studies examples test-matrix clean FORCE
 
 help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
@@ -22,6 +22,7 @@ help:
 	@echo 'make test-all  ruff, mypy, every test, one row of the matrix; what CI runs'
 	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
 	@echo 'make studies  the evidence: charts and tables, written to runs'
+	@echo 'make examples  the pictures of docs/examples.md, anew'
 	@echo 'make clean  remove .venv and what builds and tests left; runs/ stays'
 	@echo 'All make .venv if need be; PYTHON=python3.12 chooses its Python.'
 
@@ -40,7 +41,8 @@ test-all: .venv/test.stamp lint
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m 'not realtime' $(ARGS) || $(NONE_CHOSEN)
 	$(BIN)/python -m pytest -m realtime $(ARGS) || $(NONE_CHOSEN)
 	@$(MAKE) --no-print-directory test-matrix MATRIX=$(CI_ROW) \
-	  MARKS='not realtime and not slow' CORE_TESTS='$(CI_ROW_TESTS)'
+	  MARKS='not realtime and not slow' CORE_TESTS='$(CI_ROW_TESTS)' \
+	  CORE_PACKAGES='$(CI_ROW_PACKAGES)'
 
 lint: .venv/test.stamp
 	$(BIN)/python -m ruff check
@@ -55,6 +57,10 @@ studies: .venv/test.stamp
 	  $(BIN)/python -m studies $$study --out runs/studies || exit; done
 	@$(BIN)/python -m studies thesis --out runs/studies/thesis.html --force
 
+examples: .venv/test.stamp
+	@for each in examples/*.py; do \
+	  $(BIN)/python $$each docs/charts/example_$$(basename $$each .py).png || exit; done
+
 # pytest's status when ARGS chose tests of one of the two runs only. What is measured against the
 # clock has the processors to itself.
 NONE_CHOSEN := [ $$? -eq 5 ]
@@ -67,7 +73,10 @@ NONE_CHOSEN := [ $$? -eq 5 ]
 # of ROS 2 Jazzy. Where its Python is missing, the summary says so.
 CI_ROW := 3.12-oldest
 CI_ROW_TESTS := test/contact test/estimation test/control test/regulators test/simulation
+# What these tests import; all of the extra `test` takes twice as long to install.
+CI_ROW_PACKAGES := .[mujoco,fast] hypothesis mpmath pytest pytest-xdist
 MARKS := not realtime
+CORE_PACKAGES := .[test]
 MATRIX ?= 3.11 3.12 3.13 3.12-oldest 3.12-jazzy 3.13-jazzy 3.12-kilted
 CORE_TESTS := test --ignore test/nodes
 NODE_TESTS := test/nodes test/bags test/trials/test_recorded.py test/test_cli.py
@@ -82,12 +91,12 @@ define MATRIX_ROW
   version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='$(CORE_TESTS)'; \
   export WHEEL_LIBRARIES=; \
   case $$row in \
-    *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
+    *-oldest) packages='$(CORE_PACKAGES) numpy==1.26.* scipy==1.11.*' ;; \
     *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
     *-kilted) packages='.[kilted,test]'; tests='$(NODE_TESTS)' ;; \
     *-wheel) packages='. pytest pytest-xdist setuptools'; tests=test/test_wheel.py; \
       export WHEEL_LIBRARIES=index ;; \
-    *) packages='.[test]' ;; \
+    *) packages='$(CORE_PACKAGES)' ;; \
   esac; \
   if ! PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \
     echo "$$row: not run: python$$version is missing, or cannot make a virtual environment" \
@@ -96,13 +105,14 @@ define MATRIX_ROW
   fi; \
   echo "$$row: installing $$packages into .matrix/$$row ..."; \
   if PYENV_VERSION=$$version python$$version -m venv .matrix/$$row && \
-     $$python -m pip install --quiet --editable $$packages && \
+     $$python -m pip install --quiet --no-compile --editable $$packages && \
      $$python -m pytest -n $(JOBS) --dist loadfile -m '$(MARKS)' $$tests $(ARGS); \
   then verdict=passed; else verdict=FAILED; fi; \
   echo "$$row: $$verdict, with $$($$python -m pip freeze | grep -iE '^(numpy|scipy|rclpy)==' \
     | xargs)" >> .matrix/summary
 endef
 
+# Without --no-compile pip takes twice as long: most modules that it compiles are never imported.
 # A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
 STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
 
@@ -112,7 +122,7 @@ STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { $(MAKE_VENV); }
 	@echo 'Installing ros_pad[$(EXTRAS)] with ROS 2 Jazzy into .venv:' \
 	  'about 600 MB, one minute on a fast line ...'
-	@$(BIN)/python -m pip install --quiet --editable '.[$(EXTRAS)]' || { \
+	@$(BIN)/python -m pip install --quiet --no-compile --editable '.[$(EXTRAS)]' || { \
 	  echo 'ros_pad was not installed: pip says why above. Can this machine reach the Python package index?'; \
 	  exit 1; }
 	@pwd > .venv/ros.stamp

@@ -177,7 +177,7 @@ def run(options: argparse.Namespace) -> int:
     if options.figure is not None:
         from ros_pad.reports.design import draw
 
-        radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
+        radii = np.linspace(0.3e-3, 2.5e-3, 89).tolist()
         with bar('radii', 1.0, 'figure', delay=1.0) as progress:
             draw(options.figure, *_over(radii, options.load, area, pad, others, progress))
     if options.json:

@@ -20,7 +20,9 @@ from ros_pad.commands.sweep import parameters
 from ros_pad.control import POLICIES
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
-from ros_pad.trials import replay as replays
+from ros_pad.trials import Replay
+from ros_pad.trials import open_bag
+from ros_pad.trials import replay
 from ros_pad.trials import replayed_bag
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import NodeSettings
@@ -108,10 +110,10 @@ def run(options: argparse.Namespace) -> int:
     refuse_existing('--out', options.out)
     try:
         with bar('opening', 1.0, 'bag', delay=1.0) as show:
-            bag = replays.open_bag(options.bag, show)
+            bag = open_bag(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', bag.message_count, 'messages') as show:
-            replay = replays.replay(
+            found = replay(
                 bag,
                 settings,
                 options.namespace,
@@ -124,14 +126,14 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.replay import draw
 
         with bar('drawing', 1.0, 'figure'):
-            draw(options.figure, replay)
+            draw(options.figure, found)
     if options.out is not None:
         with bar('writing', 1.0, 'bag') as show:
-            replayed_bag.write(replay, options.out, options.namespace, show)
+            replayed_bag.write(found, options.out, options.namespace, show)
     if options.json:
         print(
             json.dumps(
-                replay.as_dict()
+                found.as_dict()
                 | {
                     'figure': None if options.figure is None else str(options.figure),
                     'out': None if options.out is None else str(options.out),
@@ -139,11 +141,11 @@ def run(options: argparse.Namespace) -> int:
             )
         )
     else:
-        _show(replay)
+        _show(found)
         for path in (options.figure, options.out):
             if path is not None:
                 print(path)
-    return 1 if replay.verdict == 'different' else 0
+    return 1 if found.verdict == 'different' else 0
 
 
 def _remaps(texts: list[str]) -> dict[str, str]:
@@ -168,7 +170,7 @@ def _values(texts: list[str]) -> dict[str, Value]:
     return {name: values[0] for name, values in parameters(texts).items()}
 
 
-def _show(replay: replays.Replay) -> None:
+def _show(replay: Replay) -> None:
     legs = ', '.join(map(str, replay.legs))
     print(f'\n{replay.bag}: {replay.duration_s:.2f} s, legs {legs}')
     for note in replay.notes:

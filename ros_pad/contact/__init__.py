@@ -20,6 +20,7 @@ from ros_pad.contact.film import film_thickness
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.material import Material
+from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.meniscus import THESIS_LIQUID
 from ros_pad.contact.meniscus import WATER
 from ros_pad.contact.meniscus import Liquid
@@ -55,6 +56,7 @@ __all__ = [
     'Liquid',
     'Material',
     'MeasuredLimit',
+    'Measurements',
     'Membrane',
     'Meniscus',
     'Pad',

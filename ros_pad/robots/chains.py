@@ -117,29 +117,31 @@ class Chains:
 
         Parameters
         ----------
-        positions : array (legs, joints)
-            Joint positions, rad or m.
+        positions : array (..., legs, joints)
+            Joint positions, rad or m; the results have the same leading axes.
         frame : array (4, 4), optional
             Transform from the base to the frame of the results; the base itself by default.
         """
-        q = positions.T[..., None, None]
+        q = positions.swapaxes(-1, -2)[..., None, None]
         steps = self._constant + np.cos(q) * self._even + np.sin(q) * self._odd
         if self._slide is not None:
             steps += q * self._slide
         if frame is not None:
-            steps[0] = frame @ steps[0]
+            steps[..., 0, :, :, :] = frame @ steps[..., 0, :, :, :]
         for joint in range(1, self.length):
-            steps[joint] = steps[joint - 1] @ steps[joint]
-        feet = steps[-1] @ self.feet
-        places = feet[:, :3, 3]
+            steps[..., joint, :, :, :] = (
+                steps[..., joint - 1, :, :, :] @ steps[..., joint, :, :, :]
+            )
+        feet = steps[..., -1, :, :, :] @ self.feet
+        places = feet[..., :3, 3]
         angular = (steps[..., :3, :3] @ self._axes)[..., 0]
-        moving = cross(angular, places - steps[..., :3, 3])
+        moving = cross(angular, places[..., None, :, :] - steps[..., :3, 3])
         if self._slide is not None:
             moving = np.where(self._slides[..., None], angular, moving)
             angular = angular * self._turns
-        return Kinematics(
-            places, feet[:, :3, :3], moving.transpose(1, 2, 0), angular.transpose(1, 2, 0), steps
-        )
+        # From (joints, legs, 3) to (legs, 3, joints).
+        moving, angular = (each.swapaxes(-3, -2).swapaxes(-2, -1) for each in (moving, angular))
+        return Kinematics(places, feet[..., :3, :3], moving, angular, steps)
 
     def gravity_torques(self, kinematics: Kinematics, gravity: Array) -> Array:
         """Return the joint torques, (legs, joints), N m, that hold the links of the legs up.

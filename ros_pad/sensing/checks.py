@@ -20,6 +20,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import quantity
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from ros_pad.robots.rotation import cross
@@ -133,13 +134,9 @@ class Recording:
     @cached_property
     def kinematics(self) -> tuple[Array, Array, Array, Array]:
         """Places, rotations, Jacobians and angular Jacobians of the feet, each (m, legs, ...)."""
-        found = [self.robot.kinematics(each) for each in self.positions]
-        return (
-            np.array([each.positions for each in found]),
-            np.array([each.rotations for each in found]),
-            np.array([each.jacobians for each in found]),
-            np.array([each.angular for each in found]),
-        )
+        positions = quantity('positions', self.positions, 'rad', -1e4, 1e4)
+        found = self.robot.chains.solve(positions.reshape(-1, *self.robot.home.shape))
+        return found.positions, found.rotations, found.jacobians, found.angular
 
     @cached_property
     def ground_forces(self) -> Array | None:

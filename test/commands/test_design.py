@@ -10,6 +10,9 @@ import pytest
 from ros_pad import cli
 from ros_pad import configuration
 
+# A sole on which few of the drawn radii fit, so that a figure takes little time.
+SMALL = ['--radius', '5e-4', '--area', '2e-6']
+
 
 def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
     assert cli.main(['design', *arguments, '--json']) == 0
@@ -118,7 +121,7 @@ def test_table_has_a_column_for_each_reading(capsys: pytest.CaptureFixture[str])
         (['--load', '7', '--area', '1e-3', '--radius', '0'], 'radius = 0'),
         (['--load', '7', '--area', '1e-3', '--pressure', '0'], 'ceiling = 0'),
         (['--load', '7', '--foot', 'huge'], 'large37'),
-        (['--load', '7', '--area', '1e-3', '--figure', 'design.txt'], '.png'),
+        (['--load', '7', *SMALL, '--figure', 'design.txt'], '.png'),
     ],
 )
 def test_bad_input(arguments: list[str], part: str, capsys: pytest.CaptureFixture[str]):
@@ -139,7 +142,7 @@ def test_figure(tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     assert 'exists already' in capsys.readouterr().err
     assert said(capsys, *arguments, '--figure', str(tmp_path / 'other.png'))
     missing = tmp_path / 'none' / 'design.svg'
-    assert cli.main(['design', '--load', '7', '--area', '1e-3', '--figure', str(missing)]) == 1
+    assert cli.main(['design', '--load', '7', *SMALL, '--figure', str(missing)]) == 1
     assert str(missing) in capsys.readouterr().err
 
 

@@ -368,3 +368,14 @@ def test_rotations_and_quaternions(angles):
 if __name__ == '__main__':
     text = json.dumps(pinocchio_figures(), indent=1)
     (REFERENCE / 'robot_pinocchio.json').write_text(text + '\n')
+
+
+@pytest.mark.parametrize('name', ['go2', 'ch3r'])
+def test_many_positions_at_once_are_those_one_by_one(name):
+    robot = Robot.load(name)
+    noise = np.random.default_rng(0).normal(0.0, 0.3, (5, *robot.home.shape))
+    together = robot.chains.solve(robot.home + noise)
+    for index, each in enumerate(noise):
+        alone = robot.chains.solve(robot.home + each)
+        for field in alone._fields:
+            assert np.array_equal(getattr(together, field)[index], getattr(alone, field)), field

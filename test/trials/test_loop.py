@@ -232,8 +232,8 @@ def test_adaptive_beats_both_fixed_shapes_on_patches():
 
 @pytest.mark.slow
 def test_on_dry_ground_adapting_costs_the_start():
-    """Most feet start as domes, which costs less than 1 % of 60 cycles on dry ground."""
-    scene = short(60, 'dry')
+    """Most feet start as domes, which costs less than 1 % of 40 cycles on dry ground."""
+    scene = short(40, 'dry')
     flat, dome, adapted = (per_cycle(scene, each) for each in ('flat', 'dome', 'adaptive'))
     assert flat > 1.2 * dome
     assert adapted > 0.99 * flat
@@ -241,7 +241,7 @@ def test_on_dry_ground_adapting_costs_the_start():
 
 @pytest.mark.slow
 def test_on_wet_ground_adapting_costs_the_probes():
-    trials = {each: run(short(60, 'wet'), each) for each in ('dome', 'adaptive')}
+    trials = {each: run(short(40, 'wet'), each) for each in ('dome', 'adaptive')}
     way = {each: trial.metrics.distance_m for each, trial in trials.items()}
     assert way['adaptive'] > 0.99 * way['dome']
     # There were probes.
@@ -253,10 +253,10 @@ def test_on_wet_ground_adapting_costs_the_probes():
 def test_where_domes_cannot_be_beaten_adapting_costs_little(foot):
     """Domes always hold without a tow, or if a foot has no adhesion."""
     if foot == 'as shipped':
-        scene = dataclasses.replace(short(60), tow=dataclasses.replace(PATCHES.tow, weight=0.0))
+        scene = dataclasses.replace(short(40), tow=dataclasses.replace(PATCHES.tow, weight=0.0))
     else:
         plain = dataclasses.replace(PATCHES.foot, friction=0.41, shear_strength=0.0)
-        scene = dataclasses.replace(short(60, 'wet'), foot=plain)
+        scene = dataclasses.replace(short(40, 'wet'), foot=plain)
     assert per_cycle(scene, 'adaptive', seed=41) > 0.99 * per_cycle(scene, 'dome', seed=41)
 
 
