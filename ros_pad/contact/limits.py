@@ -93,6 +93,16 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     InvalidInput
         When the criterion is unknown or not known for this pad, or a pressure is negative, not
         finite, or above the measurements.
+
+    Examples
+    --------
+    The thesis measured 0.15, 0.30 and 0.40 N at 65, 75 and 85 kPa:
+
+    >>> from ros_pad.contact import LARGE_PAD, force_limit
+    >>> force_limit(LARGE_PAD, [65e3, 75e3, 85e3]).round(3).tolist()
+    [0.244, 0.317, 0.404]
+    >>> round(force_limit(LARGE_PAD, 75e3, 'flattening'), 3)
+    0.527
     """
     check_criterion(pad, criterion)
     p = quantity('pressure', pressure, 'Pa')
@@ -156,6 +166,12 @@ def pressure_for(
     InvalidInput
         When the criterion is unknown or not known for this pad, a value is negative or not finite,
         or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import LARGE_PAD, pressure_for
+    >>> round(pressure_for(LARGE_PAD, 0.25, margin=1.2))  # Pa
+    72767
     """
     check_criterion(pad, criterion)
     load = quantity('force', force, 'N')

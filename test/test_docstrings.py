@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Docstrings of the public names: complete, with units and errors, and examples that are true."""
+
+import ast
+import dataclasses
+import doctest
+import importlib
+import inspect
+import pathlib
+import re
+import sys
+import textwrap
+
+import pytest
+
+PARTS = 'contact capillary robots sensing estimation control regulators simulation bags trials'
+PACKAGES = [f'ros_pad.{part}' for part in (*PARTS.split(), 'trials.sweep', 'errors')]
+
+UNIT = re.compile(
+    r'(?<![\w/-])(1/)?(m|mm|kg|N|Pa|J|s|ns|rad|Hz)[²³]?(?![\w-])'
+    r'|(?i:dimensionless|no unit|probabilit|ratio|factor|share|coefficient|quaternion|relative'
+    r'|as for|stretch|transform)'
+)
+"""A unit, or a word for what has none."""
+
+CHECKS = {'quantity', 'number', 'integer', 'text', 'choice'}
+"""Functions of ros_pad.configuration, which raise InvalidInput."""
+
+
+def names_of(package: str) -> list[str]:
+    """Return the public names of a package."""
+    module = importlib.import_module(package)
+    return getattr(module, '__all__', [n for n, each in vars(module).items() if type(each) is type])
+
+
+def function_of(member: object) -> object:
+    """Return the function of a property or method."""
+    for name in ('fget', 'func', '__func__'):
+        member = getattr(member, name, None) or member
+    return member
+
+
+def documented() -> dict[str, object]:
+    """Return public classes and functions, public methods and properties, by full name."""
+    found = {}
+    for package in PACKAGES:
+        for name in names_of(package):
+            each = getattr(importlib.import_module(package), name)
+            if inspect.isclass(each) or inspect.isfunction(each):
+                found[f'{package}.{name}'] = each
+            for member, value in vars(each).items() if inspect.isclass(each) else ():
+                if not member.startswith('_') and inspect.isfunction(function_of(value)):
+                    found[f'{package}.{name}.{member}'] = function_of(value)
+    return found
+
+
+DOCUMENTED = documented()
+
+
+def sections(text: str) -> dict[str, str]:
+    """Return the text of each section of a NumPy docstring; '' is what is before the first."""
+    parts = ['', *re.split(r'(?m)^(\w+)\n-{3,}$', inspect.cleandoc(text))]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def entries(section: str) -> dict[str, tuple[str, str]]:
+    """Return type and description of each name in a section."""
+    found = {}
+    for entry in re.findall(r'(?m)^\S.*(?:\n(?: .*)?)*', section):
+        head, _, text = entry.partition('\n')
+        names, _, kind = head.partition(' : ')
+        found |= {name.strip(' *'): (kind, text) for name in names.split(',')}
+    return found
+
+
+def unit_missing(kind: str, text: str) -> bool:
+    """Return whether a number of this type is described without unit."""
+    numbers = re.search('float|array(?! of (int|str|bool))', kind)
+    return bool(numbers) and not UNIT.search(text)
+
+
+def parameters(of: object) -> set[str]:
+    """Return the names of the parameters of a function or class; errors and protocols have none."""
+    if inspect.isclass(of) and (issubclass(of, Exception) or getattr(of, '_is_protocol', False)):
+        return set()
+    names = inspect.signature(of).parameters
+    return {name for name in names if name not in ('self', 'cls') and not name.startswith('_')}
+
+
+def raised(of: object) -> set[str]:
+    """Return the errors that a function raises itself, or a class when an instance is made."""
+    if inspect.isclass(of):
+        makers = [vars(of)[n] for n in ('__init__', '__post_init__') if n in vars(of)]
+        makers = [each for each in makers if '<string>' not in each.__code__.co_filename]
+        return set().union(*map(raised, makers))
+    found = set()
+    for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(of)))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found |= {'InvalidInput'} if node.func.id in CHECKS else set()
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            name = ast.unparse(node.exc.func)
+            found |= {name} if name[0].isupper() else set()
+    return found
+
+
+def faults(of: object) -> list[str]:
+    """Return what is missing in the docstring of a class or function, or wrong."""
+    if not of.__doc__:
+        return ['no docstring']
+    parts, is_class = sections(of.__doc__), inspect.isclass(of)
+    described = entries(parts.get('Parameters', ''))
+    attributes = entries(parts.get('Attributes', ''))
+    texts = described | attributes
+    found = [f'{name}: no unit' for name, (kind, text) in texts.items() if unit_missing(kind, text)]
+    is_record = dataclasses.is_dataclass(of) or hasattr(of, '_fields')
+    given = set(texts if is_record else described)
+    wanted = parameters(of)
+    found += [f'{name}: not documented' for name in wanted - given]
+    found += [f'{name}: no such parameter' for name in set(described) - wanted]
+    if not is_class:
+        result = str(inspect.signature(of).return_annotation)
+        text = parts[''] + parts.get('Returns', '') + parts.get('Yields', '')
+        found += ['result: no unit'] if unit_missing(result.lower(), text) else []
+        plain = '.' not in of.__qualname__
+        found += ['Returns: missing'] if plain and result != 'None' and 'Returns' not in parts else []
+    promised = parts.get('Raises', '')
+    found += [f'{name}: not in Raises' for name in raised(of) if not re.search(name, promised)]
+    return found
+
+
+@pytest.mark.parametrize('name', DOCUMENTED)
+def test_the_docstring_is_complete(name: str):
+    assert not faults(DOCUMENTED[name])
