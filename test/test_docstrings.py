@@ -75,7 +75,7 @@ def entries(section: str) -> dict[str, tuple[str, str]]:
 
 def unit_missing(kind: str, text: str) -> bool:
     """Return whether a number of this type is described without unit."""
-    numbers = re.search('float|array(?! of (int|str|bool))', kind)
+    numbers = re.search('float|array(?! of (int|str|bool)|\[np.bool)', kind)
     return bool(numbers) and not UNIT.search(text)
 
 
@@ -120,7 +120,7 @@ def faults(of: object) -> list[str]:
     if not is_class:
         result = str(inspect.signature(of).return_annotation)
         text = parts[''] + parts.get('Returns', '') + parts.get('Yields', '')
-        found += ['result: no unit'] if unit_missing(result.lower(), text) else []
+        found += ['result: no unit'] if unit_missing(result.lower().replace("ndarray", "array"), text) else []
         plain = '.' not in of.__qualname__
         found += ['Returns: missing'] if plain and result != 'None' and 'Returns' not in parts else []
     promised = parts.get('Raises', '')

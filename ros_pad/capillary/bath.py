@@ -50,11 +50,12 @@ class Wall:
         floor (m) and inclination (rad, above 0 and below pi; below pi/2 the wall leans outwards).
         The height grows with the place.
     floor : float
-        Place at floor level.
+        Place at floor level, in the unit of ``meridian``: m, rad or what else it takes.
     top : float
-        Place of the upper end of the wall, above ``floor``.
+        Place of the upper end of the wall, in that unit (m, rad), above ``floor``.
     bottom : float
-        Place of the lower end: ``floor``, or below it if the pad dips into the bath.
+        Place of the lower end, in that unit (m, rad): ``floor``, or below it if the pad dips into
+        the bath.
     steps : int
         Number of steps in which the wall is searched for the contact line.
     """
@@ -77,6 +78,11 @@ class Wall:
             Radius of the contact, m, above 0 and below that of the sphere.
         height : float
             Height of the upper end, m, above 0; by default the top of the sphere.
+
+        Returns
+        -------
+        Wall
+            The wall.
 
         Raises
         ------
@@ -124,6 +130,11 @@ class Wall:
             Extent of the wall above floor level, m, above 0, and below floor level, m, from 0.
             Both may be infinite; the wall ends at the tip of the cone at the latest.
 
+        Returns
+        -------
+        Wall
+            The wall.
+
         Raises
         ------
         InvalidInput
@@ -143,9 +154,25 @@ class Wall:
 
     @classmethod
     def cylinder(cls, radius: float, height: float = math.inf, depth: float = math.inf) -> Wall:
-        """Return the wall of a cylinder, lengths in m as for :meth:`cone`.
+        """Return the wall of a cylinder, by default one that dips into the bath like a long fibre.
 
-        By default the cylinder dips into the bath like a long fibre.
+        Parameters
+        ----------
+        radius : float
+            Radius, m, above 0.
+        height, depth : float
+            Extent of the wall above floor level, m, above 0, and below it, m, from 0; as for
+            :meth:`cone`.
+
+        Returns
+        -------
+        Wall
+            The wall.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is out of range.
         """
         return cls.cone(radius, 0.5 * math.pi, height, depth)
 
@@ -159,6 +186,11 @@ class Wall:
             Radii, m, above 0; n from 2.
         heights : array, shape (n,)
             Rising heights, m; the first at most 0, the last above 0.
+
+        Returns
+        -------
+        Wall
+            The wall.
 
         Raises
         ------
@@ -240,14 +272,19 @@ def bath_meniscus(
 
     Parameters
     ----------
-    sphere_radius, contact_radius : float
+    sphere_radius, contact_radius : float, optional
         Radius of a dome and of its contact with the floor, m, above 0.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
-    wall : Wall
+    wall : Wall, optional
         Wall of any other axisymmetric pad, instead of the two radii.
     gravity : float
         Gravity, m/s², above 0.
+
+    Returns
+    -------
+    BathMeniscus
+        Height, radius, m, force, N, volume, m³, and points of the surface.
 
     Raises
     ------
@@ -257,11 +294,18 @@ def bath_meniscus(
     NoSurface
         With status ``blocked``, where the surface would run through the wall.
 
-    Examples
-    --------
-    >>> from ros_pad.contact import WATER
-    >>> round(1e3 * bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER).height, 3)
-    0.889
+    Examples -------- A dome with the force of the water on it, in micronewtons; and a fibre, the
+    limit of thin walls:
+
+    >>> from ros_pad.capillary import Wall, bath_meniscus
+    >>> from ros_pad.contact import WATER, fibre_meniscus
+    >>> found = bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER)
+    >>> round(1e3 * found.height, 3), round(1e6 * found.force), found.status
+    (0.889, 384, 'ok')
+    >>> fibre = bath_meniscus(wall=Wall.cylinder(0.5e-3), liquid=WATER)
+    >>> exact = fibre_meniscus(0.5e-3, WATER.surface_tension, WATER.angle, WATER.density)
+    >>> round(fibre.height / exact, 9)
+    1.0
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')

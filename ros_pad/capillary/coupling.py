@@ -103,6 +103,12 @@ def press_wet(
     gravity : float
         Gravity, m/s², above 0.
 
+    Returns
+    -------
+    WetPad
+        Gap, radii and heights, m, tension, N/m, force, N, beside those of the dry shape,
+        ``rigid``.
+
     Raises
     ------
     NoEquilibrium

@@ -49,25 +49,89 @@ class Face:
     def revolution(
         cls, radii: npt.ArrayLike, heights: npt.ArrayLike, centre: tuple[float, float] = (0.0, 0.0)
     ) -> Face:
-        """Return a face of revolution through points of its meridian, m, shape (n,)."""
+        """Return a face of revolution through points of its meridian.
+
+        Parameters
+        ----------
+        radii, heights : array, shape (n,)
+            Points in the order in which they are wetted, m; n from 2.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+        """
         rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
         return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
 
     @classmethod
     def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the face of an axisymmetric pad, from the floor to its top."""
+        """Return the face of an axisymmetric pad, from the floor to its top.
+
+        Parameters
+        ----------
+        wall : Wall
+            The wall of the pad, of finite height.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+        """
         places = np.linspace(wall.floor, wall.top, KNOTS)
         radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
         return cls.revolution(radii, heights, centre)
 
     @classmethod
     def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return a disc of the floor, radius in m, wetted from its centre."""
+        """Return a disc of the floor, wetted from its centre.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the disc, m, above 0.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range.
+        """
         return replace(cls.plate(radius, 0.0, centre), under=True)
 
     @classmethod
     def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the underside of a horizontal disc, lengths in m, wetted from its centre."""
+        """Return the underside of a horizontal disc, wetted from its centre.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the disc, m, above 0.
+        height : float
+            Height above the floor, m.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range.
+        """
         size = number('radius', radius, 'm', above=True)
         return cls.revolution([0.0, size], [height, height], centre)
 
@@ -83,6 +147,11 @@ class Face:
             4 for a square pattern, 6 for a hexagonal one.
         height : float
             Height of the planes, m, above 0.
+
+        Returns
+        -------
+        Face
+            The planes.
 
         Raises
         ------
@@ -114,6 +183,11 @@ class Face:
             horizontal parts (bottom and top) are ignored.
         centre : array, shape (2,)
             x and y of a vertical line inside the pad, m.
+
+        Returns
+        -------
+        Face
+            The wall, fitted to the mesh.
 
         Raises
         ------
