@@ -3,12 +3,9 @@
 
 import ast
 import dataclasses
-import doctest
 import importlib
 import inspect
-import pathlib
 import re
-import sys
 import textwrap
 
 import pytest
@@ -30,7 +27,8 @@ CHECKS = {'quantity', 'number', 'integer', 'text', 'choice'}
 def names_of(package: str) -> list[str]:
     """Return the public names of a package."""
     module = importlib.import_module(package)
-    return getattr(module, '__all__', [n for n, each in vars(module).items() if type(each) is type])
+    classes = [name for name, each in vars(module).items() if isinstance(each, type)]
+    return getattr(module, '__all__', classes)
 
 
 def function_of(member: object) -> object:
@@ -75,12 +73,12 @@ def entries(section: str) -> dict[str, tuple[str, str]]:
 
 def unit_missing(kind: str, text: str) -> bool:
     """Return whether a number of this type is described without unit."""
-    numbers = re.search('float|array(?! of (int|str|bool)|\[np.bool)', kind)
+    numbers = re.search(r'float|array(?! of (int|str|bool)|\[np.bool)', kind)
     return bool(numbers) and not UNIT.search(text)
 
 
 def parameters(of: object) -> set[str]:
-    """Return the names of the parameters of a function or class; errors and protocols have none."""
+    """Return the names of the parameters of a function or class; none of errors and protocols."""
     if inspect.isclass(of) and (issubclass(of, Exception) or getattr(of, '_is_protocol', False)):
         return set()
     names = inspect.signature(of).parameters
@@ -107,22 +105,22 @@ def faults(of: object) -> list[str]:
     """Return what is missing in the docstring of a class or function, or wrong."""
     if not of.__doc__:
         return ['no docstring']
-    parts, is_class = sections(of.__doc__), inspect.isclass(of)
+    parts = sections(of.__doc__)
     described = entries(parts.get('Parameters', ''))
     attributes = entries(parts.get('Attributes', ''))
     texts = described | attributes
-    found = [f'{name}: no unit' for name, (kind, text) in texts.items() if unit_missing(kind, text)]
+    found = [f'{name}: no unit' for name, entry in texts.items() if unit_missing(*entry)]
     is_record = dataclasses.is_dataclass(of) or hasattr(of, '_fields')
     given = set(texts if is_record else described)
     wanted = parameters(of)
     found += [f'{name}: not documented' for name in wanted - given]
     found += [f'{name}: no such parameter' for name in set(described) - wanted]
-    if not is_class:
-        result = str(inspect.signature(of).return_annotation)
-        text = parts[''] + parts.get('Returns', '') + parts.get('Yields', '')
-        found += ['result: no unit'] if unit_missing(result.lower().replace("ndarray", "array"), text) else []
-        plain = '.' not in of.__qualname__
-        found += ['Returns: missing'] if plain and result != 'None' and 'Returns' not in parts else []
+    if not inspect.isclass(of):
+        result = str(inspect.signature(of).return_annotation).replace('ndarray', 'Array')
+        text = parts[''] + parts.get('Returns', '')
+        found += ['result: no unit'] if unit_missing(result.lower(), text) else []
+        named = result == 'None' or '.' in of.__qualname__ or 'Returns' in parts
+        found += [] if named else ['no Returns']
     promised = parts.get('Raises', '')
     found += [f'{name}: not in Raises' for name in raised(of) if not re.search(name, promised)]
     return found

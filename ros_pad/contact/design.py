@@ -347,7 +347,7 @@ class Design:
 
     @property
     def pads_needed(self) -> float:
-        """Number of pads (dimensionless) that carry the load at the ceiling; infinite if none do."""
+        """Number of pads, no unit, that carry the load at the ceiling; infinite if none does."""
         if self.pad_limit == 0.0:
             return math.inf
         return math.ceil(self.load * self.margin / self.pad_limit)

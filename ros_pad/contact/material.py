@@ -69,7 +69,7 @@ class Material:
     parameters : sequence of float
         Its parameters in the order of that table, Pa; the exponents of ``ogden`` have no unit.
     largest_stretch : float, optional
-        Uniaxial stretch, dimensionless, up to which the parameters hold, above 1 up to 20. In other states of
+        Uniaxial stretch up to which the parameters hold, above 1 up to 20. In other states of
         strain they hold up to the same I1, which is how far a tensile test says something about
         them. By default unknown; shapes are then computed up to 5.
     source : str
@@ -238,7 +238,7 @@ class Material:
 
     @cached_property
     def unit_law(self) -> tuple[str, tuple[float, ...]]:
-        """The law as ``yeoh`` or ``ogden``, and its parameters over the shear modulus (no unit)."""
+        """The law as ``yeoh`` or ``ogden``, and parameters over the shear modulus (no unit)."""
         p, mu = self.parameters, self._modulus
         if self.law == 'mooney_rivlin':
             return 'ogden', (2.0 * p[0] / mu, 2.0, -2.0 * p[1] / mu, -2.0)

@@ -232,8 +232,8 @@ def hysteresis_force(
         Contact angles at which the line starts to move forwards and backwards, rad, from 0 to pi;
         advancing >= receding.
     shape_factor : float or array
-        K, dimensionless, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth) to 1
-        (two constant angles, one for each half of the line), which is the upper bound.
+        Factor K, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth)
+        to 1 (two constant angles, one for each half of the line), which is the upper bound.
 
     Returns
     -------
