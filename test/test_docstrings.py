@@ -3,18 +3,24 @@
 
 import ast
 import dataclasses
+import doctest
 import importlib
 import inspect
+import pathlib
 import re
 import textwrap
 
 import pytest
 
+from ros_pad.configuration import number
+from ros_pad.errors import NoBridge
+
 PARTS = 'contact capillary robots sensing estimation control regulators simulation bags trials'
-PACKAGES = [f'ros_pad.{part}' for part in (*PARTS.split(), 'trials.sweep', 'errors')]
+PARTS += ' trials.sweep trials.recorded trials.replay errors'
+PACKAGES = [f'ros_pad.{part}' for part in PARTS.split()]
 
 UNIT = re.compile(
-    r'(?<![\w/-])(1/)?(m|mm|kg|N|Pa|J|s|ns|rad|Hz)[²³]?(?![\w-])'
+    r'(?<![\w/-])(1/)?(m|mm|kg|N|Pa|J|s|ns|rad|Hz|nats)[²³]?(?![\w-])'
     r'|(?i:dimensionless|no unit|probabilit|ratio|factor|share|coefficient|quaternion|relative'
     r'|as for|stretch|transform)'
 )
@@ -88,6 +94,8 @@ def parameters(of: object) -> set[str]:
 def raised(of: object) -> set[str]:
     """Return the errors that a function raises itself, or a class when an instance is made."""
     if inspect.isclass(of):
+        if getattr(of, '_is_protocol', False):
+            return set()
         makers = [vars(of)[n] for n in ('__init__', '__post_init__') if n in vars(of)]
         makers = [each for each in makers if '<string>' not in each.__code__.co_filename]
         return set().union(*map(raised, makers))
@@ -116,9 +124,11 @@ def faults(of: object) -> list[str]:
     found += [f'{name}: not documented' for name in wanted - given]
     found += [f'{name}: no such parameter' for name in set(described) - wanted]
     if not inspect.isclass(of):
-        result = str(inspect.signature(of).return_annotation).replace('ndarray', 'Array')
-        text = parts[''] + parts.get('Returns', '')
-        found += ['result: no unit'] if unit_missing(result.lower(), text) else []
+        result = str(inspect.signature(of).return_annotation)
+        given = entries(parts.get('Returns', '')) or {result.lower(): ('', parts[''])}
+        found += [
+            'result: no unit' for kind, (_, text) in given.items() if unit_missing(kind, text)
+        ]
         named = result == 'None' or '.' in of.__qualname__ or 'Returns' in parts
         found += [] if named else ['no Returns']
     promised = parts.get('Raises', '')
@@ -129,3 +139,66 @@ def faults(of: object) -> list[str]:
 @pytest.mark.parametrize('name', DOCUMENTED)
 def test_the_docstring_is_complete(name: str):
     assert not faults(DOCUMENTED[name])
+
+
+def constants() -> dict[str, str]:
+    """Return the package of each public name that is no class or function."""
+    found = {}
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        found |= {name: package for name in names_of(package) if not callable(vars(module)[name])}
+    return found
+
+
+@pytest.mark.parametrize(('name', 'package'), constants().items())
+def test_what_a_constant_is_stands_below_it(name: str, package: str):
+    folder = pathlib.Path(importlib.import_module(package).__file__).parent
+    assignment = rf'(?m)^{name}\b[^=\n]*= (.+\n)(?:[ )}}].*\n)*(?="""[A-Z])'
+    assert any(re.search(assignment, each.read_text('utf-8')) for each in folder.glob('*.py'))
+
+
+MODULES = sorted({each.__module__ for each in DOCUMENTED.values()} - {'ros_pad.errors'})
+
+
+WITH_EXAMPLES = (
+    'inflate press force_limit pressure_for contact_angle meniscus bridge pads_in foot_force'
+    ' tangential_resistance Pad.of squeeze wet bath_meniscus FootEstimator BodyEstimator'
+    ' MorphologyController Scene.load Robot.load run create SimulatedRegulator BagReader'
+    ' PneumaticChannel'
+)
+
+
+@pytest.mark.parametrize('name', WITH_EXAMPLES.split())
+def test_the_main_names_have_an_example(name: str):
+    found = next(each for full, each in DOCUMENTED.items() if full.endswith(f'.{name}'))
+    assert doctest.DocTestParser().get_examples(found.__doc__)
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_the_examples_are_true(module: str):
+    assert not doctest.testmod(importlib.import_module(module)).failed
+
+
+def undocumented_length(length: float, *, mass: float = 1.0) -> float:
+    """Return a length.
+
+    Parameters
+    ----------
+    length : float
+        Length of it.
+    width : float
+        Width, m.
+    """
+    raise NoBridge(number('length', length, 'm'))
+
+
+def test_faults_of_a_docstring_are_found():
+    assert set(faults(undocumented_length)) == {
+        'length: no unit',
+        'mass: not documented',
+        'width: no such parameter',
+        'result: no unit',
+        'no Returns',
+        'NoBridge: not in Raises',
+        'InvalidInput: not in Raises',
+    }

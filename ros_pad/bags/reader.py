@@ -69,6 +69,25 @@ class BagReader:
     BagError
         When there is no such bag, its metadata is invalid, its storage is not MCAP without a
         compression mode, a file is missing, or no message of a damaged bag can be read.
+
+    Examples
+    --------
+    A bag of two messages, written and read without ROS; a number in CDR is a header and 8 bytes:
+
+    >>> import struct, tempfile
+    >>> from ros_pad.bags import BagReader, BagWriter
+    >>> place = tempfile.TemporaryDirectory()
+    >>> with BagWriter(f'{place.name}/bag', {'robot': 'ch3r'}) as bag:
+    ...     bag.add_topic('/leg_1/wetness', 'std_msgs/msg/Float64')
+    ...     for step, wet in enumerate((0.5, 0.9)):
+    ...         message = bytes([0, 1, 0, 0]) + struct.pack('<d', wet)
+    ...         bag.write('/leg_1/wetness', message, log_time_ns=20_000_000 * step)
+    >>> bag = BagReader(f'{place.name}/bag')
+    >>> bag.counts, bag.custom_data
+    ({'/leg_1/wetness': 2}, {'robot': 'ch3r'})
+    >>> times, values = bag.tables({'/leg_1/wetness': ['data']})['/leg_1/wetness']
+    >>> times.tolist(), values.tolist()  # ns
+    ([0, 20000000], [[0.5], [0.9]])
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -144,6 +163,15 @@ class BagReader:
         containing : bytes
             Messages without these bytes are left out.
 
+        Yields
+        ------
+        topic : str
+            Name of the topic.
+        message : object
+            Decoded message, with its fields as attributes.
+        log_time : int
+            Time at which it was recorded, ns.
+
         Raises
         ------
         BagError
@@ -175,6 +203,15 @@ class BagReader:
         paths : mapping
             Fields to read, such as ``wrench.force.x``, by topic; a topic that the bag does not
             have yields nothing.
+
+        Yields
+        ------
+        topic : str
+            Name of the topic.
+        values : tuple
+            Values of the fields, in the order of the paths.
+        log_time : int
+            Time at which it was recorded, ns.
 
         Raises
         ------

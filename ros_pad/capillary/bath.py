@@ -294,7 +294,9 @@ def bath_meniscus(
     NoSurface
         With status ``blocked``, where the surface would run through the wall.
 
-    Examples -------- A dome with the force of the water on it, in micronewtons; and a fibre, the
+    Examples
+    --------
+    A dome with the force of the water on it, in micronewtons; and a fibre, the
     limit of thin walls:
 
     >>> from ros_pad.capillary import Wall, bath_meniscus

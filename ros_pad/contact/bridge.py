@@ -139,7 +139,9 @@ def bridge(
         both or none of filling angle and volume are given, gravity is above 0 with ``circle``, or
         a bridge with gravity is too wide, or its neck too narrow, to be resolved.
 
-    Notes ----- ``young_laplace`` follows the meridian as Kenmotsu's form of Delaunay's surfaces
+    Notes
+    -----
+    ``young_laplace`` follows the meridian as Kenmotsu's form of Delaunay's surfaces
     without gravity, and integrates it with gravity; see :mod:`ros_pad.contact.bridge`.
 
     Examples

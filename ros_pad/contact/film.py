@@ -50,7 +50,8 @@ def film_thickness(
     Returns
     -------
     float or array
-        h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2 (Stefan-Reynolds), broadcast over the inputs.
+        Thickness, m: h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2 (Stefan-Reynolds), broadcast over the
+        inputs.
 
     Raises
     ------

@@ -82,8 +82,8 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     Returns
     -------
     float or array
-        0 where the pad carries nothing (``measured`` of the thesis: below 52.3 kPa). In arrays
-        NaN above the end of the model.
+        Force, N; 0 where the pad carries nothing (``measured`` of the thesis: below 52.3 kPa). In
+        arrays NaN above the end of the model.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def pressure_for(
     Returns
     -------
     float or array
-        NaN in arrays where no pressure of the model carries the force.
+        Gauge pressure, Pa. NaN in arrays where no pressure of the model carries the force.
 
     Raises
     ------

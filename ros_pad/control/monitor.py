@@ -104,6 +104,17 @@ class PadMonitor:
     of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
 
     An update takes 1 to 2 µs.
+
+    Examples
+    --------
+    A pad that stays flat is faulty some time after the command to fill it:
+
+    >>> from ros_pad.control import PadMonitor
+    >>> monitor = PadMonitor(ceiling=90e3)
+    >>> for step in range(30):
+    ...     monitor.update(0.1 * step, setpoint=75e3, pressure=0.0)
+    >>> monitor.reason
+    'does not fill: 0.0 kPa 0.5 s after 75.0 kPa was commanded'
     """
 
     __slots__ = (

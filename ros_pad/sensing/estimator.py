@@ -154,6 +154,7 @@ class BodyEstimate(NamedTuple):
     covariance : array (9, 9)
         Of position, m, rotation in odom axes, rad, and velocity, m/s.
     feet : tuple of FootMotion
+        The feet, in the order of ``robot.legs``.
     doubt : str
         Why this must not be relied on: a kind, a colon, and details; empty if it may be.
     """
@@ -173,6 +174,7 @@ class BodyEstimator:
     Parameters
     ----------
     robot : Robot
+        The robot whose sensors are read.
     gyro_noise : float
         Standard deviation of a sample of the gyro, rad/s, above 0 up to 1.
     accelerometer_noise : float
@@ -211,6 +213,24 @@ class BodyEstimator:
     ------
     InvalidInput
         When a value is outside its range; the message names it.
+
+    Examples
+    --------
+    A robot that stands for a second on all feet:
+
+    >>> import numpy as np
+    >>> from ros_pad.robots import Robot
+    >>> from ros_pad.sensing import BodyEstimator
+    >>> robot = Robot.load('go2')
+    >>> estimator, joints = BodyEstimator(robot), robot.home.ravel()
+    >>> forces = np.zeros((4, 3))
+    >>> forces[:, 2] = 9.81 * robot.mass / 4
+    >>> for time in np.arange(200) * 5e-3:
+    ...     estimate = estimator.update(
+    ...         time, [0, 0, 0], [0, 0, 9.81], joints, 0 * joints, foot_forces=forces
+    ...     )
+    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.slipping for foot in estimate.feet]
+    (True, [False, False, False, False])
     """
 
     def __init__(
@@ -322,6 +342,11 @@ class BodyEstimator:
             Forces of the ground on the feet, N, in the axes of ``force_axes``.
         efforts : array (joints,), optional
             Joint torques, N m, from which forces are taken where there are no foot forces.
+
+        Returns
+        -------
+        BodyEstimate
+            Position, m, velocity, m/s, orientation and feet after this sample.
 
         Raises
         ------

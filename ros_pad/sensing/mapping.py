@@ -80,7 +80,13 @@ class Readings(NamedTuple):
     forces: MappingType[int, Array] = {}
 
     def pass_to(self, stage: SensingStage) -> None:
-        """Pass the readings to a sensing stage, forces first, so that the joints find them."""
+        """Pass the readings to a sensing stage, forces first, so that the joints find them.
+
+        Parameters
+        ----------
+        stage : SensingStage
+            The stage that receives them.
+        """
         for leg, force in self.forces.items():
             stage.force(leg, self.stamp, force.tolist())
         if self.gyro is not None and self.accelerometer is not None:
@@ -216,6 +222,17 @@ class Mapping:
 
     Use :meth:`load`.
 
+    Parameters
+    ----------
+    name : str
+        Name of the file.
+    sources : sequence of Source
+        Topics to subscribe to, with their types and fields.
+    notes : sequence of str
+        What is missing besides what the sources show, as in ``missing``.
+    axes : str
+        Value of ``force_axes``.
+
     Attributes
     ----------
     name : str
@@ -228,6 +245,14 @@ class Mapping:
         ``base`` or ``foot``: the axes of the forces.
     force_kind : str
         ``vector``, ``normal`` (one axis) or ``contact`` (flags); empty without forces.
+
+    Examples
+    --------
+    >>> from ros_pad.robots import Robot
+    >>> from ros_pad.sensing import Mapping
+    >>> mapping = Mapping.load('default', Robot.load('ch3r'))
+    >>> [source.topic for source in mapping.sources][:3], mapping.force_kind
+    (['imu/data', 'joint_states', 'leg_1/foot_wrench'], 'vector')
     """
 
     def __init__(self, name: str, sources: Sequence[Source], notes: Sequence[str], axes: str):
@@ -249,6 +274,11 @@ class Mapping:
             Name of a shipped mapping, or path of a file that ends in .yaml or .yml.
         robot : Robot
             The robot whose joints and legs give the order of the readings.
+
+        Returns
+        -------
+        Mapping
+            The mapping.
 
         Raises
         ------
@@ -282,6 +312,11 @@ class Mapping:
             The message, with its fields as attributes.
         arrival : int
             Time at which it arrived, or was recorded, ns.
+
+        Returns
+        -------
+        Readings
+            What the message contains, in SI units.
 
         Raises
         ------

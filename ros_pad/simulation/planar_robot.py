@@ -67,6 +67,16 @@ class PlanarRobot:
         not installed.
     InvalidInput
         When the period is not finite and above 0.
+
+    Examples
+    --------
+    >>> from ros_pad.simulation import Floor, PlanarRobot, Scene
+    >>> scene = Scene.load('hexapod_patches')
+    >>> robot = PlanarRobot(scene, Floor.uniform(True, 0.3e-3), period=2e-3, compile_steps=False)
+    >>> robot.walk([75e3] * 6, steps=3000)
+    3000
+    >>> f'{robot.body[0]:.2f} m'
+    '0.70 m'
     """
 
     def __init__(
@@ -132,7 +142,12 @@ class PlanarRobot:
         return float(x), float(y), float(heading)
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
+        """Advance by ``period``.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads of each leg, Pa, from 0.
 
         Raises
         ------
@@ -144,10 +159,17 @@ class PlanarRobot:
         self._advance(pressures, 1, False)
 
     def walk(self, pressures: Sequence[float], steps: int) -> int:
-        """Make many steps with the same gauge pressures, Pa, one for each leg.
+        """Make many steps with the same pressures.
 
         The result is that of as many calls of :meth:`step`, but compiled code makes all of them in
         one call. The walk ends early when the robot tips over.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads of each leg, Pa, from 0.
+        steps : int
+            Number of steps, from 0.
 
         Returns
         -------

@@ -85,7 +85,18 @@ class RailLeg:
         return self._x, 0.0, 0.0
 
     def plan(self, time: float) -> tuple[bool, float, float]:
-        """Return whether the foot stands, its distance ahead of the body and its height, m."""
+        """Return where the gait has the foot.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+
+        Returns
+        -------
+        tuple
+            Whether the foot stands, its distance ahead of the body, m, and its height, m.
+        """
         gait = self._gait
         since = max(0.0, time - self._start) % gait.cycle
         if since < gait.stance:
@@ -95,7 +106,12 @@ class RailLeg:
         return False, -0.5 * gait.stroke * math.cos(math.pi * share), height
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with the pads' gauge pressure, Pa, in a sequence of one.
+        """Advance by ``period``.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads, in a sequence of one, Pa, from 0.
 
         Raises
         ------

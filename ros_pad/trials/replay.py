@@ -50,6 +50,7 @@ class Outcome:
     Attributes
     ----------
     leg : int
+        Number of the leg.
     stance_ends : int
         Number of stances that ended in the replay.
     wet_ends : tuple
@@ -74,9 +75,11 @@ class Replay:
     Attributes
     ----------
     bag : str
+        Path of the bag.
     settings : NodeSettings
         Settings with which the bag was replayed.
     legs : tuple of int
+        Numbers of the legs.
     start_ns : int
         Beginning of the bag, ns.
     duration_s : float
@@ -121,7 +124,13 @@ class Replay:
         return 'nothing'
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON, without the tracks."""
+        """Return plain values for JSON, without the tracks.
+
+        Returns
+        -------
+        dict
+            Verdict, settings, counts and comparisons, by name.
+        """
         settings = self.settings
         return {
             'bag': self.bag,
@@ -150,6 +159,16 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 def open_bag(path: str | os.PathLike[str]) -> BagReader:
     """Open a bag; for an SQLite bag, the error message has the command that converts it.
+
+    Parameters
+    ----------
+    path : str or path
+        Folder of a bag, or one of its files.
+
+    Returns
+    -------
+    BagReader
+        The open bag.
 
     Raises
     ------
@@ -189,6 +208,11 @@ def replay(
         Topic of the bag, by its name in ros_pad: ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Replay
+        What estimators and controller make of the samples, beside what was recorded.
 
     Raises
     ------

@@ -27,23 +27,23 @@ class Metrics:
     Attributes
     ----------
     distance_m : float
-        Distance of the body along x.
+        Distance of the body along x, m.
     duration_s : float
-        Simulated time, including the time before the first step.
+        Simulated time, s, including the time before the first step.
     cycles : float
-        Gait cycles walked.
+        Gait cycles walked, no unit.
     distance_per_cycle_m : float
-        Mean distance of the body along x in a gait cycle.
+        Mean distance of the body along x in a gait cycle, m.
     slip_path_m : list of float
-        Length of all slip of each foot.
+        Length of all slip of each foot, m.
     lateral_drift_m, yaw_drift_rad : float
-        Sideways position and heading of the body at the end.
+        Sideways position, m, and heading, rad, of the body at the end.
     dissipation_j : float
-        Work lost in feet that slip or rotate.
+        Work lost in feet that slip or rotate, J.
     switches : list of int
         Number of switches of each foot.
     overload_s : list of float
-        Time for which each foot was a dome above its force limit.
+        Time for which each foot was a dome above its force limit, s.
     wet_accuracy : float or None
         Share of flat stances at whose end P(wet) was on the correct side of 0.5; None without
         flat stances.
@@ -57,9 +57,9 @@ class Metrics:
     underpressure : list of int
         Number of touch-downs of each foot as a dome with less pressure than its load needs.
     goal_m : float or None
-        Distance to the goal; None for a scene without a goal.
+        Distance to the goal, m; None for a scene without a goal.
     time_to_goal_s : float or None
-        Time from the first step to the goal; None if the body did not reach it.
+        Time from the first step to the goal, s; None if the body did not reach it.
     """
 
     distance_m: float
@@ -149,8 +149,11 @@ class Trial:
     Attributes
     ----------
     scene, policy, fidelity : str
+        Name of the scene, policy and fidelity level; empty where a bag does not have them.
     seed : int
+        Seed of floor and noise.
     legs : tuple of int
+        Numbers of the legs.
     time : ndarray (n,)
         Time of each sensor sample, s.
     body : ndarray (n, 3)
@@ -178,7 +181,7 @@ class Trial:
     settings : dict
         Foot, gait and other recorded settings.
     real_time_factor : float or None
-        Simulated time over computing time; None where it is not on record.
+        Ratio of simulated time to computing time; None where it is not on record.
     """
 
     scene: str
@@ -225,9 +228,19 @@ class Trial:
         self.force[:, :, :2] = turned(self.force[:, :, 0], self.force[:, :, 1])
 
     def standing(self, load_gate: float) -> np.ndarray:
-        """Return whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).
+        """Return whether each foot stands at each sensor sample.
 
         A foot that bounces, without load for less than ``BOUNCE``, still stands.
+
+        Parameters
+        ----------
+        load_gate : float
+            Normal force above which a foot stands, N.
+
+        Returns
+        -------
+        array of bool (n, legs)
+            True in stance.
         """
         loaded = self.force[:, :, 2] > load_gate
         time = self.time[:, None]
@@ -236,9 +249,12 @@ class Trial:
         return until - since < BOUNCE
 
     def wet(self) -> np.ndarray:
-        """Return whether the true ground below each foot is wet at each control step (m, legs).
+        """Return whether the true ground below each foot is wet.
 
-        False where the position of a foot is unknown.
+        Returns
+        -------
+        array of bool (m, legs)
+            True on wet ground; False where the position of a foot is unknown.
 
         Raises
         ------

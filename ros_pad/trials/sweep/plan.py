@@ -37,7 +37,10 @@ _POLICY = [each.name for each in POLICY_SETTINGS]
 LARGEST_SEED = 2**31 - 1
 
 Value: TypeAlias = 'float | int | bool | str'
+"""Value of a parameter of a sweep."""
+
 Row: TypeAlias = 'dict[str, Any]'
+"""Values of a trial by column."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,18 @@ class Job:
         return json.dumps(self.labels, sort_keys=True)
 
     def failed(self, error: object) -> Row:
-        """Return the row that has an error in place of the metrics of this trial."""
+        """Return the row that has an error in place of the metrics of this trial.
+
+        Parameters
+        ----------
+        error : object
+            Error of the trial.
+
+        Returns
+        -------
+        dict
+            Labels of the trial, and the text of the error.
+        """
         return self.labels | {'level': self.level, 'error': str(error)}
 
 
@@ -103,6 +117,13 @@ class Sweep:
     InvalidInput
         When scenes, seeds or the values of a parameter are empty, a value is given twice, a policy
         is unknown, or a seed or name is not allowed.
+
+    Examples
+    --------
+    >>> from ros_pad.trials.sweep import Sweep
+    >>> sweep = Sweep(['leg_wet_flat'], ['flat', 'dome'], range(3))
+    >>> [(job.policy, job.seed) for job in sweep.jobs()]
+    [('flat', 0), ('flat', 1), ('flat', 2), ('dome', 0), ('dome', 1), ('dome', 2)]
     """
 
     scenes: Sequence[str]
@@ -133,6 +154,11 @@ class Sweep:
 
     def jobs(self) -> list[Job]:
         """Return the trials, in order, each checked as far as is possible without running it.
+
+        Returns
+        -------
+        list of Job
+            The trials.
 
         Raises
         ------
@@ -215,6 +241,18 @@ def _errors_naming(values: Mapping[str, Value]) -> Iterator[None]:
 
 def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> Scene:
     """Read a scene with changed values of some dotted keys of its YAML, such as ``tow.weight``.
+
+    Parameters
+    ----------
+    source : str or path
+        Name of a shipped scene, or path of a YAML file.
+    values : mapping
+        Values by dotted key.
+
+    Returns
+    -------
+    Scene
+        The scene.
 
     Raises
     ------

@@ -35,6 +35,7 @@ class Found:
     Attributes
     ----------
     folder : Path
+        Folder of the sweep.
     sweep : Sweep
         Scenes, policies, seeds and parameters of the finished trials.
     rows : list of dict
@@ -56,12 +57,33 @@ class Found:
 
 
 def is_sweep(folder: str | os.PathLike[str]) -> bool:
-    """Return whether a folder holds a sweep."""
+    """Return whether a folder holds a sweep.
+
+    Parameters
+    ----------
+    folder : str or path
+        The folder.
+
+    Returns
+    -------
+    bool
+        True if it has the file of a sweep.
+    """
     return (pathlib.Path(folder) / RESULTS).is_file()
 
 
 def read(folder: str | os.PathLike[str]) -> Found:
     """Read the finished trials of a sweep, without changing its folder.
+
+    Parameters
+    ----------
+    folder : str or path
+        Folder of the sweep.
+
+    Returns
+    -------
+    Found
+        Its finished trials.
 
     Raises
     ------
@@ -145,7 +167,20 @@ class Point:
 
 
 def points(rows: Iterable[Row], parameters: Iterable[str]) -> list[Point]:
-    """Return the mean distance per cycle over the seeds, with interval, for each combination."""
+    """Return the mean distance per cycle over the seeds, for each combination of the rest.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Rows of a sweep, from :func:`run` or :func:`read`.
+    parameters : iterable of str
+        Names of the parameters of the sweep.
+
+    Returns
+    -------
+    list of Point
+        Mean distance, m, and its 95 % interval.
+    """
     names = ('scene', 'policy', *parameters)
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
