@@ -41,7 +41,7 @@ class Found:
     rows : list of dict
         One row for each finished trial, in the order of the sweep, all with the same columns.
     about : dict
-        Version, fidelity, parameters and scenes, see :func:`identity`.
+        Version, fidelity, parameters and checksums of the scenes.
     """
 
     folder: pathlib.Path
