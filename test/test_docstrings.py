@@ -118,6 +118,8 @@ def faults(of: object) -> list[str]:
     attributes = entries(parts.get('Attributes', ''))
     texts = described | attributes
     found = [f'{name}: no unit' for name, entry in texts.items() if unit_missing(*entry)]
+    joined = re.findall(r'(?m)^\w+, .* : ', parts.get('Attributes', ''))
+    found += [f'{heads}one entry for each attribute' for heads in joined]
     is_record = dataclasses.is_dataclass(of) or hasattr(of, '_fields')
     given = set(texts if is_record else described)
     wanted = parameters(of)

@@ -57,8 +57,10 @@ class BagReader:
         Number of messages on each topic.
     custom_data : dict of str to str
         Texts about the trial, by key; empty if the path is an MCAP file.
-    start, end : int
-        Times of the first and the last message, ns; 0 in an empty bag.
+    start : int
+        Time of the first message, ns; 0 in an empty bag.
+    end : int
+        Time of the last message, ns; 0 in an empty bag.
     message_count : int
         Number of messages that can be read.
     problem : str or None

@@ -239,9 +239,11 @@ class BathMeniscus:
         and suction. It equals the weight of the raised liquid.
     volume : float
         Volume of liquid above floor level minus the missing volume below it, m³.
-    radii, heights : array, shape (n,)
-        The surface from the contact line outwards, m, to where the slope is a millionth of
-        ``slope``.
+    radii : array, shape (n,)
+        Radii of points of the surface, m, from the contact line outwards to where the slope is a
+        millionth of ``slope``.
+    heights : array, shape (n,)
+        Heights of these points, m.
     status : str
         ``ok``; ``several`` where the wall has other equilibria higher up (the lowest is returned);
         ``rim`` where the liquid reaches the end of the wall and is pinned at its edge; ``dry``

@@ -293,8 +293,10 @@ class Design:
         Number of pads.
     pitch : float
         Distance between the centres of neighbouring pads in a hexagonal pattern, m.
-    load, load_per_pad : float
-        Normal force on the whole foot and on one pad, N.
+    load : float
+        Normal force on the whole foot, N.
+    load_per_pad : float
+        Normal force on one pad, N.
     margin : float
         Safety factor: the force limit covers the load times this factor.
     criterion : str

@@ -71,8 +71,10 @@ class Squeezed(NamedTuple):
         Middles of the rings, m, (rings,).
     area : array
         Area of each ring, m², (rings,).
-    thickness, pressure : array
-        Film, m, and its pressure, Pa, (times, rings).
+    thickness : array
+        Thickness of the film, m, (times, rings).
+    pressure : array
+        Pressure in the film, Pa, (times, rings).
     load : array
         Force of the film on the surface, N, (times,).
     drained : array

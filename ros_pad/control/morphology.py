@@ -104,9 +104,10 @@ class FootFault:
     ----------
     leg : int
         Number of the leg.
-    start, end : float
-        Times at which the fault was found and at which its end was found, s; the end is None while
-        the fault lasts.
+    start : float
+        Time at which the fault was found, s.
+    end : float or None
+        Time at which its end was found, s; None while the fault lasts.
     reason : str
         Last description of the fault, with numbers.
     """

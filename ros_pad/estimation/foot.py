@@ -104,8 +104,10 @@ class Estimate(NamedTuple):
         Standard deviation of the slip speed, m/s; infinite while sensors are faulty.
     wet_probability : float
         Probability that the ground is wet, 0 to 1.
-    friction_mean, friction_sd : float
-        Mean and standard deviation of the coefficient of friction.
+    friction_mean : float
+        Mean of the coefficient of friction.
+    friction_sd : float
+        Standard deviation of the coefficient of friction.
     margin : float
         Friction margin, no unit: 5 % quantile of μ less T/N; below zero, slip is likely. NaN from
         a fault of the sensors until the foot stands again; in swing the last value.

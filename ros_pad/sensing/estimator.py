@@ -115,8 +115,10 @@ class FootMotion(NamedTuple):
 
     Attributes
     ----------
-    position, velocity : array (3,)
-        Centre of the foot, m, m/s.
+    position : array (3,)
+        Position of the centre of the foot, m.
+    velocity : array (3,)
+        Its velocity, m/s.
     force : array (3,)
         Force of the ground on the foot, N.
     in_contact : bool
@@ -147,8 +149,10 @@ class BodyEstimate(NamedTuple):
     ----------
     time : float
         Time of the sample, s.
-    position, velocity : array (3,)
-        Of the base, m, m/s.
+    position : array (3,)
+        Position of the base, m.
+    velocity : array (3,)
+        Velocity of the base, m/s.
     orientation : array (4,)
         Quaternion x y z w from the base to odom.
     covariance : array (9, 9)

@@ -62,10 +62,16 @@ class Readings(NamedTuple):
     ----------
     stamp : int
         Time of the readings, ns.
-    gyro, accelerometer : array (3,) or None
-        Angular velocity, rad/s, and specific force, m/s², in the axes of the IMU.
-    positions, velocities, efforts : array (joints,) or None
-        In the order of ``robot.joint_names``, rad (m), rad/s (m/s), N m (N).
+    gyro : array (3,) or None
+        Angular velocity in the axes of the IMU, rad/s.
+    accelerometer : array (3,) or None
+        Specific force in the axes of the IMU, m/s².
+    positions : array (joints,) or None
+        Joint positions in the order of ``robot.joint_names``, rad (m).
+    velocities : array (joints,) or None
+        Joint velocities, rad/s (m/s).
+    efforts : array (joints,) or None
+        Joint torques, N m (N).
     forces : dict of int to array (3,)
         Forces of the ground on feet, N, by index of the leg, in the axes of
         :attr:`Mapping.force_axes`.

@@ -269,9 +269,10 @@ class PneumaticChannel:
 
     Attributes
     ----------
-    outlet_pressure, pad_pressure : float
-        Pressures at the outlet of the regulator and in the pad, gauge Pa, in [0, full scale], also
-        with faults.
+    outlet_pressure : float
+        Pressure at the outlet of the regulator, gauge Pa, in [0, full scale], also with faults.
+    pad_pressure : float
+        Pressure in the pad, gauge Pa, in [0, full scale], also with faults.
     setpoint : float
         The last set-point commanded, gauge Pa.
     settled : bool

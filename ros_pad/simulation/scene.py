@@ -352,8 +352,10 @@ class Scene:
     ----------
     source : str
         Name of the shipped scene, or path of the file, that describes it.
-    name, description : str
-        Name without folder, and the text ``description`` of the file.
+    name : str
+        Name without folder.
+    description : str
+        Text ``description`` of the file.
     robot : str
         Name or path of the robot as the file has it; ``rail_leg`` for the leg on its rail.
     body : LeggedBody or RailBody

@@ -88,8 +88,10 @@ class Replay:
         Number of samples that the estimator used, by leg.
     refused : dict
         Number of rejected samples, and the reason of the last one, by leg.
-    recorded, replayed : dict
-        A :class:`Track` by leg and kind.
+    recorded : dict
+        A :class:`Track` by leg and kind, as recorded.
+    replayed : dict
+        A :class:`Track` by leg and kind, as replayed.
     comparisons : list of Comparison
         One for each recorded topic of estimates and decisions.
     outcomes : list of Outcome

@@ -36,8 +36,10 @@ class Metrics:
         Mean distance of the body along x in a gait cycle, m.
     slip_path_m : list of float
         Length of all slip of each foot, m.
-    lateral_drift_m, yaw_drift_rad : float
-        Sideways position, m, and heading, rad, of the body at the end.
+    lateral_drift_m : float
+        Sideways position of the body at the end, m.
+    yaw_drift_rad : float
+        Heading of the body at the end, rad.
     dissipation_j : float
         Work lost in feet that slip or rotate, J.
     switches : list of int
@@ -148,8 +150,12 @@ class Trial:
 
     Attributes
     ----------
-    scene, policy, fidelity : str
-        Name of the scene, policy and fidelity level; empty where a bag does not have them.
+    scene : str
+        Name of the scene.
+    policy : str
+        Name of the policy.
+    fidelity : str
+        Fidelity level.
     seed : int
         Seed of floor and noise.
     legs : tuple of int
@@ -158,16 +164,28 @@ class Trial:
         Time of each sensor sample, s.
     body : ndarray (n, 3)
         Position x and y, m, and heading, rad.
-    force, position : ndarray (n, legs, 3)
-        Measured force of the ground, N, and position of each foot, m.
+    force : ndarray (n, legs, 3)
+        Measured force of the ground on each foot, N.
+    position : ndarray (n, legs, 3)
+        Measured position of each foot, m.
     slow_time : ndarray (m,)
         Time of each control step, s.
-    pressure, setpoint : ndarray (m, legs)
-        Gauge pressure and set-point, Pa.
-    wet_probability, friction, margin, slip_speed : ndarray (m, legs)
-        Estimates of P(wet), μ, friction margin and slip speed, m/s.
-    slipping, dome : ndarray of bool (m, legs)
-        Slip alarm, and whether the chosen morphology is dome.
+    pressure : ndarray (m, legs)
+        Gauge pressure, Pa.
+    setpoint : ndarray (m, legs)
+        Set-point, gauge Pa.
+    wet_probability : ndarray (m, legs)
+        Probability of wet ground, 0 to 1.
+    friction : ndarray (m, legs)
+        Estimated coefficient of friction.
+    margin : ndarray (m, legs)
+        Friction margin, no unit.
+    slip_speed : ndarray (m, legs)
+        Estimated slip speed, m/s.
+    slipping : ndarray of bool (m, legs)
+        Slip alarm.
+    dome : ndarray of bool (m, legs)
+        Whether the chosen morphology is dome.
     doubt : ndarray of int (m, legs)
         Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
         was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.

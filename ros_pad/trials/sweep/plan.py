@@ -53,8 +53,10 @@ class Job:
         Scene, policy, seed and parameters, which identify the trial; first columns of its row.
     scene : Scene
         Scene with the parameters of this trial.
-    policy, level : str
-        Policy and fidelity level.
+    policy : str
+        Policy.
+    level : str
+        Fidelity level.
     seed : int
         Seed of floor and noise.
     tuning : Tuning

@@ -154,8 +154,11 @@ class Point:
         Number of walks that failed or ended early.
     mean : float or None
         Mean distance, m; None without walks.
-    low, high : float or None
-        Ends of the 95 % interval of the mean by Student's t, m; None for fewer than two walks.
+    low : float or None
+        Lower end of the 95 % interval of the mean by Student's t, m; None for fewer than two
+        walks.
+    high : float or None
+        Upper end of this interval, m.
     """
 
     labels: Row
