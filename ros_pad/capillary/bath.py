@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.fibre import outer_surface
@@ -197,7 +198,8 @@ class Wall:
         InvalidInput
             When a value is not finite or out of range, heights do not rise, or shapes differ.
         """
-        r, z = quantity('radii', radii, 'm', above=True), np.asarray(heights, dtype=float)
+        r = quantity('radii', radii, 'm', above=True)
+        z = quantity('heights', heights, 'm', -math.inf)
         if r.ndim != 1 or r.shape != z.shape or r.size < 2:
             raise InvalidInput(
                 f'radii of shape {np.shape(r)} and heights of shape {z.shape} are not allowed:'
@@ -319,7 +321,9 @@ def bath_meniscus(
             f' {"without" if wall is None else "with"} a wall are not allowed: either both radii'
             ' or a wall is needed'
         )
-    if wall is None:
+    if wall is not None:
+        instance('wall', wall, Wall)
+    else:
         assert sphere_radius is not None and contact_radius is not None
         wall = Wall.dome(sphere_radius, contact_radius)
     weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)

@@ -14,8 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.capillary.bath import Wall
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import broadcast
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
@@ -39,11 +42,20 @@ class Face:
     under : bool
         True if the liquid stands on this face, as on a floor; False if the face is beside or
         above the liquid.
+
+    Raises
+    ------
+    InvalidInput
+        When the centre is not two finite numbers.
     """
 
     rails: Callable[[Array], Array]
     centre: tuple[float, float] = (0.0, 0.0)
     under: bool = False
+
+    def __post_init__(self) -> None:
+        if np.shape(quantity('centre', self.centre, 'm', -math.inf)) != (2,):
+            raise InvalidInput(f'centre = {self.centre} is not allowed: x and y are needed')
 
     @classmethod
     def revolution(
@@ -62,8 +74,22 @@ class Face:
         -------
         Face
             The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, a radius is negative, or there are not two points or more.
         """
-        rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
+        r, z = broadcast(
+            'radii and heights',
+            quantity('radii', radii, 'm'),
+            quantity('heights', heights, 'm', -math.inf),
+        )
+        if np.ndim(r) != 1 or r.size < 2:
+            raise InvalidInput(
+                f'radii of shape {np.shape(r)} are not allowed: at least two points are needed'
+            )
+        rail = _even(np.stack([r, z], axis=-1))
         return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
 
     @classmethod
@@ -81,7 +107,13 @@ class Face:
         -------
         Face
             The face.
+
+        Raises
+        ------
+        InvalidInput
+            When ``wall`` is no Wall, or is infinite.
         """
+        instance('wall', wall, Wall)
         places = np.linspace(wall.floor, wall.top, KNOTS)
         radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
         return cls.revolution(radii, heights, centre)

@@ -17,6 +17,7 @@ from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.surface import Line
 from ros_pad.capillary.surface import LiquidSurface
 from ros_pad.capillary.surface import minimise
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
@@ -62,6 +63,9 @@ def spanned(
     """
     integer('sectors', sectors, 6)
     integer('rows', rows, 1)
+    number('growth', growth, '(ratio)', above=True)
+    instance('first', first, Face)
+    instance('last', last, Face)
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
     outwards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
     rings = []
@@ -142,7 +146,8 @@ def bath_surface(
     >>> abs(surface.volume / bath_meniscus(wall=wall, liquid=WATER).volume - 1) < 0.02
     True
     """
-    azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
+    instance('face', face, Face)
+    azimuths = np.linspace(0.0, 2.0 * math.pi, integer('sectors', sectors, 6), endpoint=False)
     rails = face.rails(azimuths)
     mean = rails.mean(axis=0)
     bath = _round_bath(mean, liquid, gravity)
@@ -241,7 +246,12 @@ def pattern_surface(
         When a value is out of range, pads of this pitch touch, or both or none of pressure and
         volume are given.
     """
+    instance('face', face, Face)
+    instance('liquid', liquid, Liquid)
     heavy = liquid.density * number('gravity', gravity, 'm/s²')
+    integer('sectors', sectors, 6)
+    if volume is not None:
+        number('volume', volume, 'm³', above=True)
     cell = Face.cell(pitch, sides, 1.0)
     if sectors % (2 * sides):
         raise InvalidInput(

@@ -31,6 +31,7 @@ from ros_pad.capillary.faces import KNOTS
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.faces import boundary_edges
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.pad import Array
@@ -90,8 +91,9 @@ class Line:
         Raises
         ------
         InvalidInput
-            When place or angle is out of range.
+            When place or angle is out of range, or ``face`` is no Face.
         """
+        instance('face', face, Face)
         if angle is not None:
             number('angle', angle, 'rad', high=math.pi)
         number('place', place, '(share of the rail)', high=1.0)

@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import quantity
 from ros_pad.contact.pad import Array
 from ros_pad.contact.pad import Floats
@@ -153,6 +154,7 @@ def inflate(pad: Pad, pressure: npt.ArrayLike) -> Inflated:
     >>> (1e3 * domes.height).round(2).tolist(), domes.status.tolist()
     ([1.38, 2.29, nan], ['ok', 'ok', 'no_inflation'])
     """
+    instance('pad', pad, Pad)
     p = quantity('pressure', pressure, 'Pa')
     if pad.material is not None:
         from ros_pad.contact.hyperelastic import inflate_rubber
@@ -241,6 +243,7 @@ def press(
     >>> press(LARGE_PAD, 75e3, [0.0, 0.6]).status.tolist()
     ['ok', 'flattened']
     """
+    instance('pad', pad, Pad)
     if model != 'thesis' or pad.material is not None:
         choice('model', model, MODELS)
         choice('adhesion', adhesion, tuple(ADHESION_SIGNS))

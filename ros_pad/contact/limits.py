@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import flattening_force
@@ -228,6 +229,7 @@ def criteria(pad: Pad) -> tuple[str, ...]:
 
 def check_criterion(pad: Pad, criterion: str, name: str = 'criterion') -> None:
     """Raise `InvalidInput` for a criterion that is unknown, or not known for the pad."""
+    instance('pad', pad, Pad)
     if pad.edge is not None and criterion in CRITERIA[:-1]:
         raise InvalidInput(
             f'{name} = {criterion!r} is not allowed for {pad}: shapes under load are not known'

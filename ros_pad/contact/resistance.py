@@ -33,6 +33,7 @@ from ros_pad import configuration
 from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -464,6 +465,7 @@ def tangential_resistance(
     >>> tangential_resistance(foot, 2.0, [0.0, 75e3], **films).round(2).tolist()
     [0.24, 0.8]
     """
+    instance('foot', foot, Foot)
     values = broadcast(
         'load, pressure and films',
         quantity('load', load, 'N'),

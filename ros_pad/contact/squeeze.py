@@ -163,7 +163,13 @@ class HalfSpace:
         -------
         float
             Radius, m, by Hertz, or that of the sole if it is flat.
+
+        Raises
+        ------
+        InvalidInput
+            When the load is negative or not finite.
         """
+        load = number('load', load, 'N')
         if self.curvature == 0.0:
             return self.radius
         return float((0.75 * load / (self.curvature * self.modulus)) ** (1.0 / 3.0))
@@ -247,8 +253,13 @@ class Membrane:
         -------
         float
             Radius, m.
+
+        Raises
+        ------
+        InvalidInput
+            When the load is negative or not finite.
         """
-        return math.sqrt(load / (math.pi * self.pressure))
+        return math.sqrt(number('load', load, 'N') / (math.pi * self.pressure))
 
     def deflection(self, edges: Array, at: Array) -> Array:
         """Return the deflection at radii by unit pressure on each ring.

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.configuration import choice as one_of
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
@@ -291,6 +292,12 @@ class MorphologyController:
         lift_off_share: float = LIFT_OFF.default,
         command_timeout: float = COMMAND_TIMEOUT.default,
     ) -> None:
+        instance('foot', foot, Foot)
+        if not callable(policy):
+            raise InvalidInput(
+                f'policy = {policy!r} is not allowed: a function is needed, such as policy_named'
+                ' returns'
+            )
         number('expected_load', expected_load, 'N', above=True)
         first = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
         for leg in legs:
@@ -354,7 +361,7 @@ class MorphologyController:
         InvalidInput
             For a leg that is not controlled.
         """
-        state = self._legs[leg]
+        state = self._state(leg)
         if not state.air.monitor.reason:
             return state.morphology
         return DOME if state.air.holds else FLAT
@@ -377,7 +384,7 @@ class MorphologyController:
         InvalidInput
             For a leg that is not controlled.
         """
-        return self._legs[leg].setpoint
+        return self._state(leg).setpoint
 
     def fault(self, leg: int) -> str:
         """Return the present faults of a leg.

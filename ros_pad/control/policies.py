@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ros_pad.configuration import Setting
+from ros_pad.configuration import choice
 from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 
@@ -251,6 +252,7 @@ def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
     >>> first_morphologies('adaptive', [1, 2, 3])
     {1: 'flat', 2: 'dome', 3: 'flat'}
     """
+    choice('policy', policy, POLICIES)
     if policy == 'adaptive':
         return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
     return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
+from ros_pad.configuration import instance
+from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
@@ -192,7 +194,7 @@ class FootEstimator:
     Raises
     ------
     InvalidInput
-        When the expected load is not a number above 0.
+        When the expected load is not a number above 0, or foot or tuning is of another class.
 
     Examples
     --------
@@ -224,8 +226,10 @@ class FootEstimator:
         shared: FrictionScales | None = None,
         shared_axes: SharedAxes | None = None,
     ) -> None:
+        instance('foot', foot, Foot)
         expected_load = number('expected_load', expected_load, 'N', above=True)
-        self.tuning = tuning = tuning or Tuning()
+        self.tuning = tuning = Tuning() if tuning is None else tuning
+        instance('tuning', tuning, Tuning)
         self._foot = foot
         self._expected_load = expected_load
         self._least_load = AIRBORNE_LOAD * expected_load  # a smaller one may be an offset, N
@@ -305,7 +309,8 @@ class FootEstimator:
             Gauge pressure in the pads, Pa.
         moment : float or None
             Yaw moment of the ground on the foot, N m; None if it is not measured. The part of the
-            friction that turning uses follows from it, and is otherwise assumed.
+            friction that turning uses follows from it, and is otherwise assumed. Not used with
+            the setting ``moment_noise`` 0.
         position_time : float or None
             Time at which the position was measured, s; None if it is `time`.
         motion : ContactMotion or None
@@ -717,8 +722,12 @@ def estimators_of(
     Raises
     ------
     InvalidInput
-        When the expected load is not a number above 0, or the count no whole number from 1.
+        When the expected load is not a number above 0, the count no whole number from 1, or foot
+        or tuning of another class.
     """
+    instance('foot', foot, Foot)
+    instance('tuning', tuning, Tuning)
+    integer('count', count, 1)
     expected_load = number('expected_load', expected_load, 'N', above=True)
     shared, axes = shared_friction(foot, expected_load, tuning), SharedAxes()
     feet = [FootEstimator(foot, expected_load, tuning, shared, axes) for _ in range(count)]

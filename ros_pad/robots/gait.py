@@ -102,7 +102,12 @@ class Gait:
         ((0.0, 0.5, 0.0, 0.5, 0.0, 0.5), [False, True, False, True, False, True])
         """
         choice('gait', name, GAITS)
-        places = np.asarray(hips, dtype=float)
+        places = quantity('hips', hips, 'm', -math.inf)
+        if places.ndim != 2 or places.shape[1] < 2:
+            raise InvalidInput(
+                f'hips of shape {places.shape} is not allowed: a row for each leg, with x and y,'
+                ' is needed'
+            )
         legs = len(places)
         if name in ('tripod', 'trot'):
             _check_legs(name, legs, (6, 8) if name == 'tripod' else (4,))

@@ -339,7 +339,7 @@ class Robot:
         InvalidInput
             When an argument has another shape or values that are not finite.
         """
-        pull = quantity('gravity', gravity, 'm/s2', -100.0, 100.0)
+        pull = _in_shape('gravity', quantity('gravity', gravity, 'm/s²', -100.0, 100.0), (3,))
         return self.chains.gravity_torques(self.kinematics(q), pull)
 
     def joint_positions(self, feet: npt.ArrayLike, near: npt.ArrayLike | None = None) -> Array:
@@ -367,7 +367,8 @@ class Robot:
         -----
         Newton's method with damped least squares.
         """
-        goal = quantity('feet', feet, 'm', -100.0, 100.0)
+        places = quantity('feet', feet, 'm', -100.0, 100.0)
+        goal = _in_shape('feet', places, (len(self.legs), 3))
         q = self._shaped(self.home if near is None else near).copy()
         for _ in range(50):
             found = self.chains.solve(q)
@@ -390,6 +391,13 @@ class Robot:
                 ' needed'
             )
         return checked.reshape(self.home.shape)
+
+
+def _in_shape(name: str, value: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array; raise `InvalidInput` if it has another shape."""
+    if value.shape != shape:
+        raise InvalidInput(f'{name} of shape {value.shape} is not allowed: {shape} is needed')
+    return value
 
 
 def _check_sizes(robot: Robot) -> None:

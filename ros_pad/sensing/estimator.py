@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.errors import InvalidInput
@@ -255,6 +256,7 @@ class BodyEstimator:
         joint_delay: float = 0.0,
         rejection: bool = True,
     ) -> None:
+        instance('robot', robot, Robot)
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
@@ -66,7 +67,7 @@ class PlanarRobot:
         When the legs cannot walk the scene's gait, or when steps are to be compiled and numba is
         not installed.
     InvalidInput
-        When the period is not finite and above 0.
+        When the period is not finite and above 0, or the scene has a rail leg.
 
     Examples
     --------
@@ -87,6 +88,9 @@ class PlanarRobot:
         compile_steps: bool | None = None,
         soles_turn: bool = False,
     ) -> None:
+        instance('scene', scene, Scene)
+        instance('scene.body', scene.body, LeggedBody)
+        instance('floor', floor, Floor)
         assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
         check_reach(scene)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.faults import LEAK_CRITICAL_RATIO
@@ -320,6 +321,8 @@ class PneumaticChannel:
         ambient: float = ATMOSPHERE,
         faults: Sequence[Fault] = (),
     ) -> None:
+        instance('regulator', regulator, RegulatorModel)
+        instance('hose', hose, Hose)
         number('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
         self.regulator = regulator
         self.hose = hose

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
@@ -52,10 +53,13 @@ class RailLeg:
     Raises
     ------
     InvalidInput
-        When the period is not finite and above 0.
+        When the period is not finite and above 0, or the scene has another robot.
     """
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
+        instance('scene', scene, Scene)
+        instance('scene.body', scene.body, RailBody)
+        instance('floor', floor, Floor)
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
         number('period', period, 's', above=True)
         self.legs: tuple[int, ...] = (1,)

@@ -206,6 +206,7 @@ class Floor:
                     f'drawing: row {place} contains {min(odd)!r}: only # (wet) and . (dry) are'
                     ' allowed'
                 )
+        number('cell', cell, 'm', above=True)
         # Rows of the map go along +y, those of a drawing against it.
         wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
         return cls(wet, cell, (-cell / 2.0, -cell * len(drawing) / 2.0), film_thickness)

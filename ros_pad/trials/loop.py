@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
@@ -436,6 +437,8 @@ def run(
     if not isinstance(scene, Scene):
         scene = Scene.load(scene)
     policy = scene.policy if policy is None else policy
+    if tuning is not None:
+        instance('tuning', tuning, Tuning)
     choice('sensing', sensing, SOURCES)
     level = levels.level(scene, fidelity, policy, sensing == 'joints')
     loop = ClosedLoop(scene, policy, seed, level, tuning, policy_parameters, sensing)

@@ -137,6 +137,8 @@ class Sweep:
     def __post_init__(self) -> None:
         axes = {'scene': self.scenes, 'policy': self.policies, 'seed': self.seeds}
         for name, values in (*axes.items(), *self.parameters.items()):
+            if isinstance(values, str):
+                raise InvalidInput(f'{name} = {values!r} is not allowed: a list is needed')
             if not values and name != 'policy':
                 raise InvalidInput(f'{name}: at least one value is needed')
             for place, value in enumerate(values):
