@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -414,6 +415,7 @@ def design(
     >>> sole.pads, round(sole.pressure), round(sole.reachable_load, 1), sole.carried
     (51, 39125, 19.5, True)
     """
+    instance('pad', pad, Pad)
     load = number('load', load, 'N', above=True)
     need_stiffness('a design', pad)
     area = number('area', area, 'm²', above=True)

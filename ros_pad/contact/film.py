@@ -127,8 +127,14 @@ class Film:
         Parameters
         ----------
         thickness : float
-            Thickness of the film, m, from 0, which is dry ground. For speed it is not checked.
+            Thickness of the film, m, from 0, which is dry ground.
+
+        Raises
+        ------
+        InvalidInput
+            When the thickness is negative or not finite.
         """
+        thickness = number('thickness', thickness, 'm')
         self._fresh = thickness**-2 if thickness > 0.0 else math.inf
         self._dome_state = self._sole_state = self._fresh
         self._dome_area = 0.0

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.material import Material
 from ros_pad.contact.thickness import check_edge
@@ -195,6 +196,7 @@ class Pad:
 
 def need_stiffness(what: str, pad: Pad) -> None:
     """Raise `InvalidInput` for a pad of a material where the law of the thesis is computed."""
+    instance('pad', pad, Pad)
     if pad.material is not None:
         raise InvalidInput(f'{what} needs a pad with a measured stiffness, and not {pad}')
 

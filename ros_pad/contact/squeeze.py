@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -346,6 +347,7 @@ def squeeze(
     >>> f'{1e6 * rigid:.1f} micrometres'
     '3.4 micrometres'
     """
+    instance('surface', surface, HalfSpace, Membrane)
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
     if number('rise', rise, 's') > 0.0 and load is None:
         raise InvalidInput(f'rise = {rise:g} s is not allowed: it is that of a load')

@@ -291,6 +291,7 @@ class Mapping:
         ConfigError
             When there is no such mapping, its file is not valid, or it does not fit the robot.
         """
+        configuration.instance('robot', robot, Robot)
         path = configuration.locate('mappings', source)
         table = Table.load(path)
         table.text('description', default='')

@@ -157,7 +157,7 @@ class Floor:
         >>> round(float(floor.wet_map.mean()), 3), floor.depth(0.0, 0.0)  # m
         (0.4, 0.0003)
         """
-        if not 0.0 < wet_fraction < 1.0:
+        if number('wet_fraction', wet_fraction, '(share)', high=1.0) in (0.0, 1.0):
             raise InvalidInput(
                 f'wet_fraction = {wet_fraction!r} is not allowed: a number above 0 and below 1 is'
                 ' needed'

@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
+from ros_pad.configuration import instance
 from ros_pad.control import POLICIES
 from ros_pad.control import policy_named
 from ros_pad.control.policies import PREFIX
@@ -135,6 +136,7 @@ class Sweep:
     fidelity: str = 'auto'
 
     def __post_init__(self) -> None:
+        instance('parameters', self.parameters, Mapping)
         axes = {'scene': self.scenes, 'policy': self.policies, 'seed': self.seeds}
         for name, values in (*axes.items(), *self.parameters.items()):
             if isinstance(values, str):
