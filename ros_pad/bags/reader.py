@@ -78,9 +78,12 @@ class BagReader:
 
     >>> import struct, tempfile
     >>> from ros_pad.bags import BagReader, BagWriter
+    >>> from mcap.records import Channel, Schema
+    >>> schema = Schema(1, b'float64 data', 'ros2msg', 'std_msgs/msg/Float64')
+    >>> channel = Channel(1, '/leg_1/wetness', 'cdr', {'offered_qos_profiles': '[]'}, 1)
     >>> place = tempfile.TemporaryDirectory()
     >>> with BagWriter(f'{place.name}/bag', {'robot': 'ch3r'}) as bag:
-    ...     bag.add_topic('/leg_1/wetness', 'std_msgs/msg/Float64')
+    ...     bag.copy_topic(channel, schema)
     ...     for step, wet in enumerate((0.5, 0.9)):
     ...         message = bytes([0, 1, 0, 0]) + struct.pack('<d', wet)
     ...         bag.write('/leg_1/wetness', message, log_time_ns=20_000_000 * step)
