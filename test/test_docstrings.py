@@ -20,13 +20,13 @@ PARTS += ' trials.sweep trials.recorded trials.replay errors'
 PACKAGES = [f'ros_pad.{part}' for part in PARTS.split()]
 
 UNIT = re.compile(
-    r'(?<![\w/-])(1/)?(m|mm|kg|N|Pa|J|s|ns|rad|Hz|nats)[²³]?(?![\w-])'
+    r"(?<![\w/'-])(1/)?(m|mm|kg|N|Pa|J|s|ns|rad|Hz|nats)[²³]?(?![\w-])"
     r'|(?i:dimensionless|no unit|probabilit|ratio|factor|share|coefficient|quaternion|relative'
     r'|as for|stretch|transform)'
 )
 """A unit, or a word for what has none."""
 
-CHECKS = {'quantity', 'number', 'integer', 'text', 'choice'}
+CHECKS = {'quantity', 'number', 'integer', 'text', 'choice', 'instance'}
 """Functions of ros_pad.configuration, which raise InvalidInput."""
 
 

@@ -204,8 +204,8 @@ class BodyEstimator:
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
     radius_error : float
-        Standard deviation of the radius with which feet roll over the robot's ``foot_radius``, 0
-        to 1: soft feet sink in.
+        Standard deviation of the radius with which feet roll, as a share of the robot's
+        ``foot_radius``, 0 to 1: soft feet sink in.
     length_error : float
         Standard deviation of the relative error of the length of all legs, 0 to 0.5.
     joint_delay : float
