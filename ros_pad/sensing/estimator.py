@@ -418,7 +418,8 @@ class BodyEstimator:
             ('foot_forces', (joints[0], 3), 'N', 1e6),
             ('efforts', size, 'N m', 1e6),
         )
-        given = [
+        # The last two may be missing.
+        given: list[tuple[tuple[str, tuple[int, ...], str, float], Any]] = [
             (names[place], reading)
             for place, reading in enumerate(readings)
             if reading is not None or place < 4

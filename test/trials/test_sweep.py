@@ -173,11 +173,11 @@ def test_scenes_with_other_legs_share_a_table(tmp_path: pathlib.Path):
 def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path: pathlib.Path, monkeypatch):
     sweep = Sweep([LEG], ['flat'], [0, 1, 2], SHORT)
     jobs = sweep.jobs()
-    broken = dataclasses.replace(jobs[1], tuning='none')
+    broken = dataclasses.replace(jobs[1], policy_parameters=1)
     monkeypatch.setattr(Sweep, 'jobs', lambda self: [jobs[0], broken, jobs[2]])
     rows = sweeps.run(sweep, tmp_path / 'sweep', 2)
     assert [bool(row['error']) for row in rows] == [False, True, False]
-    assert 'AttributeError' in rows[1]['error']
+    assert 'TypeError' in rows[1]['error']
     assert (rows[1]['seed'], rows[1]['distance_m'], rows[1]['level']) == (1, None, 'L0')
     monkeypatch.undo()
     assert sweeps.run(sweep, tmp_path / 'sweep', 1) == rows
