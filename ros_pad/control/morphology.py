@@ -260,7 +260,7 @@ class MorphologyController:
     Raises
     ------
     InvalidInput
-        When a value is outside its range; the message names it.
+        When a value is outside its range, or foot or policy of another kind; the message names it.
     LimitError
         When the fixed pressure is above the foot's ceiling.
 
