@@ -2,8 +2,9 @@
 """Check values, and read the YAML files under ``config/`` strictly.
 
 Every value from outside (argument, YAML key, ROS parameter) is checked by :func:`quantity`,
-:func:`number`, :func:`integer`, :func:`text` or :func:`choice`. A :class:`Setting` describes one
-named value. A :class:`Table` is one mapping of a YAML file; keys that are never read are an error.
+:func:`number`, :func:`integer`, :func:`text`, :func:`choice` or :func:`instance`. A
+:class:`Setting` describes one named value. A :class:`Table` is one mapping of a YAML file; keys
+that are never read are an error.
 """
 
 from __future__ import annotations
@@ -143,6 +144,12 @@ def text(name: str, value: str) -> str:
     if not isinstance(value, str):
         raise _not_allowed(name, value, 'text')
     return value
+
+
+def instance(name: str, value: object, *kinds: type) -> None:
+    """Check that a value is an object of one of the classes; raise `InvalidInput` if not."""
+    if not isinstance(value, kinds):
+        raise _not_allowed(name, value, f'a {" or ".join(kind.__name__ for kind in kinds)}')
 
 
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:

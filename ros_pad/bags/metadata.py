@@ -16,6 +16,7 @@ from mcap.records import Channel
 from mcap.records import Schema
 
 from ros_pad.bags.storage import Contents
+from ros_pad.configuration import instance
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import reason
@@ -160,6 +161,8 @@ def texts(custom_data: Mapping[str, str] | None) -> dict[str, str]:
     InvalidInput
         When a key or a value is not text.
     """
+    if custom_data is not None:
+        instance('custom_data', custom_data, Mapping)
     for key, value in (custom_data or {}).items():
         if not isinstance(key, str) or not isinstance(value, str):
             raise InvalidInput(

@@ -62,8 +62,10 @@ class BagReader:
         Number of messages on each topic.
     custom_data : dict of str to str
         Texts about the trial, by key; empty if the path is an MCAP file.
-    start, end : int
-        Times of the first and the last message, ns; 0 in an empty bag.
+    start : int
+        Time of the first message, ns; 0 in an empty bag.
+    end : int
+        Time of the last message, ns; 0 in an empty bag.
     message_count : int
         Number of messages that can be read.
     problem : str or None
@@ -74,6 +76,28 @@ class BagReader:
     BagError
         When there is no such bag, its metadata is invalid, its storage is not MCAP without a
         compression mode, a file is missing, or no message of a damaged bag can be read.
+
+    Examples
+    --------
+    A bag of two messages, written and read without ROS; a number in CDR is a header and 8 bytes:
+
+    >>> import struct, tempfile
+    >>> from ros_pad.bags import BagReader, BagWriter
+    >>> from mcap.records import Channel, Schema
+    >>> schema = Schema(1, b'float64 data', 'ros2msg', 'std_msgs/msg/Float64')
+    >>> channel = Channel(1, '/leg_1/wetness', 'cdr', {'offered_qos_profiles': '[]'}, 1)
+    >>> place = tempfile.TemporaryDirectory()
+    >>> with BagWriter(f'{place.name}/bag', {'robot': 'ch3r'}) as bag:
+    ...     bag.copy_topic(channel, schema)
+    ...     for step, wet in enumerate((0.5, 0.9)):
+    ...         message = bytes([0, 1, 0, 0]) + struct.pack('<d', wet)
+    ...         bag.write('/leg_1/wetness', message, log_time_ns=20_000_000 * step)
+    >>> bag = BagReader(f'{place.name}/bag')
+    >>> bag.counts, bag.custom_data
+    ({'/leg_1/wetness': 2}, {'robot': 'ch3r'})
+    >>> times, values = bag.tables({'/leg_1/wetness': ['data']})['/leg_1/wetness']
+    >>> times.tolist(), values.tolist()  # ns
+    ([0, 20000000], [[0.5], [0.9]])
     """
 
     def __init__(self, path: str | os.PathLike[str], progress: Progress | None = None) -> None:
@@ -155,6 +179,15 @@ class BagReader:
         progress : callable or None
             Called now and then with the share that is done, 0 to 1.
 
+        Yields
+        ------
+        topic : str
+            Name of the topic.
+        message : object
+            Decoded message, with its fields as attributes.
+        log_time : int
+            Time at which it was recorded, ns.
+
         Raises
         ------
         BagError
@@ -186,6 +219,15 @@ class BagReader:
         paths : mapping
             Fields to read, such as ``wrench.force.x``, by topic; a topic that the bag does not
             have yields nothing.
+
+        Yields
+        ------
+        topic : str
+            Name of the topic.
+        values : tuple
+            Values of the fields, in the order of the paths.
+        log_time : int
+            Time at which it was recorded, ns.
 
         Raises
         ------
@@ -238,7 +280,10 @@ class BagReader:
     def log_times(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Return the log times of all messages on each topic, int64, ns, in the order of the file.
 
-        The callback is called now and then with the share that is done, 0 to 1.
+        Parameters
+        ----------
+        progress : callable, optional
+            Called now and then with the share that is done, 0 to 1.
 
         Raises
         ------

@@ -40,7 +40,7 @@ _RECORD_SIZE_LIMIT = 1 << 30  # bytes; a longer record counts as damage
 
 @dataclass
 class Repair:
-    """Findings of a repair.
+    """Findings of :func:`repair`.
 
     Attributes
     ----------
@@ -114,6 +114,11 @@ def repair(
         Folder of the new bag, which must not exist.
     progress : callable, optional
         Called with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Repair
+        Numbers of messages that were written, and of what was lost.
 
     Raises
     ------

@@ -213,6 +213,11 @@ class BagWriter:
     def describe(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data about the trial; the next flush writes it.
 
+        Parameters
+        ----------
+        custom_data : mapping of str to str
+            Texts by key, added to the earlier ones.
+
         Raises
         ------
         InvalidInput

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.contact.fibre import outer_surface
@@ -50,11 +51,12 @@ class Wall:
         floor (m) and inclination (rad, above 0 and below pi; below pi/2 the wall leans outwards).
         The height grows with the place.
     floor : float
-        Place at floor level.
+        Place at floor level, in the unit of ``meridian``: m, rad or what else it takes.
     top : float
-        Place of the upper end of the wall, above ``floor``.
+        Place of the upper end of the wall, in that unit (m, rad), above ``floor``.
     bottom : float
-        Place of the lower end: ``floor``, or below it if the pad dips into the bath.
+        Place of the lower end, in that unit (m, rad): ``floor``, or below it if the pad dips into
+        the bath.
     steps : int
         Number of steps in which the wall is searched for the contact line.
     """
@@ -77,6 +79,11 @@ class Wall:
             Radius of the contact, m, above 0 and below that of the sphere.
         height : float
             Height of the upper end, m, above 0; by default the top of the sphere.
+
+        Returns
+        -------
+        Wall
+            The wall.
 
         Raises
         ------
@@ -124,6 +131,11 @@ class Wall:
             Extent of the wall above floor level, m, above 0, and below floor level, m, from 0.
             Both may be infinite; the wall ends at the tip of the cone at the latest.
 
+        Returns
+        -------
+        Wall
+            The wall.
+
         Raises
         ------
         InvalidInput
@@ -143,9 +155,25 @@ class Wall:
 
     @classmethod
     def cylinder(cls, radius: float, height: float = math.inf, depth: float = math.inf) -> Wall:
-        """Return the wall of a cylinder, lengths in m as for :meth:`cone`.
+        """Return the wall of a cylinder, by default one that dips into the bath like a long fibre.
 
-        By default the cylinder dips into the bath like a long fibre.
+        Parameters
+        ----------
+        radius : float
+            Radius, m, above 0.
+        height, depth : float
+            Extent of the wall above floor level, m, above 0, and below it, m, from 0; as for
+            :meth:`cone`.
+
+        Returns
+        -------
+        Wall
+            The wall.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is out of range.
         """
         return cls.cone(radius, 0.5 * math.pi, height, depth)
 
@@ -160,12 +188,18 @@ class Wall:
         heights : array, shape (n,)
             Rising heights, m; the first at most 0, the last above 0.
 
+        Returns
+        -------
+        Wall
+            The wall.
+
         Raises
         ------
         InvalidInput
             When a value is not finite or out of range, heights do not rise, or shapes differ.
         """
-        r, z = quantity('radii', radii, 'm', above=True), np.asarray(heights, dtype=float)
+        r = quantity('radii', radii, 'm', above=True)
+        z = quantity('heights', heights, 'm', -math.inf)
         if r.ndim != 1 or r.shape != z.shape or r.size < 2:
             raise InvalidInput(
                 f'radii of shape {np.shape(r)} and heights of shape {z.shape} are not allowed:'
@@ -207,9 +241,11 @@ class BathMeniscus:
         and suction. It equals the weight of the raised liquid.
     volume : float
         Volume of liquid above floor level minus the missing volume below it, m³.
-    radii, heights : array, shape (n,)
-        The surface from the contact line outwards, m, to where the slope is a millionth of
-        ``slope``.
+    radii : array, shape (n,)
+        Radii of points of the surface, m, from the contact line outwards to where the slope is a
+        millionth of ``slope``.
+    heights : array, shape (n,)
+        Heights of these points, m.
     status : str
         ``ok``; ``several`` where the wall has other equilibria higher up (the lowest is returned);
         ``rim`` where the liquid reaches the end of the wall and is pinned at its edge; ``dry``
@@ -240,14 +276,19 @@ def bath_meniscus(
 
     Parameters
     ----------
-    sphere_radius, contact_radius : float
+    sphere_radius, contact_radius : float, optional
         Radius of a dome and of its contact with the floor, m, above 0.
     liquid : Liquid
         Its contact angle on the pad is ``liquid.angle``.
-    wall : Wall
+    wall : Wall, optional
         Wall of any other axisymmetric pad, instead of the two radii.
     gravity : float
         Gravity, m/s², above 0.
+
+    Returns
+    -------
+    BathMeniscus
+        Height, radius, m, force, N, volume, m³, and points of the surface.
 
     Raises
     ------
@@ -259,9 +300,18 @@ def bath_meniscus(
 
     Examples
     --------
-    >>> from ros_pad.contact import WATER
-    >>> round(1e3 * bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER).height, 3)
-    0.889
+    A dome with the force of the water on it, in micronewtons; and a fibre, the
+    limit of thin walls:
+
+    >>> from ros_pad.capillary import Wall, bath_meniscus
+    >>> from ros_pad.contact import WATER, fibre_meniscus
+    >>> found = bath_meniscus(1.55e-3, 0.583e-3, liquid=WATER)
+    >>> round(1e3 * found.height, 3), round(1e6 * found.force), found.status
+    (0.889, 384, 'ok')
+    >>> fibre = bath_meniscus(wall=Wall.cylinder(0.5e-3), liquid=WATER)
+    >>> exact = fibre_meniscus(0.5e-3, WATER.surface_tension, WATER.angle, WATER.density)
+    >>> round(fibre.height / exact, 9)
+    1.0
     """
     if not isinstance(liquid, Liquid):
         raise InvalidInput(f'liquid = {liquid!r} is not allowed: a Liquid is needed')
@@ -271,7 +321,9 @@ def bath_meniscus(
             f' {"without" if wall is None else "with"} a wall are not allowed: either both radii'
             ' or a wall is needed'
         )
-    if wall is None:
+    if wall is not None:
+        instance('wall', wall, Wall)
+    else:
         assert sphere_radius is not None and contact_radius is not None
         wall = Wall.dome(sphere_radius, contact_radius)
     weight = liquid.density * number('gravity', gravity, 'm/s²', above=True)

@@ -55,8 +55,10 @@ class WetPad:
         Radius of the contact with the floor, m.
     tension : float
         Tension of the dry part of the membrane, N/m.
-    height, line_radius : float
-        Height above the floor and radius of the contact line, m.
+    height : float
+        Height of the contact line above the floor, m.
+    line_radius : float
+        Radius of the contact line, m.
     kink : float
         Angle by which the membrane bends outwards at the contact line, rad.
     rim_angle : float
@@ -65,8 +67,10 @@ class WetPad:
         Pressure of the liquid minus that of the air at the contact line, Pa.
     force : float
         Vertical force of the liquid on the pad, N, positive towards the floor.
-    radii, heights : array, shape (n,)
-        The wall from the floor to the rim, m.
+    radii : array, shape (n,)
+        Radii of points of the wall from the floor to the rim, m.
+    heights : array, shape (n,)
+        Heights of these points, m.
     rigid : WetPad or None
         The same pad without the effect of the liquid on its shape; None in that pad itself.
     """
@@ -102,6 +106,12 @@ def press_wet(
         Its contact angle on the pad is ``liquid.angle``.
     gravity : float
         Gravity, m/s², above 0.
+
+    Returns
+    -------
+    WetPad
+        Gap, radii and heights, m, tension, N/m, force, N, beside those of the dry shape,
+        ``rigid``.
 
     Raises
     ------

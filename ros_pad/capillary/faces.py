@@ -14,8 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.capillary.bath import Wall
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
+from ros_pad.configuration import quantity
 from ros_pad.contact.pad import Array
+from ros_pad.contact.pad import broadcast
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import MeshError
 
@@ -39,35 +42,128 @@ class Face:
     under : bool
         True if the liquid stands on this face, as on a floor; False if the face is beside or
         above the liquid.
+
+    Raises
+    ------
+    InvalidInput
+        When the centre is not two finite numbers.
     """
 
     rails: Callable[[Array], Array]
     centre: tuple[float, float] = (0.0, 0.0)
     under: bool = False
 
+    def __post_init__(self) -> None:
+        if np.shape(quantity('centre', self.centre, 'm', -math.inf)) != (2,):
+            raise InvalidInput(f'centre = {self.centre} is not allowed: x and y are needed')
+
     @classmethod
     def revolution(
         cls, radii: npt.ArrayLike, heights: npt.ArrayLike, centre: tuple[float, float] = (0.0, 0.0)
     ) -> Face:
-        """Return a face of revolution through points of its meridian, m, shape (n,)."""
-        rail = _even(np.stack([np.asarray(radii, float), np.asarray(heights, float)], axis=-1))
+        """Return a face of revolution through points of its meridian.
+
+        Parameters
+        ----------
+        radii, heights : array, shape (n,)
+            Points in the order in which they are wetted, m; n from 2.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, a radius is negative, or there are not two points or more.
+        """
+        r, z = broadcast(
+            'radii and heights',
+            quantity('radii', radii, 'm'),
+            quantity('heights', heights, 'm', -math.inf),
+        )
+        if np.ndim(r) != 1 or r.size < 2:
+            raise InvalidInput(
+                f'radii of shape {np.shape(r)} are not allowed: at least two points are needed'
+            )
+        rail = _even(np.stack([r, z], axis=-1))
         return cls(lambda azimuths: np.broadcast_to(rail, (azimuths.size, KNOTS, 2)), centre)
 
     @classmethod
     def of_wall(cls, wall: Wall, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the face of an axisymmetric pad, from the floor to its top."""
+        """Return the face of an axisymmetric pad, from the floor to its top.
+
+        Parameters
+        ----------
+        wall : Wall
+            The wall of the pad, of finite height.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When ``wall`` is no Wall, or is infinite.
+        """
+        instance('wall', wall, Wall)
         places = np.linspace(wall.floor, wall.top, KNOTS)
         radii, heights = np.transpose([wall.meridian(float(place))[:2] for place in places])
         return cls.revolution(radii, heights, centre)
 
     @classmethod
     def floor(cls, radius: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return a disc of the floor, radius in m, wetted from its centre."""
+        """Return a disc of the floor, wetted from its centre.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the disc, m, above 0.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range.
+        """
         return replace(cls.plate(radius, 0.0, centre), under=True)
 
     @classmethod
     def plate(cls, radius: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Face:
-        """Return the underside of a horizontal disc, lengths in m, wetted from its centre."""
+        """Return the underside of a horizontal disc, wetted from its centre.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the disc, m, above 0.
+        height : float
+            Height above the floor, m.
+        centre : (float, float)
+            x and y of the axis, m.
+
+        Returns
+        -------
+        Face
+            The face.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite or out of range.
+        """
         size = number('radius', radius, 'm', above=True)
         return cls.revolution([0.0, size], [height, height], centre)
 
@@ -83,6 +179,11 @@ class Face:
             4 for a square pattern, 6 for a hexagonal one.
         height : float
             Height of the planes, m, above 0.
+
+        Returns
+        -------
+        Face
+            The planes.
 
         Raises
         ------
@@ -114,6 +215,11 @@ class Face:
             horizontal parts (bottom and top) are ignored.
         centre : array, shape (2,)
             x and y of a vertical line inside the pad, m.
+
+        Returns
+        -------
+        Face
+            The wall, fitted to the mesh.
 
         Raises
         ------

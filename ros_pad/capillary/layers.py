@@ -130,6 +130,11 @@ class Wet:
         direction : float or array of 2 or 3 numbers
             Azimuth, rad from the x axis, or a vector, whose vertical part is ignored.
 
+        Returns
+        -------
+        float
+            Area, m².
+
         Raises
         ------
         InvalidInput
@@ -139,23 +144,54 @@ class Wet:
         return self._projected(direction, np.ones_like(self.heights))
 
     def force(self, direction: float | npt.ArrayLike) -> float:
-        """Return pressure times section for a direction of motion, N (thesis 4.18).
+        """Return pressure times section for a direction of motion (thesis 4.18).
 
-        This is the thesis' estimate of the force on one side of the pad; below 0 the liquid pulls.
-        It is not a bound, because the pressure is that of an arc. Exact surfaces pull many times
-        as much on each of the two sides, and around a symmetric pad these forces cancel. Direction
-        and errors are as for :meth:`section`.
+        This is the thesis' estimate of the force on one side of the pad. It is not a bound,
+        because the pressure is that of an arc. Exact surfaces pull many times as much on each of
+        the two sides, and around a symmetric pad these forces cancel.
+
+        Parameters
+        ----------
+        direction : float or array of 2 or 3 numbers
+            Azimuth, rad, or a vector, as for :meth:`section`.
+
+        Returns
+        -------
+        float
+            Force, N; below 0 the liquid pulls. NaN if a slice has no result.
+
+        Raises
+        ------
+        InvalidInput
+            As for :meth:`section`.
         """
         return self._projected(direction, self.pressure)
 
     def hysteresis_force(
         self, direction: float | npt.ArrayLike, advancing_angle: float, receding_angle: float
     ) -> float:
-        """Return the largest force of the pinned contact line against a motion, N.
+        """Return the largest force of the pinned contact line against a motion.
 
         This is the width of the line across the direction, times tension, times cos θ_receding -
-        cos θ_advancing; see :func:`ros_pad.contact.hysteresis_force`. NaN if a slice has no
-        result. Angles are in rad, directions as for :meth:`section`.
+        cos θ_advancing; see :func:`ros_pad.contact.hysteresis_force`.
+
+        Parameters
+        ----------
+        direction : float or array of 2 or 3 numbers
+            Azimuth, rad, or a vector, as for :meth:`section`.
+        advancing_angle, receding_angle : float
+            Contact angles at which the line starts to move, rad, from 0 to pi; advancing >=
+            receding.
+
+        Returns
+        -------
+        float
+            Force, N; NaN if a slice has no result.
+
+        Raises
+        ------
+        InvalidInput
+            When an angle is out of range, or as for :meth:`section`.
         """
         across = self._across(direction)
         width = float(np.ptp(across)) if np.isfinite(self.heights).all() else math.nan
@@ -165,9 +201,22 @@ class Wet:
         return float(hysteresis_force(0.5 * width, tension, advancing_angle, receding_angle))
 
     def surface(self, count: int = 17) -> Array:
-        """Return points of the surface from floor to wall, m, shape (slices, count, 3).
+        """Return points of the surface from floor to wall.
 
-        Slices without a result are NaN; count is from 2 to 1000.
+        Parameters
+        ----------
+        count : int
+            Number of points in each slice, 2 to 1000.
+
+        Returns
+        -------
+        array, shape (slices, count, 3)
+            Points, m; NaN in slices without a result.
+
+        Raises
+        ------
+        InvalidInput
+            When the count is out of range.
         """
         integer('count', count, 2, 1000)
         start = math.cos(self.floor_angle)
@@ -274,12 +323,27 @@ def wet(
         Refuse heights that are ``far_off``. If False they are returned, up to 3 times too high or
         low; use them only for comparison.
 
+    Returns
+    -------
+    Wet
+        Height and radius of the contact line, m, pressure, Pa, and status of each slice.
+
     Raises
     ------
     InvalidInput
         When a value is out of range or of the wrong type.
     MeshError
         Where a slice does not meet the wall exactly once in every layer.
+
+    Examples
+    --------
+    The exact meniscus of this dome in a wide bath is 0.889 mm high (:func:`bath_meniscus`):
+
+    >>> from ros_pad.capillary import Mesh, wet
+    >>> from ros_pad.contact import WATER
+    >>> found = wet(Mesh.dome(1.55e-3, 0.583e-3), WATER)
+    >>> round(1e3 * found.mean_height, 3), set(found.status.tolist())
+    (0.957, {'ok'})
     """
     _check(mesh, liquid, balance)
     integer('layers', layers, 4, 100000)
@@ -447,12 +511,26 @@ def wet_pattern(
         Refuse heights that are ``far_off``, as for :func:`wet`, or ``far_apart``: in wide gaps the
         level surface is lower than the meniscus of each pad.
 
+    Returns
+    -------
+    WetPattern
+        Height, m, pressure, Pa, volume, m³, and status.
+
     Raises
     ------
     MeshError
         Where the pads fill the whole area.
     InvalidInput
         When a value is out of range or of the wrong type.
+
+    Examples
+    --------
+    >>> from ros_pad.capillary import Mesh, wet_pattern
+    >>> from ros_pad.contact import WATER
+    >>> mesh = Mesh.dome(1.55e-3, 0.583e-3, height=2.9e-3)
+    >>> found = wet_pattern(mesh, WATER, area=10.4e-6)
+    >>> round(1e3 * found.height, 3), found.status
+    (1.664, 'ok')
     """
     _check(mesh, liquid, balance)
     number('area', area, 'm²', above=True)

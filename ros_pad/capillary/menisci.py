@@ -17,6 +17,7 @@ from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.surface import Line
 from ros_pad.capillary.surface import LiquidSurface
 from ros_pad.capillary.surface import minimise
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
@@ -42,7 +43,7 @@ def spanned(
     first, last : Face
         Upper and lower face of a bridge; inner and outer face of a meniscus.
     places : pair of float
-        Place of the contact line on the rails of each face, from 0 to 1.
+        Place of the contact line on the rails of each face, dimensionless, from 0 to 1.
     angles : pair of float
         Contact angle on each face, rad; None pins the line.
     sectors, rows : int
@@ -62,6 +63,9 @@ def spanned(
     """
     integer('sectors', sectors, 6)
     integer('rows', rows, 1)
+    number('growth', growth, '(ratio)', above=True)
+    instance('first', first, Face)
+    instance('last', last, Face)
     azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
     outwards = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
     rings = []
@@ -112,6 +116,11 @@ def bath_surface(
         Distance from the pad at which the surface ends, level, in capillary lengths, above 0. From
         2 on, the relative error of height, force and volume is at most ``2.1 exp(-2 reach)``.
 
+    Returns
+    -------
+    LiquidSurface
+        Positions, m, area, m², energy, J, volume, m³, pressure, Pa, and force on each face, N.
+
     Raises
     ------
     NoSurface
@@ -125,8 +134,20 @@ def bath_surface(
     The minimisation starts from the exact meniscus of the axisymmetric pad with the same mean
     radius at each height. The surface ends on a vertical cylinder, at a right angle: a surface
     held at floor level there would leave out ``exp(-reach)`` of the volume, which its edge bears.
+
+    Examples
+    --------
+    The same dome as a surface of triangles: within 2 % of the exact one of :func:`bath_meniscus`.
+
+    >>> from ros_pad.capillary import Face, Wall, bath_meniscus, bath_surface
+    >>> from ros_pad.contact import WATER
+    >>> wall = Wall.dome(1.55e-3, 0.583e-3)
+    >>> surface = bath_surface(Face.of_wall(wall), WATER, sectors=12)
+    >>> abs(surface.volume / bath_meniscus(wall=wall, liquid=WATER).volume - 1) < 0.02
+    True
     """
-    azimuths = np.linspace(0.0, 2.0 * math.pi, sectors, endpoint=False)
+    instance('face', face, Face)
+    azimuths = np.linspace(0.0, 2.0 * math.pi, integer('sectors', sectors, 6), endpoint=False)
     rails = face.rails(azimuths)
     mean = rails.mean(axis=0)
     bath = _round_bath(mean, liquid, gravity)
@@ -200,10 +221,10 @@ def pattern_surface(
         Distance between the axes of neighbouring pads, m.
     sides : int
         4 for a square pattern, 6 for a hexagonal one.
-    pressure : float
+    pressure : float, optional
         Pressure of the liquid minus that of the air at the floor, Pa: 0 where the liquid is
         connected to a wide bath at floor level.
-    volume : float
+    volume : float, optional
         Volume of liquid per pad, m³, instead of the pressure. The whole floor is wet.
     gravity : float
         Gravity, m/s², from 0.
@@ -211,6 +232,11 @@ def pattern_surface(
         Number of vertices around the pad before refinement, a multiple of twice ``sides``.
     refinements : int
         Number of refinements; each halves the size of the triangles.
+
+    Returns
+    -------
+    LiquidSurface
+        Positions, m, area, m², energy, J, volume, m³, pressure, Pa, and force on each face, N.
 
     Raises
     ------
@@ -220,7 +246,12 @@ def pattern_surface(
         When a value is out of range, pads of this pitch touch, or both or none of pressure and
         volume are given.
     """
+    instance('face', face, Face)
+    instance('liquid', liquid, Liquid)
     heavy = liquid.density * number('gravity', gravity, 'm/s²')
+    integer('sectors', sectors, 6)
+    if volume is not None:
+        number('volume', volume, 'm³', above=True)
     cell = Face.cell(pitch, sides, 1.0)
     if sectors % (2 * sides):
         raise InvalidInput(

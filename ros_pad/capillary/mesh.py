@@ -53,6 +53,13 @@ class Mesh:
         triangles, or triangles that face opposite to their neighbours; when it is inside out, its
         lowest point is not at z = 0, its size is not plausible for a pad in metres, bodies
         overlap, or a body cuts itself.
+
+    Examples
+    --------
+    >>> from ros_pad.capillary import Mesh
+    >>> mesh = Mesh.dome(sphere_radius=1.55e-3, contact_radius=0.583e-3)
+    >>> mesh.points.shape, mesh.faces.shape, f'{1e9 * mesh.volume:.2f} mm³'
+    ((3530, 3), (7056, 3), '7.73 mm³')
     """
 
     points: Array
@@ -119,6 +126,11 @@ class Mesh:
         flip : bool
             Reverse every triangle, for a mesh that is inside out.
 
+        Returns
+        -------
+        Mesh
+            The mesh, in metres.
+
         Raises
         ------
         MeshError
@@ -158,6 +170,11 @@ class Mesh:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write an STL, OBJ, PLY or MSH file in metres. Existing files are not overwritten.
+
+        Parameters
+        ----------
+        path : path
+            The file, which must not exist; its suffix gives the format.
 
         Raises
         ------
@@ -205,6 +222,11 @@ class Mesh:
             Number of bands of triangles from floor to top, from 1, and of sectors around the axis,
             from 3.
 
+        Returns
+        -------
+        Mesh
+            The mesh.
+
         Raises
         ------
         InvalidInput
@@ -247,6 +269,11 @@ class Mesh:
         rings, sectors : int
             As for :meth:`dome`.
 
+        Returns
+        -------
+        Mesh
+            The mesh.
+
         Raises
         ------
         InvalidInput
@@ -261,7 +288,25 @@ class Mesh:
 
     @classmethod
     def cylinder(cls, radius: float, height: float, rings: int = 1, sectors: int = 72) -> Mesh:
-        """Make a vertical cylinder; parameters as for :meth:`cone`."""
+        """Make a vertical cylinder.
+
+        Parameters
+        ----------
+        radius, height : float
+            Radius and height, m, above 0.
+        rings, sectors : int
+            As for :meth:`dome`.
+
+        Returns
+        -------
+        Mesh
+            The mesh.
+
+        Raises
+        ------
+        InvalidInput
+            When a value is not finite, not in range or not a whole number.
+        """
         return cls.cone(number('radius', radius, 'm', above=True), radius, height, rings, sectors)
 
     @classmethod
@@ -283,8 +328,15 @@ class Mesh:
             Number of domes, from 1, at the places of the lattice nearest to the centre.
         pitch : float
             Distance between neighbours, m, above 0.
-        sphere_radius, contact_radius, height, rings, sectors
-            Parameters of each :meth:`dome`.
+        sphere_radius, contact_radius, height : float
+            Size of each dome, m, as for :meth:`dome`.
+        rings, sectors : int
+            As for :meth:`dome`.
+
+        Returns
+        -------
+        Mesh
+            The mesh.
 
         Raises
         ------

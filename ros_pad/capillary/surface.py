@@ -31,6 +31,7 @@ from ros_pad.capillary.faces import KNOTS
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.faces import Integers
 from ros_pad.capillary.faces import boundary_edges
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.pad import Array
@@ -54,7 +55,7 @@ class Line:
     azimuths : array, shape (n,)
         Azimuths of these vertices about the axis, rad, in any order.
     places : array, shape (n,)
-        Places of these vertices on their rails, from 0 to 1.
+        Places of these vertices on their rails, dimensionless, from 0 to 1.
     angle : float, optional
         Contact angle, rad, from 0 to pi. Without it the line is pinned.
     """
@@ -69,7 +70,30 @@ class Line:
     def ring(
         cls, face: Face, vertices: npt.ArrayLike, place: float, angle: float | None = None
     ) -> Line:
-        """Return a line with the same place (0 to 1) at all vertices, at equal azimuth steps."""
+        """Return a line with the same place at all vertices, at equal steps of azimuth.
+
+        Parameters
+        ----------
+        face : Face
+            The face.
+        vertices : array of int, shape (n,)
+            Vertices of the surface on the line; n from 3.
+        place : float
+            Place on the rails, dimensionless, from 0 to 1.
+        angle : float, optional
+            Contact angle, rad, from 0 to pi. Without it the line is pinned.
+
+        Returns
+        -------
+        Line
+            The line.
+
+        Raises
+        ------
+        InvalidInput
+            When place or angle is out of range, or ``face`` is no Face.
+        """
+        instance('face', face, Face)
         if angle is not None:
             number('angle', angle, 'rad', high=math.pi)
         number('place', place, '(share of the rail)', high=1.0)
@@ -147,11 +171,16 @@ def minimise(
         Surface tension, N/m, above 0.
     weight : float
         Density times gravity, N/m³, from 0.
-    pressure, volume : float
+    pressure, volume : float, optional
         Pressure of the liquid minus that of the gas at z = 0, Pa, or volume of the liquid, m³,
         above 0. Exactly one of them is required.
     refinements : int
         How often each triangle is split into four and the surface minimised again, from 0.
+
+    Returns
+    -------
+    LiquidSurface
+        Positions, m, area, m², energy, J, volume, m³, pressure, Pa, and force on each face, N.
 
     Raises
     ------

@@ -124,6 +124,11 @@ def bridge(
     plane_angle : float or array, optional
         Contact angle on the plane, rad, from 0 to pi; by default equal to ``contact_angle``.
 
+    Returns
+    -------
+    Bridge
+        Force, N, pressure, Pa, volume, m³, radii and height, m, and status.
+
     Raises
     ------
     NoBridge
@@ -134,10 +139,18 @@ def bridge(
         both or none of filling angle and volume are given, gravity is above 0 with ``circle``, or
         a bridge with gravity is too wide, or its neck too narrow, to be resolved.
 
+    Notes
+    -----
+    ``young_laplace`` follows the meridian as Kenmotsu's form of Delaunay's surfaces
+    without gravity, and integrates it with gravity; see :mod:`ros_pad.contact.bridge`.
+
     Examples
     --------
-    >>> round(1e6 * bridge(1e-3, 0.073, 0.0, filling_angle=0.1, method='young_laplace').force, 1)
-    899.0
+    >>> from ros_pad.contact import bridge
+    >>> exact = bridge(1e-3, 0.073, 0.0, filling_angle=0.1, method='young_laplace')
+    >>> circle = bridge(1e-3, 0.073, 0.0, filling_angle=0.1)
+    >>> round(1e6 * exact.force, 1), round(1e6 * circle.force, 1)  # micronewtons
+    (899.0, 894.4)
     """
     size = number('radius', radius, 'm', above=True)
     tension = number('surface_tension', surface_tension, 'N/m', above=True)

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -51,6 +52,7 @@ _MOST_PADS = 2.0**53
 
 # The liquid of figure 10 of the thesis: water at a contact angle of 60 degrees.
 DESIGN_WATER = Liquid(surface_tension=0.073, solid_tension=0.0410625, contact_angle=math.pi / 3)
+"""Water with the contact angle of the design in the thesis (3.101), 60 degrees."""
 
 
 def pads_in(area: npt.ArrayLike, radius: npt.ArrayLike, reading: str = 'corrected') -> Floats:
@@ -76,6 +78,12 @@ def pads_in(area: npt.ArrayLike, radius: npt.ArrayLike, reading: str = 'correcte
     ------
     InvalidInput
         When a value is out of range, the reading is unknown, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import pads_in
+    >>> round(pads_in(3.14e-4, 1.5e-3), 1), round(pads_in(3.14e-4, 1.5e-3, 'thesis'), 1)
+    (17.9, 50.2)
     """
     cell = CELL[choice('reading', reading, READINGS)]
     room = quantity('area', area, 'm²')
@@ -99,10 +107,21 @@ def design_pressure(
         4.2717 stiffness/radius, or 4.3 as printed. Both are above the end of the model of the
         pressed dome (3.426), see :func:`ros_pad.contact.press`.
 
+    Returns
+    -------
+    float or array
+        Gauge pressure, Pa.
+
     Raises
     ------
     InvalidInput
         When a value is out of range, the reading is unknown, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import design_pressure
+    >>> round(design_pressure(1.5e-3, 40.0))  # Pa
+    113912
     """
     tension = TENSION[choice('reading', reading, READINGS)]
     r = quantity('radius', radius, 'm', above=True)
@@ -133,10 +152,23 @@ def foot_force(
     reading : {'corrected', 'thesis'}
         1.7218 or 4.8606 times ``stiffness * area / radius``.
 
+    Returns
+    -------
+    float or array
+        Force, N, broadcast over the inputs.
+
     Raises
     ------
     InvalidInput
         When a value is out of range, the reading is unknown, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import foot_force
+    >>> round(foot_force(3.14e-4, 1.5e-3, 40.0), 2)
+    14.42
+    >>> round(foot_force(3.14e-4, 1.5e-3, 40.0, 'thesis'), 2)
+    40.7
     """
     share = math.pi / CELL[choice('reading', reading, READINGS)]
     room = quantity('area', area, 'm²')
@@ -164,14 +196,14 @@ def rise_height(
         the result depends on the unit of length. It is evaluated in millimetres, as in figure 10
         of the thesis, and returned in metres.
     cell : float, optional
-        Floor area per pad over radius², from 7.794 (domes that touch, the default). Not allowed
-        with the reading ``thesis``, which has a fixed cell.
+        Ratio of the floor area per pad to radius², from 7.794 (domes that touch, the default). Not
+        allowed with the reading ``thesis``, which has a fixed cell.
 
     Returns
     -------
     float or array
-        From 0 to 3 radii, where the gap between floor and sole is full. NaN in arrays where
-        3.101 as printed has no root: below a radius of 0.5652 mm, for every liquid.
+        Height, m, from 0 to 3 radii, where the gap between floor and sole is full. NaN in arrays
+        where 3.101 as printed has no root: below a radius of 0.5652 mm, for every liquid.
 
     Raises
     ------
@@ -190,6 +222,12 @@ def rise_height(
 
     The wall is assumed to be vertical. Above the equator of the dome the real wall leans inwards:
     liquid with contact angle θ stops at ``1.5 r (1 + cos θ)``, for 60 degrees 2.25 r, not 3 r.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import rise_height
+    >>> (1e3 * rise_height([1e-3, 1.5e-3, 2.327e-3, 4e-3])).round(3).tolist()  # mm
+    [2.951, 4.194, 5.236, 0.467]
     """
     choice('reading', reading, READINGS)
     r = quantity('radius', radius, 'm', above=True)
@@ -256,8 +294,10 @@ class Design:
         Number of pads.
     pitch : float
         Distance between the centres of neighbouring pads in a hexagonal pattern, m.
-    load, load_per_pad : float
-        Normal force on the whole foot and on one pad, N.
+    load : float
+        Normal force on the whole foot, N.
+    load_per_pad : float
+        Normal force on one pad, N.
     margin : float
         Safety factor: the force limit covers the load times this factor.
     criterion : str
@@ -310,7 +350,7 @@ class Design:
 
     @property
     def pads_needed(self) -> float:
-        """Number of pads that carry the load at the ceiling; infinite where no number does."""
+        """Number of pads, no unit, that carry the load at the ceiling; infinite if none does."""
         if self.pad_limit == 0.0:
             return math.inf
         return math.ceil(self.load * self.margin / self.pad_limit)
@@ -367,7 +407,15 @@ def design(
     InvalidInput
         When a value is out of range, criterion or reading is unknown, or the sole is too small for
         its pads.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import design
+    >>> sole = design(load=4.0, area=9e-4)
+    >>> sole.pads, round(sole.pressure), round(sole.reachable_load, 1), sole.carried
+    (51, 39125, 19.5, True)
     """
+    instance('pad', pad, Pad)
     load = number('load', load, 'N', above=True)
     need_stiffness('a design', pad)
     area = number('area', area, 'm²', above=True)

@@ -52,6 +52,11 @@ def fibre_meniscus(
         of Derjaguin and James (scalars and arrays). At 0.1 capillary lengths its error is
         +0.006 % at complete wetting, -0.7 % at 30 degrees and -1.5 % at 60 degrees.
 
+    Returns
+    -------
+    float or array
+        Height above the level of the bath, m.
+
     Raises
     ------
     InvalidInput

@@ -50,12 +50,19 @@ def film_thickness(
     Returns
     -------
     float or array
-        h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2 (Stefan-Reynolds), broadcast over the inputs.
+        Thickness, m: h(t) = [1/h0² + 4 p t/(3 η a²)]^-1/2 (Stefan-Reynolds), broadcast over the
+        inputs.
 
     Raises
     ------
     InvalidInput
         When a value is not finite or out of range, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import film_thickness
+    >>> round(1e6 * film_thickness(0.3e-3, 10e3, 10e-3, 0.3), 2)  # micrometres
+    5.0
     """
     start = quantity('initial', initial, 'm', above=True)
     pressure = quantity('contact_pressure', contact_pressure, 'Pa')
@@ -89,6 +96,15 @@ class Film:
     ------
     InvalidInput
         When the viscosity is not finite or not above 0.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import Film, Foot
+    >>> film = Film(Foot.load('large19'))
+    >>> film.touch_down(0.3e-3)
+    >>> domes, sole = film.drain(dome_load=2.0, sole_load=0.0, pressure=75e3, duration=0.3)
+    >>> f'{1e6 * domes:.3f} and {1e6 * sole:.0f} micrometres'
+    '0.122 and 300 micrometres'
     """
 
     __slots__ = (
@@ -106,7 +122,19 @@ class Film:
         self._dome_state = self._sole_state = self._fresh = math.inf
 
     def touch_down(self, thickness: float) -> None:
-        """Start a stance on a film of this thickness, m, from 0; 0 is dry ground."""
+        """Start a stance on a film.
+
+        Parameters
+        ----------
+        thickness : float
+            Thickness of the film, m, from 0, which is dry ground.
+
+        Raises
+        ------
+        InvalidInput
+            When the thickness is negative or not finite.
+        """
+        thickness = number('thickness', thickness, 'm')
         self._fresh = thickness**-2 if thickness > 0.0 else math.inf
         self._dome_state = self._sole_state = self._fresh
         self._dome_area = 0.0
@@ -114,10 +142,21 @@ class Film:
     def drain(
         self, dome_load: float, sole_load: float, pressure: float, duration: float
     ) -> tuple[float, float]:
-        """Drain for a duration, s, under the loads of domes and flat sole, N.
+        """Drain under the loads of domes and flat sole; for speed the input is not checked.
 
-        The gauge pressure, Pa, must be above 0 if the domes carry load. Return
-        :attr:`under_domes` and :attr:`under_sole`, m.
+        Parameters
+        ----------
+        dome_load, sole_load : float
+            Normal force on the domes and on the flat sole, N, from 0.
+        pressure : float
+            Gauge pressure in the pads, Pa; above 0 if the domes carry load.
+        duration : float
+            Time, s, from 0.
+
+        Returns
+        -------
+        tuple of float
+            :attr:`under_domes` and :attr:`under_sole`, m.
         """
         if dome_load > 0.0:
             area = dome_load / pressure

@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import quantity
 from ros_pad.contact.dome import BURST
 from ros_pad.contact.dome import flattening_force
@@ -82,8 +83,8 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     Returns
     -------
     float or array
-        0 where the pad carries nothing (``measured`` of the thesis: below 52.3 kPa). In arrays
-        NaN above the end of the model.
+        Force, N; 0 where the pad carries nothing (``measured`` of the thesis: below 52.3 kPa). In
+        arrays NaN above the end of the model.
 
     Raises
     ------
@@ -93,6 +94,16 @@ def force_limit(pad: Pad, pressure: npt.ArrayLike, criterion: str = DEFAULT_CRIT
     InvalidInput
         When the criterion is unknown or not known for this pad, or a pressure is negative, not
         finite, or above the measurements.
+
+    Examples
+    --------
+    The thesis measured 0.15, 0.30 and 0.40 N at 65, 75 and 85 kPa:
+
+    >>> from ros_pad.contact import LARGE_PAD, force_limit
+    >>> force_limit(LARGE_PAD, [65e3, 75e3, 85e3]).round(3).tolist()
+    [0.244, 0.317, 0.404]
+    >>> round(force_limit(LARGE_PAD, 75e3, 'flattening'), 3)
+    0.527
     """
     check_criterion(pad, criterion)
     p = quantity('pressure', pressure, 'Pa')
@@ -146,7 +157,7 @@ def pressure_for(
     Returns
     -------
     float or array
-        NaN in arrays where no pressure of the model carries the force.
+        Gauge pressure, Pa. NaN in arrays where no pressure of the model carries the force.
 
     Raises
     ------
@@ -156,6 +167,12 @@ def pressure_for(
     InvalidInput
         When the criterion is unknown or not known for this pad, a value is negative or not finite,
         or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import LARGE_PAD, pressure_for
+    >>> round(pressure_for(LARGE_PAD, 0.25, margin=1.2))  # Pa
+    72767
     """
     check_criterion(pad, criterion)
     load = quantity('force', force, 'N')
@@ -212,6 +229,7 @@ def criteria(pad: Pad) -> tuple[str, ...]:
 
 def check_criterion(pad: Pad, criterion: str, name: str = 'criterion') -> None:
     """Raise `InvalidInput` for a criterion that is unknown, or not known for the pad."""
+    instance('pad', pad, Pad)
     if pad.edge is not None and criterion in CRITERIA[:-1]:
         raise InvalidInput(
             f'{name} = {criterion!r} is not allowed for {pad}: shapes under load are not known'

@@ -132,6 +132,16 @@ class Material:
     def load(cls, name_or_path: str | os.PathLike[str]) -> Material:
         """Read ``config/materials/<name>.yaml`` or another material file.
 
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped material, or path of a file that ends in .yaml or .yml.
+
+        Returns
+        -------
+        Material
+            The material, with its name.
+
         Raises
         ------
         ConfigError
@@ -179,6 +189,16 @@ class Material:
             The factor in place of the present one.
         factor_range : (float, float), optional
             Its range; by default that of this material, widened to the factor.
+
+        Returns
+        -------
+        Material
+            The same law with the new factor.
+
+        Raises
+        ------
+        InvalidInput
+            When the factor is outside 0.1 to 10, or not in its range.
         """
         if factor_range is None:
             low, high = self.factor_range or (factor, factor)
@@ -201,24 +221,24 @@ class Material:
 
     @cached_property
     def range_end(self) -> float:
-        """The equibiaxial stretch up to which the material holds, less 1."""
+        """Equibiaxial stretch up to which the material holds, less 1; dimensionless."""
         return min(equibiaxial(self.largest_stretch or UNKNOWN_STRETCH), self.stable_end)
 
     @property
     def uniaxial_end(self) -> float:
-        """The uniaxial stretch with the I1 of that equibiaxial one."""
+        """Uniaxial stretch with the I1 of that equibiaxial one; dimensionless."""
         square = (1.0 + self.range_end) ** 2
         return float(np.roots([1.0, 0.0, -(2.0 * square + square**-2), 2.0]).real.max())
 
     @cached_property
     def stable_end(self) -> float:
-        """The equibiaxial stretch up to which shapes can be computed, less 1."""
+        """Equibiaxial stretch up to which shapes can be computed, less 1; dimensionless."""
         most = equibiaxial(max(self.largest_stretch or 0.0, UNKNOWN_STRETCH))
         return 0.98 * self._stable_end(1.05 * most)
 
     @cached_property
     def unit_law(self) -> tuple[str, tuple[float, ...]]:
-        """Return the law as ``yeoh`` or ``ogden``, with parameters over the shear modulus."""
+        """The law as ``yeoh`` or ``ogden``, and parameters over the shear modulus (no unit)."""
         p, mu = self.parameters, self._modulus
         if self.law == 'mooney_rivlin':
             return 'ogden', (2.0 * p[0] / mu, 2.0, -2.0 * p[1] / mu, -2.0)

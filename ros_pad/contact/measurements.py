@@ -106,8 +106,15 @@ class Measurements:
     ----------
     source : str
         Path of the file.
-    free, pressed, force_limits, friction : FreeDomes, PressedDomes, ForceLimits, Friction
-        Arrays with one entry for each row of this kind, in the order of the file.
+    free : FreeDomes
+        Free domes, as arrays with one entry for each row of this kind, in the order of the file;
+        so are the others.
+    pressed : PressedDomes
+        Domes pressed on a floor.
+    force_limits : ForceLimits
+        Highest loads of pads.
+    friction : Friction
+        Tangential forces of feet at slip.
     """
 
     source: str
@@ -119,6 +126,16 @@ class Measurements:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Measurements:
         """Read a CSV file; lines that start with ``#`` are comments.
+
+        Parameters
+        ----------
+        path : str or path
+            A file with a header; columns and units: docs/calibrate.md.
+
+        Returns
+        -------
+        Measurements
+            All rows, in SI units.
 
         Raises
         ------

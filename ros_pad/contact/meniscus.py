@@ -30,11 +30,22 @@ def contact_angle(solid_tension: npt.ArrayLike, surface_tension: npt.ArrayLike) 
         Surface energy of the solid and surface tension of the liquid, N/m, above 0. Their ratio
         must be from 0.25 (angle of 90 degrees) to 1 (complete wetting).
 
+    Returns
+    -------
+    float or array
+        Contact angle, rad: ``acos(2 √(solid_tension/surface_tension) - 1)``.
+
     Raises
     ------
     InvalidInput
         When a tension is not finite or not above 0, the ratio is out of range, or shapes do not
         broadcast.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import contact_angle
+    >>> round(contact_angle(0.027, 0.073), 4)  # water on silicone; the appendix has 1.35
+    1.3527
     """
     solid = quantity('solid_tension', solid_tension, 'N/m', above=True)
     liquid = quantity('surface_tension', surface_tension, 'N/m', above=True)
@@ -90,8 +101,10 @@ class Liquid:
 
 
 WATER = Liquid(surface_tension=0.073, solid_tension=0.027)
-# Both tensions in the appendix of the thesis are a tenth of those of water and silicone.
+"""Water at 20 °C on silicone: tensions 0.073 and 0.027 N/m, contact angle 77.5 degrees."""
+
 THESIS_LIQUID = Liquid(surface_tension=0.0073, solid_tension=0.0027, contact_angle=1.35)
+"""The liquid of the thesis' appendix; its tensions are a tenth of those of water and silicone."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +144,12 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
         balance exactly, with the tension of the liquid (not of the solid), and uses the correct
         sign of the curvature around the ring in 3.70.
 
+    Returns
+    -------
+    Meniscus
+        Height and ring radius, m, tangential force, N, and status, floats or arrays as in
+        ``pressed``.
+
     Raises
     ------
     InvalidInput
@@ -142,6 +161,15 @@ def meniscus(pressed: Pressed, liquid: Liquid, reading: str = 'corrected') -> Me
     With wall angle α, ``C = cot α``, ring radius ``b + h C`` and tension γ the weight balance is
     ``ρ g C h² (3b + 2hC) = 6 γ sin(θ + α) (b + hC)``. In ``y = hC/b`` this is
     ``y² (3 + 2y) = m (1 + y)``; 3.80 is ``y² = m/2``.
+
+    Examples
+    --------
+    The thesis' program has 0.0667953 mN with pi = 3.1415:
+
+    >>> from ros_pad.contact import LARGE_PAD, THESIS_LIQUID, meniscus, press
+    >>> ring = meniscus(press(LARGE_PAD, 75e3, 0.19), THESIS_LIQUID, reading='thesis')
+    >>> round(1e3 * ring.tangential_force, 4)  # mN
+    0.0668
     """
     choice('reading', reading, ('corrected', 'thesis'))
     if not isinstance(pressed, Pressed):
@@ -204,8 +232,13 @@ def hysteresis_force(
         Contact angles at which the line starts to move forwards and backwards, rad, from 0 to pi;
         advancing >= receding.
     shape_factor : float or array
-        K, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth) to 1
-        (two constant angles, one for each half of the line), which is the upper bound.
+        Factor K, from pi/4 (cosine of the contact angle proportional to the cosine of the azimuth)
+        to 1 (two constant angles, one for each half of the line), which is the upper bound.
+
+    Returns
+    -------
+    float or array
+        Force, N.
 
     Raises
     ------
@@ -255,6 +288,11 @@ def capillary_pull(
         Its contact angle is not used.
     gravity : float
         Gravity, m/s², from 0.
+
+    Returns
+    -------
+    float or array
+        Force, N, broadcast over radius and film.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.material import Material
 from ros_pad.contact.thickness import check_edge
@@ -156,13 +157,27 @@ class Pad:
             Radius of the flat pad, m, above 0.
         thickness : float
             Thickness of the flat pad, m, above 0 up to the radius.
-        measured_limit, edge
-            As for :class:`Pad`.
+        measured_limit : MeasuredLimit, optional
+            Force limits measured on this pad.
+        edge : {None, 'bonded', 'clamped'}
+            How the sheet is held at the rim, as for :class:`Pad`.
+
+        Returns
+        -------
+        Pad
+            Its stiffness is shear modulus times thickness, N/m.
 
         Raises
         ------
         InvalidInput
             When a value is not finite or outside its range, or ``material`` is no `Material`.
+
+        Examples
+        --------
+        >>> from ros_pad.contact import Material, Pad, inflate
+        >>> pad = Pad.of(Material.load('dragon_skin_10'), radius=2e-3, thickness=0.4e-3)
+        >>> round(pad.stiffness, 2), round(1e3 * inflate(pad, 20e3).height, 3)  # N/m, mm
+        (21.01, 1.611)
         """
         if not isinstance(material, Material):
             raise InvalidInput(f'material = {material!r} is not allowed: a Material is needed')
@@ -181,6 +196,7 @@ class Pad:
 
 def need_stiffness(what: str, pad: Pad) -> None:
     """Raise `InvalidInput` for a pad of a material where the law of the thesis is computed."""
+    instance('pad', pad, Pad)
     if pad.material is not None:
         raise InvalidInput(f'{what} needs a pad with a measured stiffness, and not {pad}')
 

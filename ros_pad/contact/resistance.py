@@ -33,6 +33,7 @@ from ros_pad import configuration
 from ros_pad.configuration import Setting
 from ros_pad.configuration import Table
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -136,7 +137,7 @@ class Foot:
     sole_radius : float
         Radius of the sole, m.
     friction : float
-        Load-proportional part of dry friction, μ of Eq. 3.66.
+        Coefficient of the load-proportional part of dry friction, μ of Eq. 3.66.
     shear_strength : float
         Shear strength of adhesive contact, τ of Eq. 3.67, Pa.
     conforming_pressure : float
@@ -146,7 +147,7 @@ class Foot:
     critical_film : float
         Film thickness that leaves 1/e of dry contact, for every exponent, m.
     film_exponent : float
-        Exponent m: how steeply contact is lost with film thickness.
+        Exponent m, dimensionless: how steeply contact is lost with film thickness.
     shear_stiffness : float
         Tangential stiffness of sole and pads, N/m.
     chamber_volume : float
@@ -164,6 +165,13 @@ class Foot:
     InvalidInput
         When a value is not finite or out of range, the pads do not fit on the sole, or there is no
         force limit at the ceiling.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import Foot
+    >>> foot = Foot.load('large19')
+    >>> foot.pads, foot.ceiling
+    (19, 90000.0)
     """
 
     source: str
@@ -210,6 +218,16 @@ class Foot:
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> Foot:
         """Read ``config/feet/<name>.yaml`` or another foot file.
+
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped foot, or path of a file that ends in .yaml or .yml.
+
+        Returns
+        -------
+        Foot
+            The foot; ``source`` is its name or path.
 
         Raises
         ------
@@ -279,10 +297,20 @@ class Foot:
         )
 
     def air_volume(self, pressure: float) -> float:
-        """Return the air volume of free domes and chamber at a gauge pressure, Pa, in m³.
+        """Return the air volume of free domes and chamber.
 
         Pads of a material that would balloon keep the volume that they have at their largest
         pressure: a regulator can overshoot the ceiling, and no model has what they do then.
+
+        Parameters
+        ----------
+        pressure : float
+            Gauge pressure, Pa, from 0.
+
+        Returns
+        -------
+        float
+            Volume, m³.
         """
         if self.pad.material is not None:
             pressure = min(pressure, pressure_end(self.pad)[0])
@@ -290,10 +318,20 @@ class Foot:
         return self.chamber_volume + domes
 
     def dome_load(self, load: float, pressure: float) -> float:
-        """Return the part of the load, N, that the domes carry at a gauge pressure, Pa.
+        """Return the part of a load that the domes carry; for speed the input is not checked.
 
-        At most their force limit; above the ceiling, the limit at the ceiling. For speed the input
-        is not checked.
+        Parameters
+        ----------
+        load : float
+            Normal force on the foot, N, from 0.
+        pressure : float
+            Gauge pressure, Pa, from 0.
+
+        Returns
+        -------
+        float
+            Normal force on the domes, N: at most their force limit; above the ceiling, that at the
+            ceiling.
         """
         if pressure <= 0.0:
             return 0.0
@@ -414,7 +452,20 @@ def tangential_resistance(
     ------
     InvalidInput
         When a value is not finite or out of range, or shapes do not broadcast.
+
+    Examples
+    --------
+    A flat sole and domes at 75 kPa, 2 N, on dry ground and on films of the same liquid:
+
+    >>> from ros_pad.contact import Foot, tangential_resistance
+    >>> foot = Foot.load('large19')
+    >>> tangential_resistance(foot, 2.0, [0.0, 75e3]).round(2).tolist()
+    [1.6, 0.83]
+    >>> films = {'dome_film': 0.1e-6, 'sole_film': 20e-6}
+    >>> tangential_resistance(foot, 2.0, [0.0, 75e3], **films).round(2).tolist()
+    [0.24, 0.8]
     """
+    instance('foot', foot, Foot)
     values = broadcast(
         'load, pressure and films',
         quantity('load', load, 'N'),

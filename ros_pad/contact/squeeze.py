@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
@@ -71,8 +72,10 @@ class Squeezed(NamedTuple):
         Middles of the rings, m, (rings,).
     area : array
         Area of each ring, m², (rings,).
-    thickness, pressure : array
-        Film, m, and its pressure, Pa, (times, rings).
+    thickness : array
+        Thickness of the film, m, (times, rings).
+    pressure : array
+        Pressure in the film, Pa, (times, rings).
     load : array
         Force of the film on the surface, N, (times,).
     drained : array
@@ -93,11 +96,24 @@ class Squeezed(NamedTuple):
 
     @property
     def mean(self) -> Array:
-        """Mean thickness, m, (times,)."""
+        """Mean thickness, m, shape (times,)."""
         return np.asarray(self.thickness @ self.area / self.area.sum())
 
     def dry_share(self, critical_film: float, exponent: float = 2.0) -> Array:
-        """Return the share of dry contact exp(-(h/h_c)^m), averaged over the area, (times,)."""
+        """Return the share of dry contact exp(-(h/h_c)^m), averaged over the area.
+
+        Parameters
+        ----------
+        critical_film : float
+            Film h_c that leaves 1/e of dry contact, m, above 0.
+        exponent : float
+            Exponent m, dimensionless, above 0.
+
+        Returns
+        -------
+        array, shape (times,)
+            Share, 0 to 1.
+        """
         dry = np.exp(-((self.thickness / critical_film) ** exponent))
         return np.asarray(dry @ self.area / self.area.sum())
 
@@ -115,6 +131,11 @@ class HalfSpace:
         Reduced modulus E/(1 - ν²), Pa, above 0: 4 μ for rubber with shear modulus μ.
     curvature : float
         One over the radius of the sphere, 1/m; 0 for a flat sole.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of range.
     """
 
     radius: float
@@ -132,15 +153,42 @@ class HalfSpace:
         return self.radius / self.modulus
 
     def contact_radius(self, load: float) -> float:
-        """Return the radius of the dry contact under a load, N: Hertz', m."""
+        """Return the radius of the dry contact under a load.
+
+        Parameters
+        ----------
+        load : float
+            Force on the surface, N, from 0.
+
+        Returns
+        -------
+        float
+            Radius, m, by Hertz, or that of the sole if it is flat.
+
+        Raises
+        ------
+        InvalidInput
+            When the load is negative or not finite.
+        """
+        load = number('load', load, 'N')
         if self.curvature == 0.0:
             return self.radius
         return float((0.75 * load / (self.curvature * self.modulus)) ** (1.0 / 3.0))
 
     def deflection(self, edges: Array, at: Array) -> Array:
-        """Return the deflection at radii by unit pressure on each ring, in :attr:`compliance`.
+        """Return the deflection at radii by unit pressure on each ring.
 
-        Edges and radii, above 0, are in units of the radius.
+        Parameters
+        ----------
+        edges : array, shape (rings + 1,)
+            Radii of the edges of the rings, over the radius (no unit), rising.
+        at : array, shape (n,)
+            Radii, over the radius (no unit), above 0.
+
+        Returns
+        -------
+        array, shape (n, rings)
+            Deflection over :attr:`compliance`, no unit.
         """
         from scipy.special import ellipe
         from scipy.special import ellipkm1
@@ -168,6 +216,11 @@ class Membrane:
         Tension, N/m, above 0.
     pressure : float
         Gauge pressure of the air, Pa, above 0.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of range.
     """
 
     radius: float
@@ -190,11 +243,40 @@ class Membrane:
         return self.radius**2 / self.tension
 
     def contact_radius(self, load: float) -> float:
-        """Return the radius of the dry contact under a load, N, which the air carries, m."""
-        return math.sqrt(load / (math.pi * self.pressure))
+        """Return the radius of the dry contact under a load that the air carries.
+
+        Parameters
+        ----------
+        load : float
+            Force on the surface, N, from 0.
+
+        Returns
+        -------
+        float
+            Radius, m.
+
+        Raises
+        ------
+        InvalidInput
+            When the load is negative or not finite.
+        """
+        return math.sqrt(number('load', load, 'N') / (math.pi * self.pressure))
 
     def deflection(self, edges: Array, at: Array) -> Array:
-        """Return the deflection at radii by unit pressure on each ring, in :attr:`compliance`."""
+        """Return the deflection at radii by unit pressure on each ring.
+
+        Parameters
+        ----------
+        edges : array, shape (rings + 1,)
+            Radii of the edges of the rings, over the radius (no unit), rising.
+        at : array, shape (n,)
+            Radii, over the radius (no unit), above 0.
+
+        Returns
+        -------
+        array, shape (n, rings)
+            Deflection over :attr:`compliance`, no unit.
+        """
         reach, r = np.broadcast_arrays(edges, at[:, None])
         far = np.maximum(reach, r)
         inner = np.where(r < reach, 0.25 * (reach**2 - r**2), 0.0)
@@ -239,6 +321,12 @@ def squeeze(
     tolerance : float
         Relative tolerance of each time step, 1e-10 to 1e-2.
 
+    Returns
+    -------
+    Squeezed
+        Thickness, m, and pressure, Pa, of each ring at each time, load, N, and volume that has
+        left, m³.
+
     Raises
     ------
     InvalidInput
@@ -246,7 +334,20 @@ def squeeze(
         is so stiff that it is rigid: use :func:`ros_pad.contact.film_thickness`.
     NoSurface
         With status ``no_convergence``, when the time steps fail.
+
+    Examples
+    --------
+    A flat soft sole of 10 mm under 2 N traps liquid that a rigid disc would press out:
+
+    >>> from ros_pad.contact import HalfSpace, film_thickness, squeeze
+    >>> film = squeeze(HalfSpace(10e-3, 2e6), 0.1e-3, [0.0, 1.0], load=2.0, rings=40)
+    >>> f'{1e6 * film.mean[-1]:.1f} micrometres'
+    '15.0 micrometres'
+    >>> rigid = film_thickness(0.1e-3, 2.0 / film.area.sum(), 10e-3, 1.0)
+    >>> f'{1e6 * rigid:.1f} micrometres'
+    '3.4 micrometres'
     """
+    instance('surface', surface, HalfSpace, Membrane)
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
     if number('rise', rise, 's') > 0.0 and load is None:
         raise InvalidInput(
@@ -309,7 +410,7 @@ def _solve(
 
 
 def trapped_film(radius: float, modulus: float, pressure: float) -> float:
-    """Return the mean film, m, that a flat soft sole traps for good once its rim has closed.
+    """Return the mean film that a flat soft sole traps for good once its rim has closed.
 
     It is the dimple of a half-space under uniform pressure, :data:`TRAPPED` p a/E*: a film that
     drains outward everywhere has a pressure that falls outward, and of these pressures the uniform
@@ -317,10 +418,28 @@ def trapped_film(radius: float, modulus: float, pressure: float) -> float:
 
     Parameters
     ----------
-    radius, modulus : float
-        As for :class:`HalfSpace`.
+    radius : float
+        Radius a of the sole, m, above 0.
+    modulus : float
+        Reduced modulus E*, Pa, above 0, as for :class:`HalfSpace`.
     pressure : float
-        Mean pressure, Pa, from 0.
+        Mean pressure p, Pa, from 0.
+
+    Returns
+    -------
+    float
+        Film, m.
+
+    Raises
+    ------
+    InvalidInput
+        When a value is not finite or out of range.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import trapped_film
+    >>> round(1e6 * trapped_film(10e-3, 2e6, 6.4e3), 1)  # micrometres
+    13.6
     """
     number('pressure', pressure, 'Pa')
     return TRAPPED * pressure * HalfSpace(radius, modulus).compliance

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.configuration import choice as one_of
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
@@ -104,9 +105,10 @@ class FootFault:
     ----------
     leg : int
         Number of the leg.
-    start, end : float
-        Times at which the fault was found and at which its end was found, s; the end is None while
-        the fault lasts.
+    start : float
+        Time at which the fault was found, s.
+    end : float or None
+        Time at which its end was found, s; None while the fault lasts.
     reason : str
         Last description of the fault, with numbers.
     """
@@ -243,11 +245,11 @@ class MorphologyController:
     friction : FrictionFelt
         Friction of flat feet and of domes, which decides whether flat feet pay.
     margin : float
-        Pressure margin as given; a new value applies from the next lift-off.
+        Pressure margin as given, a factor; a new value applies from the next lift-off.
     policy : callable
         Policy as given; a new one applies from the next lift-off.
     command_timeout : float
-        Timeout as given; a new value applies at once.
+        Timeout as given, s; a new value applies at once.
     refusals : dict
         For each leg for which a dome was chosen but would need more than the ceiling, the reason.
     switches : dict
@@ -258,9 +260,24 @@ class MorphologyController:
     Raises
     ------
     InvalidInput
-        When a value is outside its range; the message names it.
+        When a value is outside its range, or foot or policy of another kind; the message names it.
     LimitError
         When the fixed pressure is above the foot's ceiling.
+
+    Examples
+    --------
+    A foot stands on ground that is probably wet, lifts off, and becomes a dome:
+
+    >>> from ros_pad.contact import Foot
+    >>> from ros_pad.control import MorphologyController, adaptive
+    >>> foot = Foot.load('large19')
+    >>> controller = MorphologyController(foot, [1], adaptive(), expected_load=5.0)
+    >>> for step in range(6):
+    ...     time, load = 0.1 * step, 5.0 if step < 4 else 0.0
+    ...     controller.observe(1, time, pressure=0.0)
+    ...     setpoint = controller.update(1, load, wet_probability=0.9, position=(0.0, 0.0))
+    >>> controller.morphology(1), round(setpoint)  # Pa
+    ('dome', 88970)
     """
 
     def __init__(
@@ -275,6 +292,12 @@ class MorphologyController:
         lift_off_share: float = LIFT_OFF.default,
         command_timeout: float = COMMAND_TIMEOUT.default,
     ) -> None:
+        instance('foot', foot, Foot)
+        if not callable(policy):
+            raise InvalidInput(
+                f'policy = {policy!r} is not allowed: a function is needed, such as policy_named'
+                ' returns'
+            )
         number('expected_load', expected_load, 'N', above=True)
         first = dict.fromkeys(legs, start) if isinstance(start, str) else dict(start)
         for leg in legs:
@@ -322,26 +345,88 @@ class MorphologyController:
     def morphology(self, leg: int) -> str:
         """Return the morphology of a leg in the present step, or in swing in the next one.
 
-        If its pad has a fault or no readings, return the measured morphology of the pad instead.
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        str
+            ``flat`` or ``dome``. If the pad has a fault or no readings, its measured morphology
+            instead.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
         """
-        state = self._legs[leg]
+        state = self._state(leg)
         if not state.air.monitor.reason:
             return state.morphology
         return DOME if state.air.holds else FLAT
 
     def setpoint(self, leg: int) -> float:
-        """Return the set-point of a leg, gauge Pa."""
-        return self._legs[leg].setpoint
+        """Return the set-point of a leg.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        float
+            Gauge pressure, Pa.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
+        """
+        return self._state(leg).setpoint
 
     def fault(self, leg: int) -> str:
-        """Return the present faults of a leg as text; empty if there are none."""
+        """Return the present faults of a leg.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        str
+            Faults as text; empty if there are none.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
+        """
         state = self._state(leg)
         faults = state.faults
         reasons = (faults.timeout, faults.no_step, faults.sensors, state.air.monitor.reason)
         return '; '.join(filter(None, reasons))
 
     def remark(self, leg: int) -> str:
-        """Return warnings about a leg that are no faults, such as a slow hose; empty if none."""
+        """Return warnings about a leg that are no faults, such as a slow hose.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        str
+            Warnings as text; empty if there are none.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
+        """
         state = self._state(leg)
         slow = ''
         if state.lead:
@@ -352,15 +437,54 @@ class MorphologyController:
         return '; '.join(filter(None, (self.refusals.get(leg), state.air.shortfall, slow)))
 
     def lead(self, leg: int) -> int:
-        """Return by how many whole steps the fill of a leg's pad takes longer than its swing."""
+        """Return by how much the fill of a leg's pad takes longer than its swing.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        int
+            Whole steps.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
+        """
         return self._state(leg).lead
 
     def monitor(self, leg: int) -> PadMonitor:
-        """Return the monitor of a leg's air."""
+        """Return the monitor of a leg's air.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+
+        Returns
+        -------
+        PadMonitor
+            The monitor.
+
+        Raises
+        ------
+        InvalidInput
+            For a leg that is not controlled.
+        """
         return self._state(leg).air.monitor
 
     def decide(self, leg: int, state: FootState) -> float | None:
         """Process an estimate with all its inputs: :meth:`observe`, then :meth:`update`.
+
+        Parameters
+        ----------
+        leg : int
+            Number of the leg.
+        state : FootState
+            Inputs of the decision, all of one time.
 
         Returns
         -------
@@ -482,7 +606,7 @@ class MorphologyController:
         position: Sequence[float],
         friction: float = math.nan,
     ) -> float:
-        """Process an estimate and return the set-point, gauge Pa.
+        """Process an estimate.
 
         Parameters
         ----------
@@ -496,6 +620,11 @@ class MorphologyController:
             Position of the foot, x and y, m.
         friction : float
             Coefficient of friction below the foot; NaN if it is not known.
+
+        Returns
+        -------
+        float
+            Set-point, gauge Pa.
 
         Raises
         ------

@@ -31,8 +31,8 @@ class LiftOff:
     morphology : str
         Morphology of the step that ends, ``flat`` or ``dome``.
     steps : float
-        Number of steps with that morphology, including the one that ends; infinite before the
-        first change.
+        Number of steps (no unit) with that morphology, including the one that ends; infinite
+        before the first change.
     probing : bool
         Whether that step was a probe.
     wet_ahead : float
@@ -57,7 +57,15 @@ class LiftOff:
 
 @dataclass(frozen=True)
 class Choice:
-    """Morphology of the next step, and whether that step is a probe."""
+    """Morphology of the next step, and whether that step is a probe.
+
+    Attributes
+    ----------
+    morphology : str
+        ``flat`` or ``dome``.
+    probe : bool
+        Whether the step is a probe.
+    """
 
     morphology: str
     probe: bool = False
@@ -101,12 +109,34 @@ _DEFAULTS = {each.name.removeprefix(PREFIX): each.default for each in SETTINGS}
 
 
 def flat(step: LiftOff) -> Choice:
-    """Choose flat at every step."""
+    """Choose flat at every step.
+
+    Parameters
+    ----------
+    step : LiftOff
+        The foot that lifts off; not used.
+
+    Returns
+    -------
+    Choice
+        ``flat``, no probe.
+    """
     return Choice(FLAT)
 
 
 def dome(step: LiftOff) -> Choice:
-    """Choose dome at every step."""
+    """Choose dome at every step.
+
+    Parameters
+    ----------
+    step : LiftOff
+        The foot that lifts off; not used.
+
+    Returns
+    -------
+    Choice
+        ``dome``, no probe.
+    """
     return Choice(DOME)
 
 
@@ -134,11 +164,23 @@ def adaptive(
     dwell : int
         Steps for which a morphology is kept at least, except in probes.
 
+    Returns
+    -------
+    callable
+        Policy: a function of :class:`LiftOff` that returns a :class:`Choice`.
+
     Raises
     ------
     InvalidInput
         For a probability outside 0 to 1, ``dry_below`` above ``wet_above``, or ``dwell`` outside
         its range.
+
+    Examples
+    --------
+    >>> from ros_pad.control import LiftOff, adaptive
+    >>> policy = adaptive(wet_above=0.65)
+    >>> policy(LiftOff(1, 'flat', 3, False, 0.9, next_position=(0.1, 0), others_probing=False))
+    Choice(morphology='dome', probe=False)
     """
     given = (wet_above, dry_below, probe_below, dwell)
     for setting, value in zip(SETTINGS, given, strict=True):
@@ -167,6 +209,11 @@ def oracle(is_wet: IsWet) -> Policy:
     ----------
     is_wet : callable
         Function of x and y, m, that returns whether the ground is wet there.
+
+    Returns
+    -------
+    callable
+        Policy, as from :func:`adaptive`.
     """
 
     def choose(step: LiftOff) -> Choice:
@@ -188,13 +235,31 @@ def first_morphologies(policy: str, legs: Sequence[int]) -> dict[int, str]:
         Name of a policy, see :data:`POLICIES`.
     legs : sequence of int
         Numbers of the legs, in their order about the body.
+
+    Returns
+    -------
+    dict of int to str
+        ``flat`` or ``dome`` for each leg.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown policy.
+
+    Examples
+    --------
+    >>> from ros_pad.control import first_morphologies
+    >>> first_morphologies('adaptive', [1, 2, 3])
+    {1: 'flat', 2: 'dome', 3: 'flat'}
     """
+    choice('policy', policy, POLICIES)
     if policy == 'adaptive':
         return {leg: FLAT if leg in (legs[0], legs[-1]) else DOME for leg in legs}
     return dict.fromkeys(legs, DOME if policy == 'dome' else FLAT)
 
 
 POLICIES = ('flat', 'dome', 'adaptive', 'oracle')
+"""Names of the policies."""
 
 POLICY_PARAMETERS = tuple(_DEFAULTS)
 """Names of the parameters of the adaptive policy."""
@@ -215,6 +280,11 @@ def policy_named(
         Function that returns whether the ground is wet at x and y, m; only ``oracle`` needs it.
     parameters : mapping or None
         Arguments of :func:`adaptive` by name; the other policies have none.
+
+    Returns
+    -------
+    callable
+        Policy, as from :func:`adaptive`.
 
     Raises
     ------

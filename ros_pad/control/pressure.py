@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 
+from ros_pad.configuration import instance
+from ros_pad.configuration import number
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import LimitError
@@ -37,7 +39,16 @@ def dome_pressure(foot: Foot, load: float, margin: float) -> float:
         When the pressure would be above the foot's ceiling, or beyond the model of the pads.
     InvalidInput
         When the load is negative or not finite, or the margin is not finite and above 0.
+
+    Examples
+    --------
+    >>> from ros_pad.contact import Foot
+    >>> from ros_pad.control import dome_pressure
+    >>> dome_pressure(Foot.load('large19'), load=5.0, margin=1.2)
+    77600.0
     """
+    instance('foot', foot, Foot)
+    number('load', load, 'N')
     try:
         wanted = float(pressure_for(foot.pad, load / foot.pads, foot.limit, margin=margin))
     except NoEquilibrium as error:

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
+from ros_pad.configuration import instance
+from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
@@ -92,7 +94,7 @@ class Estimate(NamedTuple):
         Time of the sample, s.
     standing : bool
         Whether the foot carries load.
-        slipping : bool
+    slipping : bool
         Whether the slip alarm is on.
     slip_velocity : tuple of float
         Velocity of the contact over the floor, only its part along the tangential force, x and y,
@@ -104,11 +106,13 @@ class Estimate(NamedTuple):
         Standard deviation of the slip speed, m/s; infinite while sensors are faulty.
     wet_probability : float
         Probability that the ground is wet, 0 to 1.
-    friction_mean, friction_sd : float
-        Mean and standard deviation of the coefficient of friction.
+    friction_mean : float
+        Mean of the coefficient of friction.
+    friction_sd : float
+        Standard deviation of the coefficient of friction.
     margin : float
-        Friction margin: 5 % quantile of μ less T/N; below zero, slip is likely. NaN from a fault
-        of the sensors until the foot stands again; in swing the last value.
+        Friction margin, no unit: 5 % quantile of μ less T/N; below zero, slip is likely. NaN from
+        a fault of the sensors until the foot stands again; in swing the last value.
     fresh : bool
         Whether this sample updated wetness and friction, or was the first of a swing or of a
         sensor fault.
@@ -190,7 +194,28 @@ class FootEstimator:
     Raises
     ------
     InvalidInput
-        When the expected load is not a number above 0.
+        When the expected load is not a number above 0, or foot or tuning is of another class.
+
+    Examples
+    --------
+    Force and position of a flat foot at 1 kHz. It stands for 0.5 s, then it slips at 40 mm/s,
+    although the tangential force is only a sixth of the load: the ground is wet.
+
+    >>> from random import Random
+    >>> from ros_pad.contact import Foot
+    >>> from ros_pad.estimation import FootEstimator
+    >>> estimator, noise = FootEstimator(Foot.load('large19'), expected_load=6.8), Random(0).gauss
+    >>> alarms = []
+    >>> for step in range(1000):
+    ...     x = -0.04 * max(0, step - 500) * 1e-3
+    ...     position = [each + noise(0, 1.5e-4) for each in (x, 0, 0)]
+    ...     force = [each + noise(0, 0.03) for each in (1.1, 0, 6.8)]
+    ...     alarms.append(estimator.update(step * 1e-3, force, position, pressure=0.0).slipping)
+    >>> 500 < alarms.index(True) < 600, any(alarms[:500])
+    (True, False)
+    >>> estimate = estimator.estimate
+    >>> estimate.wet_probability > 0.9, round(estimate.friction_mean, 1)
+    (True, 0.2)
     """
 
     def __init__(
@@ -201,8 +226,10 @@ class FootEstimator:
         shared: FrictionScales | None = None,
         shared_axes: SharedAxes | None = None,
     ) -> None:
+        instance('foot', foot, Foot)
         expected_load = number('expected_load', expected_load, 'N', above=True)
-        self.tuning = tuning = tuning or Tuning()
+        self.tuning = tuning = Tuning() if tuning is None else tuning
+        instance('tuning', tuning, Tuning)
         self._foot = foot
         self._expected_load = expected_load
         self._least_load = AIRBORNE_LOAD * expected_load  # a smaller one may be an offset, N
@@ -282,7 +309,8 @@ class FootEstimator:
             Gauge pressure in the pads, Pa.
         moment : float or None
             Yaw moment of the ground on the foot, N m; None if it is not measured. The part of the
-            friction that turning uses follows from it, and is otherwise assumed.
+            friction that turning uses follows from it, and is otherwise assumed. Not used with
+            the setting ``moment_noise`` 0.
         position_time : float or None
             Time at which the position was measured, s; None if it is `time`.
         motion : ContactMotion or None
@@ -671,7 +699,35 @@ def shared_friction(foot: Foot, expected_load: float, tuning: Tuning) -> Frictio
 def estimators_of(
     count: int, foot: Foot, expected_load: float, tuning: Tuning
 ) -> tuple[list[FootEstimator], FrictionScales]:
-    """Return the estimators of all feet of a robot, and what they share of friction."""
+    """Return the estimators of all feet of a robot, and what they share of friction.
+
+    Parameters
+    ----------
+    count : int
+        Number of feet, from 1.
+    foot : Foot
+        All feet are of this kind.
+    expected_load : float
+        Normal force on a foot in stance, N, above 0.
+    tuning : Tuning
+        Settings for sensors and ground.
+
+    Returns
+    -------
+    list of FootEstimator
+        One estimator for each foot.
+    FrictionScales
+        What the feet learn of friction together.
+
+    Raises
+    ------
+    InvalidInput
+        When the expected load is not a number above 0, the count no whole number from 1, or foot
+        or tuning of another class.
+    """
+    instance('foot', foot, Foot)
+    instance('tuning', tuning, Tuning)
+    integer('count', count, 1)
     expected_load = number('expected_load', expected_load, 'N', above=True)
     shared, axes = shared_friction(foot, expected_load, tuning), SharedAxes()
     feet = [FootEstimator(foot, expected_load, tuning, shared, axes) for _ in range(count)]

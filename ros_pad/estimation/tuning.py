@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import dataclass
 
 from ros_pad.configuration import Setting
@@ -120,16 +121,27 @@ def attribute(setting: Setting) -> str:
     return setting.name.replace('.', '_')
 
 
+def _described(setting: Setting) -> str:
+    kind = setting.value_type.__name__
+    unit = ', no unit' if kind == 'float' and not setting.unit else ''
+    values = f'Allowed: {setting.allowed}{unit}; default: {setting.default}.'
+    return f'{attribute(setting)} : {kind}\n    {setting.description} {values}\n'
+
+
 @dataclass(frozen=True)
 class Tuning:
-    """Settings of an estimator for robot, sensors and ground.
-
-    Attributes, their units, ranges and meanings are those of :data:`SETTINGS`.
+    """Settings of an estimator for robot, sensors and ground; :data:`SETTINGS` describes them.
 
     Raises
     ------
     InvalidInput
         When a value is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> from ros_pad.estimation import Tuning
+    >>> Tuning(wet_prior=0.2).wet_prior
+    0.2
     """
 
     position_noise: float = _DEFAULTS['position_noise']
@@ -168,5 +180,20 @@ class Tuning:
         }
 
     def rim_speed(self, foot: Foot) -> float:
-        """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius, m/s."""
+        """Return the scrubbing speed of a turning foot at 2/3 of the sole's radius.
+
+        Parameters
+        ----------
+        foot : Foot
+            The foot.
+
+        Returns
+        -------
+        float
+            Speed, m/s.
+        """
         return foot.turning_radius * self.turning_rate
+
+
+Tuning.__doc__ = f'{inspect.cleandoc(Tuning.__doc__ or "")}\n\nAttributes\n----------\n'
+Tuning.__doc__ += ''.join(map(_described, SETTINGS))

@@ -29,7 +29,7 @@ class Reading:
     faults : tuple of str
         Faults that the device reports, as the device names them; empty when there are none.
     time : float
-        s, on the clock of the backend.
+        Time of the reading, s, on the clock of the backend.
     """
 
     pressure: float
@@ -66,7 +66,7 @@ class Regulator(Protocol):
         Parameters
         ----------
         gauge_pa : float
-            0 to ``ceiling``.
+            Set-point, gauge Pa, 0 to ``ceiling``.
 
         Raises
         ------

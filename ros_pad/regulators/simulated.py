@@ -40,13 +40,14 @@ class SimulatedRegulator:
     ceiling : float
         Highest set-point, gauge Pa, 1 to ``full_scale``.
     hose_diameter, hose_length : float
-        m; see :class:`~ros_pad.simulation.pneumatics.Hose`.
+        Inner diameter and length of the hose, m, in the ranges of
+        :class:`ros_pad.simulation.Hose`.
     hose_conductance : float, optional
         Measured sonic conductance of the whole line, m³/(s Pa), instead of the hose formula.
     pad_volume : float or callable
         Air volume of the pads and their chamber, m³, or a function of the gauge pressure, Pa.
     natural_frequency, damping, dead_time, dead_band, full_scale, quantum, slew_limit : float
-        See :class:`~ros_pad.simulation.pneumatics.RegulatorModel`.
+        As for :class:`ros_pad.simulation.RegulatorModel`.
     sensor_resolution : float
         Smallest step of readings, Pa, 0.1 to 1000. With whole Pa an ambient pressure of
         101325 Pa can be added to a reading and subtracted again without a rounding error.
@@ -75,6 +76,22 @@ class SimulatedRegulator:
     the set-point, so the pressure depends only on the commands and their times. A reading
     between two internal steps is computed on a copy, so readings do not change the result. Noise
     is drawn once for each time that is read. Long times at rest are computed in one step.
+
+    Examples
+    --------
+    The clock is that of the example, so the pad fills at once:
+
+    >>> from ros_pad.regulators import create
+    >>> time = 0.0
+    >>> regulator = create('simulated', clock=lambda: time, hose_diameter=0.002)
+    >>> regulator.open()
+    >>> regulator.set_pressure(75e3)
+    >>> readings = []
+    >>> for time in (0.0, 0.1, 0.2, 0.5):
+    ...     readings.append(round(regulator.read().pressure, -3))
+    >>> readings
+    [0.0, 71000.0, 75000.0, 75000.0]
+    >>> regulator.close()
     """
 
     def __init__(
@@ -147,7 +164,22 @@ class SimulatedRegulator:
             self._rest, self._steps = 0.0, 0
 
     def set_pressure(self, gauge_pa: float) -> None:
-        """Command a pressure in [0, ceiling], gauge Pa; see ``Regulator.set_pressure``."""
+        """Command a pressure.
+
+        Parameters
+        ----------
+        gauge_pa : float
+            Set-point, gauge Pa, 0 to ``ceiling``.
+
+        Raises
+        ------
+        InvalidInput
+            When it is negative or not finite.
+        LimitError
+            When it is above the ceiling.
+        TransportError
+            While the regulator is closed, or silent by a fault.
+        """
         setpoint = permitted(gauge_pa, self._ceiling)
         rest = self._advance()
         self._check_answer(self._now)

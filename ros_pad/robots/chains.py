@@ -53,13 +53,13 @@ class Kinematics(NamedTuple):
     positions : array (legs, 3)
         Places of the feet, m.
     rotations : array (legs, 3, 3)
-        Rotations from the feet to the frame.
+        Rotations from the feet to the frame, dimensionless.
     jacobians : array (legs, 3, joints)
         Velocity of a foot for each joint velocity, m/rad (or 1).
     angular : array (legs, 3, joints)
-        Angular velocity of a foot for each joint velocity.
+        Angular velocity of a foot for each joint velocity, no unit (rad/m where a joint slides).
     frames : array (joints, legs, 4, 4)
-        Transforms from the joints to the frame.
+        Transforms from the joints to the frame, m.
     """
 
     positions: Array
@@ -77,13 +77,14 @@ class Chains:
     legs : sequence of sequence of Joint
         The joints of each leg, from the base to the foot.
     feet : array (legs, 4, 4)
-        Transforms from the last joint of each leg to the centre of its foot.
+        Transforms from the last joint of each leg to the centre of its foot, m.
 
     Attributes
     ----------
     legs : tuple of tuple of Joint
+        As the parameter.
     feet : array (legs, 4, 4)
-        As the parameters.
+        As for the parameter, m.
     """
 
     def __init__(self, legs: Sequence[Sequence[Joint]], feet: Array) -> None:
@@ -120,7 +121,12 @@ class Chains:
         positions : array (..., legs, joints)
             Joint positions, rad or m; the results have the same leading axes.
         frame : array (4, 4), optional
-            Transform from the base to the frame of the results; the base itself by default.
+            Transform from the base to the frame of the results, m; the base itself by default.
+
+        Returns
+        -------
+        Kinematics
+            Positions, m, rotations and Jacobians of all feet.
         """
         q = positions.swapaxes(-1, -2)[..., None, None]
         steps = self._constant + np.cos(q) * self._even + np.sin(q) * self._odd
@@ -144,9 +150,19 @@ class Chains:
         return Kinematics(places, feet[..., :3, :3], moving, angular, steps)
 
     def gravity_torques(self, kinematics: Kinematics, gravity: Array) -> Array:
-        """Return the joint torques, (legs, joints), N m, that hold the links of the legs up.
+        """Return the joint torques that hold the links of the legs up.
 
-        ``gravity`` is the acceleration of gravity, (3,), m/s², in the axes of the kinematics.
+        Parameters
+        ----------
+        kinematics : Kinematics
+            Result of :meth:`solve`.
+        gravity : array (3,)
+            Acceleration of gravity in the axes of the kinematics, m/s².
+
+        Returns
+        -------
+        array (legs, joints)
+            Torques, N m (forces, N, where joints slide).
         """
         frames = kinematics.frames
         axes = (frames[..., :3, :3] @ self._axes)[..., 0]

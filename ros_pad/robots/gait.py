@@ -79,16 +79,35 @@ class Gait:
         hips : array (legs, 2 or more)
             Places of the hips on the base, x fore and y left, m.
         cycle, duty, lift : float
-            As for :class:`Gait`.
+            Duration of the cycle, s, share of stance, and lift, m, in the ranges of
+            :class:`Gait`.
+
+        Returns
+        -------
+        Gait
+            The gait, with a phase for each leg.
 
         Raises
         ------
         InvalidInput
             For another name, a number of legs that the gait is not for, or a duty with which more
             legs swing at once than the gait lets.
+
+        Examples
+        --------
+        >>> from ros_pad.robots import Gait, Robot
+        >>> robot = Robot.load('ch3r')
+        >>> gait = Gait.named('tripod', robot.hips, cycle=1.0, duty=0.55, lift=0.03)
+        >>> gait.phases, gait.stands(0.6).tolist()
+        ((0.0, 0.5, 0.0, 0.5, 0.0, 0.5), [False, True, False, True, False, True])
         """
         choice('gait', name, GAITS)
-        places = np.asarray(hips, dtype=float)
+        places = quantity('hips', hips, 'm', -math.inf)
+        if places.ndim != 2 or places.shape[1] < 2:
+            raise InvalidInput(
+                f'hips of shape {places.shape} is not allowed: a row for each leg, with x and y,'
+                ' is needed'
+            )
         legs = len(places)
         if name in ('tripod', 'trot'):
             _check_legs(name, legs, (6, 8) if name == 'tripod' else (4,))
@@ -104,7 +123,21 @@ class Gait:
 
     @classmethod
     def read(cls, table: Table, hips: npt.ArrayLike, usual: Gait | None = None) -> Gait:
-        """Read a gait for legs at these places; ``usual`` has what the table does not have.
+        """Read a gait for legs at these places.
+
+        Parameters
+        ----------
+        table : Table
+            The mapping ``gait`` of a YAML file.
+        hips : array (legs, 2 or more)
+            Places of the hips on the base, x fore and y left, m.
+        usual : Gait, optional
+            Gait with what the table does not have.
+
+        Returns
+        -------
+        Gait
+            The gait.
 
         Raises
         ------
@@ -135,11 +168,33 @@ class Gait:
             raise ConfigError(f'{table.origin}: {error}') from error
 
     def phase(self, time: float) -> Array:
-        """Return the time since each leg's last touch-down, (legs,), as a share of the cycle."""
+        """Return the time since each leg's last touch-down.
+
+        Parameters
+        ----------
+        time : float
+            Time since the gait began, s.
+
+        Returns
+        -------
+        array (legs,)
+            Share of the cycle, 0 to 1.
+        """
         return np.asarray((time / self.cycle - np.array(self.phases)) % 1.0)
 
     def stands(self, time: float) -> npt.NDArray[np.bool_]:
-        """Return whether each leg stands at a time, s."""
+        """Return whether each leg stands.
+
+        Parameters
+        ----------
+        time : float
+            Time since the gait began, s.
+
+        Returns
+        -------
+        array of bool (legs,)
+            True in stance.
+        """
         return self.phase(time) < self.duty
 
 

@@ -177,12 +177,27 @@ class Robot:
         foot_radius : float, optional
             Radius with which the feet roll, m, 0 to 1; of a YAML file, it replaces the file's.
 
+        Returns
+        -------
+        Robot
+            The robot.
+
         Raises
         ------
         ConfigError
             When there is no such robot, or its file is not valid.
         InvalidInput
             When an argument is not allowed.
+
+        Examples
+        --------
+        >>> from ros_pad.robots import Robot
+        >>> robot = Robot.load('go2')
+        >>> robot.legs, len(robot.joint_names), round(robot.mass, 2)  # kg
+        (('FL', 'FR', 'RL', 'RR'), 12, 15.02)
+        >>> feet = robot.foot_positions(robot.home)
+        >>> bool(abs(robot.joint_positions(feet) - robot.home).max() < 1e-6)
+        True
         """
         path = os.fspath(source)
         if foot_radius is not None:
@@ -207,6 +222,16 @@ class Robot:
     def kinematics(self, q: npt.ArrayLike) -> Kinematics:
         """Return positions, rotations and Jacobians of all feet in the axes of the base.
 
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+
+        Returns
+        -------
+        Kinematics
+            Positions, m, rotations and Jacobians.
+
         Raises
         ------
         InvalidInput
@@ -215,40 +240,135 @@ class Robot:
         return self.chains.solve(self._shaped(q))
 
     def foot_positions(self, q: npt.ArrayLike) -> Array:
-        """Return the places of the feet, (legs, 3), m, in the axes of the base."""
-        return self.kinematics(q).positions
+        """Return the places of the feet in the axes of the base.
 
-    def foot_rotations(self, q: npt.ArrayLike) -> Array:
-        """Return the rotations from the links of the feet to the base, (legs, 3, 3)."""
-        return self.kinematics(q).rotations
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
 
-    def foot_jacobians(self, q: npt.ArrayLike) -> Array:
-        """Return the feet's velocities for each joint velocity, (legs, 3, joints), m/rad."""
-        return self.kinematics(q).jacobians
-
-    def angular_jacobians(self, q: npt.ArrayLike) -> Array:
-        """Return the feet's angular velocities for each joint velocity, (legs, 3, joints)."""
-        return self.kinematics(q).angular
-
-    def gravity_torques(self, q: npt.ArrayLike, gravity: npt.ArrayLike = _DOWN) -> Array:
-        """Return the joint torques that hold the links of the legs up, (legs, joints), N m.
-
-        ``gravity`` is the acceleration of gravity in the axes of the base, (3,), m/s².
-        """
-        pull = quantity('gravity', gravity, 'm/s2', -100.0, 100.0)
-        return self.chains.gravity_torques(self.kinematics(q), pull)
-
-    def joint_positions(self, feet: npt.ArrayLike, near: npt.ArrayLike | None = None) -> Array:
-        """Return joint positions, (legs, joints), that bring the feet to places, (legs, 3), m.
-
-        Newton's method from ``near``, or from ``home``, with damped least squares.
+        Returns
+        -------
+        array (legs, 3)
+            Places, m.
 
         Raises
         ------
         InvalidInput
-            When a foot does not reach its place.
+            When ``q`` has another shape or values that are not finite.
         """
-        goal = quantity('feet', feet, 'm', -100.0, 100.0)
+        return self.kinematics(q).positions
+
+    def foot_rotations(self, q: npt.ArrayLike) -> Array:
+        """Return the rotations from the links of the feet to the base.
+
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+
+        Returns
+        -------
+        array (legs, 3, 3)
+            Rotations, dimensionless.
+
+        Raises
+        ------
+        InvalidInput
+            When ``q`` has another shape or values that are not finite.
+        """
+        return self.kinematics(q).rotations
+
+    def foot_jacobians(self, q: npt.ArrayLike) -> Array:
+        """Return the feet's velocities for each joint velocity.
+
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+
+        Returns
+        -------
+        array (legs, 3, joints)
+            Jacobians, m/rad (no unit where a joint slides).
+
+        Raises
+        ------
+        InvalidInput
+            When ``q`` has another shape or values that are not finite.
+        """
+        return self.kinematics(q).jacobians
+
+    def angular_jacobians(self, q: npt.ArrayLike) -> Array:
+        """Return the feet's angular velocities for each joint velocity.
+
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+
+        Returns
+        -------
+        array (legs, 3, joints)
+            Jacobians, no unit (rad/m where a joint slides).
+
+        Raises
+        ------
+        InvalidInput
+            When ``q`` has another shape or values that are not finite.
+        """
+        return self.kinematics(q).angular
+
+    def gravity_torques(self, q: npt.ArrayLike, gravity: npt.ArrayLike = _DOWN) -> Array:
+        """Return the joint torques that hold the links of the legs up.
+
+        Parameters
+        ----------
+        q : array (joints,) or (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+        gravity : array (3,)
+            Acceleration of gravity in the axes of the base, m/s².
+
+        Returns
+        -------
+        array (legs, joints)
+            Torques, N m (forces, N, where joints slide).
+
+        Raises
+        ------
+        InvalidInput
+            When an argument has another shape or values that are not finite.
+        """
+        pull = _in_shape('gravity', quantity('gravity', gravity, 'm/s²', -100.0, 100.0), (3,))
+        return self.chains.gravity_torques(self.kinematics(q), pull)
+
+    def joint_positions(self, feet: npt.ArrayLike, near: npt.ArrayLike | None = None) -> Array:
+        """Return joint positions that bring the feet to places.
+
+        Parameters
+        ----------
+        feet : array (legs, 3)
+            Places of the feet in the axes of the base, m.
+        near : array (legs, joints a leg), optional
+            Joint positions from which the search begins, rad; :attr:`home` by default.
+
+        Returns
+        -------
+        array (legs, joints a leg)
+            Joint positions, rad (m where a joint slides).
+
+        Raises
+        ------
+        InvalidInput
+            When a foot does not reach its place, or an argument has another shape or values that
+            are not finite.
+
+        Notes
+        -----
+        Newton's method with damped least squares.
+        """
+        places = quantity('feet', feet, 'm', -100.0, 100.0)
+        goal = _in_shape('feet', places, (len(self.legs), 3))
         q = self._shaped(self.home if near is None else near).copy()
         for _ in range(50):
             found = self.chains.solve(q)
@@ -274,6 +394,13 @@ class Robot:
                 ' needed'
             )
         return checked.reshape(self.home.shape)
+
+
+def _in_shape(name: str, value: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array; raise `InvalidInput` if it has another shape."""
+    if value.shape != shape:
+        raise InvalidInput(f'{name} of shape {value.shape} is not allowed: {shape} is needed')
+    return value
 
 
 def _check_sizes(robot: Robot) -> None:

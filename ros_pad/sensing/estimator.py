@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.configuration import quantity
 from ros_pad.errors import InvalidInput
@@ -115,8 +116,10 @@ class FootMotion(NamedTuple):
 
     Attributes
     ----------
-    position, velocity : array (3,)
-        Centre of the foot, m, m/s.
+    position : array (3,)
+        Position of the centre of the foot, m.
+    velocity : array (3,)
+        Its velocity, m/s.
     force : array (3,)
         Force of the ground on the foot, N.
     in_contact : bool
@@ -147,13 +150,16 @@ class BodyEstimate(NamedTuple):
     ----------
     time : float
         Time of the sample, s.
-    position, velocity : array (3,)
-        Of the base, m, m/s.
+    position : array (3,)
+        Position of the base, m.
+    velocity : array (3,)
+        Velocity of the base, m/s.
     orientation : array (4,)
         Quaternion x y z w from the base to odom.
     covariance : array (9, 9)
         Of position, m, rotation in odom axes, rad, and velocity, m/s.
     feet : tuple of FootMotion
+        The feet, in the order of ``robot.legs``.
     doubt : str
         Why this must not be relied on: a kind, a colon, and details; empty if it may be.
     """
@@ -173,6 +179,7 @@ class BodyEstimator:
     Parameters
     ----------
     robot : Robot
+        The robot whose sensors are read.
     gyro_noise : float
         Standard deviation of a sample of the gyro, rad/s, above 0 up to 1.
     accelerometer_noise : float
@@ -197,8 +204,8 @@ class BodyEstimator:
         ``base`` if the foot forces come in the axes of the base, ``foot`` for those of the links
         of the feet.
     radius_error : float
-        Standard deviation of the radius with which feet roll over the robot's ``foot_radius``, 0
-        to 1: soft feet sink in.
+        Standard deviation of the radius with which feet roll, as a share of the robot's
+        ``foot_radius``, 0 to 1: soft feet sink in.
     length_error : float
         Standard deviation of the relative error of the length of all legs, 0 to 0.5.
     joint_delay : float
@@ -211,6 +218,24 @@ class BodyEstimator:
     ------
     InvalidInput
         When a value is outside its range; the message names it.
+
+    Examples
+    --------
+    A robot that stands for a second on all feet:
+
+    >>> import numpy as np
+    >>> from ros_pad.robots import Robot
+    >>> from ros_pad.sensing import BodyEstimator
+    >>> robot = Robot.load('go2')
+    >>> estimator, joints = BodyEstimator(robot), robot.home.ravel()
+    >>> forces = np.zeros((4, 3))
+    >>> forces[:, 2] = 9.81 * robot.mass / 4
+    >>> for time in np.arange(200) * 5e-3:
+    ...     estimate = estimator.update(
+    ...         time, [0, 0, 0], [0, 0, 9.81], joints, 0 * joints, foot_forces=forces
+    ...     )
+    >>> bool(np.linalg.norm(estimate.velocity) < 1e-3), [foot.slipping for foot in estimate.feet]
+    (True, [False, False, False, False])
     """
 
     def __init__(
@@ -231,6 +256,7 @@ class BodyEstimator:
         joint_delay: float = 0.0,
         rejection: bool = True,
     ) -> None:
+        instance('robot', robot, Robot)
         if not robot.mass > 0.0:
             raise InvalidInput(f'robot {robot.name!r} is not allowed: its links have no mass')
         self._robot = robot
@@ -323,6 +349,11 @@ class BodyEstimator:
         efforts : array (joints,), optional
             Joint torques, N m, from which forces are taken where there are no foot forces.
 
+        Returns
+        -------
+        BodyEstimate
+            Position, m, velocity, m/s, orientation and feet after this sample.
+
         Raises
         ------
         InvalidInput
@@ -390,7 +421,12 @@ class BodyEstimator:
             ('foot_forces', (joints[0], 3), 'N', 1e6),
             ('efforts', size, 'N m', 1e6),
         )
-        given = [(n, r) for n, r in zip(names, readings, strict=True) if r is not None]
+        # The last two may be missing.
+        given: list[tuple[tuple[str, tuple[int, ...], str, float], Any]] = [
+            (names[place], reading)
+            for place, reading in enumerate(readings)
+            if reading is not None or place < 4
+        ]
         # One look at all of them is enough if they are fine; NaN is not below the limit.
         if not (
             all(

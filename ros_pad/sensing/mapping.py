@@ -62,10 +62,16 @@ class Readings(NamedTuple):
     ----------
     stamp : int
         Time of the readings, ns.
-    gyro, accelerometer : array (3,) or None
-        Angular velocity, rad/s, and specific force, m/s², in the axes of the IMU.
-    positions, velocities, efforts : array (joints,) or None
-        In the order of ``robot.joint_names``, rad (m), rad/s (m/s), N m (N).
+    gyro : array (3,) or None
+        Angular velocity in the axes of the IMU, rad/s.
+    accelerometer : array (3,) or None
+        Specific force in the axes of the IMU, m/s².
+    positions : array (joints,) or None
+        Joint positions in the order of ``robot.joint_names``, rad (m).
+    velocities : array (joints,) or None
+        Joint velocities, rad/s (m/s).
+    efforts : array (joints,) or None
+        Joint torques, N m (N).
     forces : dict of int to array (3,)
         Forces of the ground on feet, N, by index of the leg, in the axes of
         :attr:`Mapping.force_axes`.
@@ -80,7 +86,13 @@ class Readings(NamedTuple):
     forces: MappingType[int, Array] = {}
 
     def pass_to(self, stage: SensingStage) -> None:
-        """Pass the readings to a sensing stage, forces first, so that the joints find them."""
+        """Pass the readings to a sensing stage, forces first, so that the joints find them.
+
+        Parameters
+        ----------
+        stage : SensingStage
+            The stage that receives them.
+        """
         for leg, force in self.forces.items():
             stage.force(leg, self.stamp, force.tolist())
         if self.gyro is not None and self.accelerometer is not None:
@@ -216,6 +228,17 @@ class Mapping:
 
     Use :meth:`load`.
 
+    Parameters
+    ----------
+    name : str
+        Name of the file.
+    sources : sequence of Source
+        Topics to subscribe to, with their types and fields.
+    notes : sequence of str
+        What is missing besides what the sources show, as in ``missing``.
+    axes : str
+        Value of ``force_axes``.
+
     Attributes
     ----------
     name : str
@@ -228,6 +251,14 @@ class Mapping:
         ``base`` or ``foot``: the axes of the forces.
     force_kind : str
         ``vector``, ``normal`` (one axis) or ``contact`` (flags); empty without forces.
+
+    Examples
+    --------
+    >>> from ros_pad.robots import Robot
+    >>> from ros_pad.sensing import Mapping
+    >>> mapping = Mapping.load('default', Robot.load('ch3r'))
+    >>> [source.topic for source in mapping.sources][:3], mapping.force_kind
+    (['imu/data', 'joint_states', 'leg_1/foot_wrench'], 'vector')
     """
 
     def __init__(self, name: str, sources: Sequence[Source], notes: Sequence[str], axes: str):
@@ -250,11 +281,17 @@ class Mapping:
         robot : Robot
             The robot whose joints and legs give the order of the readings.
 
+        Returns
+        -------
+        Mapping
+            The mapping.
+
         Raises
         ------
         ConfigError
             When there is no such mapping, its file is not valid, or it does not fit the robot.
         """
+        configuration.instance('robot', robot, Robot)
         path = configuration.locate('mappings', source)
         table = Table.load(path)
         table.text('description', default='')
@@ -282,6 +319,11 @@ class Mapping:
             The message, with its fields as attributes.
         arrival : int
             Time at which it arrived, or was recorded, ns.
+
+        Returns
+        -------
+        Readings
+            What the message contains, in SI units.
 
         Raises
         ------

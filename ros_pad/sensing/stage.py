@@ -271,6 +271,7 @@ class SensingStage:
     Parameters
     ----------
     robot : Robot
+        The robot.
     estimator : BodyEstimator
         Estimator of this robot.
     emit : callable
@@ -285,6 +286,7 @@ class SensingStage:
     Attributes
     ----------
     estimator : BodyEstimator
+        As given.
     samples : int
         Number of samples used so far.
     last_ns : int
@@ -337,7 +339,17 @@ class SensingStage:
         self._fresh: Counter[str] = Counter()  # of those, how many had a new stamp
 
     def imu(self, stamp_ns: int, gyro: npt.ArrayLike, accelerometer: npt.ArrayLike) -> None:
-        """Process a reading of the IMU: time stamp, ns, rad/s, and specific force, m/s²."""
+        """Process a reading of the IMU.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Time stamp, ns.
+        gyro : array (3,)
+            Angular velocity in the axes of the IMU, rad/s.
+        accelerometer : array (3,)
+            Specific force in the axes of the IMU, m/s², +9.81 upwards at rest.
+        """
         try:
             reading = _Inertial(
                 stamp_ns,
@@ -410,7 +422,17 @@ class SensingStage:
         self._process()
 
     def force(self, leg_index: int, stamp_ns: int, force: Sequence[float]) -> None:
-        """Process the force of the ground on a foot, N, in the axes of its sensor."""
+        """Process the force of the ground on a foot.
+
+        Parameters
+        ----------
+        leg_index : int
+            Index of the leg in ``robot.legs``.
+        stamp_ns : int
+            Time stamp, ns.
+        force : sequence of 3 floats
+            Force in the axes of its sensor, N.
+        """
         try:
             reading = _Force(stamp_ns, _checked('foot force', force, 3, 'N'))
         except InvalidInput as error:
@@ -423,12 +445,24 @@ class SensingStage:
         self._process()
 
     def reject(self, error: InvalidInput) -> None:
-        """Report a rejected reading; its error becomes the doubt if no sample follows for long."""
+        """Report a rejected reading; its error becomes the doubt if no sample follows for long.
+
+        Parameters
+        ----------
+        error : InvalidInput
+            Why the reading is not used.
+        """
         self._rejection = str(error)
         self._reject(error)
 
     def tick(self, now_ns: int) -> None:
-        """Check at a time, ns, whether readings are missing; call it every `TICK_PERIOD_NS`."""
+        """Check whether readings are missing; call it every `TICK_PERIOD_NS`.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time on the clock of the readings, ns.
+        """
         if self._silent_since_ns is None:
             self._silent_since_ns = now_ns
             return

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
@@ -67,7 +68,17 @@ class PlanarRobot:
         When the legs cannot walk the scene's gait, or when steps are to be compiled and numba is
         not installed.
     InvalidInput
-        When the period is not finite and above 0.
+        When the period is not finite and above 0, or the scene has a rail leg.
+
+    Examples
+    --------
+    >>> from ros_pad.simulation import Floor, PlanarRobot, Scene
+    >>> scene = Scene.load('hexapod_patches')
+    >>> robot = PlanarRobot(scene, Floor.uniform(True, 0.3e-3), period=2e-3, compile_steps=False)
+    >>> robot.walk([75e3] * 6, steps=3000)
+    3000
+    >>> f'{robot.body[0]:.2f} m'
+    '0.70 m'
     """
 
     def __init__(
@@ -78,6 +89,9 @@ class PlanarRobot:
         compile_steps: bool | None = None,
         soles_turn: bool = False,
     ) -> None:
+        instance('scene', scene, Scene)
+        instance('scene.body', scene.body, LeggedBody)
+        instance('floor', floor, Floor)
         assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
         check_reach(scene)
@@ -133,7 +147,12 @@ class PlanarRobot:
         return float(x), float(y), float(heading)
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with these gauge pressures, Pa, one for each leg.
+        """Advance by ``period``.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads of each leg, Pa, from 0.
 
         Raises
         ------
@@ -145,10 +164,17 @@ class PlanarRobot:
         self._advance(pressures, 1, False)
 
     def walk(self, pressures: Sequence[float], steps: int) -> int:
-        """Make many steps with the same gauge pressures, Pa, one for each leg.
+        """Make many steps with the same pressures.
 
         The result is that of as many calls of :meth:`step`, but compiled code makes all of them in
         one call. The walk ends early when the robot tips over.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads of each leg, Pa, from 0.
+        steps : int
+            Number of steps, from 0.
 
         Returns
         -------

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.faults import LEAK_CRITICAL_RATIO
@@ -63,7 +64,7 @@ class RegulatorModel:
     dead_time : float
         Delay, s, 0 to 1.
     dead_band : float
-        Smallest change that is followed, as a fraction of full scale, 0 to 0.1.
+        Smallest change that is followed, as a share of full scale, 0 to 0.1.
     full_scale : float
         Highest outlet pressure, Pa, 1e3 to 1e6.
     quantum : float
@@ -96,7 +97,18 @@ class RegulatorModel:
             number('slew_limit', self.slew_limit, 'Pa/s', 1e3)
 
     def transition(self, time: float) -> tuple[float, float, float, float]:
-        """Return the exact transition matrix of (error, error rate) over a time in s, by rows."""
+        """Return the exact transition matrix of (error, error rate) over a time.
+
+        Parameters
+        ----------
+        time : float
+            Time, s, from 0.
+
+        Returns
+        -------
+        tuple of float
+            Its four entries by rows: no unit, s, 1/s, no unit.
+        """
         w, z = self.natural_frequency, self.damping
         decay = math.exp(-z * w * time)
         if z < 1.0:
@@ -155,7 +167,7 @@ class Hose:
         regulator's valve is narrower than the hose. All of the hose is then behind the resistance.
         1e-8 m³/(s Pa) = 1 dm³/(s bar).
     measured_critical_ratio : float, optional
-        b of the whole line, 0 to 0.9, in place of the formula.
+        Critical ratio b of the whole line, 0 to 0.9, in place of the formula.
 
     Raises
     ------
@@ -222,9 +234,17 @@ class Hose:
         return math.pi * self.inner_diameter**4 / (256.0 * AIR_VISCOSITY * self.length * rt)
 
     def conductance(self, first: float, second: float) -> float:
-        """Return mass flow over pressure difference between two absolute pressures, kg/(s Pa).
+        """Return mass flow over pressure difference between two absolute pressures.
 
-        The result is finite and positive also where the pressures are equal.
+        Parameters
+        ----------
+        first, second : float
+            Absolute pressures at the two ends, Pa, above 0.
+
+        Returns
+        -------
+        float
+            Conductance, kg/(s Pa), finite and positive also where the pressures are equal.
         """
         turbulent = conductance(self.sonic_conductance, self.critical_ratio, first, second)
         laminar = self._laminar * (first + second)
@@ -237,7 +257,9 @@ class PneumaticChannel:
     Parameters
     ----------
     regulator : RegulatorModel
+        The regulator.
     hose : Hose
+        The hose behind it.
     pad_volume : float or callable
         Air volume of all pads of the foot and their chamber, m³, 1e-9 to 1e-2: a constant, or a
         function of gauge pressure in Pa. A function is tabulated once, from 0 to full scale.
@@ -248,9 +270,10 @@ class PneumaticChannel:
 
     Attributes
     ----------
-    outlet_pressure, pad_pressure : float
-        Pressures at the outlet of the regulator and in the pad, gauge Pa, in [0, full scale], also
-        with faults.
+    outlet_pressure : float
+        Pressure at the outlet of the regulator, gauge Pa, in [0, full scale], also with faults.
+    pad_pressure : float
+        Pressure in the pad, gauge Pa, in [0, full scale], also with faults.
     setpoint : float
         The last set-point commanded, gauge Pa.
     settled : bool
@@ -275,6 +298,19 @@ class PneumaticChannel:
     the pad relaxes exactly towards an outlet that moves linearly. So the pad never overshoots the
     outlet, however small the volume or steep the law of the flow, and the error falls with the
     square of the step. Steps end where a fault starts or ends.
+
+    Examples
+    --------
+    Time to fill pads and chamber of 5 cm³ through 1 m of hose to 90 % of 75 kPa:
+
+    >>> from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel
+    >>> for bore in (4e-3, 1e-3):
+    ...     channel = PneumaticChannel(RegulatorModel(), Hose(bore, 1.0), pad_volume=5e-6)
+    ...     while channel.step(75e3, 1e-3) < 0.9 * 75e3:
+    ...         pass
+    ...     f'{1e3 * bore:.0f} mm: {channel.time:.2f} s'
+    '4 mm: 0.09 s'
+    '1 mm: 0.14 s'
     """
 
     def __init__(
@@ -285,6 +321,8 @@ class PneumaticChannel:
         ambient: float = ATMOSPHERE,
         faults: Sequence[Fault] = (),
     ) -> None:
+        instance('regulator', regulator, RegulatorModel)
+        instance('hose', hose, Hose)
         number('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
         self.regulator = regulator
         self.hose = hose

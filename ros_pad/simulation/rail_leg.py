@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
@@ -52,10 +53,13 @@ class RailLeg:
     Raises
     ------
     InvalidInput
-        When the period is not finite and above 0.
+        When the period is not finite and above 0, or the scene has another robot.
     """
 
     def __init__(self, scene: Scene, floor: Floor, period: float) -> None:
+        instance('scene', scene, Scene)
+        instance('scene.body', scene.body, RailBody)
+        instance('floor', floor, Floor)
         assert isinstance(scene.body, RailBody) and isinstance(scene.gait, RailGait)
         number('period', period, 's', above=True)
         self.legs: tuple[int, ...] = (1,)
@@ -85,7 +89,18 @@ class RailLeg:
         return self._x, 0.0, 0.0
 
     def plan(self, time: float) -> tuple[bool, float, float]:
-        """Return whether the foot stands, its distance ahead of the body and its height, m."""
+        """Return where the gait has the foot.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+
+        Returns
+        -------
+        tuple
+            Whether the foot stands, its distance ahead of the body, m, and its height, m.
+        """
         gait = self._gait
         since = max(0.0, time - self._start) % gait.cycle
         if since < gait.stance:
@@ -95,7 +110,12 @@ class RailLeg:
         return False, -0.5 * gait.stroke * math.cos(math.pi * share), height
 
     def step(self, pressures: Sequence[float]) -> None:
-        """Advance by ``period`` with the pads' gauge pressure, Pa, in a sequence of one.
+        """Advance by ``period``.
+
+        Parameters
+        ----------
+        pressures : sequence of float
+            Gauge pressure of the pads, in a sequence of one, Pa, from 0.
 
         Raises
         ------

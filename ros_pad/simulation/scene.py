@@ -355,18 +355,26 @@ class Scene:
     ----------
     source : str
         Name of the shipped scene, or path of the file, that describes it.
-    name, description : str
-        Name without folder, and the text ``description`` of the file.
+    name : str
+        Name without folder.
+    description : str
+        Text ``description`` of the file.
     robot : str
         Name or path of the robot as the file has it; ``rail_leg`` for the leg on its rail.
     body : LeggedBody or RailBody
+        Masses, sizes and forces of the body.
     gait : WalkingGait or RailGait
+        Gait of the legs.
     heading_gain : float
         Rate at which the gait steers back to heading zero, 1/s; 0 for a rail leg.
     foot : Foot
+        Foot of every leg.
     floor : FloorPlan
+        What a floor for a seed is made from.
     tow : Tow
+        Load that the robot pulls.
     sensors : SensorNoise
+        Noise and rate of the sensors.
     regulator : dict
         Air line of every foot, as options of the simulated regulator.
     policy : str
@@ -446,18 +454,55 @@ class Scene:
     def load(cls, name_or_path: str | os.PathLike[str]) -> Scene:
         """Read ``config/scenes/<name>.yaml``, or the file at a path.
 
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped scene, or path of a file that ends in .yaml or .yml.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
         Raises
         ------
         ConfigError
             When the scene is unknown, or its file has a missing or unknown key or a value that is
             not allowed.
+
+        Examples
+        --------
+        >>> from ros_pad.simulation import Scene
+        >>> scene = Scene.load('hexapod_patches')
+        >>> scene.legs, scene.foot.source, round(scene.expected_load, 2)  # N
+        ((1, 2, 3, 4, 5, 6), 'large37', 6.83)
         """
         path = configuration.locate('scenes', name_or_path)
         return cls.read(Table.load(path), os.fspath(name_or_path), path.stem)
 
     @classmethod
     def read(cls, table: Table, source: str, name: str) -> Scene:
-        """Read a scene from a table; raise `ConfigError` as :meth:`load` does."""
+        """Read a scene from a table.
+
+        Parameters
+        ----------
+        table : Table
+            The mapping in the file.
+        source : str
+            Name or path of the file, see :attr:`source`.
+        name : str
+            Name of the scene, see :attr:`name`.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        ConfigError
+            As from :meth:`load`.
+        """
         if 'bench' in table:
             raise ConfigError(
                 f'{table.origin}: is a bench scene, in which no robot walks: compute it with '

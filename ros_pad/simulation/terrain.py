@@ -98,7 +98,25 @@ class Floor:
 
     @classmethod
     def uniform(cls, wet: bool, film_thickness: float) -> Floor:
-        """Return a floor that is wet, or dry, everywhere; the film thickness is in m."""
+        """Return a floor that is wet, or dry, everywhere.
+
+        Parameters
+        ----------
+        wet : bool
+            Whether it is wet.
+        film_thickness : float
+            Depth of the liquid, m, from 0.
+
+        Returns
+        -------
+        Floor
+            The floor.
+
+        Raises
+        ------
+        InvalidInput
+            When the depth is negative or not finite.
+        """
         return cls(np.array([[wet]]), 1.0, (0.0, 0.0), film_thickness)
 
     @classmethod
@@ -122,12 +140,24 @@ class Floor:
         seed : int
             Whole number from 0; the same seed gives the same floor.
 
+        Returns
+        -------
+        Floor
+            The floor.
+
         Raises
         ------
         InvalidInput
             When wet fraction, patch length, depth or seed is out of its range.
+
+        Examples
+        --------
+        >>> from ros_pad.simulation import Floor
+        >>> floor = Floor.patches(0.4, patch_length=0.5, film_thickness=0.3e-3, seed=1)
+        >>> round(float(floor.wet_map.mean()), 3), floor.depth(0.0, 0.0)  # m
+        (0.4, 0.0003)
         """
-        if not 0.0 < wet_fraction < 1.0:
+        if number('wet_fraction', wet_fraction, '(share)', high=1.0) in (0.0, 1.0):
             raise InvalidInput(
                 f'wet_fraction = {wet_fraction!r} is not allowed: a number above 0 and below 1 is'
                 ' needed'
@@ -152,6 +182,11 @@ class Floor:
         film_thickness : float
             Depth of the liquid, m.
 
+        Returns
+        -------
+        Floor
+            The floor.
+
         Raises
         ------
         InvalidInput
@@ -171,6 +206,7 @@ class Floor:
                     f'drawing: row {place} contains {min(odd)!r}: only # (wet) and . (dry) are'
                     ' allowed'
                 )
+        number('cell', cell, 'm', above=True)
         # Rows of the map go along +y, those of a drawing against it.
         wet = np.array([[each == '#' for each in row] for row in reversed(drawing)])
         return cls(wet, cell, (-cell / 2.0, -cell * len(drawing) / 2.0), film_thickness)
@@ -184,6 +220,11 @@ class Floor:
             Root mean square of the heights, m, 0 or more.
         seed : int
             Whole number from 0; the same seed gives the same heights.
+
+        Returns
+        -------
+        Floor
+            A floor with these heights and the same liquid.
 
         Raises
         ------
@@ -199,7 +240,18 @@ class Floor:
         return replace(self, heights=heights * (unevenness / heights.std()))
 
     def height(self, x: float, y: float) -> float:
-        """Return the height of the ground at a world position, m."""
+        """Return the height of the ground at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        float
+            Height, m.
+        """
         heights = self.heights
         if heights is None:
             return 0.0
@@ -208,17 +260,50 @@ class Floor:
         return float(heights[row, column])
 
     def wet(self, x: float, y: float) -> bool:
-        """Return whether there is liquid at a world position, m."""
+        """Return whether there is liquid at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        bool
+            True on wet ground.
+        """
         rows = self._rows
         row = rows[int((y - self.origin[1]) // self.cell) % len(rows)]
         return row[int((x - self.origin[0]) // self.cell) % len(row)] != 0
 
     def depth(self, x: float, y: float) -> float:
-        """Return the depth of the liquid at a world position, m; 0 on dry ground."""
+        """Return the depth of the liquid at a position.
+
+        Parameters
+        ----------
+        x, y : float
+            World position, m.
+
+        Returns
+        -------
+        float
+            Depth, m; 0 on dry ground.
+        """
         return self.film_thickness if self.wet(x, y) else 0.0
 
     def wet_along(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return :meth:`wet` for arrays of positions, as booleans of their shape."""
+        """Return :meth:`wet` for arrays of positions.
+
+        Parameters
+        ----------
+        x, y : array
+            World position, m.
+
+        Returns
+        -------
+        array of bool
+            True on wet ground, in the shape of the positions.
+        """
         rows, columns = self.wet_map.shape
         # floor_divide is as exact as //; a rounded quotient could put a position just before the
         # edge of a cell in the next cell.

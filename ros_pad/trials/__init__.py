@@ -7,6 +7,16 @@ from ros_pad.trials.replay import Outcome
 from ros_pad.trials.replay import Replay
 from ros_pad.trials.replay import open_bag
 from ros_pad.trials.replay import replay
+from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 
-__all__ = ['NodeSettings', 'Outcome', 'Replay', 'Trial', 'open_bag', 'replay', 'run']
+__all__ = [
+    'Metrics',
+    'NodeSettings',
+    'Outcome',
+    'Replay',
+    'Trial',
+    'open_bag',
+    'replay',
+    'run',
+]

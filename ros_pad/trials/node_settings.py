@@ -178,6 +178,11 @@ class NodeSettings:
         They come from the recorded parameters of estimator and controller, as in bags of ros_pad's
         recorder, or else from the scene that the bag names.
 
+        Parameters
+        ----------
+        bag : BagReader
+            The bag.
+
         Raises
         ------
         BagError
@@ -282,7 +287,13 @@ class NodeSettings:
         return self.policy_parameters if self.policy == 'adaptive' else None
 
     def rules(self) -> Policy:
-        """Return the policy with its parameters and, for an oracle, the true ground."""
+        """Return the policy with its parameters and, for an oracle, the true ground.
+
+        Raises
+        ------
+        InvalidInput
+            When the bag is of a policy that ros_pad no longer has.
+        """
         is_wet = self.floor.wet if self.floor else None
         if self.policy == 'adaptive' and OLD_PROBING in self.policy_parameters:
             raise InvalidInput(
@@ -294,7 +305,13 @@ class NodeSettings:
         return policy_named(self.policy, is_wet, self._of_policy())
 
     def controller(self, legs: Sequence[int]) -> MorphologyController:
-        """Return a new controller of some legs."""
+        """Return a new controller.
+
+        Parameters
+        ----------
+        legs : sequence of int
+            Its legs, from 1.
+        """
         return MorphologyController(
             self.foot,
             legs,

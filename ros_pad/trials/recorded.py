@@ -393,4 +393,4 @@ def _read(
     return {key: _Series.of(topics[name], *tables[name]) for name, key in wanted.items()}
 
 
-__all__ = ['late', 'load', 'wanted_topics']
+__all__ = ['load']

@@ -50,6 +50,7 @@ class Outcome:
     Attributes
     ----------
     leg : int
+        Number of the leg.
     stance_ends : int
         Number of stances that ended in the replay.
     wet_ends : tuple
@@ -74,9 +75,11 @@ class Replay:
     Attributes
     ----------
     bag : str
+        Path of the bag.
     settings : NodeSettings
         Settings with which the bag was replayed.
     legs : tuple of int
+        Numbers of the legs.
     start_ns : int
         Beginning of the bag, ns.
     duration_s : float
@@ -85,8 +88,10 @@ class Replay:
         Number of samples that the estimator used, by leg.
     refused : dict
         Number of rejected samples, and the reason of the last one, by leg.
-    recorded, replayed : dict
-        A :class:`Track` by leg and kind.
+    recorded : dict
+        A :class:`Track` by leg and kind, as recorded.
+    replayed : dict
+        A :class:`Track` by leg and kind, as replayed.
     comparisons : list of Comparison
         One for each recorded topic of estimates and decisions.
     outcomes : list of Outcome
@@ -121,7 +126,13 @@ class Replay:
         return 'nothing'
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON, without the tracks."""
+        """Return plain values for JSON, without the tracks.
+
+        Returns
+        -------
+        dict
+            Verdict, settings, counts and comparisons, by name.
+        """
         settings = self.settings
         return {
             'bag': self.bag,
@@ -151,7 +162,17 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
     """Open a bag; for an SQLite bag, the error message has the command that converts it.
 
-    Parameters are as for :class:`ros_pad.bags.BagReader`.
+    Parameters
+    ----------
+    path : str or path
+        Folder of a bag, or one of its files.
+    progress : callable, optional
+        Called with the share of the bag that is read, 0 to 1.
+
+    Returns
+    -------
+    BagReader
+        The open bag.
 
     Raises
     ------
@@ -191,6 +212,11 @@ def replay(
         Topic of the bag, by its name in ros_pad: ``{'leg_{leg}/wrench': '/foot_{leg}/ft'}``.
     progress : callable or None
         Called now and then with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Replay
+        What estimators and controller make of the samples, beside what was recorded.
 
     Raises
     ------

@@ -27,23 +27,25 @@ class Metrics:
     Attributes
     ----------
     distance_m : float
-        Distance of the body along x.
+        Distance of the body along x, m.
     duration_s : float
-        Simulated time, including the time before the first step.
+        Simulated time, s, including the time before the first step.
     cycles : float
-        Gait cycles walked.
+        Gait cycles walked, no unit.
     distance_per_cycle_m : float
-        Mean distance of the body along x in a gait cycle.
+        Mean distance of the body along x in a gait cycle, m.
     slip_path_m : list of float
-        Length of all slip of each foot.
-    lateral_drift_m, yaw_drift_rad : float
-        Sideways position and heading of the body at the end.
+        Length of all slip of each foot, m.
+    lateral_drift_m : float
+        Sideways position of the body at the end, m.
+    yaw_drift_rad : float
+        Heading of the body at the end, rad.
     dissipation_j : float
-        Work lost in feet that slip or rotate.
+        Work lost in feet that slip or rotate, J.
     switches : list of int
         Number of switches of each foot.
     overload_s : list of float
-        Time for which each foot was a dome above its force limit.
+        Time for which each foot was a dome above its force limit, s.
     wet_accuracy : float or None
         Share of flat stances at whose end P(wet) was on the correct side of 0.5; None without
         flat stances.
@@ -57,9 +59,9 @@ class Metrics:
     underpressure : list of int
         Number of touch-downs of each foot as a dome with less pressure than its load needs.
     goal_m : float or None
-        Distance to the goal; None for a scene without a goal.
+        Distance to the goal, m; None for a scene without a goal.
     time_to_goal_s : float or None
-        Time from the first step to the goal; None if the body did not reach it.
+        Time from the first step to the goal, s; None if the body did not reach it.
     """
 
     distance_m: float
@@ -148,23 +150,42 @@ class Trial:
 
     Attributes
     ----------
-    scene, policy, fidelity : str
+    scene : str
+        Name of the scene.
+    policy : str
+        Name of the policy.
+    fidelity : str
+        Fidelity level.
     seed : int
+        Seed of floor and noise.
     legs : tuple of int
+        Numbers of the legs.
     time : ndarray (n,)
         Time of each sensor sample, s.
     body : ndarray (n, 3)
         Position x and y, m, and heading, rad.
-    force, position : ndarray (n, legs, 3)
-        Measured force of the ground, N, and position of each foot, m.
+    force : ndarray (n, legs, 3)
+        Measured force of the ground on each foot, N.
+    position : ndarray (n, legs, 3)
+        Measured position of each foot, m.
     slow_time : ndarray (m,)
         Time of each control step, s.
-    pressure, setpoint : ndarray (m, legs)
-        Gauge pressure and set-point, Pa.
-    wet_probability, friction, margin, slip_speed : ndarray (m, legs)
-        Estimates of P(wet), μ, friction margin and slip speed, m/s.
-    slipping, dome : ndarray of bool (m, legs)
-        Slip alarm, and whether the chosen morphology is dome.
+    pressure : ndarray (m, legs)
+        Gauge pressure, Pa.
+    setpoint : ndarray (m, legs)
+        Set-point, gauge Pa.
+    wet_probability : ndarray (m, legs)
+        Probability of wet ground, 0 to 1.
+    friction : ndarray (m, legs)
+        Estimated coefficient of friction.
+    margin : ndarray (m, legs)
+        Friction margin, no unit.
+    slip_speed : ndarray (m, legs)
+        Estimated slip speed, m/s.
+    slipping : ndarray of bool (m, legs)
+        Slip alarm.
+    dome : ndarray of bool (m, legs)
+        Whether the chosen morphology is dome.
     doubt : ndarray of int (m, legs)
         Why the ground was unobservable, as an index in :data:`ros_pad.estimation.DOUBTS`; 0 if it
         was observable, -1 if this is unknown. Shape (0, 0) where no doubts are on record.
@@ -178,7 +199,7 @@ class Trial:
     settings : dict
         Foot, gait and other recorded settings.
     real_time_factor : float or None
-        Simulated time over computing time; None where it is not on record.
+        Ratio of simulated time to computing time; None where it is not on record.
     """
 
     scene: str
@@ -225,9 +246,19 @@ class Trial:
         self.force[:, :, :2] = turned(self.force[:, :, 0], self.force[:, :, 1])
 
     def standing(self, load_gate: float) -> np.ndarray:
-        """Return whether each foot stands, with more than ``load_gate`` newtons: bool (n, legs).
+        """Return whether each foot stands at each sensor sample.
 
         A foot that bounces, without load for less than ``BOUNCE``, still stands.
+
+        Parameters
+        ----------
+        load_gate : float
+            Normal force above which a foot stands, N.
+
+        Returns
+        -------
+        array of bool (n, legs)
+            True in stance.
         """
         loaded = self.force[:, :, 2] > load_gate
         time = self.time[:, None]
@@ -236,9 +267,12 @@ class Trial:
         return until - since < BOUNCE
 
     def wet(self) -> np.ndarray:
-        """Return whether the true ground below each foot is wet at each control step (m, legs).
+        """Return whether the true ground below each foot is wet.
 
-        False where the position of a foot is unknown.
+        Returns
+        -------
+        array of bool (m, legs)
+            True on wet ground; False where the position of a foot is unknown.
 
         Raises
         ------

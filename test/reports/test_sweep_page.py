@@ -11,8 +11,9 @@ from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.reports import sweep_page
 from ros_pad.trials import sweep as sweeps
-from ros_pad.trials.sweep import Results
 from ros_pad.trials.sweep import Sweep
+from ros_pad.trials.sweep import table
+from ros_pad.trials.sweep.table import Results
 
 SWEEP = Sweep(
     ['leg_wet_flat'],
@@ -43,7 +44,7 @@ def folder(tmp_path):
     """Return the folder of a sweep of 32 trials, of which one failed and one ended early."""
     jobs = {job.key: job for job in SWEEP.jobs()}
     found = tmp_path / 'drag'
-    with Results(found, sweeps.identity(SWEEP), jobs) as results:
+    with Results(found, table.identity(SWEEP), jobs) as results:
         # A pool of processes may finish trials in any order.
         for number, (key, job) in enumerate(reversed(jobs.items())):
             if number == 0:
@@ -111,7 +112,7 @@ def test_the_order_in_which_trials_were_done_does_not_matter(folder, tmp_path):
         tuple(r[n] for n in ('policy', 'seed', 'body.rolling_drag')): r
         for r in sweeps.read(folder).rows
     }
-    with Results(other, sweeps.identity(SWEEP), jobs) as results:
+    with Results(other, table.identity(SWEEP), jobs) as results:
         for key, job in jobs.items():
             mine = known[job.policy, job.seed, job.labels['body.rolling_drag']]
             results.add(key, job.labels | {n: v for n, v in mine.items() if v is not None})
@@ -133,22 +134,22 @@ def test_reports_of_trials_are_linked(folder):
 def test_folders_without_trials(tmp_path):
     with pytest.raises(InvalidInput, match='holds no sweep'):
         sweeps.read(tmp_path)
-    at_work = Results(tmp_path / 'new', sweeps.identity(SWEEP), [])
+    at_work = Results(tmp_path / 'new', table.identity(SWEEP), [])
     with at_work, pytest.raises(PadError, match='is running'):
         sweeps.read(tmp_path / 'new')
     with pytest.raises(InvalidInput, match='no trial'):
         sweeps.read(tmp_path / 'new')
     (tmp_path / 'bad').mkdir()
-    (tmp_path / 'bad' / sweeps.RESULTS).write_bytes(b'no data base' * 100)
+    (tmp_path / 'bad' / table.RESULTS).write_bytes(b'no data base' * 100)
     with pytest.raises(PadError, match='damaged'):
         sweeps.read(tmp_path / 'bad')
 
 
 def test_reading_changes_nothing(folder):
-    before = (folder / sweeps.RESULTS).read_bytes()
+    before = (folder / table.RESULTS).read_bytes()
     sweep_page.write(sweeps.read(folder), folder / 'report.html')
-    assert (folder / sweeps.RESULTS).read_bytes() == before
-    with sqlite3.connect(folder / sweeps.RESULTS) as base:
+    assert (folder / table.RESULTS).read_bytes() == before
+    with sqlite3.connect(folder / table.RESULTS) as base:
         assert base.execute('SELECT count(*) FROM trial').fetchone() == (32,)
 
 

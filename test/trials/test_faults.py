@@ -12,7 +12,7 @@ from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import run
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.sweep import columns_of
+from ros_pad.trials.sweep.table import columns_of
 from ros_pad.trials.trial import fault_lines
 
 PATCHES = Scene.load('hexapod_patches')

@@ -20,8 +20,11 @@ from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials import sweep as sweeps
 from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.sweep import Results
 from ros_pad.trials.sweep import Sweep
+from ros_pad.trials.sweep import execution
+from ros_pad.trials.sweep import plan
+from ros_pad.trials.sweep import table
+from ros_pad.trials.sweep.table import Results
 
 LEG = 'leg_wet_flat'
 SHORT = {'cycles': [2]}
@@ -141,7 +144,7 @@ def test_rows_are_those_of_single_trials_whatever_the_number_of_workers(tmp_path
     assert reported == list(range(9))
     row = one[5]
     assert (row['policy'], row['seed'], row['body.rolling_drag']) == ('flat', 1, 1.0)
-    trial = loop.run(sweeps.scene_with(LEG, {'cycles': 2, 'body.rolling_drag': 1.0}), 'flat', 1)
+    trial = loop.run(plan.scene_with(LEG, {'cycles': 2, 'body.rolling_drag': 1.0}), 'flat', 1)
     assert row['distance_per_cycle_m'] == trial.metrics.distance_per_cycle_m
     assert row['slip_path_m_leg1'] == trial.metrics.slip_path_m[0]
     assert (row['level'], row['verdict'], row['error']) == ('L0', None, None)
@@ -170,11 +173,11 @@ def test_scenes_with_other_legs_share_a_table(tmp_path: pathlib.Path):
 def test_a_trial_that_fails_is_a_row_and_can_be_tried_again(tmp_path: pathlib.Path, monkeypatch):
     sweep = Sweep([LEG], ['flat'], [0, 1, 2], SHORT)
     jobs = sweep.jobs()
-    broken = dataclasses.replace(jobs[1], tuning='none')
+    broken = dataclasses.replace(jobs[1], policy_parameters=1)
     monkeypatch.setattr(Sweep, 'jobs', lambda self: [jobs[0], broken, jobs[2]])
     rows = sweeps.run(sweep, tmp_path / 'sweep', 2)
     assert [bool(row['error']) for row in rows] == [False, True, False]
-    assert 'AttributeError' in rows[1]['error']
+    assert 'TypeError' in rows[1]['error']
     assert (rows[1]['seed'], rows[1]['distance_m'], rows[1]['level']) == (1, None, 'L0')
     monkeypatch.undo()
     assert sweeps.run(sweep, tmp_path / 'sweep', 1) == rows
@@ -258,7 +261,7 @@ def test_folders_that_hold_something_else_are_left_alone(tmp_path: pathlib.Path)
     with pytest.raises(InvalidInput, match='holds no sweep'):
         Results(tmp_path / 'full', {}, [])
     (tmp_path / 'bad').mkdir()
-    (tmp_path / 'bad' / sweeps.RESULTS).write_text('no base of data' * 100)
+    (tmp_path / 'bad' / table.RESULTS).write_text('no base of data' * 100)
     with pytest.raises(PadError, match=r'trials.sqlite is damaged'):
         Results(tmp_path / 'bad', {}, [])
 
@@ -278,21 +281,21 @@ def test_a_kill_in_the_middle_of_a_write_leaves_the_rows_before_it(tmp_path: pat
     if not child:
         with Results(tmp_path / 'sweep', {}, ['a', 'b']) as results:
             results.add('a', {'n': 1})
-        base = sqlite3.connect(tmp_path / 'sweep' / sweeps.RESULTS, isolation_level=None)
+        base = sqlite3.connect(tmp_path / 'sweep' / table.RESULTS, isolation_level=None)
         base.execute('PRAGMA cache_size = 1')
         base.execute('BEGIN')
         for number in range(100):
             base.execute('INSERT INTO trial VALUES (?, ?)', (f'b{number}', 'x' * 10000))
         os.kill(os.getpid(), signal.SIGKILL)
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
-    assert (tmp_path / 'sweep' / sweeps.RESULTS).stat().st_size > 500_000  # rows without commit
+    assert (tmp_path / 'sweep' / table.RESULTS).stat().st_size > 500_000  # rows without commit
     with Results(tmp_path / 'sweep', {}, ['a', 'b']) as results:
         assert results.rows(['a', 'b'])[0]['n'] == 1
         assert len(results) == 1
         results.add('b', {'n': 2})
         results.add('b', {'n': 3})
         assert [row['n'] for row in results.rows(['a', 'b'])] == [1, 2]
-    base = sqlite3.connect(tmp_path / 'sweep' / sweeps.RESULTS)
+    base = sqlite3.connect(tmp_path / 'sweep' / table.RESULTS)
     assert base.execute('SELECT COUNT(*) FROM trial').fetchone() == (2,)
 
 
@@ -358,7 +361,7 @@ def test_a_cluster_that_loses_a_worker_loses_no_trial(tmp_path: pathlib.Path):
     assert killed
     with Results(tmp_path / 'here', {}, []) as results:
         for job in sweep.jobs():
-            results.add(job.key, sweeps.run_job(job))
+            results.add(job.key, execution.run_job(job))
         here = results.rows(job.key for job in sweep.jobs())
     assert [row['error'] for row in rows] == [None] * 16
     assert without_pace(rows) == without_pace(here)

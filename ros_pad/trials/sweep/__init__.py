@@ -7,24 +7,14 @@ folder, so that a killed sweep can continue where it stopped. At the end the swe
 """
 
 from ros_pad.trials.sweep.execution import run
-from ros_pad.trials.sweep.execution import run_job
 from ros_pad.trials.sweep.plan import Job
 from ros_pad.trials.sweep.plan import Row
 from ros_pad.trials.sweep.plan import Sweep
 from ros_pad.trials.sweep.plan import Value
-from ros_pad.trials.sweep.plan import scene_with
 from ros_pad.trials.sweep.summary import Found
 from ros_pad.trials.sweep.summary import Point
 from ros_pad.trials.sweep.summary import is_sweep
 from ros_pad.trials.sweep.summary import points
 from ros_pad.trials.sweep.summary import read
-from ros_pad.trials.sweep.table import RESULTS
-from ros_pad.trials.sweep.table import Results
-from ros_pad.trials.sweep.table import columns_of
-from ros_pad.trials.sweep.table import identity
-from ros_pad.trials.sweep.table import write_tables
 
-__all__ = [
-    'RESULTS', 'Found', 'Job', 'Point', 'Results', 'Row', 'Sweep', 'Value', 'columns_of',
-    'identity', 'is_sweep', 'points', 'read', 'run', 'run_job', 'scene_with', 'write_tables',
-]  # fmt: skip
+__all__ = ['Found', 'Job', 'Point', 'Row', 'Sweep', 'Value', 'is_sweep', 'points', 'read', 'run']

@@ -20,6 +20,7 @@ from typing import TypeAlias
 from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.configuration import choice
+from ros_pad.configuration import instance
 from ros_pad.control import POLICIES
 from ros_pad.control import policy_named
 from ros_pad.control.policies import PREFIX
@@ -39,7 +40,10 @@ _POLICY = [each.name for each in POLICY_SETTINGS]
 LARGEST_SEED = 2**31 - 1
 
 Value: TypeAlias = 'float | int | bool | str'
+"""Value of a parameter of a sweep."""
+
 Row: TypeAlias = 'dict[str, Any]'
+"""Values of a trial by column."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,10 @@ class Job:
         Scene, policy, seed and parameters, which identify the trial; first columns of its row.
     scene : Scene
         Scene with the parameters of this trial.
-    policy, level : str
-        Policy and fidelity level.
+    policy : str
+        Policy.
+    level : str
+        Fidelity level.
     seed : int
         Seed of floor and noise.
     tuning : Tuning
@@ -76,7 +82,18 @@ class Job:
         return json.dumps(self.labels, sort_keys=True)
 
     def failed(self, error: object) -> Row:
-        """Return the row that has an error in place of the metrics of this trial."""
+        """Return the row that has an error in place of the metrics of this trial.
+
+        Parameters
+        ----------
+        error : object
+            Error of the trial.
+
+        Returns
+        -------
+        dict
+            Labels of the trial, and the text of the error.
+        """
         return self.labels | {'level': self.level, 'error': str(error)}
 
 
@@ -105,6 +122,13 @@ class Sweep:
     InvalidInput
         When scenes, seeds or the values of a parameter are empty, a value is given twice, a policy
         is unknown, or a seed or name is not allowed.
+
+    Examples
+    --------
+    >>> from ros_pad.trials.sweep import Sweep
+    >>> sweep = Sweep(['leg_wet_flat'], ['flat', 'dome'], range(3))
+    >>> [(job.policy, job.seed) for job in sweep.jobs()]
+    [('flat', 0), ('flat', 1), ('flat', 2), ('dome', 0), ('dome', 1), ('dome', 2)]
     """
 
     scenes: Sequence[str]
@@ -114,8 +138,11 @@ class Sweep:
     fidelity: str = 'auto'
 
     def __post_init__(self) -> None:
+        instance('parameters', self.parameters, Mapping)
         axes = {'scene': self.scenes, 'policy': self.policies, 'seed': self.seeds}
         for name, values in (*axes.items(), *self.parameters.items()):
+            if isinstance(values, str):
+                raise InvalidInput(f'{name} = {values!r} is not allowed: a list is needed')
             if not values and name != 'policy':
                 raise InvalidInput(f'{name}: at least one value is needed')
             for place, value in enumerate(values):
@@ -135,6 +162,11 @@ class Sweep:
 
     def jobs(self) -> list[Job]:
         """Return the trials, in order, each checked as far as is possible without running it.
+
+        Returns
+        -------
+        list of Job
+            The trials.
 
         Raises
         ------
@@ -217,6 +249,18 @@ def _errors_naming(values: Mapping[str, Value]) -> Iterator[None]:
 
 def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> Scene:
     """Read a scene with changed values of some dotted keys of its YAML, such as ``tow.weight``.
+
+    Parameters
+    ----------
+    source : str or path
+        Name of a shipped scene, or path of a YAML file.
+    values : mapping
+        Values by dotted key.
+
+    Returns
+    -------
+    Scene
+        The scene.
 
     Raises
     ------

@@ -35,12 +35,13 @@ class Found:
     Attributes
     ----------
     folder : Path
+        Folder of the sweep.
     sweep : Sweep
         Scenes, policies, seeds and parameters of the finished trials.
     rows : list of dict
         One row for each finished trial, in the order of the sweep, all with the same columns.
     about : dict
-        Version, fidelity, parameters and scenes, see :func:`identity`.
+        Version, fidelity, parameters and checksums of the scenes.
     """
 
     folder: pathlib.Path
@@ -56,12 +57,33 @@ class Found:
 
 
 def is_sweep(folder: str | os.PathLike[str]) -> bool:
-    """Return whether a folder holds a sweep."""
+    """Return whether a folder holds a sweep.
+
+    Parameters
+    ----------
+    folder : str or path
+        The folder.
+
+    Returns
+    -------
+    bool
+        True if it has the file of a sweep.
+    """
     return (pathlib.Path(folder) / RESULTS).is_file()
 
 
 def read(folder: str | os.PathLike[str]) -> Found:
     """Read the finished trials of a sweep, without changing its folder.
+
+    Parameters
+    ----------
+    folder : str or path
+        Folder of the sweep.
+
+    Returns
+    -------
+    Found
+        Its finished trials.
 
     Raises
     ------
@@ -132,8 +154,11 @@ class Point:
         Number of walks that failed or ended early.
     mean : float or None
         Mean distance, m; None without walks.
-    low, high : float or None
-        Ends of the 95 % interval of the mean by Student's t, m; None for fewer than two walks.
+    low : float or None
+        Lower end of the 95 % interval of the mean by Student's t, m; None for fewer than two
+        walks.
+    high : float or None
+        Upper end of this interval, m.
     """
 
     labels: Row
@@ -145,7 +170,20 @@ class Point:
 
 
 def points(rows: Iterable[Row], parameters: Iterable[str]) -> list[Point]:
-    """Return the mean distance per cycle over the seeds, with interval, for each combination."""
+    """Return the mean distance per cycle over the seeds, for each combination of the rest.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Rows of a sweep, from :func:`run` or :func:`read`.
+    parameters : iterable of str
+        Names of the parameters of the sweep.
+
+    Returns
+    -------
+    list of Point
+        Mean distance, m, and its 95 % interval.
+    """
     names = ('scene', 'policy', *parameters)
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:

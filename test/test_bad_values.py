@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Public functions refuse bad arguments with an error that names the argument and its value."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ros_pad import capillary
+from ros_pad import contact
+from ros_pad import control
+from ros_pad import estimation
+from ros_pad import robots
+from ros_pad import sensing
+from ros_pad import simulation
+from ros_pad import trials
+from ros_pad.bags import BagWriter
+from ros_pad.contact import LARGE_PAD
+from ros_pad.contact import WATER
+from ros_pad.errors import InvalidInput
+from ros_pad.simulation import Hose
+from ros_pad.simulation import RegulatorModel
+from ros_pad.trials.sweep import Sweep
+
+FOOT = contact.Foot.load('large19')
+ROBOT = robots.Robot.load('go2')
+FACE = capillary.Face.floor(1e-3)
+CENTRE = [0.0, 1.0, 2.0]
+FLOOR = simulation.Floor.uniform(True, 1e-4)
+HEXAPOD = simulation.Scene.load('hexapod_patches')
+RAIL_LEG = simulation.Scene.load('leg_wet_flat')
+CONTROLLER = control.MorphologyController(FOOT, [1], control.flat, 5.0)
+
+
+def sample(**bad: Any) -> sensing.BodyEstimate:
+    """Give an estimator one sample."""
+    joints = ROBOT.home.ravel()
+    good = {
+        'gyro': np.zeros(3),
+        'accelerometer': np.array([0.0, 0.0, 9.81]),
+        'joint_positions': joints,
+        'joint_velocities': 0.0 * joints,
+    }
+    return sensing.BodyEstimator(ROBOT).update(0.0, **(good | bad))
+
+
+CASES = (
+    (contact.inflate, ('large', 75e3), 'pad'),
+    (contact.press, ('large', 75e3, 0.1), 'pad'),
+    (contact.force_limit, ('large', 75e3), 'pad'),
+    (contact.pressure_for, ('large', 0.1), 'pad'),
+    (contact.design, (4.0, 9e-4, 'large'), 'pad'),
+    (contact.tangential_resistance, ('large19', 2.0, 0.0), 'foot'),
+    (contact.squeeze, (LARGE_PAD, 1e-4, [0.0, 1.0], 1.0), 'surface'),
+    (contact.HalfSpace(1e-2, 1e5, 1.0).contact_radius, (-1.0,), 'load'),
+    (contact.Membrane(1e-2, 20.0, 1e4).contact_radius, (-1.0,), 'load'),
+    (contact.Film(FOOT).touch_down, (-1e-4,), 'thickness'),
+    (capillary.bath_meniscus, (), {'liquid': WATER, 'wall': 1e-3}),
+    (capillary.press_wet, ('large', 75e3, 0.1, WATER), 'pad'),
+    (capillary.bath_surface, ('dome', WATER), 'face'),
+    (capillary.bath_surface, (FACE, WATER, 9.81, 24.5), 'sectors'),
+    (capillary.pattern_surface, (FACE, 'water', 4e-3), 'liquid'),
+    (capillary.pattern_surface, (FACE, WATER, 4e-3, 6, None, math.nan), 'volume'),
+    (capillary.pattern_surface, (FACE, WATER, 4e-3, 6, None, 1e-9, 9.81, '24'), 'sectors'),
+    (capillary.spanned, (FACE, 'floor', (0.3, 0.3), (1.0, 1.0)), 'last'),
+    (capillary.spanned, (FACE, FACE, (0.3, 0.3), (1.0, 1.0), 24, 8, -1.0), 'growth'),
+    (capillary.Wall.through, ([1e-3, 2e-3], [0.0, 'top']), 'heights'),
+    (capillary.Face.revolution, ([1e-3, 2e-3], [0.0, math.nan]), 'heights'),
+    (capillary.Face.revolution, ([1e-3], [0.0]), 'radii'),
+    (capillary.Face.plate, (1e-3, '1 mm'), 'heights'),
+    (capillary.Face.floor, (1e-3, CENTRE), 'centre'),
+    (capillary.Face.of_wall, (1e-3,), 'wall'),
+    (capillary.Line.ring, ('floor', [0, 1, 2], 0.5), 'face'),
+    (robots.Gait.named, ('tripod', [0.1, 0.2], 1.0, 0.6, 0.03), 'hips'),
+    (ROBOT.gravity_torques, (ROBOT.home, -9.81), 'gravity'),
+    (ROBOT.joint_positions, ([0.1, 0.0, -0.3],), 'feet'),
+    (sensing.BodyEstimator, ('go2',), 'robot'),
+    (sensing.Mapping.load, ('go2', 'go2'), 'robot'),
+    (sample, (), {'gyro': None}),
+    (sample, (), {'joint_velocities': None}),
+    (estimation.FootEstimator, ('large19', 5.0), 'foot'),
+    (estimation.FootEstimator, (FOOT, 5.0, {'wet_prior': 0.2}), 'tuning'),
+    (estimation.estimators_of, (6.0, FOOT, 5.0, estimation.Tuning()), 'count'),
+    (estimation.estimators_of, (6, FOOT, 5.0, None), 'tuning'),
+    (control.first_morphologies, ('adaptiv', [1, 2]), 'policy'),
+    (control.dome_pressure, ('large19', 5.0, 1.2), 'foot'),
+    (control.dome_pressure, (FOOT, -5.0, 1.2), 'load'),
+    (control.MorphologyController, ('large19', [1], control.flat, 5.0), 'foot'),
+    (control.MorphologyController, (FOOT, [1], 'adaptive', 5.0), 'policy'),
+    (CONTROLLER.morphology, (7,), 'leg'),
+    (CONTROLLER.setpoint, (7,), 'leg'),
+    (simulation.PneumaticChannel, ('alicat', Hose(4e-3, 1.0), 5e-6), 'regulator'),
+    (simulation.PneumaticChannel, (RegulatorModel(), 4e-3, 5e-6), 'hose'),
+    (simulation.Floor.patches, ('half', 0.5, 1e-4, 0), 'wet_fraction'),
+    (simulation.Floor.drawn, (['#.'], '0.1', 1e-4), 'cell'),
+    (simulation.PlanarRobot, ('hexapod_patches', FLOOR, 1e-3), 'scene'),
+    (simulation.PlanarRobot, (RAIL_LEG, FLOOR, 1e-3), 'scene.body'),
+    (simulation.PlanarRobot, (HEXAPOD, 'wet', 1e-3), 'floor'),
+    (simulation.RailLeg, (HEXAPOD, FLOOR, 1e-3), 'scene.body'),
+    (trials.run, ('leg_wet_flat',), {'tuning': {'wet_prior': 0.2}}),
+    (Sweep, ('leg_wet_flat',), 'scene'),
+    (Sweep, (['leg_wet_flat'], (), [0], [('wet_prior', [0.2])]), 'parameters'),
+)
+"""Function, its arguments, and the name of the bad one, or bad arguments by name."""
+
+
+@pytest.mark.parametrize(('function', 'arguments', 'bad'), CASES)
+def test_the_error_names_the_argument(function: Callable, arguments: tuple, bad: Any):
+    named = bad if isinstance(bad, dict) else {}
+    name = list(named)[-1] if named else bad
+    with pytest.raises(InvalidInput, match=rf'^{name}\b.* needed'):
+        function(*arguments, **named)
+
+
+def test_custom_data_must_be_a_mapping(tmp_path):
+    with pytest.raises(InvalidInput, match=r"^custom_data = 'ch3r' .* needed"):
+        BagWriter(tmp_path / 'bag', 'ch3r')
