@@ -49,6 +49,7 @@ from ros_pad.contact.resistance import RUBBER_SETTINGS
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.squeeze import STIFF
 from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation.pneumatics import Hose
@@ -111,19 +112,20 @@ def _own(name: str, unit: str, low: float, high: float) -> Setting:
     return Setting(name, float, '', unit, low, high)
 
 
+_MM, _UM, _KPA = ('mm', 1e-3), ('µm', 1e-6), ('kPa', 1e3)
 FIELDS = (
     Field('pads', 'Pads', _of(FOOT_SETTINGS, 'pads'), 1, 400, 1, '', 1),
-    Field('radius', 'Pad radius', _of(PAD_SETTINGS, 'radius'), 0.2, 4.0, 0.05, 'mm', 1e-3),
+    Field('radius', 'Pad radius', _of(PAD_SETTINGS, 'radius'), 0.2, 4.0, 0.05, *_MM),
     Field('stiffness', 'Stiffness', _of(PAD_SETTINGS, 'stiffness'), 2, 150, 0.5, 'N/m', 1),
-    Field('thickness', 'Thickness', _of(RUBBER_SETTINGS, 'thickness'), 0.05, 1.5, 0.01, 'mm', 1e-3),
-    Field('sole_radius', 'Sole radius', _of(FOOT_SETTINGS, 'sole_radius'), 3, 60, 0.5, 'mm', 1e-3),
-    Field('supply', 'Highest pressure', _of(FOOT_SETTINGS, 'ceiling', 'supply'), 1, 150, 1, 'kPa', 1e3),
-    Field('pressure', 'Pressure', _own('pressure', 'Pa', 0.0, 1e6), 0, 150, 0.5, 'kPa', 1e3),
+    Field('thickness', 'Thickness', _of(RUBBER_SETTINGS, 'thickness'), 0.05, 1.5, 0.01, *_MM),
+    Field('sole_radius', 'Sole radius', _of(FOOT_SETTINGS, 'sole_radius'), 3, 60, 0.5, *_MM),
+    Field('supply', 'Highest pressure', _of(FOOT_SETTINGS, 'ceiling', 'supply'), 1, 150, 1, *_KPA),
+    Field('pressure', 'Pressure', _own('pressure', 'Pa', 0.0, 1e6), 0, 150, 0.5, *_KPA),
     Field('load', 'Load on the foot', _own('load', 'N', 1e-3, 1e4), 0.1, 100, 0.1, 'N', 1),
-    Field('film', 'Liquid film', _own('film', 'm', 1e-6, 1e-2), 0.01, 1, 0.01, 'mm', 1e-3),
+    Field('film', 'Liquid film', _own('film', 'm', 1e-6, 1e-2), 0.01, 1, 0.01, *_MM),
     Field('stand', 'Time on the film', _own('stand', 's', 1e-4, 1e3), 0.01, 2, 0.01, 's', 1),
-    Field('roughness', 'Roughness, RMS', _own('roughness', 'm', 0.0, 1e-3), 0, 10, 0.1, 'µm', 1e-6),
-    Field('bore', 'Hose, inside', _own('bore', 'm', 0.5e-3, 20e-3), 0.5, 8, 0.1, 'mm', 1e-3),
+    Field('roughness', 'Roughness, RMS', _own('roughness', 'm', 0.0, 1e-3), 0, 10, 0.1, *_UM),
+    Field('bore', 'Hose, inside', _own('bore', 'm', 0.5e-3, 20e-3), 0.5, 8, 0.1, *_MM),
     Field('hose', 'Hose, length', _own('hose', 'm', 0.0, 50.0), 0, 10, 0.1, 'm', 1),
 )  # fmt: skip
 _BLAMED = {'ceiling': 'supply', 'limit': 'criterion', 'setpoint': 'pressure', 'force': 'load'}
@@ -242,6 +244,10 @@ class Explored:
     pitch: float
     touching: float
 
+    def valid(self, name: str) -> bool:
+        """Return whether an input has no error."""
+        return not any(each.error and each.name == name for each in self.verdicts)
+
 
 class _Parts:
     """Computes parts, and turns their errors into verdicts."""
@@ -265,6 +271,8 @@ class _Parts:
         except InvalidInput as error:
             name = str(error).partition(' = ')[0]
             self.note(_BLAMED.get(name, name), str(error), True)
+        except ConfigError as error:
+            self.note('material', str(error), True)
         return None
 
     def note(self, name: str, text: str, error: bool = False) -> None:
@@ -279,21 +287,21 @@ def explore(inputs: Inputs) -> Explored:
     """Compute everything that the page shows."""
     parts = _Parts()
     for field in FIELDS:
-        value = getattr(inputs, field.name)
-        if value is not None or field.name != 'thickness':
-            parts('', field.setting.accept, value) if value is not None else parts.note(
-                field.name, f'{field.name}: {field.setting.allowed} is needed', True
-            )
+        if field.name != 'thickness' or inputs.thickness is not None:
+            parts('', field.setting.accept, getattr(inputs, field.name))
     pad = parts('radius stiffness thickness', _pad, inputs)
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
     parts('pressure', _below_ceiling, inputs, foot)
     free = parts('pressure', lambda pad: inflate(pad, inputs.pressure), pad)
-    places, pitch = parts('pads sole_radius radius', _places, inputs, free, parts) or (None, 0.0)
+    around = functools.partial(_places, inputs, free, parts)
+    places, pitch = parts('pads sole_radius radius', around) or (None, math.nan)
     limits = parts('pressure', _limits, pad, inputs.pressure) or {}
     limit = parts('pressure', _limit, inputs, foot, limits, parts)
-    pressed = parts('pressure load pads', _pressed, inputs, pad, limit, parts)
-    loads, curves = _curves(inputs, foot, limits, limit, free, parts)
+    loads, curves = parts('load', _curves, inputs, foot, limits, parts) or (np.zeros(1), {})
+    touching = parts('load roughness', _touching, inputs, foot) or 0.0
+    share = parts('load pads', lambda: inputs.load / inputs.pads)
+    pressed = parts('pressure', press, pad, inputs.pressure, share)
     return Explored(
         inputs=inputs,
         verdicts=tuple(parts.verdicts),
@@ -311,7 +319,7 @@ def explore(inputs: Inputs) -> Explored:
         switching=parts('pressure bore hose', _switched, inputs, foot, parts),
         places=places,
         pitch=pitch,
-        touching=parts('load roughness', _touching, inputs, foot) or 0.0,
+        touching=touching,
     )
 
 
@@ -369,7 +377,7 @@ def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
 
 
 def _places(inputs: Inputs, free: Inflated | None, parts: _Parts) -> tuple[Array, float]:
-    """Return centres of the pads in a hexagonal pattern that fills the sole, and their pitch, m."""
+    """Return centres of the pads in a hexagonal pattern over the sole, and their pitch, m."""
     radius, lattice = inputs.radius, hexagonal(inputs.pads)
     reach = float(np.hypot(*lattice.T).max())
     pitch = max(inputs.sole_radius - radius, 0.0) / max(reach, 0.5)
@@ -406,7 +414,8 @@ def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Part
     if np.isnan(spread).any():
         parts.note(
             'pressure',
-            'in doubt: if the material is as soft as it may be, its model ends below this pressure',
+            'in doubt: were the material as soft as it may be, its model would end below this'
+            ' pressure',
         )
     others += spread[~np.isnan(spread)].tolist()
     if inputs.load > value:
@@ -418,6 +427,7 @@ def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Part
     return Span(value, min(others), max(others))
 
 
+@functools.lru_cache(maxsize=8)
 def _by_factor(foot: Foot, pressure: float) -> Array:
     """Return the limit of a pad, N, over the range of the factor of its material.
 
@@ -430,25 +440,16 @@ def _by_factor(foot: Foot, pressure: float) -> Array:
     return np.asarray(times * force_limit(foot.pad, pressure / times, foot.limit))
 
 
-def _pressed(inputs: Inputs, pad: Pad, limit: Span | None, parts: _Parts) -> Pressed:
-    return press(pad, inputs.pressure, inputs.load / inputs.pads)
-
-
 def _limit_curve(foot: Foot) -> tuple[Array, Array]:
     pressures = np.linspace(0.0, foot.ceiling, _PRESSURES)
     return pressures, np.array([foot.dome_load(math.inf, each) for each in pressures.tolist()])
 
 
 def _curves(
-    inputs: Inputs,
-    foot: Foot | None,
-    limits: Mapping[str, float],
-    limit: Span | None,
-    free: Inflated | None,
-    parts: _Parts,
+    inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts
 ) -> tuple[Array, dict[str, Array]]:
     """Return loads, the last of them the present one, and the capacity there by state, N."""
-    largest = 2.0 * inputs.load if limit is None else max(1.3 * inputs.load, 1.2 * limit.value)
+    largest = max(1.3 * inputs.load, 1.2 * foot.pads * limits.get(foot.limit, 0.0))
     loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs.load)
     found = {}
     for state in STATES:
@@ -541,7 +542,7 @@ def _switched(inputs: Inputs, foot: Foot, parts: _Parts) -> Switching | None:
     return found
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=8)
 def _switching(foot: Foot, pressure: float, hose: Hose) -> Switching:
     regulator = RegulatorModel(full_scale=max(RegulatorModel().full_scale, pressure))
     channel = PneumaticChannel(regulator, hose, foot.air_volume)
@@ -583,7 +584,7 @@ def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
         'Foot',
         [
             Row('limit', 'force limit', _span(found.limit, 'N')),
-            Row('pitch', 'pitch of the pads', _text(found.pitch or math.nan, 'mm', 1e-3)),
+            Row('pitch', 'pitch of the pads', _text(found.pitch, 'mm', 1e-3)),
             Row('fill', 'fills to 90 % in', _text(switching.fill if switching else math.nan, 's')),
             Row('vent', 'flat again after', _text(switching.vent if switching else math.nan, 's')),
         ],

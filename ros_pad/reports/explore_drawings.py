@@ -139,6 +139,8 @@ def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -
 def profile(found: Explored) -> Drawing:
     """Draw the dome free and pressed on the floor; cut through its axis."""
     radius, free, pressed = found.inputs.radius, found.free, found.pressed
+    if found.pad is None:
+        return Drawing('One pad on the floor', 'There is no pad.', _nothing())
     tall = max(radius, *(each.height for each in (free, pressed) if each is not None), 0.0)
     scale = min((WIDTH - 40.0) / (3.2 * radius), (HEIGHT - 96.0) / tall)
     base, centre = 44.0, 0.5 * WIDTH
@@ -173,6 +175,8 @@ def profile(found: Explored) -> Drawing:
 
 def sole(found: Explored) -> Drawing:
     """Draw the sole from below, flat and domed, with what touches the floor."""
+    if found.places is None:
+        return Drawing('Sole from below', 'There is no sole.', _nothing())
     size = 0.22 * WIDTH
     middle = 0.5 * HEIGHT - 14.0
     scale = size / found.inputs.sole_radius
@@ -186,7 +190,7 @@ def sole(found: Explored) -> Drawing:
                 f' cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>'
             )
         contact = found.pressed.contact_radius if name == 'dome' and found.pressed else 0.0
-        for x, y in () if found.places is None else found.places.tolist():
+        for x, y in found.places.tolist():
             place = f'cx="{centre + scale * x:.1f}" cy="{middle + scale * y:.1f}"'
             body.append(f'<circle class="pad" {place} r="{scale * found.inputs.radius:.2f}"/>')
             if contact:
@@ -199,8 +203,8 @@ def sole(found: Explored) -> Drawing:
         f'flat: {100.0 * found.touching:.3g} % touches' if found.touching else 'flat: –',
         'domes: –' if math.isnan(share) else f'domes: {100.0 * share:.3g} % touches',
     ]
-    for place, text in zip((0.26, 0.74), words, strict=True):
-        body.append(_text(place * WIDTH, HEIGHT - 10.0, text, 'middle'))
+    for share, text in zip((0.26, 0.74), words, strict=True):
+        body.append(_text(share * WIDTH, HEIGHT - 10.0, text, 'middle'))
     alt = f'{found.inputs.pads} pads on the sole. {". ".join(words)} of the area of the sole.'
     return Drawing('Sole from below', alt, ''.join(body))
 
@@ -236,11 +240,13 @@ def limits(found: Explored) -> Drawing:
         return Drawing(title, 'No force limit can be computed.', _nothing())
     pressures, curve = found.limit_curve
     there = {name: foot.pads * each for name, each in found.limits.items() if each == each}
-    top = 1.08 * max(float(curve.max()), found.inputs.load, *there.values(), 0.0)
+    load = found.inputs.load if found.valid('load') else 0.0
+    top = 1.08 * max(float(curve.max()), load, *there.values())
     plot = Plot(1e-3 * foot.ceiling, top, 'gauge pressure, kPa', 'force limit of the foot, N')
     plot.line((1e-3 * pressures).tolist(), curve.tolist(), 'ink')
-    plot.line([0.0, plot.x_end], [found.inputs.load] * 2, 'dry')
-    plot.parts.append(_text(plot.left + 6.0, plot.y(found.inputs.load) - 5.0, 'load'))
+    if load:
+        plot.line([0.0, plot.x_end], [load, load], 'dry')
+        plot.parts.append(_text(plot.left + 6.0, plot.y(load) - 5.0, 'load'))
     now, lowest = 1e-3 * found.inputs.pressure, math.inf
     if found.limit is not None:
         plot.line([now, now], [found.limit.low, found.limit.high], 'wet')
