@@ -302,6 +302,8 @@ def explore(inputs: Inputs) -> Explored:
     touching = parts('load roughness', _touching, inputs, foot) or 0.0
     share = parts('load pads', lambda: inputs.load / inputs.pads)
     pressed = parts('pressure', press, pad, inputs.pressure, share)
+    ring = parts('', meniscus, pressed, LIQUIDS[inputs.liquid])
+    switching = parts('pressure bore hose', _switched, inputs, foot, parts)
     return Explored(
         inputs=inputs,
         verdicts=tuple(parts.verdicts),
@@ -309,14 +311,14 @@ def explore(inputs: Inputs) -> Explored:
         foot=foot,
         free=free,
         pressed=pressed,
-        ring=parts('', meniscus, pressed, LIQUIDS[inputs.liquid]),
+        ring=ring,
         limits=limits,
         limit=limit,
         limit_curve=None if foot is None else _limit_curve(foot),
         grip={state: Span(*curve[:, -1].tolist()) for state, curve in curves.items()},
         loads=loads[:-1],
         curves={state: curve[:, :-1] for state, curve in curves.items()},
-        switching=parts('pressure bore hose', _switched, inputs, foot, parts),
+        switching=switching,
         places=places,
         pitch=pitch,
         touching=touching,

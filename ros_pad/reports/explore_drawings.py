@@ -22,6 +22,7 @@ from ros_pad.reports.style import STANCE
 from ros_pad.reports.style import VERMILION
 
 WIDTH, HEIGHT = 480.0, 310.0
+NAMES = ('profile', 'sole', 'grip', 'limits')
 COLOURS = {
     'light': {'ink': BLACK, 'pale': PALE, 'sole': STANCE, 'dry': VERMILION, 'wet': BLUE},
     'dark': {'ink': '#e6e6e6', 'pale': '#8a8f98', 'sole': '#3a3f47', 'dry': '#f0955a',
@@ -118,12 +119,8 @@ class Plot:
 
 def drawings(found: Explored) -> dict[str, Drawing]:
     """Return the drawings of the page by name."""
-    return {
-        'profile': profile(found),
-        'sole': sole(found),
-        'grip': grip(found),
-        'limits': limits(found),
-    }
+    made = profile(found), sole(found), grip(found), limits(found)
+    return dict(zip(NAMES, made, strict=True))
 
 
 def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -> Array:
