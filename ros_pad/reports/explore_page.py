@@ -49,10 +49,12 @@ body {{ background: var(--paper); color: var(--ink); font: 15px/1.45 system-ui, 
   max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
 .top {{ grid-column: 1 / -1; display: flex; flex-wrap: wrap; gap: 0.5rem 1rem;
   align-items: center; }}
-.top h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0 auto 0 0; }}
+.top > :first-child {{ margin-right: auto; }}
+.top h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
 .inputs {{ grid-row: 2 / 4; }}
 h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0.35rem; }}
-.control {{ margin-bottom: 0.25rem; }}
+.control {{ margin-bottom: 0.4rem; }}
+.control input[type=range] {{ width: 100%; accent-color: var(--wet); margin: 0; }}
 .verdict {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
   padding-left: 0.5rem; border-left: 3px solid var(--wet); overflow-wrap: anywhere; }}
 .verdict.error {{ border-color: var(--dry); font-weight: 600; }}
@@ -60,11 +62,10 @@ h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
 .figures svg {{ display: block; width: 100%; height: auto; }}
 .numbers {{ display: grid; gap: 0 1.5rem; margin-top: 0.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(14.5rem, 1fr)); }}
-dl {{ display: grid; grid-template-columns: auto auto; justify-content: space-between;
-  margin: 0; font-size: 0.9rem; }}
+  grid-template-columns: repeat(auto-fit, minmax(17rem, 1fr)); }}
+dl {{ display: grid; grid-template-columns: 1fr auto; margin: 0; font-size: 0.9rem; }}
 dt, dd {{ border-bottom: 1px solid var(--line); padding: 0.12rem 0; margin: 0; }}
-dd {{ text-align: right; font-variant-numeric: tabular-nums; }}
+dd {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
 .note {{ font-size: 0.82rem; max-width: 62rem; margin-top: 0.8rem; }}
 .stale {{ opacity: 0.35; }}
 @media (max-width: 800px) {{
@@ -147,7 +148,7 @@ class Page:
         fields = {field.name: field for field in FIELDS}
         with ui.element('main').classes('explore'):
             with ui.element('div').classes('top'):
-                ui.html(f'<h1>{html.escape(self._inputs.foot.source)}: a foot by looking</h1>')
+                ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>')
                 self._status = ui.label().props('role=status')
                 ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
                 ui.button('Picture', on_click=self._picture).props('outline no-caps dense')
@@ -175,29 +176,29 @@ class Page:
         value = getattr(self._inputs, field.name)
         shown = None if value is None else float(f'{value / field.unit:.9g}')
 
-        def typed(event: Any) -> None:
-            number = event.value
-            if number is not None and field.low <= number <= field.high:
-                slider.value = number
-            if number is None:
-                given = None if field.name == 'thickness' else math.nan
-            elif field.setting.value_type is int and number == int(number):
-                given = int(number)
-            else:
-                # Without the rounding of the unit: 1.3 mm are 0.0013 m.
-                given = float(f'{number * field.unit:.12g}')
-            self._change(field.name, given)
+        sliding = False
 
-        box = self._ui.number(field.label, value=shown, step=field.step, on_change=typed)
+        def slid(event: Any) -> None:
+            nonlocal sliding
+            sliding = True
+            box.set_value(float(event.args))
+            sliding = False
+
+        def changed(event: Any) -> None:
+            number = event.value
+            if number is not None and not sliding:
+                # As a property of the element, old values would pull at a slider that moves.
+                ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
+            self._change(field.name, _si(field, number))
+
+        ui = self._ui
+        box = ui.number(field.label, value=shown, step=field.step, on_change=changed)
         box.props(f'dense outlined suffix="{field.shown}" name={field.name}')
-        slider = self._ui.slider(
-            min=field.low,
-            max=field.high,
-            step=field.step,
-            value=shown,
-            on_change=lambda event: box.set_value(event.value),
+        slider = ui.element('input').props(
+            f'type=range min={field.low} max={field.high} step={field.step} default-value={shown}'
+            f' aria-label="{field.label}, {field.shown}"'
         )
-        slider.props(f'aria-label="{field.label}, {field.shown}" name={field.name} dense')
+        slider.on('input', slid, js_handler='(event) => emit(event.target.value)')
 
     def _choice(self, name: str) -> None:
         value = getattr(self._inputs, name)
@@ -288,6 +289,16 @@ class Page:
         if self._found is not None:
             drawn = explore_drawings.picture(self._found)
             self._ui.download.content(drawn, 'foot.svg')
+
+
+def _si(field: Field, number: float | None) -> float | None:
+    """Return what was typed in SI units; a number that is missing is NaN, or no thickness."""
+    if number is None:
+        return None if field.name == 'thickness' else math.nan
+    if field.setting.value_type is int and number == int(number):
+        return int(number)
+    # Without the rounding of the unit: 1.3 mm are 0.0013 m.
+    return float(f'{number * field.unit:.12g}')
 
 
 def foot_file(foot: Foot) -> str:

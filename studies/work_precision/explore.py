@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measure how long the page of `pad explore` takes to answer a slider, in headless Chromium.
+
+Writes explore.png, a picture of the page, and explore.json. Times, ms, are from the key that moves
+a slider to the new numbers in the document. It needs Chromium and playwright.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.parse
+from collections.abc import Iterator
+from collections.abc import Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ros_pad.errors import PadError
+from ros_pad.reports.explore import FIELDS
+from ros_pad.reports.files import save
+from studies import command
+
+CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
+OPTIONS = (
+    *('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-sync'),
+    *('--disable-background-networking', '--disable-component-update'),
+    '--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1',
+)
+FEET = ('large37', 'small217')
+LONGEST = 60e3  # ms, until an answer comes, however slow the machine
+_MOVE = """async (slider) => {
+  const answer = () => document.querySelector('[data-answer]').dataset.answer;
+  const before = answer(), start = performance.now();
+  slider.value = Number(slider.value) - Number(slider.step);
+  slider.dispatchEvent(new Event('input', {bubbles: true}));
+  while (answer() === before) await new Promise(done => setTimeout(done, 1));
+  return performance.now() - start;
+}"""
+
+
+@contextmanager
+def served(*words: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """Run ``pad explore`` with arguments; yield the address of its page, and the process."""
+    environment = {name: value for name, value in os.environ.items() if 'PYTEST' not in name}
+    child = subprocess.Popen(
+        [sys.executable, '-m', 'ros_pad', 'explore', '--no-browser', *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+    assert child.stdout is not None
+    try:
+        address = child.stdout.readline().partition(' ')[0]
+        while not _listens(address):
+            if child.poll() is not None:
+                raise PadError(f'pad explore ended: {child.communicate()[1]}')
+            time.sleep(0.05)
+        yield address, child
+    finally:
+        child.send_signal(signal.SIGTERM)
+        child.communicate(timeout=60)
+
+
+def _listens(address: str) -> bool:
+    parts = urllib.parse.urlsplit(address)
+    try:
+        socket.create_connection((parts.hostname, parts.port)).close()
+    except OSError:
+        return False
+    return True
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Yield a headless Chromium that finds no host but this one."""
+    from playwright.sync_api import sync_playwright
+
+    if CHROMIUM is None:
+        raise PadError('no Chromium is installed: the page cannot be opened')
+    with sync_playwright() as play:
+        found = play.chromium.launch(executable_path=CHROMIUM, args=[*OPTIONS])
+        try:
+            yield found
+        finally:
+            found.close()
+
+
+def opened(chromium: Any, address: str, **options: Any) -> Any:
+    """Return a page with its first answer."""
+    page = chromium.new_page(**options)
+    page.set_default_timeout(LONGEST)
+    page.goto(address)
+    page.wait_for_selector('[data-answer]')
+    return page
+
+
+def measure(page: Any, moves: int) -> dict[str, list[float]]:
+    """Return the times of answers, ms, by the slider that is moved."""
+    return {
+        field.name: [slider(page, field.label).evaluate(_MOVE) for _ in range(moves)]
+        for field in FIELDS
+    }
+
+
+def slider(page: Any, label: str) -> Any:
+    """Return a slider by the label of its field."""
+    return page.locator(f'input[type=range][aria-label^="{label},"]')
+
+
+def main(words: Sequence[str]) -> int:
+    """Measure, print and draw."""
+    parser = command.parser('explore', __doc__)
+    command.add_count(parser, '--moves', 10, 'moves of each slider')
+    command.add_out(parser)
+    options = parser.parse_args(words)
+    times = {}
+    with browser() as chromium:
+        for foot in command.each(FEET, 'explore', 'foot'):
+            with served(foot) as (address, _):
+                page = opened(chromium, address, viewport={'width': 1280, 'height': 900})
+                if foot == FEET[0]:
+                    options.out.mkdir(parents=True, exist_ok=True)
+                    save(options.out / 'explore.png', page.screenshot(full_page=True))
+                times[foot] = measure(page, options.moves)
+                page.close()
+    lines = [f'{"foot":10} {"slider":12} {"median, ms":>10} {"95 %, ms":>10}']
+    for foot, found in times.items():
+        together = {'all': [each for row in found.values() for each in row]}
+        for name, row in (found | together).items():
+            middle, most = np.quantile(row, (0.5, 0.95))
+            lines.append(f'{foot:10} {name:12} {middle:10.0f} {most:10.0f}')
+    kept = command.write(options.out, 'explore', {'times_ms': times})
+    command.show(options, kept, '\n'.join(lines))
+    return 0
