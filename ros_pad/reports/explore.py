@@ -586,7 +586,7 @@ def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
         'Foot',
         [
             Row('limit', 'force limit', _span(found.limit, 'N')),
-            Row('pitch', 'pitch of the pads', _text(found.pitch, 'mm', 1e-3)),
+            Row('pitch', 'pitch of pads', _text(found.pitch, 'mm', 1e-3)),
             Row('fill', 'fills to 90 % in', _text(switching.fill if switching else math.nan, 's')),
             Row('vent', 'flat again after', _text(switching.vent if switching else math.nan, 's')),
         ],

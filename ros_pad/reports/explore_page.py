@@ -62,7 +62,7 @@ h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
 .figures svg {{ display: block; width: 100%; height: auto; }}
 .numbers {{ display: grid; gap: 0 1.5rem; margin-top: 0.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(17rem, 1fr)); }}
+  grid-template-columns: repeat(auto-fit, minmax(15.5rem, 1fr)); }}
 dl {{ display: grid; grid-template-columns: 1fr auto; margin: 0; font-size: 0.9rem; }}
 dt, dd {{ border-bottom: 1px solid var(--line); padding: 0.12rem 0; margin: 0; }}
 dd {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
@@ -186,19 +186,24 @@ class Page:
 
         def changed(event: Any) -> None:
             number = event.value
-            if number is not None and not sliding:
-                # As a property of the element, old values would pull at a slider that moves.
-                ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
+            if not sliding:
+                place(number)
             self._change(field.name, _si(field, number))
+
+        def place(number: float | None) -> None:
+            # As a property of the element an old value would pull at a slider that moves.
+            if number is not None:
+                ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
 
         ui = self._ui
         box = ui.number(field.label, value=shown, step=field.step, on_change=changed)
         box.props(f'dense outlined suffix="{field.shown}" name={field.name}')
         slider = ui.element('input').props(
-            f'type=range min={field.low} max={field.high} step={field.step} default-value={shown}'
+            f'type=range min={field.low} max={field.high} step={field.step}'
             f' aria-label="{field.label}, {field.shown}"'
         )
         slider.on('input', slid, js_handler='(event) => emit(event.target.value)')
+        place(shown)
 
     def _choice(self, name: str) -> None:
         value = getattr(self._inputs, name)
