@@ -54,9 +54,7 @@ def run(options: argparse.Namespace) -> int:
     from ros_pad.reports.explore_page import HOST
     from ros_pad.reports.explore_page import serve
 
-    port = _port(HOST, options.port)
-    print(f'http://{HOST}:{port}/ shows {foot.source}; Ctrl-C ends it', flush=True)
-    serve(foot, port, not options.no_browser, options.out)
+    serve(foot, _port(HOST, options.port), not options.no_browser, options.out)
     return 0
 
 

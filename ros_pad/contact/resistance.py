@@ -353,8 +353,10 @@ class Foot:
 @functools.lru_cache(maxsize=64)
 def _limits(pad: Pad, ceiling: float, cells: int, criterion: str) -> tuple[float, ...]:
     """Return the force limits of a pad, N, at the ends of equal cells up to the ceiling, Pa."""
-    force_limit(pad, ceiling, criterion)  # raises where the array below would have NaN
-    return tuple(force_limit(pad, np.linspace(0.0, ceiling, cells + 1), criterion).tolist())
+    limits = force_limit(pad, np.linspace(0.0, ceiling, cells + 1), criterion)
+    if np.isnan(limits[-1]):
+        force_limit(pad, ceiling, criterion)  # raises
+    return tuple(limits.tolist())
 
 
 def _pad(table: Table) -> Pad:

@@ -11,7 +11,7 @@ import asyncio
 import html
 import math
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -32,7 +32,8 @@ from ros_pad.reports.explore import explore
 from ros_pad.reports.explore import rows
 
 HOST = '127.0.0.1'
-_PATIENCE = 0.1  # s, after which old numbers are shown pale while new ones are computed
+PATIENCE = 0.1
+"""Time after which old numbers are shown pale while new ones are computed, s."""
 _GROUPS = {
     'Pads': ('material', 'pads', 'radius', 'stiffness', 'thickness', 'sole_radius', 'criterion'),
     'Air': ('supply', 'pressure', 'bore', 'hose'),
@@ -104,6 +105,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
         from starlette.middleware.trustedhost import TrustedHostMiddleware
     except ImportError as error:
         raise PadError(f"NiceGUI is missing ({error}): pip install 'ros_pad[explore]'") from error
+    print(f'http://{HOST}:{port}/ shows {foot.source}; Ctrl-C ends it', flush=True)
     # A page elsewhere whose name leads to this machine must not read this one.
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
     ui.run(
@@ -118,6 +120,44 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
         show_welcome_message=False,
         timeout_graceful_shutdown=1,
     )
+
+
+class Latest:
+    """Computes in a thread, and again if that was asked for meanwhile: once, however often.
+
+    Parameters
+    ----------
+    compute : callable
+        Returns an answer to what is true when it begins; called in a thread.
+    show : callable
+        Called with the answer, in the thread of the event loop.
+    wait : callable
+        Called there if an answer takes longer than :data:`PATIENCE`.
+    """
+
+    def __init__(
+        self,
+        compute: Callable[[], Any],
+        show: Callable[[Any], None],
+        wait: Callable[[], None],
+    ) -> None:
+        self._compute, self._show, self._wait = compute, show, wait
+        self._asked = False
+        self._task: asyncio.Task[None] | None = None
+
+    def ask(self) -> None:
+        """Ask for an answer to what is true from now on."""
+        self._asked = True
+        if self._task is None or self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._work())
+
+    async def _work(self) -> None:
+        while self._asked:
+            self._asked = False
+            thread = asyncio.ensure_future(asyncio.to_thread(self._compute))
+            if not (await asyncio.wait({thread}, timeout=PATIENCE))[0]:
+                self._wait()
+            self._show(await thread)
 
 
 class Page:
@@ -136,7 +176,8 @@ class Page:
 
         self._ui: Any = ui
         self._inputs, self._out = inputs, out
-        self._wanted, self._busy, self._answers = False, False, 0
+        self._latest = Latest(lambda: _answered(self._inputs), self._show, self._set_pale)
+        self._answers = 0
         self._found: Explored | None = None
         self._verdicts: dict[str, Any] = {}
         self._figures: dict[str, Any] = {}
@@ -169,7 +210,7 @@ class Page:
                 self._numbers = ui.html(sanitize=False)
                 ui.html(f'<p class="note">{BAND}</p>', sanitize=False)
         self._pale = both, answer
-        self._changed()
+        self._latest.ask()
 
     def _number(self, field: Field) -> None:
         """Make a number and its slider, which move one another."""
@@ -221,40 +262,15 @@ class Page:
 
     def _change(self, name: str, value: Any) -> None:
         self._inputs = replace(self._inputs, **{name: value})
-        self._changed()
+        self._latest.ask()
 
-    def _changed(self) -> None:
-        from nicegui import background_tasks
-
-        self._wanted = True
-        if not self._busy:
-            self._busy = True
-            background_tasks.create(self._answer(), name='answer')
-
-    async def _answer(self) -> None:
-        """Compute and show until nothing has changed meanwhile."""
-        from nicegui import run
-
-        try:
-            while self._wanted:
-                self._wanted = False
-                task = asyncio.ensure_future(run.io_bound(_answered, self._inputs))
-                if not (await asyncio.wait({task}, timeout=_PATIENCE))[0]:
-                    self._set_pale(True)
-                answer = await task
-                if answer is None:  # the server stops
-                    return
-                self._show(*answer)
-        finally:
-            self._busy = False
-
-    def _set_pale(self, pale: bool) -> None:
+    def _set_pale(self, pale: bool = True) -> None:
         self._status.set_text('computing …' if pale else '')
         for each in self._pale:
             each.classes(add='stale') if pale else each.classes(remove='stale')
 
-    def _show(self, found: Explored, figures: Mapping[str, str], numbers: str) -> None:
-        self._found = found
+    def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
+        self._found, figures, numbers = answer
         self._answers += 1
         for name, figure in figures.items():
             self._figures[name].set_content(figure)
@@ -263,7 +279,7 @@ class Page:
                 ''.join(
                     f'<p class="verdict{" error" if each.error else ""}" role="alert">'
                     f'{html.escape(each.text)}</p>'
-                    for each in found.verdicts
+                    for each in self._found.verdicts
                     if each.name == name
                 )
             )
