@@ -237,8 +237,8 @@ class Page:
                 ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
 
         ui = self._ui
-        box = ui.number(field.label, value=shown, step=field.step, on_change=changed)
-        box.props(f'dense outlined suffix="{field.shown}" name={field.name}')
+        box = ui.number(field.label, value=shown, format='%.7g', on_change=changed)
+        box.props(f'dense outlined suffix="{field.shown}" name={field.name} step=any')
         slider = ui.element('input').props(
             f'type=range min={field.low} max={field.high} step={field.step}'
             f' aria-label="{field.label}, {field.shown}"'

@@ -12,6 +12,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 import xml.etree.ElementTree
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -177,7 +178,9 @@ def test_changes_that_come_meanwhile_are_answered_together():
         while shown != [0, 9]:
             await asyncio.sleep(0.001)
 
-    asyncio.run(asyncio.wait_for(scenario(), 60.0))
+    # Beside the event loop of the browser's driver.
+    with ThreadPoolExecutor() as pool:
+        pool.submit(asyncio.run, asyncio.wait_for(scenario(), 60.0)).result()
     assert computed == [0, 9]
     assert waited == [0]
 
