@@ -176,7 +176,7 @@ class Page:
 
         self._ui: Any = ui
         self._inputs, self._out = inputs, out
-        self._latest = Latest(lambda: _answered(self._inputs), self._show, self._set_pale)
+        self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
         self._answers = 0
         self._found: Explored | None = None
         self._verdicts: dict[str, Any] = {}
@@ -206,10 +206,10 @@ class Page:
             with ui.element('section').classes('figures').props('aria-label="Drawings"') as both:
                 for name in explore_drawings.NAMES:
                     self._figures[name] = ui.html(sanitize=False)
-            with ui.element('section').classes('answer').props('aria-label="Numbers"') as answer:
+            with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
                 self._numbers = ui.html(sanitize=False)
                 ui.html(f'<p class="note">{BAND}</p>', sanitize=False)
-        self._pale = both, answer
+        self._pale = both, numbers
         self._latest.ask()
 
     def _number(self, field: Field) -> None:
@@ -332,7 +332,7 @@ def foot_file(foot: Foot) -> str:
     return foot_text(foot, f'{foot.source}, explored', head, comments)
 
 
-def _answered(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
+def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
     """Return the answer to the inputs, its drawings and its numbers, as HTML."""
     found = explore(inputs)
     figures = {

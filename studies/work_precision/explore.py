@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure how long the page of `pad explore` takes to answer a slider, in headless Chromium.
 
-Writes explore.png, a picture of the page, and explore.json. Times, ms, are from the key that moves
-a slider to the new numbers in the document. It needs Chromium and playwright.
+Writes explore.png, a picture of the page, and explore.json. Times, ms, are from the event of a
+slider to the new numbers in the document; beside them is the processor time of the computation
+alone, which other work on the machine changes less. It needs Chromium and playwright.
 """
 
 from __future__ import annotations
@@ -18,12 +19,16 @@ import urllib.parse
 from collections.abc import Iterator
 from collections.abc import Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ros_pad.contact import Foot
 from ros_pad.errors import PadError
 from ros_pad.reports.explore import FIELDS
+from ros_pad.reports.explore import Inputs
+from ros_pad.reports.explore_page import answer
 from ros_pad.reports.files import save
 from studies import command
 
@@ -36,11 +41,11 @@ OPTIONS = (
 FEET = ('large37', 'small217')
 LONGEST = 60e3  # ms, until an answer comes, however slow the machine
 # Always to values that were not there before: what was computed once is partly kept.
-_MOVE = """async (slider) => {
+_MOVE = """async (slider, to) => {
   const [low, high, now, step] = ['min', 'max', 'value', 'step'].map(key => Number(slider[key]));
   const answer = () => document.querySelector('[data-answer]').dataset.answer;
   const before = answer(), start = performance.now();
-  slider.value = now > low + 0.3 * (high - low) ? now - step : now + step;
+  slider.value = to ?? (now > low + 0.3 * (high - low) ? now - step : now + step);
   slider.dispatchEvent(new Event('input', {bubbles: true}));
   while (answer() === before) await new Promise(done => setTimeout(done, 1));
   return performance.now() - start;
@@ -105,11 +110,32 @@ def opened(chromium: Any, address: str, **options: Any) -> Any:
 
 
 def measure(page: Any, moves: int) -> dict[str, list[float]]:
-    """Return the times of answers, ms, by the slider that is moved."""
-    return {
-        field.name: [slider(page, field.label).evaluate(_MOVE) for _ in range(moves)]
-        for field in FIELDS
-    }
+    """Return the times of answers, ms, by the slider that is moved, and put back after that."""
+    found = {}
+    for field in FIELDS:
+        moved = slider(page, field.label)
+        before = moved.input_value()
+        found[field.name] = [moved.evaluate(_MOVE) for _ in range(moves)]
+        moved.evaluate(_MOVE, before)
+    return found
+
+
+def computed(foot: str, moves: int) -> dict[str, list[float]]:
+    """Return the processor times of the same answers without a page, ms, by slider."""
+    shipped = Inputs.of(Foot.load(foot))
+    answer(shipped)
+    found: dict[str, list[float]] = {}
+    for field in FIELDS:
+        inputs = shipped
+        for _ in range(moves):
+            now, step = getattr(inputs, field.name), field.step * field.unit
+            low, high = field.low * field.unit, field.high * field.unit
+            moved = now - step if now > low + 0.3 * (high - low) else now + step
+            inputs = replace(inputs, **{field.name: moved})
+            start = time.process_time()
+            answer(inputs)
+            found.setdefault(field.name, []).append(1e3 * (time.process_time() - start))
+    return found
 
 
 def slider(page: Any, label: str) -> Any:
@@ -123,22 +149,30 @@ def main(words: Sequence[str]) -> int:
     command.add_count(parser, '--moves', 10, 'moves of each slider')
     command.add_out(parser)
     options = parser.parse_args(words)
-    times = {}
+    times, alone = {}, {}
     with browser() as chromium:
         for foot in command.each(FEET, 'explore', 'foot'):
+            alone[foot] = computed(foot, options.moves)
             with served(foot) as (address, _):
-                page = opened(chromium, address, viewport={'width': 1280, 'height': 900})
+                page = opened(chromium, address, viewport={'width': 1440, 'height': 900})
                 if foot == FEET[0]:
                     options.out.mkdir(parents=True, exist_ok=True)
                     save(options.out / 'explore.png', page.screenshot(full_page=True))
                 times[foot] = measure(page, options.moves)
                 page.close()
-    lines = [f'{"foot":10} {"slider":12} {"median, ms":>10} {"95 %, ms":>10}']
+    lines = [f'{"":24}{"page, ms":>16}{"processor, ms":>16}']
+    lines += [f'{"foot":12}{"slider":12}' + 2 * f'{"median":>8}{"95 %":>8}']
     for foot, found in times.items():
-        together = {'all': [each for row in found.values() for each in row]}
-        for name, row in (found | together).items():
-            middle, most = np.quantile(row, (0.5, 0.95))
-            lines.append(f'{foot:10} {name:12} {middle:10.0f} {most:10.0f}')
-    kept = command.write(options.out, 'explore', {'times_ms': times})
+        for name in (*found, 'all'):
+            line = f'{foot:12}{name:12}'
+            for each in (found, alone[foot]):
+                row = each.get(name) or [time for row in each.values() for time in row]
+                line += ''.join(f'{value:8.0f}' for value in np.quantile(row, (0.5, 0.95)))
+            lines.append(line)
+    load = os.getloadavg()[0]
+    lines.append(f'{load:.1f} processes on {os.cpu_count()} cores in the last minute')
+    kept = command.write(
+        options.out, 'explore', {'load': load, 'times_ms': times, 'processor_ms': alone}
+    )
     command.show(options, kept, '\n'.join(lines))
     return 0
