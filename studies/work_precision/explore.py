@@ -45,9 +45,11 @@ _MOVE = """async (slider, to) => {
   const [low, high, now, step] = ['min', 'max', 'value', 'step'].map(key => Number(slider[key]));
   const answer = () => document.querySelector('[data-answer]').dataset.answer;
   const before = answer(), start = performance.now();
-  slider.value = to ?? (now > low + 0.3 * (high - low) ? now - step : now + step);
+  slider.dataset.way ??= now > 0.5 * (low + high) ? -1 : 1;
+  slider.value = to ?? now + slider.dataset.way * step;
   slider.dispatchEvent(new Event('input', {bubbles: true}));
-  while (answer() === before) await new Promise(done => setTimeout(done, 1));
+  const tick = () => new Promise(done => setTimeout(done, 1));
+  while (answer() === before && Number(slider.value) !== now) await tick();
   return performance.now() - start;
 }"""
 
@@ -128,9 +130,9 @@ def computed(foot: str, moves: int) -> dict[str, list[float]]:
     for field in FIELDS:
         inputs = shipped
         for _ in range(moves):
-            now, step = getattr(inputs, field.name), field.step * field.unit
-            low, high = field.low * field.unit, field.high * field.unit
-            moved = now - step if now > low + 0.3 * (high - low) else now + step
+            down = getattr(shipped, field.name) > 0.5 * (field.low + field.high) * field.unit
+            step = -field.step if down else field.step
+            moved = getattr(inputs, field.name) + step * field.unit
             inputs = replace(inputs, **{field.name: moved})
             start = time.process_time()
             answer(inputs)
