@@ -2,7 +2,7 @@
 """What ``pad explore`` shows of a foot, computed from its inputs without a page.
 
 Each part is computed by the function that the other commands use. A part that has no answer is
-None, with a verdict at the input that is the cause; the other parts stay.
+None, with a remark at the input that is the cause; the other parts stay.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class Inputs:
         )
 
 
-class Verdict(NamedTuple):
+class Remark(NamedTuple):
     """Where a model ends, or what to know: the input that is the cause, and words."""
 
     name: str
@@ -203,7 +203,7 @@ class Explored:
 
     Attributes
     ----------
-    verdicts : tuple of Verdict
+    remarks : tuple of Remark
         At most one error for each input.
     foot : Foot
         The foot, on smooth ground, as it is exported.
@@ -227,7 +227,7 @@ class Explored:
     """
 
     inputs: Inputs
-    verdicts: tuple[Verdict, ...]
+    remarks: tuple[Remark, ...]
     pad: Pad | None
     foot: Foot | None
     free: Inflated | None
@@ -244,16 +244,12 @@ class Explored:
     pitch: float
     touching: float
 
-    def valid(self, name: str) -> bool:
-        """Return whether an input has no error."""
-        return not any(each.error and each.name == name for each in self.verdicts)
-
 
 class _Parts:
-    """Computes parts, and turns their errors into verdicts."""
+    """Computes parts, and turns their errors into remarks."""
 
     def __init__(self) -> None:
-        self.verdicts: list[Verdict] = []
+        self.remarks: list[Remark] = []
         self._bad: set[str] = set()
 
     def __call__(self, needs: str, make: Callable[..., Any], *given: Any) -> Any:
@@ -276,9 +272,9 @@ class _Parts:
         return None
 
     def note(self, name: str, text: str, error: bool = False) -> None:
-        """Add a verdict; of several errors at one input the first is kept."""
+        """Add a remark; of several errors at one input the first is kept."""
         if not (error and name in self._bad):
-            self.verdicts.append(Verdict(name, text, error))
+            self.remarks.append(Remark(name, text, error))
         if error:
             self._bad.add(name)
 
@@ -286,9 +282,12 @@ class _Parts:
 def explore(inputs: Inputs) -> Explored:
     """Compute everything that the page shows."""
     parts = _Parts()
+    # A material has its stiffness from its law; pads without one need no thickness.
+    unused = 'stiffness' if inputs.material != MEASURED else 'thickness'
     for field in FIELDS:
-        if field.name != 'thickness' or inputs.thickness is not None:
-            parts('', field.setting.accept, getattr(inputs, field.name))
+        value = getattr(inputs, field.name)
+        if field.name != unused or (unused == 'thickness' and value is not None):
+            parts('', field.setting.accept, math.nan if value is None else value)
     pad = parts('radius stiffness thickness', _pad, inputs)
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
@@ -306,7 +305,7 @@ def explore(inputs: Inputs) -> Explored:
     switching = parts('pressure bore hose', _switched, inputs, foot, parts)
     return Explored(
         inputs=inputs,
-        verdicts=tuple(parts.verdicts),
+        remarks=tuple(parts.remarks),
         pad=pad,
         foot=foot,
         free=free,

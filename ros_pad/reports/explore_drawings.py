@@ -154,7 +154,7 @@ def profile(found: Explored) -> Drawing:
     if free is not None:
         cap = _cap(free.height, free.sphere_radius, radius, 0.0, free.height)
         body.append(wall(cap, 'free pad'))
-    words = 'no pressed dome: see the verdicts'
+    words = 'no pressed dome: see what is marked'
     if pressed is not None:
         b, gap = pressed.contact_radius, pressed.gap
         floor = base + scale * gap
@@ -237,7 +237,7 @@ def limits(found: Explored) -> Drawing:
         return Drawing(title, 'No force limit can be computed.', _nothing())
     pressures, curve = found.limit_curve
     there = {name: foot.pads * each for name, each in found.limits.items() if each == each}
-    load = found.inputs.load if found.valid('load') else 0.0
+    load = found.inputs.load if 0.0 < found.inputs.load < math.inf else 0.0
     top = 1.08 * max(float(curve.max()), load, *there.values())
     plot = Plot(1e-3 * foot.ceiling, top, 'gauge pressure, kPa', 'force limit of the foot, N')
     plot.line((1e-3 * pressures).tolist(), curve.tolist(), 'ink')
@@ -259,7 +259,7 @@ def limits(found: Explored) -> Drawing:
 
 
 def _nothing() -> str:
-    return _text(0.5 * WIDTH, 0.5 * HEIGHT, 'no answer: see the verdicts', 'middle')
+    return _text(0.5 * WIDTH, 0.5 * HEIGHT, 'no answer: see what is marked', 'middle')
 
 
 def svg(drawing: Drawing) -> str:

@@ -56,14 +56,14 @@ body {{ background: var(--paper); color: var(--ink); font: 15px/1.45 system-ui, 
 h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0.35rem; }}
 .control {{ margin-bottom: 0.4rem; }}
 .control input[type=range] {{ width: 100%; accent-color: var(--wet); margin: 0; }}
-.verdict {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
+.remark {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
   padding-left: 0.5rem; border-left: 3px solid var(--wet); overflow-wrap: anywhere; }}
-.verdict.error {{ border-color: var(--dry); font-weight: 600; }}
+.remark.error {{ border-color: var(--dry); font-weight: 600; }}
 .figures {{ display: grid; gap: 0.5rem 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
 .figures svg {{ display: block; width: 100%; height: auto; }}
 .numbers {{ display: grid; gap: 0 1.5rem; margin-top: 0.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(15.5rem, 1fr)); }}
+  grid-template-columns: repeat(auto-fit, minmax(14.5rem, 1fr)); }}
 dl {{ display: grid; grid-template-columns: 1fr auto; margin: 0; font-size: 0.9rem; }}
 dt, dd {{ border-bottom: 1px solid var(--line); padding: 0.12rem 0; margin: 0; }}
 dd {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
@@ -132,14 +132,14 @@ class Latest:
     show : callable
         Called with the answer, in the thread of the event loop.
     wait : callable
-        Called there if an answer takes longer than :data:`PATIENCE`.
+        Called there with words if an answer takes longer than :data:`PATIENCE`, or fails.
     """
 
     def __init__(
         self,
         compute: Callable[[], Any],
         show: Callable[[Any], None],
-        wait: Callable[[], None],
+        wait: Callable[[str], None],
     ) -> None:
         self._compute, self._show, self._wait = compute, show, wait
         self._asked = False
@@ -156,8 +156,12 @@ class Latest:
             self._asked = False
             thread = asyncio.ensure_future(asyncio.to_thread(self._compute))
             if not (await asyncio.wait({thread}, timeout=PATIENCE))[0]:
-                self._wait()
-            self._show(await thread)
+                self._wait('computing …')
+            try:
+                self._show(await thread)
+            except Exception as error:
+                self._wait(f'no answer: {error}')
+                raise
 
 
 class Page:
@@ -179,7 +183,8 @@ class Page:
         self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
         self._answers = 0
         self._found: Explored | None = None
-        self._verdicts: dict[str, Any] = {}
+        self._controls: dict[str, Any] = {}
+        self._remarks: dict[str, Any] = {}
         self._figures: dict[str, Any] = {}
 
     def build(self) -> None:
@@ -197,12 +202,13 @@ class Page:
                 for title, names in _GROUPS.items():
                     ui.html(f'<h2>{title}</h2>', sanitize=False)
                     for name in names:
-                        with ui.element('div').classes('control'):
+                        self._controls[name] = ui.element('div').classes('control')
+                        with self._controls[name]:
                             if name in fields:
                                 self._number(fields[name])
                             else:
                                 self._choice(name)
-                            self._verdicts[name] = ui.html(sanitize=False)
+                            self._remarks[name] = ui.html(sanitize=False)
             with ui.element('section').classes('figures').props('aria-label="Drawings"') as both:
                 for name in explore_drawings.NAMES:
                     self._figures[name] = ui.html(sanitize=False)
@@ -264,29 +270,31 @@ class Page:
         self._inputs = replace(self._inputs, **{name: value})
         self._latest.ask()
 
-    def _set_pale(self, pale: bool = True) -> None:
-        self._status.set_text('computing …' if pale else '')
+    def _set_pale(self, words: str) -> None:
+        self._status.set_text(words)
         for each in self._pale:
-            each.classes(add='stale') if pale else each.classes(remove='stale')
+            each.classes(add='stale') if words else each.classes(remove='stale')
 
     def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
         self._found, figures, numbers = answer
+        # A material has its stiffness from its law.
+        self._controls['stiffness'].set_visibility(self._inputs.material == MEASURED)
         self._answers += 1
         for name, figure in figures.items():
             self._figures[name].set_content(figure)
-        for name, element in self._verdicts.items():
+        for name, element in self._remarks.items():
             element.set_content(
                 ''.join(
-                    f'<p class="verdict{" error" if each.error else ""}" role="alert">'
+                    f'<p class="remark{" error" if each.error else ""}" role="alert">'
                     f'{html.escape(each.text)}</p>'
-                    for each in self._found.verdicts
+                    for each in self._found.remarks
                     if each.name == name
                 )
             )
         self._numbers.set_content(
             f'<div class="numbers" data-answer="{self._answers}">{numbers}</div>'
         )
-        self._set_pale(False)
+        self._set_pale('')
 
     def _export(self) -> None:
         """Download the foot, and write it if a file was asked for."""

@@ -47,7 +47,7 @@ def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]
     assert cli.main(['contact', *options]) == 0
     said = json.loads(capsys.readouterr().out)
     found = explore(LARGE)
-    assert found.verdicts == ()
+    assert found.remarks == ()
     assert found.free.height == said['free']['height_m']
     assert found.pressed.gap == said['pressed']['gap_m']
     assert found.pressed.contact_radius == said['pressed']['contact_radius_m']
@@ -72,7 +72,7 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
         assert found.grip[state].value == pytest.approx(value, rel=1e-12)
         low, high = found.grip[state][1:]
         assert low < value < high
-    assert 'above the force limit' in found.verdicts[0].text and not found.verdicts[0].error
+    assert 'above the force limit' in found.remarks[0].text and not found.remarks[0].error
 
 
 def test_bands_hold_each_constant_halved_and_doubled():
@@ -110,7 +110,7 @@ def test_switching_is_that_of_the_channel():
     )
     slow = changed(bore=0.5e-3, hose=50.0)
     assert slow.switching.fill == math.inf
-    assert [each.name for each in slow.verdicts] == ['hose']
+    assert [each.name for each in slow.remarks] == ['hose']
 
 
 # The input that is marked, words there, and the numbers that go; all others stay.
@@ -138,7 +138,7 @@ BAD = [
 @pytest.mark.parametrize(('values', 'name', 'words', 'gone'), BAD)
 def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, gone: set[str]):
     found = changed(**values)
-    (error,) = (each for each in found.verdicts if each.error)
+    (error,) = (each for each in found.remarks if each.error)
     assert error.name == name
     assert words in error.text
     missing = {key for key, text in texts(found).items() if text == '–'}
@@ -151,9 +151,9 @@ def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, 
 
 def notes(**values: object) -> dict[str, str]:
     found = changed(**values)
-    assert not any(each.error for each in found.verdicts)
+    assert not any(each.error for each in found.remarks)
     assert '–' not in texts(found).values()
-    return {each.name: each.text for each in found.verdicts}
+    return {each.name: each.text for each in found.remarks}
 
 
 def test_what_is_worth_knowing_is_no_error():

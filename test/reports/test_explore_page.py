@@ -168,7 +168,7 @@ def test_changes_that_come_meanwhile_are_answered_together():
         return computed[-1]
 
     async def scenario() -> None:
-        latest = explore_page.Latest(compute, shown.append, lambda: waited.append(len(shown)))
+        latest = explore_page.Latest(compute, shown.append, lambda words: waited.append(words))
         latest.ask()
         while not waited:
             await asyncio.sleep(0.001)
@@ -182,7 +182,24 @@ def test_changes_that_come_meanwhile_are_answered_together():
     with ThreadPoolExecutor() as pool:
         pool.submit(asyncio.run, asyncio.wait_for(scenario(), 60.0)).result()
     assert computed == [0, 9]
-    assert waited == [0]
+    assert waited[0] == 'computing …'
+
+
+def test_an_answer_that_fails_leaves_no_old_numbers_as_new():
+    said = []
+
+    def compute() -> None:
+        raise ValueError('broken')
+
+    async def scenario() -> None:
+        latest = explore_page.Latest(compute, said.append, said.append)
+        latest.ask()
+        with pytest.raises(ValueError, match='broken'):
+            await latest._task
+
+    with ThreadPoolExecutor() as pool:
+        pool.submit(asyncio.run, scenario()).result()
+    assert said[-1] == 'no answer: broken'
 
 
 def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):
