@@ -428,17 +428,26 @@ def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Part
     return Span(value, min(others), max(others))
 
 
-@functools.lru_cache(maxsize=8)
 def _by_factor(foot: Foot, pressure: float) -> Array:
     """Return the limit of a pad, N, over the range of the factor of its material.
 
-    Pads of one shape have forces and pressures in proportion to the factor.
+    NaN where the model of a pad ends below the pressure.
     """
     material = foot.pad.material
     if material is None or material.factor_range is None or foot.limit == 'measured':
         return np.zeros(0)
-    times = np.linspace(*material.factor_range, _FACTORS) / material.factor
-    return np.asarray(times * force_limit(foot.pad, pressure / times, foot.limit))
+    factors = np.linspace(*material.factor_range, _FACTORS) / material.factor
+    return _scaled(foot.pad, foot.limit, pressure, tuple(factors.tolist()))
+
+
+@functools.lru_cache(maxsize=8)
+def _scaled(pad: Pad, criterion: str, pressure: float, times: tuple[float, ...]) -> Array:
+    """Return limits of pads with so many times the stresses, N.
+
+    Pads of one shape have forces and pressures in proportion to them.
+    """
+    factors = np.array(times)
+    return np.asarray(factors * force_limit(pad, pressure / factors, criterion))
 
 
 def _limit_curve(foot: Foot) -> tuple[Array, Array]:
