@@ -346,11 +346,8 @@ def _pad(inputs: Inputs) -> Pad:
 def _criterion(inputs: Inputs, pad: Pad, parts: _Parts) -> str:
     if inputs.criterion in criteria(pad):
         return inputs.criterion
-    parts.note(
-        'criterion',
-        f'{inputs.criterion} is not known for these pads, of which nothing was measured or which'
-        f' are no spherical domes: {DEFAULT_CRITERION} is used',
-    )
+    words = f'{inputs.criterion} is not known for these pads: {DEFAULT_CRITERION} is used'
+    parts.note('criterion', words)
     return DEFAULT_CRITERION
 
 

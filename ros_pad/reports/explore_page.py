@@ -62,11 +62,12 @@ h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0
 .figures {{ display: grid; gap: 0.5rem 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
 .figures svg {{ display: block; width: 100%; height: auto; }}
-.numbers {{ display: grid; gap: 0 1.5rem; margin-top: 0.5rem;
-  grid-template-columns: repeat(auto-fit, minmax(14.5rem, 1fr)); }}
-dl {{ display: grid; grid-template-columns: 1fr auto; margin: 0; font-size: 0.9rem; }}
-dt, dd {{ border-bottom: 1px solid var(--line); padding: 0.12rem 0; margin: 0; }}
-dd {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
+.numbers {{ display: grid; gap: 0 1.25rem; margin-top: 0.5rem;
+  grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+dl {{ margin: 0; font-size: 0.86rem; }}
+dl div {{ display: flex; justify-content: space-between; gap: 0.5rem; padding: 0.12rem 0;
+  border-bottom: 1px solid var(--line); white-space: nowrap; }}
+dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
 .note {{ font-size: 0.82rem; max-width: 62rem; margin-top: 0.8rem; }}
 .stale {{ opacity: 0.35; }}
 @media (max-width: 800px) {{
@@ -351,7 +352,8 @@ def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
     for title, group in rows(found):
         parts.append(f'<div><h2>{html.escape(title)}</h2><dl>')
         parts += [
-            f'<dt>{html.escape(row.label)}</dt><dd id="{row.key}">{html.escape(row.text)}</dd>'
+            f'<div><dt>{html.escape(row.label)}</dt>'
+            f'<dd id="{row.key}">{html.escape(row.text)}</dd></div>'
             for row in group
         ]
         parts.append('</dl></div>')
