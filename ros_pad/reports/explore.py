@@ -191,7 +191,7 @@ class Remark(NamedTuple):
 
 
 class Switching(NamedTuple):
-    """Time to 90 % of the pressure, and from it until the pads are flat, s; may be infinite."""
+    """Time to 90 % of the pressure, and from all of it until pads are flat, s; may be infinite."""
 
     fill: float
     vent: float

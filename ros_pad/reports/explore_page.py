@@ -115,6 +115,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
         port=port,
         title=f'{foot.source} · pad explore',
         dark=None,
+        language='en-US',
         show=browser,
         reload=False,
         tailwind=False,
@@ -195,7 +196,7 @@ class Page:
         fields = {field.name: field for field in FIELDS}
         with ui.element('main').classes('explore'):
             with ui.element('div').classes('top'):
-                ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>')
+                ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
                 self._status = ui.label().props('role=status')
                 ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
                 ui.button('Picture', on_click=self._picture).props('outline no-caps dense')
