@@ -360,6 +360,7 @@ def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
             f'the model of these pads ends at {1e-3 * end:.4g} kPa: that is the ceiling of the'
             ' foot',
         )
+    _of(FOOT_SETTINGS, 'ceiling').accept(ceiling)  # or no file of this foot could be read
     return replace(
         inputs.foot,
         pad=pad,
@@ -475,7 +476,7 @@ def _capacity(
     """Return the capacity under loads, N: value, lowest and highest, as rows."""
     pressure = inputs.pressure if 'dome' in state else 0.0
     if 'dome' in state and pressure < DOME_PRESSURE:
-        return None
+        return None  # the foot is flat
     film = inputs.film if 'wet' in state else 0.0
     own = foot.dome_load(math.inf, pressure)
     doubted = _doubted(foot, inputs.roughness)

@@ -149,6 +149,13 @@ def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, 
     assert 'nan' not in picture(found)
 
 
+def test_a_foot_that_no_file_may_have_is_refused():
+    found = changed(stiffness=1.0, radius=4e-3, pads=7, pressure=800.0, load=0.01)
+    (error,) = (each for each in found.remarks if each.name == 'supply' and each.error)
+    assert error.text == 'ceiling = 849.0 is not allowed: a number from 1000 to 1000000 Pa is needed'
+    assert found.foot is None and found.free is not None
+
+
 def notes(**values: object) -> dict[str, str]:
     found = changed(**values)
     assert not any(each.error for each in found.remarks)
