@@ -116,7 +116,7 @@ setup(
         # Meshes of pads from STL, OBJ, PLY and MSH files.
         'mesh': ['meshio>=5.3'],
         # `pad explore`: pads designed in the browser.
-        'explore': ['matplotlib>=3.6', 'nicegui>=3.0'],
+        'explore': ['matplotlib>=3.6', 'nicegui>=3.0', 'starlette>=0.40'],
         # The site: `make docs`.
         'docs': DOCS,
         # ruff and mypy change their verdicts between minor versions, so these are pinned.

@@ -36,6 +36,8 @@ EXTRAS = {
     'distributed': 'sweep',
     'pyarrow': 'sweep',
     'meshio': 'mesh',
+    'nicegui': 'explore',
+    'starlette': 'explore',
 }
 WORDS = {'rclpy and the messages': ROS, 'matplotlib': {'matplotlib', 'mpl_toolkits'}}
 

@@ -16,7 +16,9 @@ import json
 import math
 import pathlib
 from collections.abc import Callable
+from collections.abc import Iterable
 from collections.abc import Iterator
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -331,8 +333,34 @@ def foot_file(calibration: Calibration) -> str:
 
     The comment behind each constant states whether it was fitted, with its 95 % interval.
     """
-    foot, pad = calibration.foot, calibration.foot.pad
+    foot = calibration.foot
+    source = pathlib.PurePath(calibration.measurements.source).name
+    head = [
+        f'Calibrated by pad calibrate from {source}.',
+        'Fitted constants have a 95 % interval; all others are those of the start foot.',
+        *calibration.warnings,
+    ]
     comments = {constant.name: _comment(constant) for constant in calibration.constants}
+    return foot_text(foot, f'{foot.source}, calibrated', head, comments)
+
+
+def foot_text(
+    foot: Foot, description: str, head: Iterable[str], comments: Mapping[str, str]
+) -> str:
+    """Return the YAML text of a foot, for :meth:`Foot.load`.
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot.
+    description : str
+        What the file states under this key.
+    head : iterable of str
+        Lines of the comment at the top.
+    comments : mapping of str to str
+        What the comment behind a constant has after its unit, by name of the constant.
+    """
+    pad, limit = foot.pad, foot.pad.measured_limit
 
     def entry(name: str, value: float, unit: str, indent: str = '') -> str:
         # PyYAML reads 1e-05 as text: a number needs a decimal point.
@@ -340,17 +368,14 @@ def foot_file(calibration: Calibration) -> str:
         text = text if '.' in text else text.replace('e', '.0e') if 'e' in text else f'{text}.0'
         return f'{f"{indent}{name}: {text}":35} # {unit}'
 
-    def known(name: str, unit: str) -> str:
-        comment = f'{unit}, {comments.get(name, "of the start foot")}'
-        return entry(name, getattr(foot, name), comment)
+    def known(name: str, unit: str, value: float, indent: str = '', other: str = '') -> str:
+        comment = comments.get(other or name, 'of the start foot')
+        return entry(name, value, f'{unit}, {comment}', indent)
 
-    source = pathlib.PurePath(calibration.measurements.source).name
     lines = [
-        f'# Calibrated by pad calibrate from {source}.',
-        '# Fitted constants have a 95 % interval; all others are those of the start foot.',
-        *(f'# {warning}' for warning in calibration.warnings),
+        *(f'# {line}' for line in head),
         # In quotes: a path may contain characters with a meaning in YAML.
-        f'description: {json.dumps(foot.source + ", calibrated", ensure_ascii=False)}',
+        f'description: {json.dumps(description, ensure_ascii=False)}',
         '',
         'pad:',
         entry('radius', pad.radius, 'm', '  '),
@@ -359,32 +384,32 @@ def foot_file(calibration: Calibration) -> str:
         if pad.thickness is not None:
             lines.append(entry('thickness', pad.thickness, 'm', '  '))
         lines += [
-            entry('stiffness', pad.stiffness, f'N/m, {comments["stiffness"]}', '  '),
+            known('stiffness', 'N/m', pad.stiffness, '  '),
             entry('adhesion_energy', pad.adhesion_energy, 'J/m2', '  '),
         ]
     else:
         lines += _material_lines(pad, comments, entry)
-    limit = pad.measured_limit
     if limit is not None:
         lines += [
             '  measured_limit: # of one pad',
-            entry('force', limit.force, f'N, {comments["force_limit"]}', '    '),
+            known('force', 'N', limit.force, '    ', 'force_limit'),
             entry('pressure', limit.pressure, 'Pa gauge', '    '),
-            entry('slope', limit.slope, f'N/Pa, {comments["force_limit_slope"]}', '    '),
+            known('slope', 'N/Pa', limit.slope, '    ', 'force_limit_slope'),
         ]
     lines += ['', f'pads: {foot.pads}', entry('sole_radius', foot.sole_radius, 'm')]
-    lines += [known(name, unit) for name, (unit, *_) in _FRICTION.items()]
+    lines += [known(name, unit, getattr(foot, name)) for name, (unit, *_) in _FRICTION.items()]
     lines += [
         entry('shear_stiffness', foot.shear_stiffness, 'N/m of the whole foot'),
         entry('chamber_volume', foot.chamber_volume, 'm3 of air without the domes'),
         entry('ceiling', foot.ceiling, 'Pa gauge'),
+        entry('capillary_force', foot.capillary_force, 'N a dome, of the start foot'),
         f'force_limit: {foot.limit}',
     ]
     return '\n'.join(lines) + '\n'
 
 
 def _material_lines(
-    pad: Pad, comments: dict[str, str], entry: Callable[..., str]
+    pad: Pad, comments: Mapping[str, str], entry: Callable[..., str]
 ) -> Iterator[str]:
     """Yield the lines of a foot file for material, thickness and factor of a pad."""
     material = pad.material

@@ -17,6 +17,7 @@ Domes above their force limit are pressed flat; the flat sole carries the rest o
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 from collections.abc import Callable
@@ -208,11 +209,10 @@ class Foot:
         # Every simulated step needs the limit: tabulate it once, in steps of about 0.5 kPa.
         cells = math.ceil(self.ceiling / 500.0)
         try:
-            force_limit(self.pad, self.ceiling, self.limit)
+            limits = _limits(self.pad, self.ceiling, cells, self.limit)
         except (NoEquilibrium, InvalidInput) as error:
             raise InvalidInput(f'ceiling = {self.ceiling:g} Pa is not allowed: {error}') from error
-        limits = force_limit(self.pad, np.linspace(0.0, self.ceiling, cells + 1), self.limit)
-        object.__setattr__(self, '_limit_table', tuple((self.pads * limits).tolist()))
+        object.__setattr__(self, '_limit_table', tuple(self.pads * each for each in limits))
         object.__setattr__(self, '_limit_cell', self.ceiling / cells)
 
     @classmethod
@@ -386,6 +386,15 @@ class Foot:
         """Return the resistance, N, on a film, from the dry resistance and the load, N."""
         touching = math.exp(-((film / self.critical_film) ** self.film_exponent))
         return touching * dry + (1.0 - touching) * self.boundary_friction * load
+
+
+@functools.lru_cache(maxsize=64)
+def _limits(pad: Pad, ceiling: float, cells: int, criterion: str) -> tuple[float, ...]:
+    """Return the force limits of a pad, N, at the ends of equal cells up to the ceiling, Pa."""
+    limits = force_limit(pad, np.linspace(0.0, ceiling, cells + 1), criterion)
+    if np.isnan(limits[-1]):
+        force_limit(pad, ceiling, criterion)  # raises
+    return tuple(limits.tolist())
 
 
 def _pad(table: Table) -> Pad:

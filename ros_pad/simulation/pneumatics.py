@@ -572,3 +572,39 @@ class PneumaticChannel:
             self._drawn += content + lost - self._content
         self._content = content
         self.pad_pressure = pressure
+
+
+def time_to(
+    channel: PneumaticChannel,
+    setpoint: float,
+    pressure: float,
+    tick: float = 5e-4,
+    longest: float = 60.0,
+) -> float:
+    """Hold a set-point and return the time until the pad has passed a pressure, s.
+
+    Parameters
+    ----------
+    channel : PneumaticChannel
+        The channel in the state from which the time counts; it is moved to the end of that time.
+    setpoint : float
+        Gauge Pa, 0 to full scale.
+    pressure : float
+        Gauge Pa, between that of the pad and the set-point.
+    tick, longest : float
+        Time between two looks at the pad, between which its pressure is taken to move linearly,
+        and after which there are no more, s.
+
+    Returns
+    -------
+    float
+        Infinite if the pad has not passed the pressure after the longest time.
+    """
+    time, now = 0.0, channel.pad_pressure
+    rising = now < pressure
+    while (now < pressure) is rising:
+        if time > longest:
+            return math.inf
+        before, now = now, channel.step(setpoint, tick)
+        time += tick
+    return time - tick * (now - pressure) / (now - before)

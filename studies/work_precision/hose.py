@@ -21,6 +21,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.simulation import Hose
 from ros_pad.simulation import PneumaticChannel
 from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation.pneumatics import time_to
 from studies import command
 from studies.drawing import BLACK
 from studies.drawing import BLUE
@@ -34,7 +35,6 @@ LENGTHS = tuple(np.geomspace(0.1, 20.0, 24).tolist())
 PRINTED = (0.5, 1.0, 2.0, 5.0, 10.0)
 SWING = 0.4  # s, of the shipped hexapod gaits
 GOAL = 75e3  # Pa gauge
-TICK = 5e-4  # s
 
 Volume = float | Callable[[float], float]
 
@@ -45,11 +45,7 @@ def filling_time(hose: Hose, volume: Volume, regulated: bool = True) -> float:
     channel = PneumaticChannel(model, hose, volume)
     if not regulated:
         channel.outlet_pressure = GOAL
-    before = pressure = time = 0.0
-    while pressure < 0.9 * GOAL:
-        before, pressure = pressure, channel.step(GOAL, TICK)
-        time += TICK
-    return time - TICK * (pressure - 0.9 * GOAL) / (pressure - before)
+    return time_to(channel, GOAL, 0.9 * GOAL)
 
 
 def step_cost() -> float:

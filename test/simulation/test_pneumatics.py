@@ -13,6 +13,7 @@ from ros_pad.simulation import pneumatics
 from ros_pad.simulation.pneumatics import Hose
 from ros_pad.simulation.pneumatics import PneumaticChannel
 from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.pneumatics import time_to
 
 FOUR_BY_ONE = Hose(0.004, 1.0)
 BARE = RegulatorModel(dead_time=0.0, dead_band=0.0, quantum=0.0)
@@ -533,3 +534,19 @@ def test_time_refused(dt):
     with pytest.raises(InvalidInput, match='dt = '):
         channel.step(50e3, dt)
     assert channel.settled
+
+
+def test_the_time_to_a_pressure_does_not_depend_on_the_ticks():
+    times = []
+    for tick in (1e-4, 5e-4, 2e-3):
+        channel = PneumaticChannel(RegulatorModel(), Hose(4e-3, 1.0), 2.4e-6)
+        times.append(time_to(channel, 75e3, 67.5e3, tick))
+        channel.step(75e3, 1.0)
+        times.append(time_to(channel, 0.0, 1e3, tick))
+    assert times[0] == pytest.approx(0.086, abs=0.001)  # docs/model/pneumatics.md
+    assert times[2:] == pytest.approx(2 * times[:2], rel=0.01)
+
+
+def test_a_pressure_that_is_not_reached_takes_for_ever():
+    channel = PneumaticChannel(RegulatorModel(), Hose(0.5e-3, 50.0), 20e-6)
+    assert time_to(channel, 75e3, 67.5e3, longest=1.0) == math.inf

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``pad explore``: a foot designed by looking, on a page in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import socket
+
+from ros_pad.commands.command import Commands
+from ros_pad.commands.command import add_command
+from ros_pad.commands.folder import refuse_existing
+from ros_pad.configuration import integer
+from ros_pad.contact import Foot
+from ros_pad.errors import InvalidInput
+
+
+def add(commands: Commands) -> None:
+    """Add the command and its arguments."""
+    part = add_command(
+        commands,
+        'explore',
+        run,
+        'Show a foot on a page in the browser: dome, sole, grip, force limit and switching time'
+        ' follow the sliders. The page is served to this machine alone, until Ctrl-C.',
+        'pad explore\npad explore small217 --out my_foot.yaml',
+    )
+    part.add_argument(
+        'foot',
+        metavar='FOOT',
+        nargs='?',
+        default='large37',
+        help='foot to begin with: a name in config/feet or a YAML file (default large37)',
+    )
+    part.add_argument(
+        '--port', type=int, metavar='N', help='number of the TCP port (default: a free one)'
+    )
+    part.add_argument('--no-browser', action='store_true', help='do not open a browser')
+    part.add_argument(
+        '--out',
+        type=pathlib.Path,
+        metavar='FILE',
+        help='write each foot that the page exports, into this new .yaml file, then _2, _3 and'
+        ' so on',
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve the page; return the exit status."""
+    refuse_existing('--out', options.out)
+    if options.out is not None and options.out.suffix not in ('.yaml', '.yml'):
+        raise InvalidInput(f'--out {options.out}: a name that ends in .yaml is needed')
+    foot = Foot.load(options.foot)
+    from ros_pad.reports.explore_page import HOST
+    from ros_pad.reports.explore_page import serve
+
+    serve(foot, _port(HOST, options.port), not options.no_browser, options.out)
+    return 0
+
+
+def _port(host: str, wanted: int | None) -> int:
+    """Return the port if it is free, or a free one."""
+    if wanted is not None:
+        integer('--port', wanted, 1, 65535)
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, wanted or 0))
+        except OSError as error:
+            raise InvalidInput(
+                f'--port {wanted}: {error.strerror}: give another number, or none'
+            ) from error
+        return int(trial.getsockname()[1])

@@ -1,0 +1,618 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ``pad explore`` shows of a foot, computed from its inputs without a page.
+
+Each part is computed by the function that the other commands use. A part that has no answer is
+None, with a remark at the input that is the cause; the other parts stay.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.capillary.mesh import hexagonal
+from ros_pad.configuration import Setting
+from ros_pad.configuration import quantity
+from ros_pad.contact import THESIS_LIQUID
+from ros_pad.contact import WATER
+from ros_pad.contact import Film
+from ros_pad.contact import Foot
+from ros_pad.contact import Inflated
+from ros_pad.contact import Material
+from ros_pad.contact import Meniscus
+from ros_pad.contact import Pad
+from ros_pad.contact import Pressed
+from ros_pad.contact import force_limit
+from ros_pad.contact import inflate
+from ros_pad.contact import meniscus
+from ros_pad.contact import press
+from ros_pad.contact.candidates import Span
+from ros_pad.contact.limits import DEFAULT_CRITERION
+from ros_pad.contact.limits import criteria
+from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact.pad import DOME_PRESSURE
+from ros_pad.contact.pad import Array
+from ros_pad.contact.resistance import DOMED
+from ros_pad.contact.resistance import FOOT_SETTINGS
+from ros_pad.contact.resistance import PAD_SETTINGS
+from ros_pad.contact.resistance import RUBBER_SETTINGS
+from ros_pad.contact.resistance import THICK_FILM
+from ros_pad.contact.squeeze import STIFF
+from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.errors import ConfigError
+from ros_pad.errors import InvalidInput
+from ros_pad.errors import NoEquilibrium
+from ros_pad.simulation.pneumatics import Hose
+from ros_pad.simulation.pneumatics import PneumaticChannel
+from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.pneumatics import time_to
+
+MEASURED = 'measured stiffness'
+"""Choice of the material for pads of a measured stiffness, without a material."""
+LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
+STATES = ('flat, dry', 'flat, wet', 'dome, dry', 'dome, wet')
+DOUBT = 2.0
+"""Factor by which each assumed constant of friction may be wrong, in docs/assumptions.md."""
+ASSUMED = (
+    *('friction', 'shear_strength', 'conforming_pressure'),
+    *('boundary_friction', 'critical_film', 'film_exponent'),
+)
+BAND = (
+    'Bands: lowest and highest value with one assumption changed at a time. Each assumed constant'
+    ' of friction is halved and doubled, every criterion of the force limit that the pads have is'
+    ' taken, and the factor on the stresses of the material is moved over its range; wet domes'
+    ' may also have no dry contact at all where their film keeps a dimple. They are no confidence'
+    ' intervals.'
+)
+_FACTORS = 9  # over the range of a material, as in ros_pad.contact.candidates
+_LOADS, _PRESSURES = 30, 61  # points of the curves
+_TICK, _LONGEST = 1e-3, 5.0  # s, see time_to
+
+
+class Field(NamedTuple):
+    """A number that can be chosen.
+
+    Attributes
+    ----------
+    name, label : str
+        Of the attribute of :class:`Inputs`, and on the page.
+    setting : Setting
+        What is allowed, SI.
+    low, high, step : float
+        Range of the slider, in the unit of the page.
+    shown, unit : str, float
+        That unit, and what it is in SI.
+    """
+
+    name: str
+    label: str
+    setting: Setting
+    low: float
+    high: float
+    step: float
+    shown: str
+    unit: float
+
+
+def _of(settings: Sequence[Setting], name: str, new: str = '') -> Setting:
+    return replace(next(each for each in settings if each.name == name), name=new or name)
+
+
+def _own(name: str, unit: str, low: float, high: float) -> Setting:
+    return Setting(name, float, '', unit, low, high)
+
+
+_MM, _UM, _KPA = ('mm', 1e-3), ('µm', 1e-6), ('kPa', 1e3)
+FIELDS = (
+    Field('pads', 'Pads', _of(FOOT_SETTINGS, 'pads'), 1, 400, 1, '', 1),
+    Field('radius', 'Pad radius', _of(PAD_SETTINGS, 'radius'), 0.2, 4.0, 0.05, *_MM),
+    Field('stiffness', 'Stiffness', _of(PAD_SETTINGS, 'stiffness'), 2, 150, 0.5, 'N/m', 1),
+    Field('thickness', 'Thickness', _of(RUBBER_SETTINGS, 'thickness'), 0.05, 1.5, 0.01, *_MM),
+    Field('sole_radius', 'Sole radius', _of(FOOT_SETTINGS, 'sole_radius'), 3, 60, 0.5, *_MM),
+    Field('supply', 'Highest pressure', _of(FOOT_SETTINGS, 'ceiling', 'supply'), 1, 150, 1, *_KPA),
+    Field('pressure', 'Pressure', _own('pressure', 'Pa', 0.0, 1e6), 0, 150, 0.5, *_KPA),
+    Field('load', 'Load on the foot', _own('load', 'N', 1e-3, 1e4), 0.1, 100, 0.1, 'N', 1),
+    Field('film', 'Liquid film', _own('film', 'm', 1e-6, 1e-2), 0.01, 1, 0.01, *_MM),
+    Field('stand', 'Time on the film', _own('stand', 's', 1e-4, 1e3), 0.01, 2, 0.01, 's', 1),
+    Field('roughness', 'Roughness, RMS', _own('roughness', 'm', 0.0, 1e-3), 0, 10, 0.1, *_UM),
+    Field('bore', 'Hose, inside', _own('bore', 'm', 0.5e-3, 20e-3), 0.5, 8, 0.1, *_MM),
+    Field('hose', 'Hose, length', _own('hose', 'm', 0.0, 50.0), 0, 10, 0.1, 'm', 1),
+)  # fmt: skip
+_BLAMED = {'ceiling': 'supply', 'limit': 'criterion', 'setpoint': 'pressure', 'force': 'load'}
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What is chosen, SI; the foot has what cannot be chosen here. See :data:`FIELDS`.
+
+    Attributes
+    ----------
+    foot : Foot
+        The foot to begin with.
+    material, criterion, liquid : str
+        :data:`MEASURED` or a material; a criterion of the force limit; of :data:`LIQUIDS`.
+    """
+
+    foot: Foot
+    material: str
+    criterion: str
+    liquid: str
+    pads: int
+    radius: float
+    stiffness: float
+    thickness: float | None
+    sole_radius: float
+    supply: float
+    pressure: float
+    load: float
+    film: float = 3e-4
+    stand: float = 0.3
+    roughness: float = 0.0
+    bore: float = 4e-3
+    hose: float = 1.0
+
+    @classmethod
+    def of(cls, foot: Foot) -> Inputs:
+        """Return the values of a foot, at a typical pressure and half the load for that."""
+        pad, pressure = foot.pad, DOMED * foot.ceiling
+        load = 0.5 * foot.dome_load(math.inf, pressure)
+        return cls(
+            foot,
+            MEASURED if pad.material is None else pad.material.name,
+            foot.limit,
+            'water',
+            foot.pads,
+            pad.radius,
+            pad.stiffness,
+            pad.thickness,
+            foot.sole_radius,
+            foot.ceiling,
+            pressure,
+            float(f'{load:.2g}') or 1.0,
+        )
+
+
+class Remark(NamedTuple):
+    """Where a model ends, or what to know: the input that is the cause, and words."""
+
+    name: str
+    text: str
+    error: bool
+
+
+class Switching(NamedTuple):
+    """Time to 90 % of the pressure, and from all of it until pads are flat, s; may be infinite."""
+
+    fill: float
+    vent: float
+
+
+@dataclass(frozen=True)
+class Explored:
+    """The answer to :class:`Inputs`; parts without an answer are None.
+
+    Attributes
+    ----------
+    remarks : tuple of Remark
+        At most one error for each input.
+    foot : Foot
+        The foot, on smooth ground, as it is exported.
+    pad, free, pressed, ring
+        The pad, its dome free and under its share of the load, and the ring of liquid.
+    limits : dict of str to float
+        Force limit of one pad by criterion, N; NaN above the largest pressure of a criterion.
+    limit : Span
+        Force limit of the foot, N.
+    limit_curve : tuple of array
+        Pressures up to the ceiling, Pa, and the limit of the foot there, N.
+    grip : dict of str to Span
+        Tangential capacity at the load, N, by state.
+    loads, curves
+        Loads, N, and value, lowest and highest capacity there as rows, by state.
+    switching : Switching
+    places : array
+        Centres of the pads, m, as rows.
+    pitch, touching : float
+        Distance of neighbouring pads, m; share of a flat sole that touches.
+    """
+
+    inputs: Inputs
+    remarks: tuple[Remark, ...]
+    pad: Pad | None
+    foot: Foot | None
+    free: Inflated | None
+    pressed: Pressed | None
+    ring: Meniscus | None
+    limits: Mapping[str, float]
+    limit: Span | None
+    limit_curve: tuple[Array, Array] | None
+    grip: Mapping[str, Span]
+    loads: Array
+    curves: Mapping[str, Array]
+    switching: Switching | None
+    places: Array | None
+    pitch: float
+    touching: float
+
+
+class _Parts:
+    """Computes parts, and turns their errors into remarks."""
+
+    def __init__(self) -> None:
+        self.remarks: list[Remark] = []
+        self._bad: set[str] = set()
+
+    def __call__(self, needs: str, make: Callable[..., Any], *given: Any) -> Any:
+        """Return what a function makes of values.
+
+        None if a value is missing, one of the inputs that it needs has an error, or it raises.
+        """
+        if self._bad & set(needs.split()) or any(each is None for each in given):
+            return None
+        try:
+            return make(*given)
+        except NoEquilibrium as error:
+            loaded = error.status == 'flattened' and not str(error).startswith('pressure = 0 ')
+            self.note('load' if loaded else 'pressure', str(error), True)
+        except InvalidInput as error:
+            name = str(error).partition(' = ')[0]
+            self.note(_BLAMED.get(name, name), str(error), True)
+        except ConfigError as error:
+            self.note('material', str(error), True)
+        return None
+
+    def note(self, name: str, text: str, error: bool = False) -> None:
+        """Add a remark; of several errors at one input the first is kept."""
+        if not (error and name in self._bad):
+            self.remarks.append(Remark(name, text, error))
+        if error:
+            self._bad.add(name)
+
+
+def explore(inputs: Inputs) -> Explored:
+    """Compute everything that the page shows."""
+    parts = _Parts()
+    # A material has its stiffness from its law; pads without one need no thickness.
+    unused = 'stiffness' if inputs.material != MEASURED else 'thickness'
+    for field in FIELDS:
+        value = getattr(inputs, field.name)
+        if field.name != unused or (unused == 'thickness' and value is not None):
+            parts('', field.setting.accept, math.nan if value is None else value)
+    pad = parts('radius stiffness thickness', _pad, inputs)
+    criterion = parts('', _criterion, inputs, pad, parts)
+    foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
+    parts('pressure', _below_ceiling, inputs, foot)
+    free = parts('pressure', lambda pad: inflate(pad, inputs.pressure), pad)
+    around = functools.partial(_places, inputs, free, parts)
+    places, pitch = parts('pads sole_radius radius', around) or (None, math.nan)
+    limits = parts('pressure', _limits, pad, inputs.pressure) or {}
+    limit = parts('pressure', _limit, inputs, foot, limits, parts)
+    loads, curves = parts('load', _curves, inputs, foot, limits, parts) or (np.zeros(1), {})
+    touching = parts('load roughness', _touching, inputs, foot) or 0.0
+    share = parts('load pads', lambda: inputs.load / inputs.pads)
+    pressed = parts('pressure', press, pad, inputs.pressure, share)
+    ring = parts('', meniscus, pressed, LIQUIDS[inputs.liquid])
+    switching = parts('pressure bore hose', _switched, inputs, foot, parts)
+    return Explored(
+        inputs=inputs,
+        remarks=tuple(parts.remarks),
+        pad=pad,
+        foot=foot,
+        free=free,
+        pressed=pressed,
+        ring=ring,
+        limits=limits,
+        limit=limit,
+        limit_curve=None if foot is None else _limit_curve(foot),
+        grip={state: Span(*curve[:, -1].tolist()) for state, curve in curves.items()},
+        loads=loads[:-1],
+        curves={state: curve[:, :-1] for state, curve in curves.items()},
+        switching=switching,
+        places=places,
+        pitch=pitch,
+        touching=touching,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _material(name: str) -> Material:
+    return Material.load(name)
+
+
+def _pad(inputs: Inputs) -> Pad:
+    """Return the pad; measured limits stay only with the pad on which they were measured."""
+    start, radius, thickness = inputs.foot.pad, inputs.radius, inputs.thickness
+    if inputs.material == MEASURED:
+        adhesion = Pad.adhesion_energy if start.material else start.adhesion_energy
+        pad = Pad(radius, inputs.stiffness, adhesion, thickness=thickness)
+    else:
+        own = start.material
+        same = own is not None and own.name == inputs.material
+        pad = Pad.of(own if same and own else _material(inputs.material), radius, thickness)  # type: ignore[arg-type]
+    measured = replace(pad, measured_limit=start.measured_limit)
+    return measured if measured == start else pad
+
+
+def _criterion(inputs: Inputs, pad: Pad, parts: _Parts) -> str:
+    if inputs.criterion in criteria(pad):
+        return inputs.criterion
+    words = f'{inputs.criterion} is not known for these pads: {DEFAULT_CRITERION} is used'
+    parts.note('criterion', words)
+    return DEFAULT_CRITERION
+
+
+def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
+    end, ceiling = largest_pressure(pad, criterion), inputs.supply
+    if ceiling >= end:
+        ceiling = float(math.floor(end))
+        parts.note(
+            'supply',
+            f'the model of these pads ends at {1e-3 * end:.4g} kPa: that is the ceiling of the'
+            ' foot',
+        )
+    _of(FOOT_SETTINGS, 'ceiling').accept(ceiling)  # or no file of this foot could be read
+    return replace(
+        inputs.foot,
+        pad=pad,
+        pads=inputs.pads,
+        sole_radius=inputs.sole_radius,
+        ceiling=ceiling,
+        limit=criterion,
+    )
+
+
+def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
+    quantity('pressure', inputs.pressure, 'Pa, the ceiling of the foot', high=foot.ceiling)
+
+
+def _places(inputs: Inputs, free: Inflated | None, parts: _Parts) -> tuple[Array, float]:
+    """Return centres of the pads in a hexagonal pattern over the sole, and their pitch, m."""
+    radius, lattice = inputs.radius, hexagonal(inputs.pads)
+    reach = float(np.hypot(*lattice.T).max())
+    pitch = max(inputs.sole_radius - radius, 0.0) / max(reach, 0.5)
+    width = 0.0
+    if free is not None:
+        width = 2.0 * (free.sphere_radius if free.height > radius else radius)
+    if inputs.pads > 1 and pitch < max(width, 2.0 * radius):
+        what = 'pads overlap' if pitch < 2.0 * radius else 'free domes touch one another'
+        width = max(width, 2.0 * radius)
+        parts.note(
+            'pads',
+            f'in a hexagonal pattern the {what}: they are {1e3 * width:.3g} mm wide at a pitch of'
+            f' {1e3 * pitch:.3g} mm',
+        )
+    return pitch * lattice, pitch
+
+
+@functools.lru_cache(maxsize=64)
+def _limits(pad: Pad, pressure: float) -> dict[str, float]:
+    """Return the force limit of a pad by criterion, N; NaN above a criterion's last pressure."""
+    return {
+        each: force_limit(pad, pressure, each)
+        if pressure < largest_pressure(pad, each)
+        else math.nan
+        for each in criteria(pad)
+    }
+
+
+def _limit(inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts) -> Span:
+    """Return the limit of the foot, N, over the criteria and the factor of the material."""
+    value = foot.pads * limits[foot.limit]
+    others = [foot.pads * each for each in limits.values() if not math.isnan(each)]
+    spread = foot.pads * _by_factor(foot, inputs.pressure)
+    if np.isnan(spread).any():
+        parts.note(
+            'pressure',
+            'in doubt: were the material as soft as it may be, its model would end below this'
+            ' pressure',
+        )
+    others += spread[~np.isnan(spread)].tolist()
+    if inputs.load > value:
+        parts.note(
+            'load',
+            f'above the force limit of the foot by the criterion {foot.limit}, {value:.4g} N: the'
+            ' domes are pressed flat, and the sole carries the rest',
+        )
+    return Span(value, min(others), max(others))
+
+
+def _by_factor(foot: Foot, pressure: float) -> Array:
+    """Return the limit of a pad, N, over the range of the factor of its material.
+
+    NaN where the model of a pad ends below the pressure.
+    """
+    material = foot.pad.material
+    if material is None or material.factor_range is None or foot.limit == 'measured':
+        return np.zeros(0)
+    factors = np.linspace(*material.factor_range, _FACTORS) / material.factor
+    return _scaled(foot.pad, foot.limit, pressure, tuple(factors.tolist()))
+
+
+@functools.lru_cache(maxsize=8)
+def _scaled(pad: Pad, criterion: str, pressure: float, times: tuple[float, ...]) -> Array:
+    """Return limits of pads with so many times the stresses, N.
+
+    Pads of one shape have forces and pressures in proportion to them.
+    """
+    factors = np.array(times)
+    return np.asarray(factors * force_limit(pad, pressure / factors, criterion))
+
+
+def _limit_curve(foot: Foot) -> tuple[Array, Array]:
+    pressures = np.linspace(0.0, foot.ceiling, _PRESSURES)
+    return pressures, np.array([foot.dome_load(math.inf, each) for each in pressures.tolist()])
+
+
+def _curves(
+    inputs: Inputs, foot: Foot, limits: Mapping[str, float], parts: _Parts
+) -> tuple[Array, dict[str, Array]]:
+    """Return loads, the last of them the present one, and the capacity there by state, N."""
+    largest = max(1.3 * inputs.load, 1.2 * foot.pads * limits.get(foot.limit, 0.0))
+    loads = np.append(np.linspace(largest / _LOADS, largest, _LOADS), inputs.load)
+    found = {}
+    for state in STATES:
+        needs = 'load roughness' + ' film stand' * ('wet' in state)
+        if 'dome' in state:
+            needs += ' pressure'
+        curve = parts(needs, _capacity, inputs, foot, limits, loads, state)
+        if curve is not None:
+            found[state] = curve
+    return loads, found
+
+
+def _capacity(
+    inputs: Inputs, foot: Foot, limits: Mapping[str, float], loads: Array, state: str
+) -> Array | None:
+    """Return the capacity under loads, N: value, lowest and highest, as rows."""
+    pressure = inputs.pressure if 'dome' in state else 0.0
+    if 'dome' in state and pressure < DOME_PRESSURE:
+        return None  # the foot is flat
+    film = inputs.film if 'wet' in state else 0.0
+    own = foot.dome_load(math.inf, pressure)
+    doubted = _doubted(foot, inputs.roughness)
+    cases = [(each, own) for each in doubted]
+    if pressure:
+        others = [*limits.values(), *_by_factor(foot, pressure).tolist()]
+        cases += [(doubted[0], foot.pads * each) for each in others if not math.isnan(each)]
+    rows = [_carried(case, loads, pressure, film, inputs.stand) for case in cases]
+    if pressure and film and _keeps_dimple(inputs, doubted[0], own):
+        rows.append(_carried(cases[0], loads, pressure, film, inputs.stand, THICK_FILM))
+    return np.stack([rows[0], np.min(rows, axis=0), np.max(rows, axis=0)])
+
+
+@functools.lru_cache(maxsize=8)
+def _doubted(foot: Foot, roughness: float) -> tuple[Foot, ...]:
+    """Return a foot on its floor, and with each assumed constant halved and doubled there."""
+    rough = foot.on_rough(roughness)
+    return rough, *(
+        replace(rough, **{name: getattr(rough, name) * times})
+        for name in ASSUMED
+        for times in (1.0 / DOUBT, DOUBT)
+    )
+
+
+def _carried(
+    case: tuple[Foot, float],
+    loads: Array,
+    pressure: float,
+    film: float,
+    stand: float,
+    under_domes: float = 0.0,
+) -> list[float]:
+    """Return the capacity, N, of a foot whose domes carry a largest load, N."""
+    (foot, most), found = case, []
+    films, drained = (0.0, 0.0), Film(foot)
+    for load in loads.tolist():
+        on_domes = min(load, most)
+        if film:
+            drained.touch_down(film)
+            films = drained.drain(on_domes, load - on_domes, pressure, stand)
+        under = under_domes or films[0]
+        found.append(foot.resistance_of(on_domes, load - on_domes, pressure, under, films[1]))
+    return found
+
+
+def _keeps_dimple(inputs: Inputs, foot: Foot, most: float) -> bool:
+    """Return whether a film under domes may keep a dimple: see docs/model/film.md."""
+    load = min(inputs.load, most)
+    if load <= 0.0:
+        return False
+    contact = math.sqrt(load / inputs.pressure / foot.pads / math.pi)
+    sphere = float(inflate(foot.pad, inputs.pressure).sphere_radius)
+    middle = dome_dimple(contact, sphere, inputs.pressure, inputs.stand)
+    film = Film(foot)
+    film.touch_down(inputs.film)
+    return 0.5 * middle >= STIFF * film.drain(load, 0.0, inputs.pressure, inputs.stand)[0]
+
+
+def _touching(inputs: Inputs, foot: Foot) -> float:
+    """Return the share of a flat sole that touches."""
+    conforming = _doubted(foot, inputs.roughness)[0].conforming_pressure
+    return min(inputs.load / (conforming * foot.sole_area), 1.0)
+
+
+def _switched(inputs: Inputs, foot: Foot, parts: _Parts) -> Switching | None:
+    if inputs.pressure <= DOME_PRESSURE:
+        return None
+    found = _switching(foot, inputs.pressure, Hose(inputs.bore, inputs.hose))
+    if math.inf in found:
+        parts.note('hose', f'the pads take longer than {_LONGEST:g} s to fill or to vent')
+    return found
+
+
+@functools.lru_cache(maxsize=8)
+def _switching(foot: Foot, pressure: float, hose: Hose) -> Switching:
+    regulator = RegulatorModel(full_scale=max(RegulatorModel().full_scale, pressure))
+    channel = PneumaticChannel(regulator, hose, foot.air_volume)
+    fill = time_to(channel, pressure, 0.9 * pressure, _TICK, _LONGEST)
+    channel.step(pressure, _LONGEST)
+    return Switching(fill, time_to(channel, 0.0, DOME_PRESSURE, _TICK, _LONGEST))
+
+
+class Row(NamedTuple):
+    """A number on the page: key, label, and text with unit."""
+
+    key: str
+    label: str
+    text: str
+
+
+def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
+    """Yield the numbers of the page by heading; a dash where there is none."""
+    free, pressed, ring, switching = found.free, found.pressed, found.ring, found.switching
+
+    def length(of: Any, name: str, label: str, title: str) -> Row:
+        value = math.nan if of is None else float(getattr(of, name))
+        return Row(f'{label}-{name}', title, _text(value, 'mm', 1e-3))
+
+    yield (
+        'Dome',
+        [
+            length(free, 'height', 'free', 'free height'),
+            length(pressed, 'gap', 'pressed', 'gap under load'),
+            length(pressed, 'contact_radius', 'pressed', 'contact radius'),
+            length(ring, 'height', 'ring', 'ring of liquid, height'),
+        ],
+    )
+    yield (
+        'Force limit of a pad',
+        [Row(f'limit-{name}', name, _text(value, 'N')) for name, value in found.limits.items()],
+    )
+    yield (
+        'Foot',
+        [
+            Row('limit', 'force limit', _span(found.limit, 'N')),
+            Row('pitch', 'pitch of pads', _text(found.pitch, 'mm', 1e-3)),
+            Row('fill', 'fills to 90 % in', _text(switching.fill if switching else math.nan, 's')),
+            Row('vent', 'flat again after', _text(switching.vent if switching else math.nan, 's')),
+        ],
+    )
+    yield (
+        'Grip',
+        [
+            Row(f'grip-{state.replace(", ", "-")}', state, _span(found.grip.get(state), 'N'))
+            for state in STATES
+        ],
+    )
+
+
+def _text(value: float, unit: str, size: float = 1.0) -> str:
+    if math.isnan(value):
+        return '–'
+    return f'over {_LONGEST:g} {unit}' if math.isinf(value) else f'{value / size:.4g} {unit}'
+
+
+def _span(span: Span | None, unit: str) -> str:
+    if span is None or math.isnan(span.value):
+        return '–'
+    return f'{_text(span.value, unit)} ({span.low:.3g} to {span.high:.3g})'

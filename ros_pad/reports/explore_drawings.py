@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The drawings of ``pad explore``, as SVG: light enough to be made anew for each change."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Iterable
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from ros_pad.contact.pad import Array
+from ros_pad.reports.explore import STATES
+from ros_pad.reports.explore import Explored
+from ros_pad.reports.style import BLACK
+from ros_pad.reports.style import BLUE
+from ros_pad.reports.style import PALE
+from ros_pad.reports.style import STANCE
+from ros_pad.reports.style import VERMILION
+
+WIDTH, HEIGHT = 480.0, 310.0
+NAMES = ('profile', 'sole', 'grip', 'limits')
+COLOURS = {
+    'light': {'ink': BLACK, 'pale': PALE, 'sole': STANCE, 'dry': VERMILION, 'wet': BLUE},
+    'dark': {'ink': '#e6e6e6', 'pale': '#8a8f98', 'sole': '#3a3f47', 'dry': '#f0955a',
+             'wet': '#5fb4ec'},
+}  # fmt: skip
+STYLE = """
+.drawing text { font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; fill: var(--ink); }
+.drawing .end { text-anchor: end; } .drawing .middle { text-anchor: middle; }
+.drawing path, .drawing circle, .drawing line { fill: none; stroke: var(--ink); }
+.drawing .axis { stroke: var(--pale); stroke-width: 1; }
+.drawing .grid { stroke: var(--pale); stroke-width: 0.5; opacity: 0.5; }
+.drawing .sole { fill: var(--sole); stroke: var(--pale); }
+.drawing .pad { stroke: var(--pale); stroke-width: 0.8; }
+.drawing .dry { stroke: var(--dry); stroke-width: 2; }
+.drawing .wet { stroke: var(--wet); stroke-width: 2; }
+.drawing .ink { stroke-width: 2; }
+.drawing .flat, .drawing .free { stroke-dasharray: 6 4; }
+.drawing .fill { fill: var(--dry); stroke: none; } .drawing .fill.wet { fill: var(--wet); }
+.drawing .fill.band { opacity: 0.14; } .drawing .fill.contact { opacity: 0.75; }
+.drawing .fill.point { fill: var(--ink); }
+"""
+
+
+class Drawing(NamedTuple):
+    """Content of an SVG of :data:`WIDTH` and :data:`HEIGHT`, its title and its description."""
+
+    title: str
+    alt: str
+    body: str
+
+
+def _path(points: Iterable[tuple[float, float]], kind: str, closed: bool = False) -> str:
+    places = ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)
+    return f'<path class="{kind}" d="M{places}{"Z" if closed else ""}"/>' if places else ''
+
+
+def _text(x: float, y: float, words: str, kind: str = '', more: str = '') -> str:
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" {more}>{html.escape(words)}</text>'
+
+
+class Plot:
+    """Axes from 0, and what is drawn in them."""
+
+    left, right, top, bottom = 56.0, 14.0, 26.0, 42.0
+
+    def __init__(self, x_end: float, y_end: float, x_label: str, y_label: str) -> None:
+        self.x_end, self.y_end = x_end or 1.0, y_end or 1.0
+        ticks = MaxNLocator(5, steps=[1, 2, 5, 10])
+        floor, wall = HEIGHT - self.bottom, WIDTH - self.right
+        self.parts = []
+        for x in ticks.tick_values(0.0, self.x_end):
+            if 0.0 <= x <= self.x_end:
+                self.parts.append(_text(self.x(x), floor + 16.0, f'{x:.6g}', 'middle'))
+        for y in ticks.tick_values(0.0, self.y_end):
+            if 0.0 <= y <= self.y_end:
+                self.parts += [
+                    _path([(self.left, self.y(y)), (wall, self.y(y))], 'grid'),
+                    _text(self.left - 6.0, self.y(y) + 4.0, f'{y:.6g}', 'end'),
+                ]
+        middle = 0.5 * (self.top + floor)
+        self.parts += [
+            _path([(self.left, self.top), (self.left, floor), (wall, floor)], 'axis'),
+            _text(0.5 * (self.left + wall), HEIGHT - 6.0, x_label, 'middle'),
+            _text(14.0, middle, y_label, 'middle', f'transform="rotate(-90 14 {middle:g})"'),
+        ]
+
+    def x(self, value: float) -> float:
+        """Return the place of a value."""
+        return self.left + value / self.x_end * (WIDTH - self.left - self.right)
+
+    def y(self, value: float) -> float:
+        """Return the place of a value, at the frame where it is outside."""
+        share = min(max(value / self.y_end, 0.0), 1.0)
+        return HEIGHT - self.bottom - share * (HEIGHT - self.top - self.bottom)
+
+    def line(self, x: Sequence[float], y: Sequence[float], kind: str) -> None:
+        """Draw a line."""
+        points = zip(x, y, strict=True)
+        self.parts.append(_path([(self.x(a), self.y(b)) for a, b in points], kind))
+
+    def band(self, x: Sequence[float], low: Array, high: Array, kind: str) -> None:
+        """Fill between two lines."""
+        edge = [*zip(x, low.tolist(), strict=True), *zip(x, high.tolist(), strict=True)]
+        edge[len(x) :] = reversed(edge[len(x) :])
+        points = [(self.x(a), self.y(b)) for a, b in edge]
+        self.parts.append(_path(points, f'fill band {kind}', closed=True))
+
+    def point(self, x: float, y: float, kind: str) -> None:
+        """Draw a point."""
+        self.parts.append(
+            f'<circle class="fill point {kind}" cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4"/>'
+        )
+
+
+def drawings(found: Explored) -> dict[str, Drawing]:
+    """Return the drawings of the page by name."""
+    made = profile(found), sole(found), grip(found), limits(found)
+    return dict(zip(NAMES, made, strict=True))
+
+
+def _cap(height: float, sphere: float, rim: float, contact: float, gap: float) -> Array:
+    """Return points of the right half of a cap from rim to contact, down from the pad base."""
+    if math.isinf(sphere):
+        return np.array([[rim, 0.0], [contact, 0.0]])
+    middle = height - sphere
+    ends = math.atan2(-middle, rim), math.atan2(gap - middle, contact)
+    angle = np.linspace(*ends, 40)
+    return np.stack([sphere * np.cos(angle), middle + sphere * np.sin(angle)], axis=1)
+
+
+def profile(found: Explored) -> Drawing:
+    """Draw the dome free and pressed on the floor; cut through its axis."""
+    radius, free, pressed = found.inputs.radius, found.free, found.pressed
+    if found.pad is None:
+        return Drawing('One pad on the floor', 'There is no pad.', _nothing())
+    tall = max(radius, *(each.height for each in (free, pressed) if each is not None), 0.0)
+    scale = min((WIDTH - 40.0) / (3.2 * radius), (HEIGHT - 96.0) / tall)
+    base, centre = 44.0, 0.5 * WIDTH
+    body = [
+        f'<rect class="sole" x="20" y="{base - 18:.1f}" width="{WIDTH - 40:.1f}" height="18"/>',
+        _text(24.0, base - 5.0, 'sole'),
+    ]
+
+    def wall(half: Array, kind: str) -> str:
+        there = [(centre + scale * x, base + scale * z) for x, z in half.tolist()]
+        back = [(2.0 * centre - x, y) for x, y in reversed(there)]
+        return _path([*there, *back], kind)
+
+    if free is not None:
+        cap = _cap(free.height, free.sphere_radius, radius, 0.0, free.height)
+        body.append(wall(cap, 'free pad'))
+    words = 'no pressed dome: see what is marked'
+    if pressed is not None:
+        b, gap = pressed.contact_radius, pressed.gap
+        floor = base + scale * gap
+        body += [
+            wall(_cap(pressed.height, pressed.sphere_radius, radius, b, gap), 'ink'),
+            _path([(20.0, floor), (WIDTH - 20.0, floor)], 'axis'),
+            _path([(centre - scale * b, floor), (centre + scale * b, floor)], 'dry'),
+            _text(WIDTH - 24.0, floor - 5.0, f'gap {1e3 * gap:.3g} mm', 'end'),
+            _text(24.0, floor - 5.0, 'floor'),
+        ]
+        words = f'contact radius {1e3 * b:.3g} mm, solid: pressed, dashed: free'
+    body.append(_text(centre, HEIGHT - 10.0, words, 'middle'))
+    return Drawing('One pad on the floor', f'Cut through one pad. {words}.', ''.join(body))
+
+
+def sole(found: Explored) -> Drawing:
+    """Draw the sole from below, flat and domed, with what touches the floor."""
+    if found.places is None:
+        return Drawing('Sole from below', 'There is no sole.', _nothing())
+    size = 0.22 * WIDTH
+    middle = 0.5 * HEIGHT - 14.0
+    scale = size / found.inputs.sole_radius
+    body = []
+    for centre, name in ((0.26 * WIDTH, 'flat'), (0.74 * WIDTH, 'dome')):
+        body.append(f'<circle class="sole" cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>')
+        if name == 'flat' and found.touching:
+            # What touches lies scattered over the whole sole: its share is the opacity.
+            body.append(
+                f'<circle class="fill" style="opacity:{0.75 * found.touching:.3f}"'
+                f' cx="{centre:.1f}" cy="{middle:.1f}" r="{size:.1f}"/>'
+            )
+        contact = found.pressed.contact_radius if name == 'dome' and found.pressed else 0.0
+        for x, y in found.places.tolist():
+            place = f'cx="{centre + scale * x:.1f}" cy="{middle + scale * y:.1f}"'
+            body.append(f'<circle class="pad" {place} r="{scale * found.inputs.radius:.2f}"/>')
+            if contact:
+                body.append(f'<circle class="fill contact" {place} r="{scale * contact:.2f}"/>')
+    area = math.pi * found.inputs.sole_radius**2
+    share = math.nan
+    if found.pressed is not None:
+        share = found.inputs.pads * math.pi * found.pressed.contact_radius**2 / area
+    words = [
+        f'flat: {100.0 * found.touching:.3g} % touches' if found.touching else 'flat: –',
+        'domes: –' if math.isnan(share) else f'domes: {100.0 * share:.3g} % touches',
+    ]
+    for share, text in zip((0.26, 0.74), words, strict=True):
+        body.append(_text(share * WIDTH, HEIGHT - 10.0, text, 'middle'))
+    alt = f'{found.inputs.pads} pads on the sole. {". ".join(words)} of the area of the sole.'
+    return Drawing('Sole from below', alt, ''.join(body))
+
+
+def grip(found: Explored) -> Drawing:
+    """Draw the tangential capacity over the load in four states, with bands."""
+    loads, title = found.loads.tolist(), 'Grip over load'
+    if not found.curves:
+        return Drawing(title, 'No grip can be computed.', _nothing())
+    top = 1.05 * max(float(each[2].max()) for each in found.curves.values())
+    plot = Plot(max(loads), top, 'load on the foot, N', 'tangential capacity, N')
+    for state, (value, low, high) in found.curves.items():
+        morphology, ground = state.split(', ')
+        plot.band(loads, low, high, ground)
+        plot.line(loads, value.tolist(), f'{ground} {morphology}')
+        plot.point(found.inputs.load, found.grip[state].value, ground)
+    plot.line([found.inputs.load] * 2, [0.0, top], 'axis')
+    for place, state in enumerate(STATES):
+        morphology, ground = state.split(', ')
+        x = plot.left + 106.0 * place
+        plot.parts += [
+            _path([(x, 12.0), (x + 26.0, 12.0)], f'{ground} {morphology}'),
+            _text(x + 31.0, 16.0, state),
+        ]
+    alt = '; '.join(f'{state} {span.value:.3g} N' for state, span in found.grip.items())
+    return Drawing(title, f'Tangential capacity at the load: {alt}.', ''.join(plot.parts))
+
+
+def limits(found: Explored) -> Drawing:
+    """Draw the force limit of the foot over the pressure, with the load and other criteria."""
+    title, foot = 'Force limit over pressure', found.foot
+    if found.limit_curve is None or foot is None:
+        return Drawing(title, 'No force limit can be computed.', _nothing())
+    pressures, curve = found.limit_curve
+    there = {name: foot.pads * each for name, each in found.limits.items() if each == each}
+    load = found.inputs.load if 0.0 < found.inputs.load < math.inf else 0.0
+    top = 1.08 * max(float(curve.max()), load, *there.values())
+    plot = Plot(1e-3 * foot.ceiling, top, 'gauge pressure, kPa', 'force limit of the foot, N')
+    plot.line((1e-3 * pressures).tolist(), curve.tolist(), 'ink')
+    if load:
+        plot.line([0.0, plot.x_end], [load, load], 'dry')
+        plot.parts.append(_text(plot.left + 6.0, plot.y(load) - 5.0, 'load'))
+    now, lowest = 1e-3 * found.inputs.pressure, math.inf
+    if found.limit is not None:
+        plot.line([now, now], [found.limit.low, found.limit.high], 'wet')
+        side = -9.0 if now > 0.6 * plot.x_end else 9.0
+        for name, value in sorted(there.items(), key=lambda each: each[1]):
+            lowest = min(plot.y(value) + 4.0, lowest - 13.0)
+            plot.point(now, value, '' if name == foot.limit else 'wet')
+            kind = 'end' if side < 0.0 else ''
+            plot.parts.append(_text(plot.x(now) + side, lowest, name, kind))
+    plot.parts.append(_text(plot.left, 16.0, f'line: {foot.limit}; points: every criterion'))
+    listed = ', '.join(f'{name} {value:.3g} N' for name, value in there.items())
+    return Drawing(title, f'Force limit of the foot: {listed}.', ''.join(plot.parts))
+
+
+def _nothing() -> str:
+    return _text(0.5 * WIDTH, 0.5 * HEIGHT, 'no answer: see what is marked', 'middle')
+
+
+def svg(drawing: Drawing) -> str:
+    """Return a drawing as an element of a page."""
+    alt = html.escape(drawing.alt, quote=True)
+    return (
+        f'<svg class="drawing" role="img" aria-label="{alt}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
+        f' xmlns="http://www.w3.org/2000/svg">{drawing.body}</svg>'
+    )
+
+
+def variables(theme: str) -> str:
+    """Return the colours of a theme as CSS."""
+    return ' '.join(f'--{name}: {value};' for name, value in COLOURS[theme].items())
+
+
+def picture(found: Explored) -> str:
+    """Return all drawings as one SVG file, for a paper."""
+    parts = []
+    for place, each in enumerate(drawings(found).values()):
+        x, y = place % 2 * (WIDTH + 20.0), place // 2 * (HEIGHT + 36.0)
+        title = _text(0.0, 16.0, each.title, '', 'style="font-weight: bold"')
+        parts.append(
+            f'<g transform="translate({x + 10.0:g} {y + 10.0:g})">{title}'
+            f'<g transform="translate(0 22)">{each.body}</g></g>'
+        )
+    wide, tall = 2.0 * WIDTH + 40.0, 2.0 * HEIGHT + 84.0
+    return (
+        f'<svg class="drawing" xmlns="http://www.w3.org/2000/svg" width="{wide:g}"'
+        f' height="{tall:g}" viewBox="0 0 {wide:g} {tall:g}">'
+        f'<style>svg {{ {variables("light")} }}{STYLE}</style>'
+        f'<rect width="{wide:g}" height="{tall:g}" style="fill: #fff; stroke: none"/>'
+        f'{"".join(parts)}</svg>\n'
+    )

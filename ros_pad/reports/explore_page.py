@@ -1,0 +1,374 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of ``pad explore``, served to this machine alone.
+
+A change of an input is computed beside the server; changes that come meanwhile are answered
+together, by the last of them. Nothing is loaded from elsewhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import math
+import pathlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from ros_pad import configuration
+from ros_pad.contact import Foot
+from ros_pad.contact.calibrate import foot_text
+from ros_pad.contact.limits import CRITERIA
+from ros_pad.errors import PadError
+from ros_pad.reports import explore_drawings
+from ros_pad.reports.explore import BAND
+from ros_pad.reports.explore import FIELDS
+from ros_pad.reports.explore import LIQUIDS
+from ros_pad.reports.explore import MEASURED
+from ros_pad.reports.explore import Explored
+from ros_pad.reports.explore import Field
+from ros_pad.reports.explore import Inputs
+from ros_pad.reports.explore import explore
+from ros_pad.reports.explore import rows
+
+HOST = '127.0.0.1'
+PATIENCE = 0.1
+"""Time after which old numbers are shown pale while new ones are computed, s."""
+_GROUPS = {
+    'Pads': ('material', 'pads', 'radius', 'stiffness', 'thickness', 'sole_radius', 'criterion'),
+    'Air': ('supply', 'pressure', 'bore', 'hose'),
+    'Ground': ('load', 'liquid', 'film', 'stand', 'roughness'),
+}
+_CHOICES = {'material': 'Material', 'criterion': 'Criterion of the limit', 'liquid': 'Liquid'}
+_CSS = f"""
+:root {{ {explore_drawings.variables('light')} --paper: #fff; --line: #dcdfe4; }}
+.body--dark {{ {explore_drawings.variables('dark')} --paper: #16191e; --line: #343a43; }}
+{explore_drawings.STYLE}
+body {{ background: var(--paper); color: var(--ink); font: 15px/1.45 system-ui, sans-serif; }}
+.nicegui-content {{ padding: 0; display: block; }}
+.explore {{ display: grid; grid-template-columns: 21rem minmax(0, 1fr); gap: 0 1.5rem;
+  max-width: 1500px; margin: 0 auto; padding: 1rem 1.25rem; }}
+.top {{ grid-column: 1 / -1; display: flex; flex-wrap: wrap; gap: 0.5rem 1rem;
+  align-items: center; }}
+.top > :first-child {{ margin-right: auto; }}
+.top h1 {{ font-size: 1.35rem; font-weight: 650; line-height: 1.2; margin: 0; }}
+.inputs {{ grid-row: 2 / 4; }}
+h2 {{ font-size: 0.95rem; font-weight: 650; line-height: 1.4; margin: 0.9rem 0 0.35rem; }}
+.control {{ margin-bottom: 0.4rem; }}
+.control input[type=range] {{ width: 100%; accent-color: var(--wet); margin: 0; }}
+.remark {{ font-size: 0.82rem; line-height: 1.3; margin: 0.1rem 0 0.4rem;
+  padding-left: 0.5rem; border-left: 3px solid var(--wet); overflow-wrap: anywhere; }}
+.remark.error {{ border-color: var(--dry); font-weight: 600; }}
+.figures {{ display: grid; gap: 0.5rem 1.5rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }}
+.figures svg {{ display: block; width: 100%; height: auto; }}
+.numbers {{ display: grid; gap: 0 1.25rem; margin-top: 0.5rem;
+  grid-template-columns: repeat(auto-fit, minmax(15rem, 1fr)); }}
+dl {{ margin: 0; font-size: 0.86rem; }}
+dl div {{ display: flex; justify-content: space-between; gap: 0.5rem; padding: 0.12rem 0;
+  border-bottom: 1px solid var(--line); white-space: nowrap; }}
+dd {{ margin: 0; font-variant-numeric: tabular-nums; }}
+.note {{ font-size: 0.82rem; max-width: 62rem; margin-top: 0.8rem; }}
+.stale {{ opacity: 0.35; }}
+@media (max-width: 800px) {{
+  .explore {{ display: flex; flex-direction: column; padding: 0.75rem; }}
+  .figures {{ order: 1; display: flex; overflow-x: auto; scroll-snap-type: x mandatory;
+    position: sticky; top: 0; z-index: 5; background: var(--paper); gap: 0.75rem;
+    border-bottom: 1px solid var(--line); margin: 0 -0.75rem; padding: 0 0.75rem 0.4rem; }}
+  .figures > * {{ flex: 0 0 92%; scroll-snap-align: center; }}
+  .inputs {{ order: 2; }} .answer {{ order: 3; }}
+}}
+"""
+
+
+def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> None:
+    """Serve the page until a signal ends the process.
+
+    Parameters
+    ----------
+    foot : Foot
+        The foot to begin with.
+    port : int
+        TCP port on the loopback interface.
+    browser : bool
+        Open a browser.
+    out : path, optional
+        Each exported foot is written here too, into the next free name.
+
+    Raises
+    ------
+    PadError
+        When NiceGUI is not installed.
+    """
+    try:
+        from nicegui import app
+        from nicegui import ui
+        from starlette.middleware.trustedhost import TrustedHostMiddleware
+    except ImportError as error:
+        raise PadError(f"NiceGUI is missing ({error}): pip install 'ros_pad[explore]'") from error
+    print(f'http://{HOST}:{port}/ shows {foot.source}; Ctrl-C ends it', flush=True)
+    # A page elsewhere whose name leads to this machine must not read this one.
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
+    ui.run(
+        lambda: Page(Inputs.of(foot), out).build(),
+        host=HOST,
+        port=port,
+        title=f'{foot.source} · pad explore',
+        dark=None,
+        language='en-US',
+        show=browser,
+        reload=False,
+        tailwind=False,
+        show_welcome_message=False,
+        timeout_graceful_shutdown=1,
+    )
+
+
+class Latest:
+    """Computes in a thread, and again if that was asked for meanwhile: once, however often.
+
+    Parameters
+    ----------
+    compute : callable
+        Returns an answer to what is true when it begins; called in a thread.
+    show : callable
+        Called with the answer, in the thread of the event loop.
+    wait : callable
+        Called there with words if an answer takes longer than :data:`PATIENCE`, or fails.
+    """
+
+    def __init__(
+        self,
+        compute: Callable[[], Any],
+        show: Callable[[Any], None],
+        wait: Callable[[str], None],
+    ) -> None:
+        self._compute, self._show, self._wait = compute, show, wait
+        self._asked = False
+        self._task: asyncio.Task[None] | None = None
+
+    def ask(self) -> None:
+        """Ask for an answer to what is true from now on."""
+        self._asked = True
+        if self._task is None or self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._work())
+
+    async def _work(self) -> None:
+        while self._asked:
+            self._asked = False
+            thread = asyncio.ensure_future(asyncio.to_thread(self._compute))
+            if not (await asyncio.wait({thread}, timeout=PATIENCE))[0]:
+                self._wait('computing …')
+            try:
+                self._show(await thread)
+            except Exception as error:
+                self._wait(f'no answer: {error}')
+                raise
+
+
+class Page:
+    """One opened page: its inputs, and the answer that it shows.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What it begins with.
+    out : path, optional
+        As for :func:`serve`.
+    """
+
+    def __init__(self, inputs: Inputs, out: pathlib.Path | None) -> None:
+        from nicegui import ui
+
+        self._ui: Any = ui
+        self._inputs, self._out = inputs, out
+        self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
+        self._answers = 0
+        self._found: Explored | None = None
+        self._controls: dict[str, Any] = {}
+        self._remarks: dict[str, Any] = {}
+        self._figures: dict[str, Any] = {}
+
+    def build(self) -> None:
+        """Make the elements of the page, and ask for the first answer."""
+        ui = self._ui
+        ui.add_css(_CSS)
+        fields = {field.name: field for field in FIELDS}
+        with ui.element('main').classes('explore'):
+            with ui.element('div').classes('top'):
+                ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
+                self._status = ui.label().props('role=status')
+                ui.button('Foot file', on_click=self._export).props('outline no-caps dense')
+                ui.button('Picture', on_click=self._picture).props('outline no-caps dense')
+            with ui.element('section').classes('inputs').props('aria-label="Inputs"'):
+                for title, names in _GROUPS.items():
+                    ui.html(f'<h2>{title}</h2>', sanitize=False)
+                    for name in names:
+                        self._controls[name] = ui.element('div').classes('control')
+                        with self._controls[name]:
+                            if name in fields:
+                                self._number(fields[name])
+                            else:
+                                self._choice(name)
+                            self._remarks[name] = ui.html(sanitize=False)
+            with ui.element('section').classes('figures').props('aria-label="Drawings"') as both:
+                for name in explore_drawings.NAMES:
+                    self._figures[name] = ui.html(sanitize=False)
+            with ui.element('section').classes('answer').props('aria-label="Numbers"') as numbers:
+                self._numbers = ui.html(sanitize=False)
+                ui.html(f'<p class="note">{BAND}</p>', sanitize=False)
+        self._pale = both, numbers
+        self._latest.ask()
+
+    def _number(self, field: Field) -> None:
+        """Make a number and its slider, which move one another."""
+        value = getattr(self._inputs, field.name)
+        shown = None if value is None else float(f'{value / field.unit:.9g}')
+
+        sliding = False
+
+        def slid(event: Any) -> None:
+            nonlocal sliding
+            sliding = True
+            box.set_value(float(event.args))
+            sliding = False
+
+        def changed(event: Any) -> None:
+            number = event.value
+            if not sliding:
+                place(number)
+            self._change(field.name, _si(field, number))
+
+        def place(number: float | None) -> None:
+            # As a property of the element an old value would pull at a slider that moves.
+            if number is not None:
+                ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
+
+        ui = self._ui
+        box = ui.number(field.label, value=shown, format='%.7g', on_change=changed)
+        box.props(f'dense outlined suffix="{field.shown}" name={field.name} step=any')
+        slider = ui.element('input').props(
+            f'type=range min={field.low} max={field.high} step={field.step}'
+            f' aria-label="{field.label}, {field.shown}"'
+        )
+        slider.on('input', slid, js_handler='(event) => emit(event.target.value)')
+        place(shown)
+
+    def _choice(self, name: str) -> None:
+        value = getattr(self._inputs, name)
+        known = {
+            'material': [MEASURED, *configuration.names('materials')],
+            'criterion': list(CRITERIA),
+            'liquid': list(LIQUIDS),
+        }[name]
+        self._ui.select(
+            known if value in known else [*known, value],
+            label=_CHOICES[name],
+            value=value,
+            on_change=lambda event: self._change(name, event.value),
+        ).props(f'dense outlined options-dense aria-label="{_CHOICES[name]}" name={name}')
+
+    def _change(self, name: str, value: Any) -> None:
+        self._inputs = replace(self._inputs, **{name: value})
+        self._latest.ask()
+
+    def _set_pale(self, words: str) -> None:
+        self._status.set_text(words)
+        for each in self._pale:
+            each.classes(add='stale') if words else each.classes(remove='stale')
+
+    def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
+        self._found, figures, numbers = answer
+        # A material has its stiffness from its law.
+        self._controls['stiffness'].set_visibility(self._inputs.material == MEASURED)
+        self._answers += 1
+        for name, figure in figures.items():
+            self._figures[name].set_content(figure)
+        for name, element in self._remarks.items():
+            element.set_content(
+                ''.join(
+                    f'<p class="remark{" error" if each.error else ""}" role="alert">'
+                    f'{html.escape(each.text)}</p>'
+                    for each in self._found.remarks
+                    if each.name == name
+                )
+            )
+        self._numbers.set_content(
+            f'<div class="numbers" data-answer="{self._answers}">{numbers}</div>'
+        )
+        self._set_pale('')
+
+    def _export(self) -> None:
+        """Download the foot, and write it if a file was asked for."""
+        found = self._found
+        if found is None or found.foot is None:
+            self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
+            return
+        text = foot_file(found.foot)
+        if self._out is not None:
+            try:
+                path = _write_new(self._out, text)
+            except OSError as error:
+                self._ui.notify(
+                    f'{self._out}: cannot be written: {error.strerror}', type='negative'
+                )
+                return
+            self._ui.notify(f'written: {path}')
+        self._ui.download.content(text, 'my_foot.yaml')
+
+    def _picture(self) -> None:
+        if self._found is not None:
+            drawn = explore_drawings.picture(self._found)
+            self._ui.download.content(drawn, 'foot.svg')
+
+
+def _si(field: Field, number: float | None) -> float | None:
+    """Return what was typed in SI units; a number that is missing is NaN, or no thickness."""
+    if number is None:
+        return None if field.name == 'thickness' else math.nan
+    if field.setting.value_type is int and number == int(number):
+        return int(number)
+    # Without the rounding of the unit: 1.3 mm are 0.0013 m.
+    return float(f'{number * field.unit:.12g}')
+
+
+def foot_file(foot: Foot) -> str:
+    """Return the YAML text of a foot that was chosen on the page."""
+    head = (
+        f'Made by pad explore from the foot {foot.source}.',
+        'Nothing of it was measured anew; what cannot be chosen there is that of this foot.',
+    )
+    comments = {'stiffness': 'as chosen', 'thickness': 'as chosen'}
+    return foot_text(foot, f'{foot.source}, explored', head, comments)
+
+
+def answer(inputs: Inputs) -> tuple[Explored, dict[str, str], str]:
+    """Return the answer to the inputs, its drawings and its numbers, as HTML."""
+    found = explore(inputs)
+    figures = {
+        name: f'<h2>{each.title}</h2>{explore_drawings.svg(each)}'
+        for name, each in explore_drawings.drawings(found).items()
+    }
+    parts = []
+    for title, group in rows(found):
+        parts.append(f'<div><h2>{html.escape(title)}</h2><dl>')
+        parts += [
+            f'<div><dt>{html.escape(row.label)}</dt>'
+            f'<dd id="{row.key}">{html.escape(row.text)}</dd></div>'
+            for row in group
+        ]
+        parts.append('</dl></div>')
+    return found, figures, ''.join(parts)
+
+
+def _write_new(path: pathlib.Path, text: str) -> pathlib.Path:
+    """Write a new file, with a number behind its name where that is taken; return its path."""
+    number, free = 1, path
+    while True:
+        try:
+            with free.open('x', encoding='utf-8') as stream:
+                stream.write(text)
+            return free
+        except FileExistsError:
+            number += 1
+            free = path.with_name(f'{path.stem}_{number}{path.suffix}')

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ``pad explore`` computes, without a page: the numbers of the other commands."""
+
+import dataclasses
+import json
+import math
+import pathlib
+import xml.etree.ElementTree
+
+import numpy as np
+import pytest
+
+from ros_pad import cli
+from ros_pad.contact import Film
+from ros_pad.contact import Foot
+from ros_pad.contact import Pad
+from ros_pad.contact import force_limit
+from ros_pad.contact import tangential_resistance
+from ros_pad.reports.explore import FIELDS
+from ros_pad.reports.explore import STATES
+from ros_pad.reports.explore import Explored
+from ros_pad.reports.explore import Field
+from ros_pad.reports.explore import Inputs
+from ros_pad.reports.explore import explore
+from ros_pad.reports.explore import rows
+from ros_pad.reports.explore_drawings import picture
+from ros_pad.reports.explore_page import foot_file
+from ros_pad.simulation import Hose
+from ros_pad.simulation import PneumaticChannel
+from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation.pneumatics import time_to
+
+LARGE = Inputs.of(Foot.load('large37'))
+
+
+def changed(**values: object) -> Explored:
+    return explore(dataclasses.replace(LARGE, **values))
+
+
+def texts(found: Explored) -> dict[str, str]:
+    return {row.key: row.text for _, group in rows(found) for row in group}
+
+
+def test_the_numbers_are_those_of_pad_contact(capsys: pytest.CaptureFixture[str]):
+    force = str(LARGE.load / 37)
+    options = ('--foot', 'large37', '--pressure', '76500', '--force', force, '--json')
+    assert cli.main(['contact', *options]) == 0
+    said = json.loads(capsys.readouterr().out)
+    found = explore(LARGE)
+    assert found.remarks == ()
+    assert found.free.height == said['free']['height_m']
+    assert found.pressed.gap == said['pressed']['gap_m']
+    assert found.pressed.contact_radius == said['pressed']['contact_radius_m']
+    assert found.ring.height == said['meniscus']['height_m']
+    assert found.limits == said['force_limit_n']
+    assert found.limit.value == 37 * said['force_limit_n']['measured']
+
+
+@pytest.mark.parametrize('roughness', [0.0, 2e-6])
+def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
+    found = changed(roughness=roughness, load=13.0)
+    foot = Foot.load('large37').on_rough(roughness)
+    for state in STATES:
+        pressure = 76500.0 if 'dome' in state else 0.0
+        films = 0.0, 0.0
+        if 'wet' in state:
+            film = Film(foot)
+            film.touch_down(3e-4)
+            on_domes = foot.dome_load(13.0, pressure)
+            films = film.drain(on_domes, 13.0 - on_domes, pressure, 0.3)
+        value = tangential_resistance(foot, 13.0, pressure, *films)
+        assert found.grip[state].value == pytest.approx(value, rel=1e-12)
+        low, high = found.grip[state][1:]
+        assert low < value < high
+    assert 'above the force limit' in found.remarks[0].text and not found.remarks[0].error
+
+
+def test_bands_hold_each_constant_halved_and_doubled():
+    own = explore(LARGE).grip
+    for name in ('friction', 'shear_strength', 'boundary_friction', 'critical_film'):
+        for factor in (0.5, 2.0):
+            wrong = {name: factor * getattr(LARGE.foot, name)}
+            foot = dataclasses.replace(LARGE.foot, **wrong)
+            for state, span in changed(foot=foot).grip.items():
+                assert own[state].low <= span.value * (1 + 1e-12)
+                assert span.value <= own[state].high * (1 + 1e-12)
+    # A wet dome without any dry contact has boundary friction alone.
+    assert own['dome, wet'].low == pytest.approx(0.12 * LARGE.load, rel=1e-3)
+
+
+def test_the_limit_over_the_factor_of_a_material_is_that_of_each_factor():
+    inputs = Inputs.of(Foot.load('small217'))
+    inputs = dataclasses.replace(inputs, criterion='thickness', pressure=8e3)
+    found = explore(inputs)
+    limits = []
+    for factor in np.linspace(*inputs.foot.pad.material.factor_range, 9):
+        material = inputs.foot.pad.material.times(factor)
+        pad = Pad.of(material, 0.5e-3, 0.2e-3)
+        limits.append(217 * force_limit(pad, 8e3, 'thickness'))
+    others = [217 * each for each in found.limits.values()]
+    assert found.limit.low == pytest.approx(min(limits + others), rel=1e-9)
+    assert found.limit.high == pytest.approx(max(limits + others), rel=1e-9)
+
+
+def test_switching_is_that_of_the_channel():
+    found = changed(bore=1e-3, hose=5.0)
+    channel = PneumaticChannel(RegulatorModel(), Hose(1e-3, 5.0), LARGE.foot.air_volume)
+    assert found.switching.fill == pytest.approx(
+        time_to(channel, 76500.0, 0.9 * 76500.0), rel=0.01
+    )
+    slow = changed(bore=0.5e-3, hose=50.0)
+    assert slow.switching.fill == math.inf
+    assert [each.name for each in slow.remarks] == ['hose']
+
+
+# The input that is marked, words there, and the numbers that go; all others stay.
+PRESSED = {'pressed-gap', 'pressed-contact_radius', 'ring-height'}
+LIMITS = {f'limit-{name}' for name in ('thickness', 'wall', 'flattening', 'max_depth', 'measured')}
+GRIP = {f'grip-{state.replace(", ", "-")}' for state in STATES}
+DOMED = {key for key in GRIP if 'dome' in key}
+FOOT = {'limit', 'fill', 'vent'}
+BAD = [
+    ({'load': 25.0}, 'load', 'the contact would cover the whole pad', PRESSED),
+    ({'load': math.nan}, 'load', 'from 0.001 to 10000 N', PRESSED | GRIP),
+    ({'pressure': 95e3}, 'pressure', 'ceiling of the foot', {'all'}),
+    ({'pressure': 0.0}, 'pressure', 'more pressure is needed', PRESSED | DOMED | {'fill', 'vent'}),
+    ({'pads': 600}, 'pads', 'at most 128', PRESSED | GRIP | FOOT | {'pitch'}),
+    ({'pads': 3.5}, 'pads', 'a whole number', PRESSED | GRIP | FOOT | {'pitch'}),
+    ({'thickness': 2e-3}, 'thickness', 'up to 0.0015 m', {'all'}),
+    ({'film': 2.0}, 'film', 'from 1e-06 to 0.01 m', {'grip-flat-wet', 'grip-dome-wet'}),
+    ({'roughness': -1.0}, 'roughness', 'from 0 to 0.001 m', GRIP),
+    ({'bore': 1e-9}, 'bore', 'from 0.0005 to 0.02 m', {'fill', 'vent'}),
+    ({'supply': 1.0}, 'supply', 'from 1000 to 1000000 Pa', GRIP | FOOT),
+    ({'material': 'nix'}, 'material', "no material named 'nix'", {'all'}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(('values', 'name', 'words', 'gone'), BAD)
+def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, gone: set[str]):
+    found = changed(**values)
+    (error,) = (each for each in found.remarks if each.error)
+    assert error.name == name
+    assert words in error.text
+    missing = {key for key, text in texts(found).items() if text == '–'}
+    if gone == {'all'}:
+        assert PRESSED | DOMED | {'fill', 'vent', 'free-height'} <= missing
+    else:
+        assert missing == gone
+    assert 'nan' not in picture(found)
+
+
+def test_a_foot_that_no_file_may_have_is_refused():
+    found = changed(stiffness=1.0, radius=4e-3, pads=7, pressure=800.0, load=0.01)
+    (error,) = (each for each in found.remarks if each.name == 'supply' and each.error)
+    assert (
+        error.text == 'ceiling = 849.0 is not allowed: a number from 1000 to 1000000 Pa is needed'
+    )
+    assert found.foot is None and found.free is not None
+
+
+def notes(**values: object) -> dict[str, str]:
+    found = changed(**values)
+    assert not any(each.error for each in found.remarks)
+    assert '–' not in texts(found).values()
+    return {each.name: each.text for each in found.remarks}
+
+
+def test_what_is_worth_knowing_is_no_error():
+    assert 'ends at 91.34 kPa' in notes(supply=150e3, criterion='wall')['supply']
+    assert 'thickness is used' in notes(radius=1.4e-3)['criterion']
+    assert 'pads overlap' in notes(pads=120)['pads']
+    assert 'domes touch one another' in notes(pads=91)['pads']
+
+
+@pytest.mark.parametrize('field', FIELDS, ids=[field.name for field in FIELDS])
+def test_the_values_of_every_slider_are_drawn(field: Field):
+    for end in (field.low, field.high):
+        value = int(end) if field.name == 'pads' else end * field.unit
+        drawn = xml.etree.ElementTree.fromstring(picture(changed(**{field.name: value})))
+        numbers = ' '.join(value for part in drawn.iter() for value in part.attrib.values())
+        assert 'nan' not in numbers and 'inf' not in numbers
+
+
+@pytest.mark.parametrize('name', ['large37', 'large19', 'small217'])
+def test_the_foot_file_gives_the_foot(name: str, tmp_path: pathlib.Path):
+    start = dataclasses.replace(Foot.load(name), capillary_force=1.5e-4)
+    inputs = dataclasses.replace(Inputs.of(start), pads=31, sole_radius=16e-3)
+    path = tmp_path / 'foot.yaml'
+    path.write_text(foot_file(explore(inputs).foot), encoding='utf-8')
+    again = Foot.load(path)
+    wanted = dataclasses.replace(start, source=str(path), pads=31, sole_radius=16e-3)
+    assert again == wanted
+    other = dataclasses.replace(inputs, radius=0.7e-3, thickness=0.15e-3, criterion='flattening')
+    found = explore(other).foot
+    path.write_text(foot_file(found), encoding='utf-8')
+    assert Foot.load(path) == dataclasses.replace(found, source=str(path))

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of ``pad explore`` in a headless Chromium, and how it is served."""
+
+import asyncio
+import json
+import pathlib
+import signal
+import socket
+import sys
+import threading
+import urllib.error
+import urllib.parse
+import urllib.request
+import xml.etree.ElementTree
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from ros_pad import cli
+from ros_pad.commands.command import INTERRUPTED
+from ros_pad.contact import Foot
+from ros_pad.reports import explore_page
+from studies.work_precision import explore as study
+
+pytest.importorskip('nicegui', reason="the extra is missing: pip install 'ros_pad[explore]'")
+
+
+@pytest.fixture(scope='module')
+def page(tmp_path_factory: pytest.TempPathFactory):
+    """Yield a page of large37 with the folder of --out and the addresses that it has asked for."""
+    pytest.importorskip('playwright')
+    if study.CHROMIUM is None:
+        pytest.skip('no Chromium is installed')
+    folder = tmp_path_factory.mktemp('explore')
+    out = str(folder / 'mine.yaml')
+    with study.served('large37', '--out', out) as (address, _), study.browser() as chromium:
+        context = chromium.new_context(accept_downloads=True)
+        asked: list[str] = []
+        context.on('request', lambda request: asked.append(request.url))
+        found = study.opened(context, address)
+        found.on('websocket', lambda line: asked.append(line.url))
+        found.folder, found.asked = folder, asked
+        yield found
+
+
+def answers(page) -> int:
+    return int(page.locator('[data-answer]').get_attribute('data-answer'))
+
+
+def typed(page, name: str, value: str) -> None:
+    """Type a value, and wait for an answer to it."""
+    before = answers(page)
+    page.locator(f'input[type=number][name={name}]').fill(value)
+    page.wait_for_function(f"document.querySelector('[data-answer]').dataset.answer > {before}")
+    page.wait_for_function("!document.querySelector('.stale')")
+
+
+def shown(page, key: str) -> float:
+    return float(page.locator(f'#{key}').inner_text().split()[0])
+
+
+def error_at(page, name: str) -> str:
+    control = page.locator('.control', has=page.locator(f'input[type=number][name={name}]'))
+    return ' '.join(control.locator('.error').all_inner_texts())
+
+
+def test_a_slider_moves_the_numbers_to_those_of_pad_contact(page, capsys):
+    before = answers(page)
+    slider = study.slider(page, 'Pressure')
+    slider.focus()
+    page.keyboard.press('ArrowLeft')
+    page.wait_for_function("document.querySelector('[name=pressure]').value === '76'")
+    page.wait_for_function(f"document.querySelector('[data-answer]').dataset.answer > {before}")
+    assert answers(page) == before + 1  # one change, one answer
+    options = ('--foot', 'large37', '--pressure', '76000', '--force', str(5.6 / 37), '--json')
+    assert cli.main(['contact', *options]) == 0
+    said = json.loads(capsys.readouterr().out)
+    for key, value in {
+        'free-height': 1e3 * said['free']['height_m'],
+        'pressed-gap': 1e3 * said['pressed']['gap_m'],
+        'pressed-contact_radius': 1e3 * said['pressed']['contact_radius_m'],
+        'ring-height': 1e3 * said['meniscus']['height_m'],
+        **{f'limit-{name}': limit for name, limit in said['force_limit_n'].items()},
+    }.items():
+        assert shown(page, key) == float(f'{value:.4g}'), key
+    drawn = page.locator('svg[aria-label*="Cut through one pad"]').get_attribute('aria-label')
+    assert f'contact radius {1e3 * said["pressed"]["contact_radius_m"]:.3g} mm' in drawn
+
+
+def test_bad_input_is_marked_where_it_is_and_the_rest_stays(page):
+    grip = shown(page, 'grip-flat-dry')
+    typed(page, 'film', '50')
+    assert 'film = 0.05 is not allowed: a number from 1e-06 to 0.01 m' in error_at(page, 'film')
+    assert page.locator('#grip-dome-wet').inner_text() == '–'
+    assert shown(page, 'grip-flat-dry') == grip
+    typed(page, 'film', '0.3')
+    assert error_at(page, 'film') == ''
+    assert shown(page, 'grip-dome-wet') > 0.0
+    typed(page, 'load', '30')
+    assert 'the contact would cover the whole pad' in error_at(page, 'load')
+    assert page.locator('#pressed-gap').inner_text() == '–'
+    typed(page, 'load', '5.6')
+    # What is typed moves the slider, too.
+    assert study.slider(page, 'Load on the foot').input_value() == '5.6'
+
+
+def test_the_foot_file_walks(page, tmp_path: pathlib.Path, capsys):
+    typed(page, 'pads', '61')
+    typed(page, 'sole_radius', '20')
+    with page.expect_download() as loading:
+        page.get_by_role('button', name='Foot file').click()
+    path = tmp_path / 'foot.yaml'
+    loading.value.save_as(path)
+    foot = Foot.load(path)
+    assert (foot.pads, foot.sole_radius) == (61, 0.02)
+    walk = ('hexapod_patches', '--foot', str(path), '--cycles', '1', '--fidelity', 'L1')
+    options = ('--no-ros', '--no-compare', '--json', '--out', str(tmp_path / 'walk'))
+    assert cli.main(['run', *walk, *options]) == 0
+    assert json.loads(capsys.readouterr().out)
+    with page.expect_download():
+        page.get_by_role('button', name='Foot file').click()
+    written = sorted(each.name for each in page.folder.iterdir())
+    assert written == ['mine.yaml', 'mine_2.yaml']
+    assert (page.folder / 'mine.yaml').read_text() == path.read_text()
+
+
+def test_the_picture_is_one_file(page, tmp_path: pathlib.Path):
+    with page.expect_download() as loading:
+        page.get_by_role('button', name='Picture').click()
+    loading.value.save_as(tmp_path / 'foot.svg')
+    picture = (tmp_path / 'foot.svg').read_text(encoding='utf-8')
+    assert xml.etree.ElementTree.fromstring(picture).tag.endswith('svg')
+    assert 'Force limit over pressure' in picture
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    page.reload()
+    page.wait_for_selector('[data-answer]')
+    hosts = {urllib.parse.urlsplit(each).hostname for each in page.asked}
+    assert hosts <= {'127.0.0.1', None}  # data has no host
+    assert any(each.startswith('ws') for each in page.asked)
+
+
+def test_a_narrow_page_is_not_wider_than_its_window(page):
+    page.set_viewport_size({'width': 390, 'height': 844})
+    assert page.evaluate('document.documentElement.scrollWidth') <= 390
+
+
+def test_other_names_of_this_machine_are_refused_and_ctrl_c_ends_it():
+    with study.served() as (address, child):
+        with urllib.request.urlopen(address) as answer:
+            assert answer.status == 200
+        request = urllib.request.Request(address, headers={'Host': 'elsewhere.example'})
+        with pytest.raises(urllib.error.HTTPError, match='400'):
+            urllib.request.urlopen(request)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=60) == INTERRUPTED
+        assert child.stderr.read() == 'pad: stopped\n'
+
+
+def test_changes_that_come_meanwhile_are_answered_together():
+    state, computed, shown, waited = [0], [], [], []
+    go = threading.Event()
+
+    def compute() -> int:
+        computed.append(state[0])
+        go.wait()
+        return computed[-1]
+
+    async def scenario() -> None:
+        latest = explore_page.Latest(compute, shown.append, lambda words: waited.append(words))
+        latest.ask()
+        while not waited:
+            await asyncio.sleep(0.001)
+        for state[0] in range(1, 10):
+            latest.ask()
+        go.set()
+        while shown != [0, 9]:
+            await asyncio.sleep(0.001)
+
+    # Beside the event loop of the browser's driver.
+    with ThreadPoolExecutor() as pool:
+        pool.submit(asyncio.run, asyncio.wait_for(scenario(), 60.0)).result()
+    assert computed == [0, 9]
+    assert waited[0] == 'computing …'
+
+
+def test_an_answer_that_fails_leaves_no_old_numbers_as_new():
+    said = []
+
+    def compute() -> None:
+        raise ValueError('broken')
+
+    async def scenario() -> None:
+        latest = explore_page.Latest(compute, said.append, said.append)
+        latest.ask()
+        with pytest.raises(ValueError, match='broken'):
+            await latest._task
+
+    with ThreadPoolExecutor() as pool:
+        pool.submit(asyncio.run, scenario()).result()
+    assert said[-1] == 'no answer: broken'
+
+
+def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'nicegui', None)
+    assert cli.main(['explore', '--no-browser']) == 1
+    said = capsys.readouterr()
+    assert said.out == ''
+    assert "pip install 'ros_pad[explore]'" in said.err
+
+
+def test_what_cannot_be_served_is_refused(tmp_path: pathlib.Path, capsys):
+    (tmp_path / 'foot.yaml').touch()
+    with socket.create_server(('127.0.0.1', 0)) as taken:
+        port = str(taken.getsockname()[1])
+        for words, message in (
+            (['--port', port], f'--port {port}: Address already in use'),
+            (['--port', '0'], '--port = 0 is not allowed: a whole number from 1 to 65535'),
+            (['--out', str(tmp_path / 'foot.yaml')], 'exists already'),
+            (['--out', 'foot.txt'], 'ends in .yaml'),
+            (['no_foot'], "no foot named 'no_foot'"),
+        ):
+            assert cli.main(['explore', '--no-browser', *words]) == 2
+            assert message in capsys.readouterr().err
