@@ -109,13 +109,9 @@ def helps():
         yield f'\n## pad {command}\n\n```text\n{group.choices[command].format_help()}```\n'
 
 
-def choose(app, what, name, member, skip, options):
-    """Leave out fields of named tuples, which are attributes already; keep constants."""
-    if type(member).__name__ == '_tuplegetter':
-        return True
-
-    constant = what == 'module' and name.isupper() and not name.startswith('_')
-    return False if constant else None
+def skip_fields(app, what, name, member, skip, options):
+    """Leave out fields of named tuples, which their docstrings list."""
+    return True if type(member).__name__ == '_tuplegetter' else None
 
 
 def describe(app, what, name, value, options, lines):
@@ -168,7 +164,7 @@ def setup(app):
     for field in PyObject.doc_field_types:
         field.label = {'variable': 'Attributes'}.get(field.name, field.label)
     app.connect('source-read', read_page)
-    app.connect('autodoc-skip-member', choose)
+    app.connect('autodoc-skip-member', skip_fields)
     app.connect('autodoc-process-docstring', describe)
     app.connect('autodoc-process-signature', shorten)
     app.connect('missing-reference', find)
