@@ -43,6 +43,7 @@ copyright = f'{author}, {PACKAGE.findtext("license")}'
 
 extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon', 'sphinx.ext.viewcode']
 source_suffix = {'.md': 'markdown'}
+exclude_patterns = ['standard_docs']  # made by rosdoc2
 root_doc = 'index'
 highlight_language = 'text'
 html_theme = 'furo'

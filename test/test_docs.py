@@ -19,7 +19,6 @@ import pytest
 
 from ros_pad import cli
 from ros_pad import configuration
-from ros_pad.capillary import Mesh
 from studies.__main__ import STUDIES
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -199,10 +198,7 @@ def test_examples_of_pages(
 ):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / 'bags', tmp_path / 'bags')
-    (tmp_path / 'runs').mkdir()
-    (tmp_path / 'runs' / 'hexapod_patches_adaptive_seed0').symlink_to('../bags/hexapod_patches')
     shutil.copy(ROOT / 'config' / 'measurements' / 'thesis.csv', 'my_pads.csv')
-    Mesh.dome(1.55, 0.6).write('pad.stl')  # mm
     known: dict[str, object] = {'__name__': '__main__'}
     for reason, kind, text in examples(page):
         if kind == 'python' and not reason:

@@ -99,9 +99,9 @@ class PadMonitor:
     Notes
     -----
     With the error e = p - set-point and m the largest ``|e|`` of the last 0.4 s, a pad outside the
-    tolerance has stopped when ``|e| > m - min(0.2 m, tolerance)`` and the set-point has been constant
-    for 0.4 s. So the slowest fill that counts as moving is an exponential one with a time constant
-    of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
+    tolerance has stopped when ``|e|`` > m - min(0.2 m, tolerance) and the set-point has been
+    constant for 0.4 s. So the slowest fill that counts as moving is an exponential one with a
+    time constant of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
 
     An update takes 1 to 2 µs.
     """
