@@ -41,7 +41,13 @@ release = version = PACKAGE.findtext('version')
 author = PACKAGE.findtext('maintainer')
 copyright = f'{author}, {PACKAGE.findtext("license")}'
 
-extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon', 'sphinx.ext.viewcode']
+extensions = [
+    'myst_parser',
+    'sphinx.ext.autodoc',
+    'sphinx.ext.napoleon',
+    'sphinx.ext.viewcode',
+    'sphinx.ext.mathjax',
+]
 source_suffix = {'.md': 'markdown'}
 exclude_patterns = ['standard_docs']  # made by rosdoc2
 root_doc = 'index'
@@ -54,6 +60,7 @@ html_show_sphinx = False
 html_copy_source = False
 
 myst_heading_anchors = 6
+myst_enable_extensions = ['dollarmath']
 
 autodoc_default_options = {'members': True, 'member-order': 'bysource'}
 autodoc_typehints_format = 'short'
