@@ -13,6 +13,7 @@ import xml.etree.ElementTree
 
 import numpy.typing
 from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.domains.python import PyObject
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.typing import stringify_annotation
@@ -46,7 +47,6 @@ extensions = [
     'sphinx.ext.autodoc',
     'sphinx.ext.napoleon',
     'sphinx.ext.viewcode',
-    'sphinx.ext.mathjax',
 ]
 source_suffix = {'.md': 'markdown'}
 exclude_patterns = ['standard_docs']  # made by rosdoc2
@@ -58,6 +58,7 @@ html_static_path = ['static']
 html_css_files = ['site.css']
 html_show_sphinx = False
 html_copy_source = False
+html_math_renderer = 'mathml'
 
 myst_heading_anchors = 6
 myst_enable_extensions = ['dollarmath']
@@ -167,6 +168,14 @@ def find(app, env, node, content):
     return None
 
 
+def math(writer, node):
+    """Write an equation as MathML, which browsers draw without a script of another site."""
+    block = isinstance(node, nodes.math_block)
+    text = tex2mathml(node.astext(), as_block=block)
+    writer.body.append(f'<div class="equation">{text}</div>' if block else text)
+    raise nodes.SkipNode
+
+
 def setup(app):
     """Connect the functions above, and name the fields of classes as NumPy does."""
     for field in PyObject.doc_field_types:
@@ -176,3 +185,4 @@ def setup(app):
     app.connect('autodoc-process-docstring', describe)
     app.connect('autodoc-process-signature', shorten)
     app.connect('missing-reference', find)
+    app.add_html_math_renderer('mathml', (math, None), (math, None))
