@@ -124,10 +124,11 @@ def skip_fields(app, what, name, member, skip, options):
 
 
 def describe(app, what, name, value, options, lines):
-    """Give a constant that a package imports the text below its assignment."""
-    package, _, short = name.rpartition('.')
+    """Give a constant the text below its assignment in any module of its package."""
     if what == 'data':
-        for module in sorted(each for each in sys.modules if each.startswith(f'{package}.')):
+        package, _, short = name.rpartition('.')
+        lines.clear()  # the text of its type
+        for module in sorted(each for each in sys.modules if f'{each}.'.startswith(f'{package}.')):
             texts = ModuleAnalyzer.for_module(module).find_attr_docs()
             if ('', short) in texts and getattr(sys.modules[module], short) is value:
                 lines[:] = texts['', short]
@@ -143,7 +144,8 @@ def shorten(app, what, name, value, options, signature, returned):
             r'~numpy\.ndarray\[.*?, ~numpy\.dtype\[(.*?)\]\]', r'NDArray[\1]', text
         )
 
-    return short(signature), short(returned)
+    protocol = signature == '(*args, **kwargs)'
+    return '' if protocol else short(signature), short(returned)
 
 
 def find(app, env, node, content):
