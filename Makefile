@@ -14,7 +14,7 @@ unexport $(filter-out ROS_DOMAIN_ID ROS_HOME ROS_LOG_DIR, \
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help run test test-all lint docs studies test-matrix clean FORCE
+.PHONY: help run test test-all lint studies test-matrix clean FORCE
 
 help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
@@ -49,6 +49,8 @@ lint: .venv/test.stamp
 	$(BIN)/python -m mypy
 
 # Warnings are errors; SITE is also read by test_site.py.
+# .PHONY is needed, since there is a folder docs.
+.PHONY: docs
 docs: export OPENBLAS_NUM_THREADS := 1
 docs: export SITE := build/site
 docs: .venv/test.stamp

@@ -98,12 +98,23 @@ class PadMonitor:
 
     Notes
     -----
-    With the error e = p - set-point and m the largest ``|e|`` of the last 0.4 s, a pad outside the
-    tolerance has stopped when ``|e|`` > m - min(0.2 m, tolerance) and the set-point has been
-    constant for 0.4 s. So the slowest fill that counts as moving is an exponential one with a
-    time constant of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
+    With the error ``e = p - set-point`` and m the largest size of e in the last 0.4 s, a pad
+    outside the tolerance has stopped when ``|e| > m - min(0.2 m, tolerance)`` and the set-point
+    has been constant for 0.4 s. So the slowest fill that counts as moving is an exponential one
+    with a time constant of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
 
     An update takes 1 to 2 µs.
+
+    Examples
+    --------
+    A pad that stays flat is faulty some time after the command to fill it:
+
+    >>> from ros_pad.control import PadMonitor
+    >>> monitor = PadMonitor(ceiling=90e3)
+    >>> for step in range(30):
+    ...     monitor.update(0.1 * step, setpoint=75e3, pressure=0.0)
+    >>> monitor.reason
+    'does not fill: 0.0 kPa 0.5 s after 75.0 kPa was commanded'
     """
 
     __slots__ = (
