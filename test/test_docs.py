@@ -30,7 +30,7 @@ PAGES = [
 FENCE = re.compile(r'^ *```(\S*)\n(.*?)^ *```$', re.DOTALL | re.MULTILINE)
 EXAMPLE = re.compile(rf'(?:^ *<!-- example: ([^>]*) -->\n)?{FENCE.pattern}', FENCE.flags)
 COMMAND = re.compile(
-    r'(?:pad (?!of )|python3? |ros2 |make |sudo |sed |export |cd |rm |\. |dask |rviz2 |\w+_node )'
+    r'(?:pad (?!of )|python3? |pip |ros2 |make |sudo |sed |export |cd |rm |\. |dask |rviz2 |\w+_node )'
 )
 LINK = re.compile(r'\]\(([^)\s]+)\)')
 SOURCES = ('ros_pad', 'studies', 'test', 'config', 'launch')

@@ -116,5 +116,7 @@ def test_the_gallery_has_every_chart_its_command_and_its_page():
         assert (DOCS / page).exists()
         if program == 'pad':
             assert callable(cli.parser(words[0]).parse_args(words).command)
+        elif words[0].startswith('examples/'):
+            assert (ROOT / words[0]).exists(), chart
         else:
             assert words[:2] == ['-m', 'studies'] and words[2] in STUDIES, chart
