@@ -48,8 +48,7 @@ lint: .venv/test.stamp
 	$(BIN)/python -m ruff format --check
 	$(BIN)/python -m mypy
 
-# Warnings are errors; SITE is also read by test_site.py.
-# .PHONY is needed, since there is a folder docs.
+# Warnings are errors. test_site.py looks at what is in SITE.
 .PHONY: docs
 docs: export OPENBLAS_NUM_THREADS := 1
 docs: export SITE := build/site
