@@ -87,7 +87,8 @@ def read_page(app, docname, source):
         file = ROOT / OUTSIDE[docname]
         text = file.read_text(encoding='utf-8')
     if docname in SECTIONS:
-        pages = re.findall(r'^- \[[^]]*\]\(([^)#]+)\.md\)', text, re.MULTILINE)
+        listed = re.findall(r'^- \[([^]]*)\]\(([^)#]+)\.md\)', text, re.MULTILINE)
+        pages = [page if title.endswith('.md') else f'{title} <{page}>' for title, page in listed]
         text += '\n'.join(['', '```{toctree}', ':hidden:', '', *pages, '```', ''])
     if docname == 'options':
         text += ''.join(helps())
