@@ -71,7 +71,8 @@ NONE_CHOSEN := [ $$? -eq 5 ]
 
 # A row is a version of Python, alone or with what it is to run on. Rows without ROS test the core,
 # and so that it needs none; `oldest` is the NumPy and SciPy of Ubuntu 24.04; `jazzy` and `kilted`
-# test the nodes. `make test-matrix MATRIX=3.12-kilted` runs one row.
+# test the nodes; `wheel` installs the wheel with its libraries into an empty environment.
+# `make test-matrix MATRIX=3.12-kilted` runs one row.
 # `test-all` runs CI_ROW on physics, estimation, control and drivers: what Ubuntu 24.04 has, the home
 # of ROS 2 Jazzy. Where its Python is missing, the summary says so.
 CI_ROW := 3.12-oldest
@@ -89,10 +90,13 @@ test-matrix:
 # Where Pythons are managed by pyenv, PYENV_VERSION makes python3.13 mean what it says.
 define MATRIX_ROW
   version=$${row%%-*}; python=.matrix/$$row/bin/python; tests='$(CORE_TESTS)'; \
+  export WHEEL_LIBRARIES=; \
   case $$row in \
     *-oldest) packages='.[test] numpy==1.26.* scipy==1.11.*' ;; \
     *-jazzy) packages='.[ros,test]'; tests='$(NODE_TESTS)' ;; \
     *-kilted) packages='.[kilted,test]'; tests='$(NODE_TESTS)' ;; \
+    *-wheel) packages='. pytest pytest-xdist setuptools'; tests=test/test_wheel.py; \
+      export WHEEL_LIBRARIES=index ;; \
     *) packages='.[test]' ;; \
   esac; \
   if ! PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \
@@ -112,7 +116,7 @@ endef
 # A stamp holds the path of its checkout: a .venv that was moved or lost its Python is redone.
 STALE := $(shell grep -sqxF '$(CURDIR)' .venv/ros.stamp && test -x $(BIN)/python || echo FORCE)
 
-.venv/ros.stamp: EXTRAS := ros,mujoco
+.venv/ros.stamp: EXTRAS := ros,mujoco,plot
 .venv/test.stamp: EXTRAS := ros,test
 .venv/ros.stamp .venv/test.stamp: setup.py setup.cfg $(STALE)
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { $(MAKE_VENV); }

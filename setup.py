@@ -2,14 +2,21 @@
 """Build ros_pad with colcon (``ament_python``) or with pip."""
 
 import os
+import pathlib
+import re
+import xml.etree.ElementTree
 from glob import glob
 
 from setuptools import find_packages
 from setuptools import setup
 
+# Of the source, also where colcon runs a link to this file in its own folder.
+ROOT = pathlib.Path(os.path.realpath(__file__)).parent
+PACKAGE = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
+URLS = {each.get('type'): each.text for each in PACKAGE.iter('url')}
 NAME = 'ros_pad'
 NODES = ['body_estimator', 'controller', 'estimator', 'recorder', 'regulator', 'simulator']
-DOCS = ['furo>=2024.8', 'myst-parser>=4.0', 'sphinx>=8.1']
+DOCS = ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4.0', 'sphinx>=8.1']
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
@@ -22,6 +29,14 @@ def shared_files() -> list[tuple[str, list[str]]]:
     for folder, _, _ in os.walk('config'):
         files.append((f'share/{NAME}/{folder}', sorted(glob(f'{folder}/*.*'))))
     return files
+
+
+def long_description() -> str:
+    """Return the README for an index page, which has neither the pages nor the pictures."""
+    place = rf'\g<0>{URLS["repository"]}'
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    text = re.sub(r'!\[[^]]*\]\((?!\w+:)', f'{place}/raw/main/', text)
+    return re.sub(r'(?<!!)\[[^]]*\]\((?!\w+:|#)', f'{place}/blob/main/', text)
 
 
 def ros(distribution: str) -> list[str]:
@@ -46,12 +61,32 @@ def ros(distribution: str) -> list[str]:
 
 setup(
     name=NAME,
-    version='0.2.0',
+    version=PACKAGE.findtext('version'),
     description='Shape-changing feet for legged robots on ROS 2: model, simulation, nodes',
-    license='Apache-2.0',
-    maintainer='ros_pad maintainers',
-    maintainer_email='ros-pad@example.org',
+    long_description=long_description(),
+    long_description_content_type='text/markdown',
+    license=PACKAGE.findtext('license'),
+    maintainer=PACKAGE.findtext('maintainer'),
+    maintainer_email=PACKAGE.find('maintainer').get('email'),
+    project_urls={
+        'Documentation': URLS['website'],
+        'Source': URLS['repository'],
+        'Issues': URLS['bugtracker'],
+        'Changelog': f'{URLS["repository"]}/blob/main/CHANGELOG.md',
+    },
+    keywords='legged robot, soft robotics, foot, contact, friction, slip, estimation, ROS 2',
+    classifiers=[
+        'Development Status :: 3 - Alpha',
+        'Environment :: Console',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3',
+        *(f'Programming Language :: Python :: 3.{minor}' for minor in (11, 12, 13)),
+        'Topic :: Scientific/Engineering :: Physics',
+        'Typing :: Typed',
+    ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['py.typed']},
     data_files=shared_files(),
     zip_safe=False,
     python_requires='>=3.11',
@@ -61,7 +96,6 @@ setup(
         'argcomplete>=3.1',
         'numpy>=1.26',
         'scipy>=1.11',
-        'matplotlib>=3.6',
         'pyyaml>=6.0',
         'tqdm>=4.66',
         'mcap>=1.5',
@@ -72,6 +106,8 @@ setup(
         # ROS 2 as wheels; leave these extras out where ROS is installed from apt.
         'ros': ros('jazzy'),
         'kilted': ros('kilted'),
+        # Pictures and reports.
+        'plot': ['matplotlib>=3.6'],
         # The hexapod with joints (L2), and compiled loops of the planar one.
         'mujoco': ['mujoco>=3.3.6'],
         'fast': ['numba>=0.60'],
@@ -80,7 +116,7 @@ setup(
         # Meshes of pads from STL, OBJ, PLY and MSH files.
         'mesh': ['meshio>=5.3'],
         # `pad explore`: pads designed in the browser.
-        'explore': ['nicegui>=3.0'],
+        'explore': ['matplotlib>=3.6', 'nicegui>=3.0'],
         # The site: `make docs`.
         'docs': DOCS,
         # ruff and mypy change their verdicts between minor versions, so these are pinned.
@@ -102,6 +138,7 @@ setup(
             'pytest-xdist',
             'ruff==0.17.*',
             'scikit-fem>=9',
+            'setuptools>=77',
             'types-PyYAML',
             *DOCS,
         ],

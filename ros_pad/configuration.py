@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import yaml
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import reason
 
 _REQUIRED: Any = object()
 
@@ -41,8 +41,14 @@ def shown(value: Any) -> str:
     return _REPR.repr(value)
 
 
-def _not_allowed(name: str, value: Any, allowed: str) -> InvalidInput:
-    return InvalidInput(f'{name} = {shown(value)} is not allowed: {allowed} is needed')
+def nearest(value: Any, known: Sequence[str]) -> str:
+    """Return a question that ends an error message if a value may be a misspelling."""
+    near = difflib.get_close_matches(str(value), known, n=1)
+    return f'. Did you mean {near[0]!r}?' if near else ''
+
+
+def _not_allowed(name: str, value: Any, allowed: str, hint: str = '') -> InvalidInput:
+    return InvalidInput(f'{name} = {shown(value)} is not allowed: {allowed} is needed{hint}')
 
 
 def _range(what: str, low: float, high: float, unit: str, above: bool = False) -> str:
@@ -142,8 +148,17 @@ def text(name: str, value: str) -> str:
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     """Check that a value is one of the allowed words; raise `InvalidInput` if not."""
     if not isinstance(value, str) or value not in allowed:
-        raise _not_allowed(name, value, f'one of {", ".join(allowed)}')
+        raise _not_allowed(name, value, f'one of {", ".join(allowed)}', nearest(value, allowed))
     return value
+
+
+def refuse(path: str | os.PathLike[str], force: bool) -> None:
+    """Raise InvalidInput if a path exists, unless it is a regular file and ``force`` is True."""
+    path = pathlib.Path(path)
+    if path.exists() and not path.is_file():
+        raise InvalidInput(f'{path}: is no regular file, and only regular files are replaced')
+    if not force and path.exists():
+        raise InvalidInput(f'{path}: exists already; --force (force=True) replaces it')
 
 
 @dataclass(frozen=True)
@@ -226,24 +241,28 @@ def shared_folder() -> pathlib.Path:
     """Return the folder with ``feet/``, ``scenes/`` and ``params.yaml``.
 
     In a source tree (also an editable install) this is ``config/`` beside the package. Otherwise
-    it is ``share/ros_pad/config`` in the first folder of ``AMENT_PREFIX_PATH`` that has it, or
-    else in ``sys.prefix``.
+    it is ``share/ros_pad/config`` under the prefix into which the package is installed (a virtual
+    environment, a colcon workspace, ``pip install --user`` or ``--target``), or else in a folder
+    of ``AMENT_PREFIX_PATH`` or in ``sys.prefix``.
 
     Raises
     ------
     ConfigError
         When no such folder is found.
     """
-    source = pathlib.Path(__file__).resolve().parent.parent / 'config'
-    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
-    installed = [pathlib.Path(p) / 'share' / 'ros_pad' / 'config' for p in prefixes if p]
-    for folder in [source, *installed]:
+    package = pathlib.Path(__file__).absolute().parent
+    source = package.resolve().parent / 'config'
+    # From the folder of the package (--target) to three above it (lib/python3.12/site-packages).
+    prefixes: list[str | pathlib.Path] = [*package.parents[:4]]
+    prefixes += filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    folders = [source]
+    folders += [pathlib.Path(p) / 'share' / 'ros_pad' / 'config' for p in [*prefixes, sys.prefix]]
+    for folder in folders:
         if (folder / 'scenes').is_dir():
             return folder
-    looked = ', '.join(str(f) for f in [source, *installed])
     raise ConfigError(
-        f'no config folder of ros_pad found; looked in {looked}: source setup.bash of the'
-        ' workspace in which ros_pad is installed'
+        f'no config folder of ros_pad found; looked in {", ".join(map(str, folders))}: install'
+        ' ros_pad with pip or colcon, which put it there; a copy of the package alone lacks it'
     )
 
 
@@ -275,60 +294,11 @@ def locate(kind: str, name_or_path: str | os.PathLike[str]) -> pathlib.Path:
     known = names(kind)
     if text in known:
         return shared_folder() / kind / f'{text}.yaml'
-    near = difflib.get_close_matches(text, known, n=1, cutoff=0.4)
-    hint = f' Did you mean {near[0]!r}?' if near else ''
     raise ConfigError(
-        f'no {kind[:-1] if kind != "feet" else "foot"} named {text!r}.{hint}'
-        f' There are: {", ".join(known)}; a path to a .yaml file works too.'
+        f'no {kind[:-1] if kind != "feet" else "foot"} named {text!r}'
+        f'{nearest(text, known) or "."} There are:'
+        f' {", ".join(known)}; a path to a .yaml file works too.'
     )
-
-
-SAFE_LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-"""The safe loader of libyaml, six times as fast as that of PyYAML, where PyYAML has it."""
-
-DEEPEST_YAML = 100
-"""Most levels of nesting of a YAML text."""
-
-
-def read_yaml(text: str, loader: Any = SAFE_LOADER) -> Any:
-    """Return the content of a YAML text.
-
-    Raises
-    ------
-    yaml.YAMLError
-        When the text is not valid, or nested more than 100 deep.
-    Exception
-        Of other kinds, for text that only looks like a date or number (2026-99-99, !!int '').
-    """
-    depth = 0
-    # The functions that make objects from events call themselves for each level of nesting; those
-    # of libyaml end the process when the stack is full.
-    for event in yaml.parse(text, Loader=SAFE_LOADER):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > DEEPEST_YAML:
-                problem = f'nested more than {DEEPEST_YAML} deep'
-                mark: Any = event.start_mark  # libyaml has a class of its own
-                raise yaml.MarkedYAMLError(None, None, problem, mark)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-    return yaml.load(text, Loader=loader)
-
-
-class _Loader(SAFE_LOADER):
-    """A safe loader that raises an error for a key that occurs twice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                continue
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'key {key.value!r} occurs twice', key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
 
 
 class Table:
@@ -349,7 +319,8 @@ class Table:
 
     def __init__(self, values: Any, origin: str) -> None:
         if not isinstance(values, dict):
-            raise ConfigError(f'{origin}: expected a table of keys, found {shown(values)}')
+            found = 'nothing' if values is None else shown(values)
+            raise ConfigError(f'{origin}: expected a table of keys, found {found}')
         self._values = dict(values)
         self._taken: set[str] = set()
         self._known: set[str] = set()
@@ -361,23 +332,24 @@ class Table:
         try:
             text = pathlib.Path(path).read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f'{os.fspath(path)}: cannot be read: {error}') from error
+            raise ConfigError(f'{os.fspath(path)}: cannot be read: {reason(error)}') from error
         return cls.parse(text, os.fspath(path))
 
     @classmethod
     def parse(cls, text: str, origin: str) -> Table:
         """Read YAML from a text; raise `ConfigError`, with line and column, if it is not valid."""
+        from ros_pad import yaml_text  # here, because a pad made of numbers needs no PyYAML
+
         try:
-            values = read_yaml(text, _Loader)
-        except yaml.YAMLError as error:
+            values = yaml_text.read_yaml(text, yaml_text.StrictLoader)
+        except Exception as error:
+            # YAMLError, or others: see read_yaml; a chain of aliases may still be too deep.
             mark = getattr(error, 'problem_mark', None)
             place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-            problem = getattr(error, 'problem', None) or str(error)
+            problem = getattr(error, 'problem', None) or str(error) or type(error).__name__
+            if mark and any('\t' in row for row in text.splitlines()[mark.line : mark.line + 1]):
+                problem += ' (a tab: YAML is indented with spaces)'
             raise ConfigError(f'{origin}{place}: not valid YAML: {problem}') from error
-        except Exception as error:
-            # See read_yaml; a chain of aliases may still be too deep.
-            problem = str(error) or type(error).__name__
-            raise ConfigError(f'{origin}: not valid YAML: {problem}') from error
         return cls(values, origin)
 
     def __contains__(self, key: str) -> bool:
@@ -391,7 +363,7 @@ class Table:
             return self._values[key]
         if default is _REQUIRED:
             others = [str(each) for each in self._values if each not in self._taken]
-            near = difflib.get_close_matches(key, others, n=1)
+            near = difflib.get_close_matches(key, others, n=1, cutoff=0.7)
             hint = f'; is {near[0]!r} a misspelling of it?' if near else ''
             raise ConfigError(f'{self.origin}: key {key!r} is missing{hint}')
         return default

@@ -105,3 +105,16 @@ class BadMessage(PadError):
 
 class UnknownEncoding(BadMessage):
     """Messages of a type or encapsulation whose fields cannot be read one by one."""
+
+
+class NoConvergence(PadError, ArithmeticError):
+    """A step of a simulation has not converged."""
+
+
+def reason(error: Exception) -> str:
+    """Return why an error of a library was raised, in words, for a message that names the file."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    if isinstance(error, KeyError):
+        return f'key {error} is missing'
+    return str(error) or type(error).__name__

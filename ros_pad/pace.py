@@ -25,6 +25,19 @@ time, s.
 """
 
 
+def part(progress: Progress | None, start: float, end: float) -> Progress:
+    """Return the callback of a part of a task, which takes the task from one share to another.
+
+    Parameters
+    ----------
+    progress : callable or None
+        Callback of the whole task.
+    start, end : float
+        Shares that are done at the beginning and the end of the part, 0 to 1.
+    """
+    return lambda share: progress(start + (end - start) * share) if progress else None
+
+
 class Pace:
     """Decide at which time stamps a slower task is due: at the first stamp in each of its periods.
 
@@ -45,7 +58,9 @@ class Pace:
 
     def __init__(self, period_ns: int) -> None:
         if not isinstance(period_ns, int) or period_ns < 1:
-            raise InvalidInput(f'period = {period_ns!r} ns: a whole number from 1 is needed')
+            raise InvalidInput(
+                f'period = {period_ns!r} ns is not allowed: a whole number from 1 is needed'
+            )
         self._period = period_ns
         self._last: int | None = None
 

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Sequence
 
 from ros_pad.commands.command import exit_status
-from studies import command
 
 STUDIES = {
     'contact': ('work_precision.contact', 'methods for the contact model (15 s)'),
@@ -82,6 +81,9 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _run(name: str, words: Sequence[str]) -> int:
+    import ros_pad.reports  # noqa: F401  without Matplotlib, an error with the remedy
+    from studies import command
+
     study = importlib.import_module(f'studies.{STUDIES[name][0]}')
     if hasattr(study, 'main'):
         return int(study.main(words))

@@ -275,7 +275,7 @@ def test_unknown_key_in_a_nested_table(tmp_path):
         ('a: !!timestamp soon', 'not valid YAML: '),
         ('a: ' + '[' * 5000, 'line 1, column 103: not valid YAML: nested more than 100 deep'),
         ('- ' * 5000, 'line 1, column 201: not valid YAML: nested more than 100 deep'),
-        ('', 'expected a table of keys, found None'),
+        ('', 'expected a table of keys, found nothing'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),
     ],
@@ -329,14 +329,33 @@ def test_unknown_names():
 def test_shared_folder_of_an_installed_package(tmp_path, monkeypatch):
     share = tmp_path / 'share' / 'ros_pad' / 'config'
     (share / 'scenes').mkdir(parents=True)
-    (tmp_path / 'lib' / 'ros_pad').mkdir(parents=True)
-    monkeypatch.setattr(configuration, '__file__', str(tmp_path / 'lib/ros_pad/configuration.py'))
+    package = tmp_path / 'too' / 'deep' / 'for' / 'it' / 'ros_pad'
+    package.mkdir(parents=True)
+    monkeypatch.setattr(configuration, '__file__', str(package / 'configuration.py'))
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path}')
     assert configuration.shared_folder() == share
     monkeypatch.setenv('AMENT_PREFIX_PATH', '')
     monkeypatch.setattr(configuration.sys, 'prefix', '/nowhere')
     with pytest.raises(ConfigError, match='no config folder of ros_pad found; looked in'):
         configuration.shared_folder()
+
+
+@pytest.mark.parametrize(
+    'place',
+    ['.', 'lib/python3.12/site-packages', 'lib/python3/dist-packages'],
+)
+def test_the_shared_folder_is_that_of_the_package(tmp_path, monkeypatch, place: str):
+    """It is not that of another version in the virtual environment or in a sourced workspace."""
+    folders = {}
+    for name in ('own', 'other'):
+        folders[name] = tmp_path / name / 'share' / 'ros_pad' / 'config'
+        (folders[name] / 'scenes').mkdir(parents=True)
+    module = tmp_path / 'own' / place / 'ros_pad' / 'configuration.py'
+    module.parent.mkdir(parents=True)
+    monkeypatch.setattr(configuration, '__file__', str(module))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'other'))
+    monkeypatch.setattr(configuration.sys, 'prefix', str(tmp_path / 'other'))
+    assert configuration.shared_folder() == folders['own']
 
 
 def test_nothing_is_infinite_by_default(tmp_path):

@@ -27,8 +27,10 @@ ROS = {
     *('std_srvs', 'tf2_msgs', 'visualization_msgs'),
 }
 NO_WHEEL = {'tf2_msgs'}  # of ROS, but not on PyPI: imported where it is asked for
-# Packages of extras: functions that need them import them inside, as they may be missing.
+# Packages of extras: functions that need them import them inside, as they may be missing. All of
+# ros_pad.reports needs Matplotlib; functions that need reports import them inside.
 EXTRAS = {
+    'matplotlib': 'plot',
     'mujoco': 'mujoco',
     'numba': 'fast',
     'distributed': 'sweep',
@@ -151,11 +153,17 @@ class Missing:
         if name.split('.')[0] in {missing}:
             raise ModuleNotFoundError(f'there is no {{name}} here')
 
+def is_left_out(name):
+    return name.startswith(('ros_pad.nodes', 'ros_pad.reports'))
+
+def failed(name):
+    assert is_left_out(name), name
+
 sys.meta_path.insert(0, Missing())
 import ros_pad
 
-for module in pkgutil.walk_packages(ros_pad.__path__, 'ros_pad.'):
-    if module.name != 'ros_pad.nodes' and not module.name.startswith('ros_pad.nodes.'):
+for module in pkgutil.walk_packages(ros_pad.__path__, 'ros_pad.', onerror=failed):
+    if not is_left_out(module.name):
         importlib.import_module(module.name)
         print(module.name)
 try:
@@ -165,7 +173,7 @@ except ModuleNotFoundError:
 """
 
 
-def test_everything_but_the_nodes_imports_without_ros_and_extras():
+def test_everything_but_nodes_and_reports_imports_without_ros_and_extras():
     child = subprocess.run(
         [sys.executable, '-c', WITHOUT.format(missing=sorted({*ROS, *EXTRAS}))],
         cwd=SOURCE.parent,
@@ -179,10 +187,37 @@ def test_everything_but_the_nodes_imports_without_ros_and_extras():
     expected = {
         '.'.join(path.relative_to(SOURCE.parent).with_suffix('').parts).removesuffix('.__init__')
         for part in TABLE
-        if part != 'nodes'
+        if part not in ('nodes', 'reports')
         for path in files(part)
     }
     assert expected <= set(imported)
+
+
+QUICK = """
+import sys
+import ros_pad.contact
+
+print(*sys.modules)
+"""
+
+
+def test_the_contact_model_imports_little():
+    child = subprocess.run(
+        [sys.executable, '-c', QUICK],
+        cwd=SOURCE.parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert child.returncode == 0, child.stderr
+    names = child.stdout.split()
+    foreign = {name.split('.')[0] for name in names} - set(sys.stdlib_module_names)
+    own = {name for name in names if name.startswith('ros_pad.')}
+    below = {name.split('.')[1] for name in own}
+    assert {'ros_pad.contact', 'ros_pad.contact.dome'} <= own
+    assert below == {'configuration', 'contact', 'errors'}
+    assert 'numpy' in foreign
+    assert not foreign & {'yaml', 'scipy', 'tqdm', 'rosbags', *EXTRAS, *ROS}
 
 
 ROSDEP_KEY = {

@@ -10,6 +10,8 @@ import xml.etree.ElementTree
 
 import pytest
 
+import ros_pad
+
 pytest.importorskip('colcon_core', reason='colcon is not installed: pip install ros_pad[test]')
 packages = pytest.importorskip('ament_index_python.packages')
 
@@ -60,7 +62,7 @@ def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     folder = tmp_path_factory.mktemp('workspace')
     source = folder / 'src' / 'ros_pad'
     source.mkdir(parents=True)
-    for name in ('package.xml', 'setup.py', 'setup.cfg', 'LICENSE'):
+    for name in ('package.xml', 'pyproject.toml', 'setup.py', 'setup.cfg', 'LICENSE', 'README.md'):
         shutil.copy(ROOT / name, source)
     for name in ('config', 'launch', 'resource', 'ros_pad'):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
@@ -170,7 +172,7 @@ def test_package_xml():
     licence = package.find('license').get('file')
     assert 'Apache License' in (ROOT / licence).read_text(encoding='utf-8')
     assert package.findtext('export/build_type') == 'ament_python'
-    assert f"version='{package.findtext('version')}'" in (ROOT / 'setup.py').read_text()
+    assert package.findtext('version') == ros_pad.__version__
     keys = {node.text for node in package if node.tag.endswith('depend')}
     assert 'rclpy' in keys
     assert keys <= ROSDEP_KEYS

@@ -16,10 +16,11 @@ from mcap.records import Channel
 from mcap.records import Schema
 
 from ros_pad.bags.storage import Contents
-from ros_pad.configuration import SAFE_LOADER
-from ros_pad.configuration import read_yaml
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import reason
+from ros_pad.yaml_text import SAFE_LOADER
+from ros_pad.yaml_text import read_yaml
 
 _NAME = 'metadata.yaml'
 _ROOT = 'rosbag2_bagfile_information'
@@ -122,7 +123,7 @@ def read(folder: pathlib.Path, topics: bool = True) -> dict[str, Any]:
                 return dict(read_yaml(text, _WithoutTopics)[_ROOT])
         return dict(read_yaml(text)[_ROOT])
     except Exception as error:  # invalid YAML or content can raise any exception
-        raise BagError(f'{path}: is not the metadata of a bag: {error!r}') from error
+        raise BagError(f'{path}: is not the metadata of a bag: {reason(error)}') from error
 
 
 def annotate(folder: str | os.PathLike[str], custom_data: Mapping[str, str]) -> None:

@@ -30,8 +30,10 @@ from ros_pad.bags.storage import Contents
 from ros_pad.bags.storage import batches
 from ros_pad.bags.storage import raw_messages
 from ros_pad.bags.storage import scan
+from ros_pad.bags.storage import shares
 from ros_pad.errors import BagError
 from ros_pad.errors import UnknownEncoding
+from ros_pad.errors import reason
 from ros_pad.pace import Progress
 
 _RowReader: TypeAlias = Callable[[bytes, np.ndarray, np.ndarray], np.ndarray]
@@ -48,6 +50,9 @@ class BagReader:
     ----------
     path : path
         The folder of a bag, or one MCAP file.
+    progress : callable or None
+        Called now and then with the share that is done, 0 to 1, where opening takes long: if a
+        file was not closed.
 
     Attributes
     ----------
@@ -71,13 +76,14 @@ class BagReader:
         compression mode, a file is missing, or no message of a damaged bag can be read.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], progress: Progress | None = None) -> None:
         self.path = pathlib.Path(path)
         self.custom_data: dict[str, str] = {}
         if not self.path.exists():
             raise BagError(f'{self.path}: no such bag')
         files = self._files_of_folder() if self.path.is_dir() else [self.path]
-        self._files = [(file, scan(file)) for file in files]
+        reach = shares(files, progress)
+        self._files = [(file, scan(file, each)) for file, each in zip(files, reach, strict=True)]
         parts = [contents for _, contents in self._files]
         for file, part in self._files:
             for channel in part.channels.values():
@@ -118,7 +124,7 @@ class BagReader:
             self.custom_data = dict(information.get('custom_data') or {})
         except (KeyError, TypeError, ValueError) as error:
             raise BagError(
-                f'{self.path / "metadata.yaml"}: is not the metadata of a bag: {error!r}'
+                f'{self.path / "metadata.yaml"}: is not the metadata of a bag: {reason(error)}'
             ) from error
         if storage != 'mcap' or compression.lower() not in ('', 'none'):
             raise BagError(
@@ -133,7 +139,10 @@ class BagReader:
         return files
 
     def messages(
-        self, topics: Collection[str] | None = None, containing: bytes = b''
+        self,
+        topics: Collection[str] | None = None,
+        containing: bytes = b'',
+        progress: Progress | None = None,
     ) -> Iterator[tuple[str, Any, int]]:
         """Yield topic, decoded message and log time in ns of each message.
 
@@ -143,17 +152,19 @@ class BagReader:
             Topics to read, by default all; a topic that the bag does not have yields nothing.
         containing : bytes
             Messages without these bytes are left out.
+        progress : callable or None
+            Called now and then with the share that is done, 0 to 1.
 
         Raises
         ------
         BagError
             When a message cannot be decoded, or a chunk of a closed file is damaged.
         """
-        for file, contents in self._files:
+        for file, contents, reach in self._shared(progress):
             wanted = _channels(contents, self.topics if topics is None else topics)
             channels = {channel.id: channel for channel in wanted}
             types: dict[int, MessageType] = {}
-            for channel_id, log_time, data in raw_messages(file, contents, channels):
+            for channel_id, log_time, data in raw_messages(file, contents, channels, reach):
                 if containing not in data:
                     continue
                 channel = channels[channel_id]
@@ -214,13 +225,9 @@ class BagReader:
         """
         none = np.empty(0, np.int64)
         found = {topic: [(none, np.empty((0, len(each))))] for topic, each in paths.items()}
-        total, done = sum(self.counts.get(topic, 0) for topic in paths), 0
-        for batch, parts in self._parts(paths):
+        for _, parts in self._parts(paths, progress):
             for topic, rows, times in parts.values():
                 found[topic].append((times.astype(np.int64), _table(rows)))
-            done += len(batch.channels)
-            if progress and total:
-                progress(done / total)
         if progress:
             progress(1.0)
         return {
@@ -228,8 +235,10 @@ class BagReader:
             for topic, each in found.items()
         }
 
-    def log_times(self) -> dict[str, np.ndarray]:
+    def log_times(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Return the log times of all messages on each topic, int64, ns, in the order of the file.
+
+        The callback is called now and then with the share that is done, 0 to 1.
 
         Raises
         ------
@@ -237,21 +246,31 @@ class BagReader:
             When a chunk of a closed file is damaged.
         """
         found = {topic: [np.empty(0, np.int64)] for topic in self.topics}
-        for file, contents in self._files:
-            for batch in batches(file, contents, contents.channels):
+        for file, contents, reach in self._shared(progress):
+            for batch in batches(file, contents, contents.channels, reach):
                 for channel_id, mine in _by_channel(batch):
                     times = batch.log_times[mine].astype(np.int64)
                     found[contents.channels[channel_id].topic].append(times)
         return {topic: np.concatenate(times) for topic, times in found.items()}
 
-    def _parts(self, paths: Mapping[str, Sequence[str]]) -> Iterator[tuple[Batch, _Parts]]:
+    def _shared(
+        self, progress: Progress | None
+    ) -> Iterator[tuple[pathlib.Path, Contents, Progress | None]]:
+        """Yield each file with its contents and the callback of its share."""
+        reach = shares([file for file, _ in self._files], progress)
+        for (file, contents), each in zip(self._files, reach, strict=True):
+            yield file, contents, each
+
+    def _parts(
+        self, paths: Mapping[str, Sequence[str]], progress: Progress | None = None
+    ) -> Iterator[tuple[Batch, _Parts]]:
         """Yield batches of messages, with topic, values and log times by channel id."""
-        for file, contents in self._files:
+        for file, contents, reach in self._shared(progress):
             readers = {
                 channel.id: (channel.topic, _row_reader(file, channel, contents, paths))
                 for channel in _channels(contents, paths)
             }
-            for batch in batches(file, contents, readers):
+            for batch in batches(file, contents, readers, reach):
                 parts: _Parts = {}
                 for channel_id, mine in _by_channel(batch):
                     topic, read = readers[channel_id]

@@ -10,7 +10,6 @@ import os
 import pathlib
 import re
 from collections import Counter
-from collections.abc import Callable
 from collections.abc import Iterator
 from dataclasses import asdict
 from dataclasses import dataclass
@@ -27,8 +26,11 @@ from mcap.stream_reader import StreamReader
 from mcap.stream_reader import breakup_chunk
 
 from ros_pad.bags import metadata
+from ros_pad.bags.storage import shares
 from ros_pad.bags.writer import BagWriter
 from ros_pad.errors import BagError
+from ros_pad.pace import Progress
+from ros_pad.pace import part
 
 KEY = 'ros_pad_repair'
 """Key of the custom data in which a repaired bag lists what was lost."""
@@ -79,9 +81,7 @@ class _File:
     channels: dict[int, Channel] = field(default_factory=dict)
 
 
-def inspect(
-    source: str | os.PathLike[str], progress: Callable[[float], None] | None = None
-) -> Repair:
+def inspect(source: str | os.PathLike[str], progress: Progress | None = None) -> Repair:
     """Return what a repair would find, without writing anything.
 
     Parameters
@@ -96,13 +96,13 @@ def inspect(
     BagError
         When there is no MCAP file.
     """
-    return _examine(pathlib.Path(source), progress)[1]
+    return _examine(pathlib.Path(source), part(progress, 0.0, 1.0))[1]
 
 
 def repair(
     source: str | os.PathLike[str],
     folder: str | os.PathLike[str],
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Repair:
     """Write every message that can be read into a new bag.
 
@@ -122,10 +122,10 @@ def repair(
         exists, or the disk is full.
     """
     source = pathlib.Path(source)
-    files, found = _examine(source, None)
+    files, found = _examine(source, part(progress, 0.0, 0.5))
     if not found.messages:
-        raise BagError(f'{source}: none of its messages can be read')
-    done = 0
+        raise BagError(f'{source}: none of its messages can be read: nothing can be repaired')
+    done, reach = 0, part(progress, 0.5, 1.0)
     with BagWriter(folder, _custom_data(source)) as writer:
         for name, (channel, schema) in _topics(source, files).items():
             writer.copy_topic(dataclasses.replace(channel, topic=name), schema)
@@ -135,8 +135,7 @@ def repair(
                     topic = file.channels[record.channel_id].topic
                     writer.write(topic, record.data, record.log_time, record.publish_time)
                     done += 1
-                    if progress:
-                        progress(done / found.messages)
+                    reach(done / found.messages)
         writer.close({KEY: json.dumps({'source': source.name} | asdict(found))})
     return found
 
@@ -158,18 +157,16 @@ def _files(source: pathlib.Path) -> list[pathlib.Path]:
     return files
 
 
-def _examine(
-    source: pathlib.Path, progress: Callable[[float], None] | None
-) -> tuple[list[_File], Repair]:
+def _examine(source: pathlib.Path, progress: Progress) -> tuple[list[_File], Repair]:
     """Return all files with their topics, and the findings.
 
     This reads all files once, because the topic of a message may be declared after the message.
     """
     files = [_File(path) for path in _files(source)]
     total = Repair()
-    for place, file in enumerate(files):
+    for file, reach in zip(files, shares([file.path for file in files], progress), strict=True):
         counts: Counter[int] = Counter()
-        for record in _records(file.path, total):
+        for record in _records(file.path, total, reach):
             match record:
                 case Schema():
                     file.schemas[record.id] = record
@@ -180,8 +177,6 @@ def _examine(
         known = sum(count for channel, count in counts.items() if channel in file.channels)
         total.messages += known
         total.lost_messages += counts.total() - known
-        if progress:
-            progress((place + 1) / len(files))
     total.described = _described(source, files, total.messages)
     return files, total
 
@@ -229,21 +224,25 @@ def _custom_data(source: pathlib.Path) -> dict[str, str]:
     return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
 
 
-def _records(path: pathlib.Path, found: Repair) -> Iterator[McapRecord]:
+def _records(
+    path: pathlib.Path, found: Repair, progress: Progress | None = None
+) -> Iterator[McapRecord]:
     """Yield the records of a file, also those in chunks, and count the damage in `found`."""
     with path.open('rb') as stream:
-        reached = 0
+        reached, size = 0, path.stat().st_size
         closed = False
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=_RECORD_SIZE_LIMIT)
         records = iter(reader.records)
         with contextlib.suppress(Exception):  # damaged bytes can raise any exception
             while (record := next(records, None)) is not None:
                 reached = stream.tell()
+                if progress:
+                    progress(reached / size)
                 closed = closed or isinstance(record, Footer)
                 yield from _opened(record, found)
         if not closed:
             found.closed = False
-            found.unread_bytes += path.stat().st_size - reached
+            found.unread_bytes += size - reached
 
 
 def _opened(record: McapRecord, found: Repair) -> list[McapRecord]:

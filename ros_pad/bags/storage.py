@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import pathlib
 import struct
@@ -30,6 +31,8 @@ from mcap.writer import MCAP0_MAGIC
 
 from ros_pad.bags.fields import items
 from ros_pad.errors import BagError
+from ros_pad.pace import Progress
+from ros_pad.pace import part
 
 _MESSAGE_HEADER = struct.Struct('<BQHIQQ')
 _FIELDS = ('opcode', 'length', 'channel', 'sequence', 'log_time', 'publish_time')
@@ -82,8 +85,18 @@ class Contents:
         return self.counts.total()
 
 
-def scan(path: pathlib.Path) -> Contents:
+def shares(files: Sequence[pathlib.Path], progress: Progress | None) -> Iterator[Progress | None]:
+    """Yield a callback for each file, in proportion to its size."""
+    ends = list(itertools.accumulate((file.stat().st_size for file in files), initial=0))
+    total = ends[-1] or 1
+    for start, end in itertools.pairwise(ends):
+        yield part(progress, start / total, end / total) if progress else None
+
+
+def scan(path: pathlib.Path, progress: Progress | None = None) -> Contents:
     """Return the contents of an MCAP file, from its summary or, without one, from all its records.
+
+    The callback is called only if all records are read.
 
     Raises
     ------
@@ -102,7 +115,7 @@ def scan(path: pathlib.Path) -> Contents:
             ) from None
         except Exception:  # a damaged summary can raise any exception; read all records then
             contents = None
-    return _from_records(path) if contents is None else contents
+    return _from_records(path, progress) if contents is None else contents
 
 
 def _from_summary(stream: IO[bytes]) -> Contents | None:
@@ -152,9 +165,11 @@ def _without_chunks(summary: bytes, contents: Contents) -> bytes:
     return rest + summary[place:]
 
 
-def _from_records(path: pathlib.Path) -> Contents:
+def _from_records(path: pathlib.Path, progress: Progress | None) -> Contents:
     contents = Contents()
-    for record in _readable_records(path, contents):
+    for share, record in _readable_records(path, contents):
+        if progress:
+            progress(share)
         if isinstance(record, Schema):
             contents.schemas[record.id] = record
         elif isinstance(record, Channel):
@@ -170,11 +185,16 @@ def _from_records(path: pathlib.Path) -> Contents:
     return contents
 
 
-def _readable_records(path: pathlib.Path, contents: Contents) -> Iterator[Any]:
-    """Yield the records of an MCAP file from its beginning to its end or its first damage."""
+def _readable_records(path: pathlib.Path, contents: Contents) -> Iterator[tuple[float, Any]]:
+    """Yield the records of an MCAP file from its beginning to its end or its first damage.
+
+    Each comes with the share of the file that is read, 0 to 1.
+    """
     with path.open('rb') as stream:
+        size = path.stat().st_size
         try:
-            yield from StreamReader(stream, validate_crcs=True).records
+            for record in StreamReader(stream, validate_crcs=True).records:
+                yield stream.tell() / size, record
             contents.finished = True
         except Exception:
             # A damaged record can raise any exception; the records before it are valid.
@@ -201,7 +221,10 @@ class Batch:
 
 
 def raw_messages(
-    path: pathlib.Path, contents: Contents, wanted: Collection[int]
+    path: pathlib.Path,
+    contents: Contents,
+    wanted: Collection[int],
+    progress: Progress | None = None,
 ) -> Iterator[tuple[int, int, bytes]]:
     """Yield channel id, log time in ns and CDR bytes of the messages on the wanted channels.
 
@@ -210,7 +233,7 @@ def raw_messages(
     BagError
         When a chunk is damaged.
     """
-    for batch in batches(path, contents, wanted):
+    for batch in batches(path, contents, wanted, progress):
         ends = batch.starts + batch.sizes
         columns = (batch.channels, batch.log_times, batch.starts, ends)
         for channel, log_time, start, end in zip(
@@ -219,7 +242,12 @@ def raw_messages(
             yield channel, log_time, batch.data[start:end]
 
 
-def batches(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> Iterator[Batch]:
+def batches(
+    path: pathlib.Path,
+    contents: Contents,
+    wanted: Collection[int],
+    progress: Progress | None = None,
+) -> Iterator[Batch]:
     """Yield the messages on the wanted channels, some megabytes at a time.
 
     Raises
@@ -229,28 +257,33 @@ def batches(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> 
     """
     pieces: list[bytes] = []
     size = 0
-    for piece in _pieces(path, contents, wanted):
+    for share, piece in _pieces(path, contents, wanted):
         pieces.append(piece)
         size += len(piece)
         if size >= _BATCH_SIZE:
             yield _batch(path, pieces, wanted)
+            if progress:
+                progress(share)
             pieces, size = [], 0
     if pieces:
         yield _batch(path, pieces, wanted)
 
 
-def _pieces(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> Iterator[bytes]:
-    """Yield bytes with whole records in them: chunks, or single messages."""
+def _pieces(
+    path: pathlib.Path, contents: Contents, wanted: Collection[int]
+) -> Iterator[tuple[float, bytes]]:
+    """Yield bytes with whole records in them, chunks or single messages, with the share read."""
     if not contents.chunks:
-        for record in _readable_records(path, contents):
+        for share, record in _readable_records(path, contents):
             if isinstance(record, Message) and record.channel_id in wanted:
                 length = _HEADER.itemsize - _RECORD_HEADER_SIZE + len(record.data)
                 times = record.log_time, record.publish_time
                 header = Opcode.MESSAGE, length, record.channel_id, record.sequence, *times
-                yield _MESSAGE_HEADER.pack(*header) + record.data
+                yield share, _MESSAGE_HEADER.pack(*header) + record.data
         return
     with path.open('rb') as stream:
-        for start, channels in sorted(contents.chunks, key=lambda chunk: chunk[0]):
+        chunks = sorted(contents.chunks, key=lambda chunk: chunk[0])
+        for number, (start, channels) in enumerate(chunks, 1):
             # Without an index of its messages, the chunk may have messages of any topic.
             if channels and channels.isdisjoint(wanted):
                 continue
@@ -260,7 +293,7 @@ def _pieces(path: pathlib.Path, contents: Contents, wanted: Collection[int]) -> 
                 records, size = get_chunk_data_stream(chunk, validate_crc=True)
             except Exception as error:  # each decompressor raises another exception type
                 raise BagError(f'{path}: is damaged at byte {start}: {error}') from error
-            yield records.read(size)
+            yield number / len(chunks), records.read(size)
 
 
 def _batch(path: pathlib.Path, pieces: Sequence[bytes], wanted: Collection[int]) -> Batch:

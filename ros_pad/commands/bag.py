@@ -21,6 +21,7 @@ from ros_pad.commands.command import complain
 from ros_pad.commands.progress import bar
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.pace import part
 from ros_pad.trials import label as labels
 from ros_pad.trials.recorded import late
 
@@ -62,7 +63,8 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidInput('--out is only for pad bag repair: pad bag info writes nothing')
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # the problem is reported below
-        reader = BagReader(options.bag)
+        with bar('opening', 1.0, 'bag', delay=1.0) as progress:
+            reader = BagReader(options.bag, progress)
     return _show(options, reader)
 
 
@@ -131,8 +133,10 @@ def _show(options: argparse.Namespace, reader: BagReader) -> int:
 def _content(bag: pathlib.Path, reader: BagReader) -> dict[str, Any]:
     problem, times, slow = reader.problem, {}, []
     try:
-        times = reader.log_times()
-        slow = late(reader)
+        with bar('reading', 1.0, 'bag', delay=1.0) as progress:
+            times = reader.log_times(part(progress, 0.0, 0.5))
+            slow = late(reader, part(progress, 0.5, 1.0))
+            progress(1.0)
     except BagError as error:  # what does not depend on single messages is listed all the same
         problem = problem or str(error)
     return {

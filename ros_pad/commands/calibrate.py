@@ -13,6 +13,10 @@ from typing import Any
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
+from ros_pad.commands.command import complain
+from ros_pad.commands.folder import check_pictures
+from ros_pad.commands.progress import bar
+from ros_pad.configuration import refuse
 from ros_pad.contact import Foot
 from ros_pad.contact import Material
 from ros_pad.contact import Pad
@@ -21,9 +25,8 @@ from ros_pad.contact.calibrate import Calibration
 from ros_pad.contact.calibrate import calibrate
 from ros_pad.contact.calibrate import foot_file
 from ros_pad.contact.measurements import Measurements
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
-from ros_pad.reports.calibration import draw
-from ros_pad.reports.files import refuse
 
 
 def add(commands: Commands) -> None:
@@ -106,24 +109,40 @@ def run(options: argparse.Namespace) -> int:
         )
     for path in (foot_path, figure_path):
         refuse(path, options.force)
+    check_pictures(options.figure)
     foot = Foot.load(options.foot)
-    found = calibrate(
-        Measurements.read(options.csv),
-        foot,
-        options.film_thickness,
-        options.viscosity,
-        fit=options.fit,
-        rubber=_rubber(options, foot),
-    )
-    picture = io.BytesIO()
-    draw(found).savefig(picture, format=figure_path.suffix[1:], dpi=150)
-    _write({figure_path: picture.getvalue(), foot_path: foot_file(found).encode()})
+    with bar('fitting', 2.0, 'steps', delay=1.0) as progress:
+        found = calibrate(
+            Measurements.read(options.csv),
+            foot,
+            options.film_thickness,
+            options.viscosity,
+            fit=options.fit,
+            rubber=_rubber(options, foot),
+        )
+        progress(1.0)
+        picture = _picture(found, figure_path)
+        progress(2.0)
+    _write({**picture, foot_path: foot_file(found).encode()})
+    drawn = figure_path if picture else None
     if options.json:
-        print(json.dumps(_values(found, foot_path, figure_path)))
+        print(json.dumps(_values(found, foot_path, drawn)))
     else:
         _show(found)
-        print(f'\nfoot:    {foot_path}\npicture: {figure_path}')
+        print(f'\nfoot:    {foot_path}\npicture: {drawn or "none: it needs Matplotlib"}')
     return 0
+
+
+def _picture(found: Calibration, path: pathlib.Path) -> dict[pathlib.Path, bytes]:
+    """Draw a fit; return the content of its file by path, nothing without Matplotlib."""
+    try:
+        from ros_pad.reports.calibration import draw
+    except ConfigError as error:
+        complain(error, 0)
+        return {}
+    picture = io.BytesIO()
+    draw(found).savefig(picture, format=path.suffix[1:], dpi=150)
+    return {path: picture.getvalue()}
 
 
 def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
@@ -136,7 +155,8 @@ def _rubber(options: argparse.Namespace, foot: Foot) -> Pad | None:
     thickness = foot.pad.thickness if options.thickness is None else options.thickness
     if material is None or thickness is None:
         raise InvalidInput(
-            f'--material and --thickness are both needed: the foot {foot.source} has not both'
+            f'--material and --thickness are both needed: the foot {foot.source} has'
+            f' material {material} and thickness {thickness} m'
         )
     return Pad.of(material, foot.pad.radius, thickness, foot.pad.measured_limit)
 
@@ -155,7 +175,7 @@ def _write(contents: dict[pathlib.Path, bytes]) -> None:
 
 
 def _values(
-    found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path
+    found: Calibration, foot_path: pathlib.Path, figure_path: pathlib.Path | None
 ) -> dict[str, Any]:
     def plain(values: dict[str, Any]) -> dict[str, Any]:
         """Replace NaN, which JSON does not have, by None."""
@@ -183,7 +203,7 @@ def _values(
         'comparisons': [plain(asdict(each)) | {'says': str(each)} for each in found.comparisons],
         'warnings': list(found.warnings),
         'foot': str(foot_path),
-        'figure': str(figure_path),
+        'figure': str(figure_path) if figure_path else None,
     }
 
 

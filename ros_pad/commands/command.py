@@ -11,12 +11,14 @@ import sys
 import textwrap
 from collections.abc import Callable
 from collections.abc import Sequence
+from functools import partial
 from typing import TypeAlias
 
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.errors import reason
 from ros_pad.signals import INTERRUPTED
 
 WIDEST = 98  # largest width of the help in columns, also on a wider terminal
@@ -80,8 +82,20 @@ def add_command(
         epilog='\n  '.join(['example:' if len(lines) == 1 else 'examples:', *lines]),
         formatter_class=Help,
     )
+    parser.register('type', float, partial(_read, float, 'a number in SI units, without a unit,'))
+    parser.register('type', int, partial(_read, int, 'a whole number'))
+    # Without this, -75e3 would be taken for an option (Python 3.14 has the same pattern).
+    parser._negative_number_matcher = re.compile(r'-\.?\d')
     parser.set_defaults(command=run)
     return parser
+
+
+def _read(kind: type[float] | type[int], needed: str, word: str) -> float:
+    """Return an argument as a number, in the form of a ``type`` of argparse."""
+    try:
+        return kind(word)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{word} is not allowed: {needed} is needed') from None
 
 
 def exit_status(run: Callable[[], int], program: str = 'pad') -> int:
@@ -105,8 +119,11 @@ def exit_status(run: Callable[[], int], program: str = 'pad') -> int:
     except BagError as error:
         # A bag that is not valid is bad input; an error of the operating system is a failure.
         return complain(error, 1 if isinstance(error.__cause__, OSError) else 2, program)
-    except (PadError, OSError) as error:
+    except PadError as error:
         return complain(error, 1, program)
+    except OSError as error:
+        where = f'{error.filename}: ' if error.filename else ''
+        return complain(f'{where}{reason(error)}', 1, program)
     except KeyboardInterrupt:
         return complain('stopped', INTERRUPTED, program)
 

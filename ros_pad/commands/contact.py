@@ -143,9 +143,15 @@ def _pad(options: argparse.Namespace) -> tuple[contact.Pad, str]:
         pad, name = contact.Foot.load(options.foot).pad, f'pad of {options.foot}'
     if options.material is not None:
         material = contact.Material.load(options.material)
+        sizes = RUBBER_SETTINGS[0], RUBBER_SETTINGS[-1]
+        for each in sizes:
+            if getattr(options, each.name) is None:
+                raise InvalidInput(
+                    f'--{each.name} is missing: {each.allowed} is needed with --material'
+                )
         radius, thickness = (
             number(f'--{each.name}', getattr(options, each.name), each.unit, each.low, each.high)
-            for each in (RUBBER_SETTINGS[0], RUBBER_SETTINGS[-1])
+            for each in sizes
         )
         made = contact.Pad.of(material, radius, thickness, edge=options.edge)
         return made, f'pad of {options.material}'

@@ -18,6 +18,8 @@ from ros_pad import configuration
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import PICTURES
+from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.folder import refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
@@ -38,6 +40,7 @@ from ros_pad.contact.limits import DEFAULT_CRITERION
 from ros_pad.contact.limits import criteria
 from ros_pad.contact.limits import resized
 from ros_pad.errors import InvalidInput
+from ros_pad.pace import Progress
 
 CEILING = 90e3  # Pa gauge, the ceiling of the shipped feet
 RADII = (0.3e-3, 0.4e-3, 0.5e-3, 0.6e-3, 0.8e-3, 1e-3, 1.25e-3, 1.5e-3, 1.75e-3, 2e-3, 2.5e-3)
@@ -135,7 +138,8 @@ def _add_materials(part: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the designs; return the exit status."""
-    refuse_existing('--figure', options.figure)
+    refuse_existing('--figure', options.figure, PICTURES)
+    check_pictures(options.figure)
     foot = None if options.foot is None else Foot.load(options.foot)
     if options.material is not None or (foot is not None and foot.pad.material is not None):
         return _compare_materials(options, foot)
@@ -162,7 +166,8 @@ def run(options: argparse.Namespace) -> int:
     others = rules
     if rules['criterion'] == 'measured':
         others = rules | {'criterion': DEFAULT_CRITERION}
-    rows = _over(RADII, options.load, area, pad, others)
+    with bar('radii', 1.0, 'table', delay=1.0) as progress:
+        rows = _over(RADII, options.load, area, pad, others, progress)
     sentences = [
         *advice(next(iter(designs.values())), rows[0], rules['ceiling']),
         *(() if others is rules else (OTHER_RADII,)),
@@ -173,7 +178,8 @@ def run(options: argparse.Namespace) -> int:
         from ros_pad.reports.design import draw
 
         radii = np.linspace(0.3e-3, 2.5e-3, 221).tolist()
-        draw(options.figure, *_over(radii, options.load, area, pad, others))
+        with bar('radii', 1.0, 'figure', delay=1.0) as progress:
+            draw(options.figure, *_over(radii, options.load, area, pad, others, progress))
     if options.json:
         summary = {
             'designs': [{'name': name, **values(each)} for name, each in designs.items()],
@@ -294,17 +300,21 @@ def material_advice(
 
 
 def _over(
-    radii: Sequence[float], load: float, area: float, pad: Pad, rules: dict[str, Any]
+    radii: Sequence[float],
+    load: float,
+    area: float,
+    pad: Pad,
+    rules: dict[str, Any],
+    progress: Progress,
 ) -> list[list[Design]]:
     """Return corrected and printed designs for those radii, m, of which a pad fits on the sole."""
-    return [
-        [
-            design(load, area, resized(pad, r), reading=reading, **rules)
-            for r in radii
-            if area >= CELL['corrected'] * r * r and r >= (pad.thickness or 0.0)
-        ]
-        for reading in READINGS
-    ]
+    fit = [r for r in radii if area >= CELL['corrected'] * r * r and r >= (pad.thickness or 0.0)]
+    found: list[list[Design]] = [[] for _ in READINGS]
+    for done, r in enumerate(fit, 1):
+        for designs, reading in zip(found, READINGS, strict=True):
+            designs.append(design(load, area, resized(pad, r), reading=reading, **rules))
+        progress(done / len(fit))
+    return found
 
 
 def values(each: Design) -> dict[str, Any]:

@@ -23,12 +23,14 @@ import textwrap
 import threading
 import time
 import uuid
+import webbrowser
 from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 
 from ros_pad.commands.command import WIDEST
@@ -39,14 +41,17 @@ from ros_pad.pace import Progress
 
 OLDEST, NEWEST = (3, 11), (3, 13)  # versions of Python with which ros_pad is tested
 DISTRIBUTION = 'jazzy'  # distribution of ROS 2 with which ros_pad is tested
-NEEDED = ('numpy', 'scipy', 'yaml', 'matplotlib', 'tqdm', 'mcap', 'rosbags', 'serial')
+NEEDED = ('numpy', 'scipy', 'yaml', 'tqdm', 'mcap', 'rosbags', 'serial')
 # Optional modules, each with the extra of ros_pad that installs it, and its purpose.
 EXTRAS = {
+    'matplotlib': ('plot', 'pictures and reports; without it, pad run writes no report'),
     'mujoco': ('mujoco', 'robots with joints, L2; without it, L1 is used'),
     'numba': ('fast', 'compiled L1; without it, L1 is ten times slower, with the same results'),
     'distributed': ('sweep', 'sweeps on a Dask cluster'),
     'pyarrow': ('sweep', 'Parquet tables of sweeps'),
     'meshio': ('mesh', 'meshes of pads from files, for pad wet'),
+    'nicegui': ('explore', 'feet designed in the browser, with pad explore'),
+    'sphinx': ('docs', 'the site, with make docs'),
 }
 # Modules of ROS 2 that the nodes import.
 ROS_MODULES = (
@@ -56,10 +61,12 @@ ROS_MODULES = (
 )
 LOOPBACK = 10.0  # s, longest time of a message from one process to another
 STARTING = 30.0  # s, longest time to import rclpy or an extra, which is slow at first
+KINDS = ('scenes', 'feet', 'materials', 'robots', 'mappings')  # of shipped files
 ROOM_NEEDED, ROOM_WANTED = 0.1e9, 1e9  # free bytes below which there is a problem, a warning
 
 _DESCRIPTION = f"""\
-Check Python, packages, ROS 2, its middleware, serial ports and disk; advise what to do.
+Check Python, packages, shipped files, ROS 2, its middleware, serial ports and disk;
+advise what to do.
 One check sends a message between two processes with the ROS settings of this shell; the
 message must arrive within {LOOPBACK:g} s.
 
@@ -205,7 +212,8 @@ def _show(finding: Finding) -> None:
 def examine(progress: Progress | None = None) -> Iterator[Finding]:
     """Run all checks one after the other, and yield their findings."""
     checks: tuple[Callable[[], Iterator[Finding]], ...] = (
-        python, packages, extras, config_folder, ros, serial_ports, folders,
+        python, packages, extras, browser, config_folder, shipped_files, ros, serial_ports,
+        folders,
     )  # fmt: skip
     for number, check in enumerate(checks, 1):
         yield from check()
@@ -256,8 +264,7 @@ def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
     for name in names:
         extra, purpose = EXTRAS[name]
         if name not in here:
-            advice = f'pip install "ros_pad[{extra}]", or --editable ".[{extra}]" in its folder'
-            yield Finding(name, 'warning', f'not installed: {purpose}', advice)
+            yield Finding(name, 'warning', f'not installed: {purpose}', _install(extra))
         elif errors[name]:
             advice = f'pip install --force-reinstall {name}, or pip uninstall {name} if not needed'
             yield Finding(name, 'warning', f'{errors[name]}; {purpose}', advice)
@@ -265,6 +272,13 @@ def extras(names: Sequence[str] = tuple(EXTRAS)) -> Iterator[Finding]:
             with contextlib.suppress(metadata.PackageNotFoundError):
                 purpose = f'{metadata.version(name)}: {purpose.partition(";")[0]}'
             yield Finding(name, 'ok', purpose)
+
+
+def _install(extra: str, checkout: pathlib.Path = pathlib.Path(__file__).parents[2]) -> str:
+    """Return the command that installs an extra of ros_pad."""
+    if (checkout / 'setup.py').is_file():
+        return f'pip install --editable "{checkout}[{extra}]"'
+    return f'pip install "ros_pad[{extra}]"'
 
 
 def _import_error(name: str) -> str:
@@ -288,16 +302,73 @@ def _child(code: str, what: str) -> tuple[str, str]:
 
 
 def config_folder() -> Iterator[Finding]:
-    """Check that the folder of the shipped configuration is found; count its scenes and feet."""
+    """Check that the folder of the shipped configuration is found; count its files."""
     try:
         from ros_pad import configuration
 
         folder = configuration.shared_folder()
-        counts = [f'{len(configuration.names(kind))} {kind}' for kind in ('scenes', 'feet')]
+        counts = [f'{len(configuration.names(kind))} {kind}' for kind in KINDS]
         yield Finding('config folder', 'ok', f'{folder}: {", ".join(counts)}')
     except Exception as error:  # ConfigError, or any error of the import
         advice = 'source install/setup.bash of your workspace, or pip install ros_pad again'
         yield Finding('config folder', 'problem', str(error), advice)
+
+
+def shipped_files() -> Iterator[Finding]:
+    """Check that every shipped scene, foot, material, robot and mapping can be read."""
+    wrong = []
+    try:
+        from ros_pad import configuration
+        from ros_pad.contact import Foot
+        from ros_pad.contact import Material
+        from ros_pad.robots import Robot
+        from ros_pad.simulation.fidelity import Promises
+        from ros_pad.simulation.scene import Scene
+        from ros_pad.simulation.scene import is_bench
+
+        def text(kind: str, name: str) -> None:
+            configuration.Table.load(configuration.locate(kind, name))
+
+        loaders: dict[str, Callable[[str], object]] = {
+            'feet': Foot.load,
+            'materials': Material.load,
+            'robots': Robot.load,
+        }
+        for kind in KINDS:
+            for name in configuration.names(kind):
+                try:
+                    if kind == 'scenes' and not is_bench(name):
+                        Scene.load(name)
+                    else:
+                        loaders.get(kind, partial(text, kind))(name)
+                except Exception as error:
+                    wrong.append(str(error))
+        Promises.load()
+    except Exception as error:  # of an import, of the folder, or of the bounds of the levels
+        wrong.append(str(error))
+    if wrong:
+        advice = 'undo the changes of these files, or pip install --force-reinstall ros_pad'
+        yield Finding('shipped files', 'problem', '; '.join(wrong), advice)
+    else:
+        yield Finding('shipped files', 'ok', 'all can be read, and the bounds of fidelity levels')
+
+
+def browser() -> Iterator[Finding]:
+    """Check that there is a browser for ``pad explore``, if that is installed."""
+    if not importlib.util.find_spec('nicegui'):
+        return
+    try:
+        name = webbrowser.get().name
+    except webbrowser.Error:
+        yield Finding(
+            'browser',
+            'warning',
+            'none can be opened here, for the page of pad explore',
+            'sudo apt install firefox, or open the address that pad explore --no-browser prints;'
+            ' from another machine after ssh -L PORT:localhost:PORT HOST',
+        )
+    else:
+        yield Finding('browser', 'ok', f'{name} opens the page of pad explore')
 
 
 _ROS = """

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,18 +12,33 @@ from tqdm import tqdm
 
 from ros_pad.pace import Progress
 
+_BEAT = 1.0  # s, between pictures of a bar without reports
+
 
 @contextmanager
 def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterator[Progress]:
     """Show a progress bar on stderr; yield the function that sets its position, 0 to ``total``.
 
     The bar ends full if the last report came within one reporting interval of the end, or if there
-    was no report. After an early end it stays at the last report. It is shown after ``delay``, s.
+    was no report. After an early end it stays at the last report. Its clock goes on between
+    reports. Where stderr is no terminal, it is shown once a minute. With ``delay``, s, it is shown
+    after that time, and only on a terminal.
     """
     shape = '{desc} {percentage:3.0f}% {bar} {n:.0f}/{total:.0f} {unit} [{elapsed}<{remaining}]'
     stride: float | None = None
+    terminal = sys.stderr.isatty()
+    over = threading.Event()
     with tqdm(
-        total=total, desc=text, unit=unit, bar_format=shape, file=sys.stderr, delay=delay
+        total=total,
+        desc=text,
+        unit=unit,
+        bar_format=shape,
+        file=sys.stderr,
+        delay=delay,
+        mininterval=0.1 if terminal else 60.0,
+        miniters=0,
+        smoothing=0.0,  # time left from the mean rate: others are wrong if reports are rare
+        disable=delay > 0.0 and not terminal,
     ) as shown:
 
         def show(place: float) -> None:
@@ -30,6 +46,18 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
             stride = max(stride or 0.0, place - shown.n)
             shown.update(place - shown.n)
 
-        yield show
+        def beat() -> None:
+            while not over.wait(_BEAT):
+                shown.update(0)
+
+        clock = threading.Thread(target=beat, daemon=True)
+        if terminal:
+            clock.start()
+        try:
+            yield show
+        finally:
+            over.set()
+            if terminal:
+                clock.join()
         if stride is None or total - shown.n <= 1.01 * stride:
             shown.update(total - shown.n)

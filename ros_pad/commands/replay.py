@@ -12,6 +12,8 @@ from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
 from ros_pad.commands.command import print_table
+from ros_pad.commands.folder import PICTURES
+from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.folder import refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import parameters
@@ -101,10 +103,12 @@ def run(options: argparse.Namespace) -> int:
     """Replay the bag; return the exit status."""
     remaps = _remaps(options.remap)
     values = _values(options.set)
-    refuse_existing('--figure', options.figure)
+    refuse_existing('--figure', options.figure, PICTURES)
+    check_pictures(options.figure)
     refuse_existing('--out', options.out)
     try:
-        bag = replays.open_bag(options.bag)
+        with bar('opening', 1.0, 'bag', delay=1.0) as show:
+            bag = replays.open_bag(options.bag, show)
         settings = NodeSettings.of(bag).changed(values, options.policy, options.foot)
         with bar('replay', bag.message_count, 'messages') as show:
             replay = replays.replay(
@@ -119,9 +123,11 @@ def run(options: argparse.Namespace) -> int:
     if options.figure is not None:
         from ros_pad.reports.replay import draw
 
-        draw(options.figure, replay)
+        with bar('drawing', 1.0, 'figure'):
+            draw(options.figure, replay)
     if options.out is not None:
-        replayed_bag.write(replay, options.out, options.namespace)
+        with bar('writing', 1.0, 'bag') as show:
+            replayed_bag.write(replay, options.out, options.namespace, show)
     if options.json:
         print(
             json.dumps(

@@ -7,20 +7,20 @@ import argparse
 import os
 import pathlib
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
+from ros_pad.configuration import refuse
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
-from ros_pad.reports import report
-from ros_pad.reports import sweep_page
-from ros_pad.reports.files import refuse
-from ros_pad.reports.files import write_figures
-from ros_pad.reports.style import Drawn
 from ros_pad.trials import recorded
 from ros_pad.trials import sweep as sweeps
+
+if TYPE_CHECKING:
+    from ros_pad.reports.style import Drawn
 
 THESIS = 'thesis_figures.html'
 """Default file name of the page with the thesis' figures."""
@@ -80,6 +80,9 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
+    from ros_pad.reports import report
+    from ros_pad.reports import sweep_page
+
     if sweeps.is_sweep(options.path):
         page = page_for(options, options.path / 'report.html')
         found = sweeps.read(options.path)
@@ -98,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
             report.write(trial, out, force=options.force, progress=progress)
 
     def drawn() -> dict[str, Drawn]:
-        with bar('figures', 1.0, 'trial') as progress:
+        with bar('drawing', 1.0, 'trial') as progress:
             return report.drawn(trial, progress=progress)
 
     return write_all(options, page, write, drawn)
@@ -132,10 +135,15 @@ def write_all(
     drawn: Callable[[], dict[str, Drawn]],
 ) -> int:
     """Write a page (unless it is None) and figures (with ``--figures``); print paths, return 0."""
+    from ros_pad.reports.files import write_figures
+
     if page is not None:
         write(page)
         print(page)
     if options.figures is not None:
-        for path in write_figures(drawn(), options.figures, options.force):
+        found = drawn()
+        with bar('figures', 1.0, 'folder') as progress:
+            paths = write_figures(found, options.figures, options.force, progress)
+        for path in paths:
             print(path)
     return 0

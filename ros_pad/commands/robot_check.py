@@ -52,7 +52,8 @@ def _live(
         from ros_pad.nodes.listening import receive
     except ImportError as error:
         raise ConfigError(
-            f'live topics need ROS 2 ({error}): install it, or give a recording with --bag'
+            f'live topics need ROS 2 ({error}): source its setup.bash, or'
+            ' pip install "ros_pad[ros]", or give a recording with --bag'
         ) from error
     with bar('listening', seconds) as progress:
         messages, topics = receive(mapping.sources, seconds, options.namespace, progress)
@@ -65,7 +66,8 @@ def _recorded(
     options: argparse.Namespace, mapping: Mapping, seconds: float, collector: Collector
 ) -> dict[str, str]:
     """Collect the messages of the first seconds of a bag; return the types of all its topics."""
-    reader = BagReader(options.bag)
+    with bar('opening', 1.0, 'bag', delay=1.0) as progress:
+        reader = BagReader(options.bag, progress)
     prefix = f'/{options.namespace.strip("/")}/' if options.namespace else '/'
     names = {
         name: source.topic

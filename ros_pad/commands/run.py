@@ -23,10 +23,10 @@ from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.reports import report
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
@@ -126,7 +126,8 @@ def run(options: argparse.Namespace) -> int:
     if options.cycles is not None:
         if not 1 <= options.cycles <= 100000:
             raise InvalidInput(
-                f'--cycles {options.cycles}: a whole number from 1 to 100000 is needed'
+                f'--cycles = {options.cycles} is not allowed: a whole number from 1 to 100000 is'
+                ' needed'
             )
         scene = dataclasses.replace(scene, cycles=options.cycles)
     if options.foot is not None:
@@ -138,7 +139,8 @@ def run(options: argparse.Namespace) -> int:
         options.tuning = dataclasses.replace(options.tuning, **changes)
     if not 0 <= options.seed < 2**31:
         raise InvalidInput(
-            f'--seed {options.seed}: a whole number from 0 to {2**31 - 1} is needed'
+            f'--seed = {options.seed} is not allowed: a whole number from 0 to {2**31 - 1} is'
+            ' needed'
         )
     policy = options.policy or scene.policy
     joints = options.sensing == 'joints'
@@ -259,15 +261,14 @@ def _run_beside(
             sensing=options.sensing,
         )
         annotate(bag, about)
-    page = folder / 'report.html'
-    with bar('report', 1.0, 'page') as progress:
-        report.write(trial, page, progress=progress)
+    page = _write_report(trial, folder / 'report.html')
     summary = _summary(trial, bag, page)
     (folder / 'summary.json').write_text(json.dumps(summary, indent=1), encoding='utf-8')
     if options.json:
         print(json.dumps(summary))
     else:
-        _show(trial, bag, page)
+        _show(trial, bag)
+        print(f'report:   {page or "none: without Matplotlib there are no pictures"}')
     if trial.metrics.verdict:
         return complain(f'the walk ended early: {trial.metrics.verdict}', 1)
     return 0
@@ -294,6 +295,19 @@ def _walk_on_nodes(
         )
 
 
+def _write_report(trial: Trial, page: pathlib.Path) -> pathlib.Path | None:
+    """Write the report and return its path; without Matplotlib return None."""
+    try:
+        with STOP.deferred():
+            from ros_pad.reports import report
+    except ConfigError as error:
+        complain(error, 0)
+        return None
+    with bar('report', 1.0, 'page') as progress:
+        report.write(trial, page, progress=progress)
+    return page
+
+
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
     """Hide the topics of this process, so that no real regulator receives the set-points."""
@@ -308,7 +322,7 @@ def alone() -> Iterator[None]:
             os.environ[_DISCOVERY] = before
 
 
-def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict[str, Any]:
+def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path | None) -> dict[str, Any]:
     own = trial.metrics
     assert own is not None
     return {
@@ -324,7 +338,7 @@ def _summary(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> dict
         **own.as_dict(),
         'real_time_factor': trial.real_time_factor,
         'bag': str(bag) if bag else None,
-        'report': str(page),
+        'report': str(page) if page else None,
         'learnt': trial.settings['learnt'],
         'omitted': trial.settings['omitted'],
         'taken': trial.settings['taken'],
@@ -345,7 +359,7 @@ def _at_most(term: dict[str, Any]) -> str:
     return text
 
 
-def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
+def _show(trial: Trial, bag: pathlib.Path | None) -> None:
     own = trial.metrics
     assert own is not None
     print(
@@ -383,4 +397,3 @@ def _show(trial: Trial, bag: pathlib.Path | None, page: pathlib.Path) -> None:
         print(f'left out: {term["term"]} ({_at_most(term)})')
     if bag:
         print(f'bag:      {bag}')
-    print(f'report:   {page}')

@@ -21,6 +21,7 @@ from ros_pad.commands.command import complain
 from ros_pad.commands.command import print_table
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
+from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import fidelity as levels
 from ros_pad.trials import sweep as sweeps
@@ -155,29 +156,31 @@ def _report(
     rows: list[sweeps.Row],
 ) -> int:
     """Write picture and page, print the means of the trials; return the exit status."""
-    from ros_pad.reports import sweep_page
-    from ros_pad.reports.sweep import draw
-
     points, notes = sweeps.points(rows, sweep.parameters), _notes(rows)
     files = [path for path in (folder / name for name in _TABLES) if path.exists()]
-    summary = {
+    summary: dict[str, Any] = {
         'folder': str(folder),
         'trials': len(rows),
         'failed': sum(bool(row['error']) for row in rows),
         'ended_early': sum(bool(row['verdict']) for row in rows),
         'tables': [str(path) for path in files],
         'picture': None,
+        'report': None,
     }
     try:
+        from ros_pad.reports import sweep_page
+        from ros_pad.reports.sweep import draw
+
+        page = folder / 'report.html'
+        sweep_page.write(sweeps.read(folder), page, force=True)
+        summary['report'] = str(page)
         draw(folder / 'sweep.png', points, sweep)
-        files.append(folder / 'sweep.png')
-        summary['picture'] = str(files[-1])
-    except InvalidInput as error:
+        summary['picture'] = str(folder / 'sweep.png')
+    except (ConfigError, InvalidInput) as error:
         notes.append(f'no picture: {error}')
-    files.append(folder / 'report.html')
-    sweep_page.write(sweeps.read(folder), files[-1], force=True)
+    files += [pathlib.Path(summary[name]) for name in ('picture', 'report') if summary[name]]
     if options.json:
-        more = {'report': str(files[-1]), 'notes': notes, 'points': [_flat(p) for p in points]}
+        more = {'notes': notes, 'points': [_flat(p) for p in points]}
         print(json.dumps(summary | more))
     else:
         _show(points, sweep)
@@ -202,7 +205,8 @@ def seeds(text: str) -> list[int]:
         first, last = int(ends[0]), int(ends[-1])
         if not 0 <= last - first < MOST:
             raise InvalidInput(
-                f'--seed {text}: {part!r}: LAST must be from FIRST to FIRST + {MOST - 1}'
+                f'--seed {text}: {part!r} is not allowed: LAST from FIRST to'
+                f' FIRST + {MOST - 1} is needed'
             )
         found += range(first, last + 1)
     return found

@@ -22,6 +22,8 @@ from ros_pad.capillary.layers import BALANCES
 from ros_pad.commands.command import Commands
 from ros_pad.commands.command import add_command
 from ros_pad.commands.command import complain
+from ros_pad.commands.folder import check_pictures
+from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
 from ros_pad.contact import THESIS_LIQUID
 from ros_pad.contact import WATER
@@ -189,11 +191,15 @@ def _add_method(part: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Find the height of the liquid on the mesh and print it; return the exit status."""
     number('--direction', options.direction, 'degrees', low=-math.inf)
+    check_pictures(options.figure, options.html)
     liquid = _liquid(options)
     try:
-        mesh = _mesh(options)
-        many = options.area is not None or options.mesh == 'pattern'
-        found = _between(mesh, liquid, options) if many else _round(mesh, liquid, options)
+        with bar('wetting', 2.0, 'steps', delay=1.0) as progress:
+            mesh = _mesh(options)
+            progress(1.0)
+            many = options.area is not None or options.mesh == 'pattern'
+            found = _between(mesh, liquid, options) if many else _round(mesh, liquid, options)
+            progress(2.0)
     except MeshError as error:
         return complain(error, 2)
     values = {
@@ -385,9 +391,12 @@ def _draw(
     from ros_pad.reports import wetted
     from ros_pad.reports import wetted_page
 
-    if options.figure is not None:
-        wetted.draw(options.figure, mesh, found, math.radians(options.direction))
-    if options.html is not None:
-        title = f'{mesh.source}, {options.liquid}'
-        shown = [row for row in rows if row[0] not in ('figure', 'html')]
-        wetted_page.write(options.html, title, shown, wetted.picture(mesh, found))
+    with bar('drawing', 2.0, 'files', delay=1.0) as progress:
+        if options.figure is not None:
+            wetted.draw(options.figure, mesh, found, math.radians(options.direction))
+        progress(1.0)
+        if options.html is not None:
+            title = f'{mesh.source}, {options.liquid}'
+            shown = [row for row in rows if row[0] not in ('figure', 'html')]
+            wetted_page.write(options.html, title, shown, wetted.picture(mesh, found))
+        progress(2.0)

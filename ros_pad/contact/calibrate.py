@@ -236,6 +236,8 @@ def calibrate(
         pad = _stiffness(measurements, _capped(measurements, start), constants, warnings)
     else:
         pad = _of_rubber(measurements, start, fit, laws, constants, warnings)
+    for constant in constants:
+        _fits_a_foot(measurements.source, constant)
     pad = _limit(measurements, pad, constants, warnings)
     limit = _criterion(foot, pad, warnings)
     ceiling = _ceiling(foot.ceiling, pad, limit, warnings)
@@ -613,7 +615,10 @@ def _of_rubber(
         if name == 'factor':
             pad = _with_range(pad, material, found[0], warnings)
     except InvalidInput as error:
-        raise InvalidInput(f'{measurements.source}: the fit is of no pad: {error}') from error
+        raise InvalidInput(
+            f'{measurements.source}: the fit gives no pad: {error}: check the units of the'
+            ' measurements'
+        ) from error
     return pad
 
 

@@ -597,6 +597,7 @@ def _refuse(code: int, pad: Pad, p: float, load: float | None = None, a: float =
         most = flattening_force(p / unit, max(a, 0.0)) * math.pi * pad.stiffness * pad.radius
         if most <= 0.0:
             why = 'adhesion alone holds the pad flat: more pressure is needed'
+            why += ' (in Pa: 75 kPa is 75e3)' if p < 1e3 else ''
         else:
             why = f'the contact would cover the whole pad: a force below {most:.6g} N is needed'
             why += " (with adhesion='text' an even smaller force)" if a < 0.0 else ''

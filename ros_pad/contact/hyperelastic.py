@@ -32,7 +32,6 @@ from typing import Any
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from ros_pad.contact.dome import FLATTENED
 from ros_pad.contact.dome import NO_CONTACT
@@ -492,7 +491,7 @@ class Domes:
                 reached[k] = np.interp(self.end, pressure[: over[0] + 1], shares[: over[0] + 1])
         # Domes with a small contact need no more than the free one does.
         at, reached = np.append(coarse, (0.0, 0.0)), np.append(reached * guess, (1.0, 1.0))
-        curve = chebyshev.Chebyshev.fit(at, reached, 6)
+        curve = np.polynomial.chebyshev.Chebyshev.fit(at, reached, 6)
         return curve(lines) + np.max(reached - curve(at)) + 0.005
 
     def _on_lines(self, x: Array, reach: Array, lines: Array, tolerance: float) -> Shapes:
@@ -542,7 +541,7 @@ class ThickDomes:
 
 def _nodes(low: float, high: float, count: int) -> Array:
     """Return the zeros of a Chebyshev polynomial on an interval, rising."""
-    return low + (high - low) * 0.5 * (1.0 + chebyshev.chebpts1(count))
+    return low + (high - low) * 0.5 * (1.0 + np.polynomial.chebyshev.chebpts1(count))
 
 
 def _unit(x: Array, span: tuple[float, float]) -> Array:
@@ -553,19 +552,23 @@ def _unit(x: Array, span: tuple[float, float]) -> Array:
 def _fit(values: Array) -> Array:
     """Return the coefficients of the polynomials through the columns of values at `_nodes`."""
     count = len(values)
-    basis = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
+    basis = np.polynomial.chebyshev.chebvander(np.polynomial.chebyshev.chebpts1(count), count - 1)
     return np.asarray(np.linalg.solve(basis, values), dtype=np.float64)
 
 
 def _finer(values: Array) -> Array:
     """Return a field at the nodes of x and lines on the finer grid of the tables."""
-    to_rows = chebyshev.chebvander(_unit(np.linspace(0.0, 1.0, _ROWS), (_LOW, 1.0)), _STRAINS - 1)
-    to_fine = chebyshev.chebvander(_unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1)
+    to_rows = np.polynomial.chebyshev.chebvander(
+        _unit(np.linspace(0.0, 1.0, _ROWS), (_LOW, 1.0)), _STRAINS - 1
+    )
+    to_fine = np.polynomial.chebyshev.chebvander(
+        _unit(np.linspace(*_SPAN, _FINE), _SPAN), _LINES - 1
+    )
     return np.asarray(to_rows @ _fit((to_fine @ _fit(values.T)).T))
 
 
 def _series(values: Array, span: tuple[float, float]) -> Any:
-    return chebyshev.Chebyshev(_fit(values), span)
+    return np.polynomial.chebyshev.Chebyshev(_fit(values), span)
 
 
 def _weights(x: Array) -> tuple[Array, Array, Array, Array]:

@@ -30,6 +30,7 @@ import numpy.typing as npt
 
 from ros_pad.contact.pad import Array
 from ros_pad.errors import ConfigError
+from ros_pad.errors import reason
 
 # Factors to SI, usual unit first, and largest plausible value in SI.
 _UNITS = {
@@ -135,7 +136,7 @@ class Measurements:
                 if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith('#')
             ]
         except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise ConfigError(f'{source}: cannot be read: {error}') from error
+            raise ConfigError(f'{source}: cannot be read: {reason(error)}') from error
         if len(lines) < 2:
             raise ConfigError(
                 f'{source}: a header and at least one row are needed besides comments and empty'
@@ -231,7 +232,9 @@ def _row(where: str, header: list[tuple[str, float, float]], cells: list[str]) -
         try:
             number = float(value) * factor
         except ValueError:
-            raise ConfigError(f'{where}: {name} = {value!r} is not a number') from None
+            raise ConfigError(
+                f'{where}: {name} = {value!r} is not allowed: a number is needed'
+            ) from None
         if not 0.0 <= number <= largest:
             raise ConfigError(
                 f'{where}: {name} = {value} is not allowed: from 0 to {largest / factor:g}, in the'

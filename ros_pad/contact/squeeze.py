@@ -249,7 +249,9 @@ def squeeze(
     """
     times = _checked(initial, time, load, velocity, viscosity, rings, tolerance)
     if number('rise', rise, 's') > 0.0 and load is None:
-        raise InvalidInput(f'rise = {rise:g} s is not allowed: it is that of a load')
+        raise InvalidInput(
+            f'rise = {rise:g} s is not allowed with a velocity: 0 s is needed, only loads rise'
+        )
     return _solve(surface, initial, times, load, velocity, viscosity, rise, rings, tolerance)
 
 
@@ -395,13 +397,14 @@ def _checked(
     if times.ndim > 1 or not times.size or np.any(np.diff(times) <= 0.0) or times[-1] <= 0.0:
         raise InvalidInput(f'time = {times} is not allowed: rising values from 0 s are needed')
     if (load is None) == (velocity is None):
-        raise InvalidInput('load or velocity is needed, and not both')
+        given = 'none is' if load is None else 'both are'
+        raise InvalidInput(f'exactly one of load and velocity is needed, but {given} given')
     if load is not None:
         number('load', load, 'N', above=True)
     elif velocity is not None:
         number('velocity', velocity, 'm/s', -1e3, 1e3)
         if velocity == 0.0:
-            raise InvalidInput('velocity = 0 m/s is not allowed: nothing moves')
+            raise InvalidInput('velocity = 0 m/s is not allowed: another number is needed')
     return times
 
 

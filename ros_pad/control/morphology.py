@@ -315,7 +315,7 @@ class MorphologyController:
         state = self._legs.get(leg)
         if state is None:
             raise InvalidInput(
-                f'leg = {leg!r}: one of {", ".join(map(str, self._legs))} is needed'
+                f'leg = {leg!r} is not allowed: one of {", ".join(map(str, self._legs))} is needed'
             )
         return state
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ros_pad.configuration import Setting
+from ros_pad.configuration import choice
 from ros_pad.configuration import number
 from ros_pad.errors import InvalidInput
 
@@ -239,6 +240,4 @@ def policy_named(
             raise InvalidInput("policy = 'oracle' needs the map of the floor (is_wet)")
         return oracle(is_wet)
     policies = {'flat': flat, 'dome': dome, 'adaptive': adaptive(**(parameters or {}))}
-    if name not in policies:
-        raise InvalidInput(f'policy = {name!r}: one of {", ".join(POLICIES)} is needed')
-    return policies[name]
+    return policies[choice('policy', name, POLICIES)]

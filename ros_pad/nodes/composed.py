@@ -225,7 +225,8 @@ class ComposedTrial:
             self.executor.spin_once(timeout_sec=0.01)
             if time.monotonic() > deadline:
                 raise PadError(
-                    f'waited more than {PATIENCE:g} s for the nodes to discover one another on DDS'
+                    f'the nodes have not discovered one another within {PATIENCE:g} s: pad'
+                    ' doctor finds the cause'
                 )
 
     def _connected(self) -> bool:
@@ -294,7 +295,9 @@ class ComposedTrial:
         self.executor.spin_until_future_complete(self._future, timeout_sec=PATIENCE)
         self._done = None
         if not self._future.done():
-            raise PadError(f'waited more than {PATIENCE:g} s of wall time for {what}')
+            raise PadError(
+                f'waited more than {PATIENCE:g} s of wall time for {what}: pad doctor checks ROS 2'
+            )
 
     def _on_received(self) -> None:
         if self._done and self._done():
@@ -436,7 +439,7 @@ def run(
     try:
         rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        raise PadError(f'ROS 2 does not start: {error}') from error
+        raise PadError(f'ROS 2 does not start: {error}: pad doctor finds the cause') from error
     try:
         trial, wall = _walked(scene, policy, seed, bag, context, level, progress, sensing, tuning)
     finally:

@@ -62,7 +62,9 @@ def _spin(make: Callable[[], Node]) -> None:
     try:
         node = make()
     except _ros.RCLError as error:  # for instance keys that SROS 2 needs are missing
-        raise PadError(f'ROS 2 cannot create the node: {error}') from error
+        raise PadError(
+            f'ROS 2 cannot create the node: {error}: pad doctor finds the cause'
+        ) from error
     try:
         executor = EventsExecutor()
         executor.add_node(node)

@@ -233,7 +233,9 @@ class Bus:
                 exclusive=True,  # a second program would take some of the replies
             )
         except Exception as error:  # pyserial raises errors of many types here, too
-            raise PortLost(f'port {line.port} cannot be opened: {error}') from error
+            raise PortLost(
+                f'port {line.port} cannot be opened: {error}: pad doctor lists the ports'
+            ) from error
 
     def _close(self) -> None:
         if self._port is not None:

@@ -1,2 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages and pictures of trials, sweeps, replays, designs and calibrations."""
+"""Pages and pictures; all of them need Matplotlib, the extra ``plot``."""
+
+from ros_pad.errors import ConfigError
+
+try:
+    import matplotlib  # noqa: F401
+except ModuleNotFoundError as error:
+    raise ConfigError(
+        f"pages and pictures need Matplotlib ({error}): pip install 'ros_pad[plot]'"
+    ) from error

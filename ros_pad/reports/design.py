@@ -45,7 +45,10 @@ def draw(
         When the path has another ending, or no pad of the drawn radii fits on the sole.
     """
     if not corrected:
-        raise InvalidInput('the sole is too small: no pad of the drawn radii fits on it')
+        raise InvalidInput(
+            'the sole is too small: no pad with a radius from 0.3 to 2.5 mm fits on it; leave out'
+            ' --figure'
+        )
 
     def figure() -> Figure:
         found = Figure(figsize=(WIDE, 3.2), layout='constrained')

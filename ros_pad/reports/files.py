@@ -12,23 +12,16 @@ from collections.abc import Mapping
 import matplotlib
 from matplotlib.figure import Figure
 
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.pace import Progress
 from ros_pad.reports.style import DPI
 from ros_pad.reports.style import PAPER_STYLE
 from ros_pad.reports.style import Drawn
 from ros_pad.reports.style import rendered
 
 _PICTURES = ('.png', '.svg', '.pdf')
-
-
-def refuse(path: str | os.PathLike[str], force: bool) -> None:
-    """Raise InvalidInput if a path exists, unless it is a regular file and ``force`` is True."""
-    path = pathlib.Path(path)
-    if path.exists() and not path.is_file():
-        raise InvalidInput(f'{path}: is no regular file, and only regular files are replaced')
-    if not force and path.exists():
-        raise InvalidInput(f'{path}: exists already; --force (force=True) replaces it')
 
 
 def save(path: str | os.PathLike[str], data: bytes, new_folder: bool = True) -> None:
@@ -80,7 +73,10 @@ def write_picture(
 
 
 def write_figures(
-    drawn: Mapping[str, Drawn], folder: str | os.PathLike[str], force: bool = False
+    drawn: Mapping[str, Drawn],
+    folder: str | os.PathLike[str],
+    force: bool = False,
+    progress: Progress | None = None,
 ) -> list[pathlib.Path]:
     """Write figures for a paper, each as PDF and as PNG of 300 dpi, and return the files.
 
@@ -94,6 +90,8 @@ def write_figures(
         Created if it is missing.
     force : bool
         Replace existing files.
+    progress : callable or None
+        Called with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -110,6 +108,8 @@ def write_figures(
     for path in files:
         refuse(path, force)
     with matplotlib.rc_context(PAPER_STYLE):
-        for path, (figure, kind) in files.items():
+        for done, (path, (figure, kind)) in enumerate(files.items(), 1):
             save(path, rendered(figure, kind, dpi=DPI))
+            if progress:
+                progress(done / len(files))
     return list(files)

@@ -15,11 +15,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 
+from ros_pad.configuration import refuse
 from ros_pad.estimation import DOUBTS
 from ros_pad.pace import Progress
 from ros_pad.reports import animation
 from ros_pad.reports import pictures
-from ros_pad.reports.files import refuse
 from ros_pad.reports.files import save
 from ros_pad.reports.page import heading
 from ros_pad.reports.page import page

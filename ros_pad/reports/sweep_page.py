@@ -13,8 +13,8 @@ import matplotlib
 import numpy as np
 from scipy.special import bdtr
 
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
-from ros_pad.reports.files import refuse
 from ros_pad.reports.files import save
 from ros_pad.reports.page import heading
 from ros_pad.reports.page import page

@@ -261,7 +261,10 @@ class Robot:
             q += np.clip(step[..., 0], -0.5, 0.5)
         leg = self.legs[int(np.abs(miss).max(1).argmax())]
         place = goal[self.legs.index(leg)].round(4).tolist()
-        raise InvalidInput(f'leg {leg} does not reach {place} m')
+        raise InvalidInput(
+            f'leg {leg} does not reach x, y, z = {place} m in the base: a place nearer to its home'
+            ' is needed'
+        )
 
     def _shaped(self, q: npt.ArrayLike) -> Array:
         checked = quantity('q', q, 'rad', -1e4, 1e4)
@@ -451,8 +454,8 @@ def _of_links(table: Table, path: pathlib.Path, others: dict[str, Any]) -> Robot
     carried = sum(joint.mass for leg in joints for joint in leg)
     if carried > mass:
         raise ConfigError(
-            f'{table.origin}: mass = {mass:g} is not allowed: the links of the legs have'
-            f' {carried:g} kg'
+            f'{table.origin}: mass = {mass:g} kg is not allowed: at least {carried:g} kg is'
+            ' needed, the mass of the links of the legs'
         )
     home = np.array([[link.home for link in links]] * len(legs))
     trunk = _trunk(table, mass - carried, joints)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.errors import ConfigError
+from ros_pad.errors import reason
 from ros_pad.robots.chains import Joint
 from ros_pad.robots.rotation import Array
 from ros_pad.robots.rotation import from_rpy
@@ -62,7 +63,9 @@ class Urdf:
         try:
             tree = xml.fromstring(pathlib.Path(path).read_bytes())
         except (OSError, xml.ParseError, ValueError, LookupError) as error:
-            raise ConfigError(f'{self._origin}: not a readable URDF file: {error}') from error
+            raise ConfigError(
+                f'{self._origin}: not a readable URDF file: {reason(error)}'
+            ) from error
         if tree.tag != 'robot':
             raise self._error(f'expected <robot>, found <{tree.tag}>')
         self.name = tree.get('name', pathlib.Path(path).stem)

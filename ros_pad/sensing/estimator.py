@@ -375,7 +375,10 @@ class BodyEstimator:
         """Return time and readings as arrays; raise `InvalidInput` for those not allowed."""
         time = number('time', time, 's', -1e12, 1e12)
         if time == self._time:
-            raise InvalidInput(f'time = {time} s is not allowed: it is that of the last sample')
+            raise InvalidInput(
+                f'time = {time} s is not allowed: another time than that of the last sample is'
+                ' needed'
+            )
         foot_forces = readings[4]
         joints = self._robot.home.shape
         size = (joints[0] * joints[1],)

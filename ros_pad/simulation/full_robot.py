@@ -194,7 +194,10 @@ class FullRobot:
         assert isinstance(scene.body, LeggedBody) and isinstance(scene.gait, WalkingGait)
         number('period', period, 's', above=True)
         if scene.body.robot.servo is None:
-            raise ConfigError(f'{scene.source}: the file of {scene.robot} has no servo')
+            raise ConfigError(
+                f'{scene.source}: fidelity L2 needs servos: the file of {scene.robot} has no'
+                ' key servo; add it, or walk with --fidelity L1'
+            )
         self._solver = check_reach(scene)
         self.legs = scene.legs
         self.joint_names = scene.body.robot.joint_names

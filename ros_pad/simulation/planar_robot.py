@@ -20,6 +20,7 @@ import numpy as np
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.errors import NoConvergence
 from ros_pad.simulation import compiled
 from ros_pad.simulation import planar_step
 from ros_pad.simulation.gait import WalkingGait
@@ -138,7 +139,7 @@ class PlanarRobot:
         ------
         InvalidInput
             When there is not one finite pressure for each leg.
-        ArithmeticError
+        NoConvergence
             When the friction step does not converge.
         """
         self._advance(pressures, 1, False)
@@ -159,7 +160,7 @@ class PlanarRobot:
         InvalidInput
             When there is not one finite pressure for each leg, or ``steps`` is not a whole
             number from 0.
-        ArithmeticError
+        NoConvergence
             When a friction step does not converge.
         """
         integer('steps', steps)
@@ -173,7 +174,7 @@ class PlanarRobot:
             self.model, self.state, self.table, tuple(pressures), steps, upright
         )
         if not converged:
-            raise ArithmeticError(
+            raise NoConvergence(
                 f'friction step of {self.period:g} s does not converge: shorten the period, or'
                 ' lower shear_stiffness of the foot'
             )

@@ -144,8 +144,12 @@ def check_pressures(pressures: Sequence[float], legs: int) -> None:
     """Raise InvalidInput unless there is one finite gauge pressure, Pa, for each leg."""
     # If one value is not finite, the sum is not finite either.
     if len(pressures) != legs or not math.isfinite(sum(pressures)):
-        needed = 'one finite number is' if legs == 1 else f'{legs} finite numbers are'
-        raise InvalidInput(f'pressures = {pressures!r} Pa: {needed} needed, one for each leg')
+        needed = (
+            'one finite number is'
+            if legs == 1
+            else f'{legs} finite numbers, one for each leg, are'
+        )
+        raise InvalidInput(f'pressures = {pressures!r} Pa is not allowed: {needed} needed')
 
 
 def check_reach(scene: Scene) -> FeetSolver:

@@ -78,7 +78,10 @@ class LeggedBody:
     def read(cls, table: Table, robot: Robot) -> LeggedBody:
         """Read the table ``body`` of a scene: what is not as in the robot's file."""
         if not robot.mass > 0.0:
-            raise ConfigError(f'{table.origin}: the links of robot {robot.name!r} have no mass')
+            raise ConfigError(
+                f'{table.origin}: the links of robot {robot.name!r} have no mass: give them an'
+                ' <inertial> with <mass>'
+            )
         legs = sum(joint.mass for leg in robot.chains.legs for joint in leg)
         if robot.mass - legs < LEAST_TRUNK * robot.mass:
             raise ConfigError(
@@ -542,7 +545,10 @@ def _robot_of(table: Table, name: str) -> Robot:
     except ConfigError as error:
         raise ConfigError(f'{table.origin}: robot: {error}') from error
     if robot.gait is None:
-        raise ConfigError(f'{table.origin}: robot = {name!r}: its file has no gait')
+        raise ConfigError(
+            f'{table.origin}: robot = {name!r}: its file has no key gait, which a walk'
+            ' needs: add it, see docs/robots.md'
+        )
     return robot
 
 

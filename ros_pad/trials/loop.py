@@ -250,7 +250,7 @@ class ClosedLoop:
         sensing: str = 'markers',
     ) -> None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise InvalidInput(f'seed = {seed!r}: a whole number from 0 is needed')
+            raise InvalidInput(f'seed = {seed!r} is not allowed: a whole number from 0 is needed')
         self.period_ns = round(1e9 / scene.sensors.rate)
         self.floor = scene.floor.build(seed)
         fidelity = levels.level(scene, fidelity, joints=sensing == 'joints')

@@ -32,6 +32,7 @@ from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
+from ros_pad.errors import reason
 from ros_pad.estimation import SETTINGS
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
@@ -192,7 +193,7 @@ class NodeSettings:
             except (KeyError, TypeError, ValueError) as error:
                 raise BagError(
                     f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator'
-                    f' or controller is missing or not valid: {error!r}'
+                    f' or controller is missing or not valid: {reason(error)}'
                 ) from error
         if not label:
             assumed = (

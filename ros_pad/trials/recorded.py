@@ -39,6 +39,7 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
 from ros_pad.pace import LATE
 from ros_pad.pace import Progress
+from ros_pad.pace import part
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
@@ -141,9 +142,10 @@ def load(
     InvalidInput
         When a remap is not allowed.
     """
-    bag = BagReader(folder)
+    bag = BagReader(folder, part(progress, 0.0, 0.4))
     wanted = wanted_topics(bag, namespace, remaps)
-    series = _read(bag, wanted, progress)
+    first = 0.4 if bag.problem else 0.0  # a bag without damage is opened at once
+    series = _read(bag, wanted, part(progress, first, 0.8))
     legs = tuple(sorted({leg for leg, _ in series if leg != OF_ROBOT}))
 
     def columns(kind: str, times: np.ndarray) -> np.ndarray:
@@ -171,7 +173,9 @@ def load(
         trial['settings']['problem'] = bag.problem
     trial['settings']['late'] = []
     with contextlib.suppress(BagError):  # a trial can be read without it
-        trial['settings']['late'] = late(bag)
+        trial['settings']['late'] = late(bag, part(progress, 0.8, 1.0))
+    if progress:
+        progress(1.0)
     ambient = trial['settings']['ambient_pressure']
     found = Trial(
         **trial,
@@ -202,14 +206,17 @@ def _pose_of(values: np.ndarray) -> np.ndarray:
     return np.column_stack([values[:, :2], _each(heading, values[:, 2:])])
 
 
-def late(bag: BagReader) -> list[str]:
-    """Return a line for each node that reported on ``/diagnostics`` that it did not keep up."""
+def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
+    """Return a line for each node that reported on ``/diagnostics`` that it did not keep up.
+
+    The callback is called now and then with the share that is done, 0 to 1.
+    """
     if bag.custom_data.get(RECORDED_AT) == 'publisher':
         return []  # composed nodes wait for one another
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
     found: dict[str, list[tuple[float, str]]] = {}
-    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode()):
+    for _, array, log_ns in bag.messages([DIAGNOSTICS.pattern], LATE.encode(), progress):
         for status in array.status:
             if status.message.startswith(LATE):
                 seconds = (log_ns - bag.start) * 1e-9
@@ -375,7 +382,7 @@ def _listed(robots: Iterable[str]) -> str:
 
 
 def _read(
-    bag: BagReader, wanted: Mapping[str, tuple[int, str]], progress: Progress | None
+    bag: BagReader, wanted: Mapping[str, tuple[int, str]], progress: Progress
 ) -> dict[tuple[int, str], _Series]:
     """Return the series of the topics of a bag by leg and kind."""
     topics = {name: TRIAL[kind] for name, (_, kind) in wanted.items()}

@@ -148,8 +148,10 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
     return {n: None if value == math.inf else value for n, value in values.items()}
 
 
-def open_bag(path: str | os.PathLike[str]) -> BagReader:
+def open_bag(path: str | os.PathLike[str], progress: Progress | None = None) -> BagReader:
     """Open a bag; for an SQLite bag, the error message has the command that converts it.
+
+    Parameters are as for :class:`ros_pad.bags.BagReader`.
 
     Raises
     ------
@@ -164,7 +166,7 @@ def open_bag(path: str | os.PathLike[str]) -> BagReader:
             f' ros2 bag convert -i {bag} -o mcap.yaml, where mcap.yaml has'
             f" 'output_bags: [{{uri: {bag}_mcap, storage_id: mcap, all: true}}]'"
         )
-    return BagReader(path)
+    return BagReader(path, progress)
 
 
 def replay(

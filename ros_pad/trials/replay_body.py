@@ -18,6 +18,7 @@ from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
+from ros_pad.errors import reason
 from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
@@ -128,7 +129,7 @@ class _Player:
     def _not_valid(self, error: Exception) -> BagError:
         return BagError(
             f'{self._bag.path}: in the custom data {PARAMETERS!r} a parameter of the body'
-            f' estimator is missing or not valid: {error!r}'
+            f' estimator is missing or not valid: {reason(error)}'
         )
 
     @staticmethod

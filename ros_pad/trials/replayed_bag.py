@@ -19,12 +19,20 @@ from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
+from ros_pad.pace import Progress
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.label import KEY
 from ros_pad.trials.replay import Replay
 
+_REPORT_EVERY = 1000  # messages
 
-def write(replay: Replay, folder: str | os.PathLike[str], namespace: str | None = None) -> None:
+
+def write(
+    replay: Replay,
+    folder: str | os.PathLike[str],
+    namespace: str | None = None,
+    progress: Progress | None = None,
+) -> None:
     """Write the replayed topics of every leg into a new bag.
 
     Parameters
@@ -35,6 +43,8 @@ def write(replay: Replay, folder: str | os.PathLike[str], namespace: str | None 
         Folder of the new bag; must not exist.
     namespace : str or None
         Namespace of the topics.
+    progress : callable or None
+        Called now and then with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -62,8 +72,12 @@ def write(replay: Replay, folder: str | os.PathLike[str], namespace: str | None 
             name = prefix + topic.name(leg)
             bag.add_topic(name, topic.type_name)
             streams.append(_messages(name, leg, topic, track))
-        for time_ns, name, data in heapq.merge(*streams, key=lambda each: each[0]):
+        total = sum(map(len, replay.replayed.values()))
+        merged = heapq.merge(*streams, key=lambda each: each[0])
+        for done, (time_ns, name, data) in enumerate(merged, 1):
             bag.write(name, data, time_ns)
+            if progress and (done % _REPORT_EVERY == 0 or done == total):
+                progress(done / total)
 
 
 def _messages(name: str, leg: int, topic: Topic, track: Track) -> Iterator[tuple[int, str, bytes]]:

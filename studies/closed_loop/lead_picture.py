@@ -23,6 +23,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ros_pad import configuration
+from ros_pad.configuration import refuse
 from ros_pad.contact import LARGE_PAD
 from ros_pad.contact import film_thickness
 from ros_pad.contact import force_limit
@@ -31,7 +32,6 @@ from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.reports import path_map
-from ros_pad.reports.files import refuse
 from ros_pad.reports.files import save
 from ros_pad.reports.pictures import draw_comparison
 from ros_pad.reports.style import STYLE

@@ -13,8 +13,8 @@ from ros_pad.commands.progress import bar
 from ros_pad.commands.report import THESIS
 from ros_pad.commands.report import page_for
 from ros_pad.commands.report import write_all
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
-from ros_pad.reports.files import refuse
 from studies import command
 from studies.thesis import page
 from studies.thesis import statements

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import matplotlib
 
 import ros_pad
+from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.pace import Progress
-from ros_pad.reports.files import refuse
 from ros_pad.reports.files import save
 from ros_pad.reports.page import embedded
 from ros_pad.reports.page import page

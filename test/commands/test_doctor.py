@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import webbrowser
 from types import SimpleNamespace
 from typing import Any
 from typing import NamedTuple
@@ -21,6 +22,7 @@ from ros_pad import cli
 from ros_pad import configuration
 from ros_pad.commands import doctor
 from ros_pad.commands.doctor import Finding
+from ros_pad.simulation.fidelity import Promises
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
@@ -109,7 +111,8 @@ def test_missing_extras_say_how_to_install_them(monkeypatch: pytest.MonkeyPatch)
     assert {each.status for each in found} == {'warning'}
     pip = {each.what: each.advice for each in found}
     for name, extra in (('mujoco', 'mujoco'), ('numba', 'fast'), ('pyarrow', 'sweep')):
-        assert f'pip install "ros_pad[{extra}]"' in pip[name]
+        assert pip[name] == f'pip install --editable "{ROOT}[{extra}]"'
+    assert doctor._install('fast', ROOT / 'ros_pad') == 'pip install "ros_pad[fast]"'
 
 
 def test_extras_that_cannot_be_imported_say_why(
@@ -164,7 +167,7 @@ while not (pathlib.Path(__file__).parent / {other!r}).exists():
 def test_the_extras_are_those_of_setup():
     text = (ROOT / 'setup.py').read_text(encoding='utf-8')
     for name, (extra, _) in doctor.EXTRAS.items():
-        assert f"'{extra}': [" in text and f"'{name}>=" in text
+        assert re.search(rf"'{extra}': (\[|DOCS,)", text) and f"'{name}>=" in text
 
 
 def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
@@ -175,6 +178,37 @@ def test_config_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
     finding = one(doctor.config_folder())
     assert (finding.status, str(tmp_path) in finding.found) == ('problem', True)
     assert 'setup.bash' in finding.advice
+
+
+def test_shipped_files_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
+    """A file of each kind that is damaged is named, and so are the bounds of fidelity levels."""
+    assert one(doctor.shipped_files()).status == 'ok'
+    shutil.copytree(ROOT / 'config', tmp_path / 'config')
+    monkeypatch.setattr('ros_pad.configuration.__file__', str(tmp_path / 'a' / 'b.py'))
+    damaged = [next((tmp_path / 'config' / kind).glob('*.yaml')) for kind in doctor.KINDS]
+    for path in damaged:
+        path.write_text('{')
+    finding = one(doctor.shipped_files())
+    assert finding.status == 'problem' and 'pip install' in finding.advice
+    assert all(f'{path}, line' in finding.found for path in damaged)
+    Promises.load.cache_clear()
+    (tmp_path / 'config' / 'fidelity.yaml').unlink()
+    assert 'fidelity.yaml' in one(doctor.shipped_files()).found
+    Promises.load.cache_clear()
+
+
+def test_a_missing_browser_is_a_warning(monkeypatch: pytest.MonkeyPatch):
+    def none() -> None:
+        raise webbrowser.Error
+
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: name)
+    monkeypatch.setattr('webbrowser.get', lambda: SimpleNamespace(name='firefox'))
+    assert 'firefox' in one(doctor.browser()).found
+    monkeypatch.setattr('webbrowser.get', none)
+    finding = one(doctor.browser())
+    assert finding.status == 'warning' and 'pad explore --no-browser' in finding.advice
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    assert not list(doctor.browser())
 
 
 def test_without_ros_it_lists_what_still_works(

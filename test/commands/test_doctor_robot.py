@@ -74,7 +74,7 @@ def test_progress_is_shown_while_sensors_are_checked(tmp_path, capsys, monkeypat
     shares = []
 
     @contextlib.contextmanager
-    def bar(text, total, unit='s'):
+    def bar(text, total, unit='s', delay=0.0):
         yield lambda share: shares.append(share) if text == 'checking' else None
 
     monkeypatch.setattr(robot_check, 'bar', bar)

@@ -87,7 +87,10 @@ def test_seeds_that_make_no_sense_are_refused(text: str):
             ['body.mass=-1', 'leg_wet_flat.yaml', '0.01 to 100 kg'],
         ),
         (['leg_wet_flat', '--set', 'policy.dwel=1'], ["'policy.dwel'", 'policy.dwell']),
-        (['leg_wet_flat', '--workers', '0'], ['workers = 0']),
+        (
+            ['leg_wet_flat', '--workers', '0'],
+            ['workers = 0 is not allowed: a whole number from 1'],
+        ),
     ],
 )
 def test_bad_input_is_refused_before_anything_runs(

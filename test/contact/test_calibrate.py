@@ -297,9 +297,9 @@ class TestMaterial:
         assert [law.name for law in found.laws] == ['stiffness', 'two constants']
         assert 'the material is not compared: height = 0.0024 m' in found.warnings[0]
         low = FreeDomes(np.array([900e3]), np.array([1.25e-3]))
-        with pytest.raises(InvalidInput, match='the fit is of no pad: factor = 32'):
+        with pytest.raises(InvalidInput, match='the fit gives no pad: factor = 32'):
             calibrate(dataclasses.replace(NOTHING, free=low), FOOT, rubber=self.pad)
-        with pytest.raises(InvalidInput, match=r'the fit is of no pad: thickness = 0\.0129'):
+        with pytest.raises(InvalidInput, match=r'the fit gives no pad: thickness = 0\.0129'):
             data = dataclasses.replace(NOTHING, free=low)
             calibrate(data, FOOT, fit='thickness', rubber=self.pad)
         bonded = dataclasses.replace(self.pad, edge='bonded')

@@ -328,8 +328,8 @@ def test_dry_share_under_a_paraboloid(middle, exponent):
     [
         ({'initial': 0.0}, 'initial = 0.0 .* m'),
         ({'load': -1.0}, 'load = -1.0 .* N'),
-        ({'load': None}, 'load or velocity is needed'),
-        ({'velocity': 1e-3}, 'not both'),
+        ({'load': None}, 'exactly one of load and velocity is needed, but none is given'),
+        ({'velocity': 1e-3}, 'needed, but both are given'),
         ({'load': None, 'velocity': 0.0}, 'velocity = 0 m/s'),
         ({'load': None, 'velocity': math.nan}, 'velocity = nan .* m/s'),
         ({'viscosity': 0.0}, 'viscosity = 0.0 .* Pa s'),
@@ -339,7 +339,10 @@ def test_dry_share_under_a_paraboloid(middle, exponent):
         ({'rings': 5}, 'rings = 5 .* 10 to 2000'),
         ({'time': []}, 'time = .* rising'),
         ({'rise': -1.0}, 'rise = -1.0 .* s'),
-        ({'load': None, 'velocity': 1e-3, 'rise': 1.0}, 'rise = 1 s .* of a load'),
+        (
+            {'load': None, 'velocity': 1e-3, 'rise': 1.0},
+            'rise = 1 s is not allowed with a velocity: 0 s',
+        ),
         ({'tolerance': 1.0}, 'tolerance = 1.0'),
         ({'surface': HalfSpace(RADIUS, 1e13)}, 'it is rigid, use film_thickness'),
         ({'surface': Membrane(1e-3, 50.0, 1e5)}, r'radius = 0.001 m .* 0.001466 m, is needed'),

@@ -349,7 +349,7 @@ def test_unknown_legs_are_refused():
     for call in (
         lambda: controller.observe(3, 0.0, 0.0), lambda: controller.fault(3),
     ):  # fmt: skip
-        with pytest.raises(InvalidInput, match='leg = 3: one of 1 is needed'):
+        with pytest.raises(InvalidInput, match='leg = 3 is not allowed: one of 1 is needed'):
             call()
 
 

@@ -115,7 +115,8 @@ def test_a_node_that_ros_refuses_reports_the_reason(capfd):
     # As when SROS 2 is requested, but ROS 2 was built without it.
     assert run(lambda: fail(rclpy_implementation.RCLError('no security libraries')), []) == 1
     assert capfd.readouterr().err == (
-        'ros_pad: ROS 2 cannot create the node: no security libraries\n'
+        'ros_pad: ROS 2 cannot create the node: no security libraries:'
+        ' pad doctor finds the cause\n'
     )
     assert not rclpy.ok()
 

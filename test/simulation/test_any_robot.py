@@ -262,11 +262,11 @@ def test_what_a_scene_lacks_is_named(tmp_path):
     robot = yaml.safe_load((tmp_path / 'robot.yaml').read_text())
     del robot['servo']
     (tmp_path / 'robot.yaml').write_text(yaml.safe_dump(robot))
-    with pytest.raises(ConfigError, match='has no servo'):
+    with pytest.raises(ConfigError, match='has no key servo; add it'):
         walk(Scene.load(path), 'L2')
     del robot['gait']
     (tmp_path / 'robot.yaml').write_text(yaml.safe_dump(robot))
-    with pytest.raises(ConfigError, match='its file has no gait'):
+    with pytest.raises(ConfigError, match='its file has no key gait'):
         Scene.load(path)
     scene = yaml.safe_load(path.read_text()) | {'robot': 'q.urdf'}
     path.write_text(yaml.safe_dump(scene))

@@ -103,7 +103,9 @@ def run(
         another sweep is running in the folder.
     """
     if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise InvalidInput(f'workers = {workers!r}: a whole number from 1 is needed')
+        raise InvalidInput(
+            f'workers = {workers!r} is not allowed: a whole number from 1 is needed'
+        )
     jobs = {job.key: job for job in sweep.jobs()}
     with ExitStack() as stack:
         if scheduler is None:

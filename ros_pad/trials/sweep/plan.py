@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
+from ros_pad.configuration import choice
 from ros_pad.control import POLICIES
 from ros_pad.control import policy_named
 from ros_pad.control.policies import PREFIX
@@ -31,6 +32,7 @@ from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.node_settings import tuning_for
+from ros_pad.yaml_text import read_yaml
 
 _ESTIMATOR = {each.name: attribute(each) for each in SETTINGS}
 _POLICY = [each.name for each in POLICY_SETTINGS]
@@ -120,13 +122,13 @@ class Sweep:
                 if value in values[:place]:
                     raise InvalidInput(f'{name} = {value!r} is given twice')
         for policy in self.policies:
-            if policy not in POLICIES:
-                raise InvalidInput(f'policy = {policy!r}: one of {", ".join(POLICIES)} is needed')
+            choice('policy', policy, POLICIES)
         for seed in self.seeds:
             whole = isinstance(seed, int) and not isinstance(seed, bool)
             if not whole or not 0 <= seed <= LARGEST_SEED:
                 raise InvalidInput(
-                    f'seed = {seed!r}: a whole number from 0 to {LARGEST_SEED} is needed'
+                    f'seed = {seed!r} is not allowed: a whole number from 0 to'
+                    f' {LARGEST_SEED} is needed'
                 )
         for name in self.parameters:
             _check_name(name)
@@ -224,7 +226,7 @@ def scene_with(source: str | os.PathLike[str], values: Mapping[str, Value]) -> S
     """
     path = configuration.locate('scenes', source)
     Table.load(path)  # reports errors of the file itself without naming the values
-    content = configuration.read_yaml(path.read_text(encoding='utf-8'))
+    content = read_yaml(path.read_text(encoding='utf-8'))
     with _errors_naming(values):
         for name, value in values.items():
             *folders, key = name.split('.')

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sdist has the whole source, and the wheel made of it works outside of a checkout.
+
+Nothing is fetched: the virtual environment in which the wheel is installed takes its libraries
+from the one that runs the tests. With ``WHEEL_LIBRARIES=index`` they are installed anew, as
+``make test-matrix MATRIX=3.12-wheel`` does.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import venv
+import xml.etree.ElementTree
+
+import numpy as np
+import pytest
+
+import ros_pad
+
+setuptools = pytest.importorskip('setuptools', minversion='77')
+
+# Wheel and sdist are built, and installed twice.
+pytestmark = pytest.mark.slow
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+LIBRARIES = pathlib.Path(np.__file__).parent.parent
+NOT_SOURCE = ('.*', '__pycache__', '*.egg-info', 'build', 'dist', 'install', 'log', 'runs')
+BUILD = """
+import os, sys
+from setuptools import build_meta
+source, folder, kind = sys.argv[1:]
+os.chdir(source)
+print(getattr(build_meta, f'build_{kind}')(folder))
+"""
+
+
+def run(*command: str | pathlib.Path, status: int = 0, **options: object) -> str:
+    """Run a command, which must end with a status; return its output."""
+    child = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, timeout=300, **options
+    )
+    assert child.returncode == status, child.stdout + child.stderr
+    return child.stdout + child.stderr * bool(status)
+
+
+def built(source: pathlib.Path, folder: pathlib.Path, kind: str) -> pathlib.Path:
+    """Build a wheel or an sdist of a source folder; return it."""
+    return folder / run(sys.executable, '-c', BUILD, source, folder, kind).split()[-1]
+
+
+@pytest.fixture(scope='module')
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """Return the unpacked sdist of a copy of the checkout."""
+    folder = tmp_path_factory.mktemp('sdist')
+    shutil.copytree(ROOT, folder / 'copy', ignore=shutil.ignore_patterns(*NOT_SOURCE))
+    shutil.copytree(ROOT / '.ci', folder / 'copy' / '.ci')
+    with tarfile.open(built(folder / 'copy', folder, 'sdist')) as archive:
+        archive.extractall(folder, filter='data')
+    (unpacked,) = folder.glob('ros_pad-*/')
+    return unpacked
+
+
+@pytest.fixture(scope='module')
+def wheel(sdist: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """Return the wheel built from the sdist."""
+    return built(sdist, tmp_path_factory.mktemp('wheel'), 'wheel')
+
+
+@pytest.fixture(scope='module')
+def programs(wheel: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """Return the folder of the programs of an environment in which the wheel is installed."""
+    place = tmp_path_factory.mktemp('environment')
+    venv.create(place)
+    if os.environ.get('WHEEL_LIBRARIES') == 'index':
+        own = place / 'bin' / 'python'
+        run(sys.executable, '-m', 'pip', '--python', own, 'install', '--quiet', f'{wheel}[plot]')
+        return place / 'bin'
+    (packages,) = place.glob('lib/python*/site-packages')
+    (packages / 'libraries.pth').write_text(f'{LIBRARIES}\n', encoding='utf-8')
+    pip('--prefix', place, wheel)
+    return place / 'bin'
+
+
+def pip(*arguments: str | pathlib.Path) -> None:
+    """Install without libraries and network."""
+    run(
+        *(sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-index'),
+        *('--ignore-installed', *arguments),
+    )
+
+
+def outside(**more: str) -> dict[str, str]:
+    """Return the environment variables of a shell that has no ROS and no checkout."""
+    left_out = ('PYTHONPATH', 'AMENT_PREFIX_PATH', 'VIRTUAL_ENV')
+    return {name: text for name, text in os.environ.items() if name not in left_out} | more
+
+
+@pytest.fixture
+def pad(programs: pathlib.Path, tmp_path: pathlib.Path):
+    """Return a function that runs `pad` in an empty folder and returns its output."""
+
+    def of(*words: str, status: int = 0, **variables: str) -> str:
+        python = programs / 'python'
+        options = {'cwd': tmp_path, 'env': outside(**variables)}
+        return run(python, programs / 'pad', *words, status=status, **options)
+
+    return of
+
+
+def test_the_sdist_is_the_whole_source(sdist: pathlib.Path):
+    listing = subprocess.run(
+        ['git', 'ls-files'], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    if listing.returncode:
+        pytest.skip('not a checkout of the repository: there is no list of its files')
+    tracked = {name for name in listing.stdout.split('\n') if name and name[0] not in '."'}
+    assert {'README.md', 'LICENSE', 'CHANGELOG.md', 'config/params.yaml', 'setup.py'} <= tracked
+    missing = {
+        name for name in tracked if (ROOT / name).is_file() and not (sdist / name).is_file()
+    }
+    assert not missing
+
+
+FOUND = """
+import json, pathlib
+from importlib import metadata
+import ros_pad
+from ros_pad import configuration
+from ros_pad.contact import Foot, Material
+from ros_pad.robots import Robot
+from ros_pad.simulation import Scene
+folder = configuration.shared_folder()
+load = {'feet': Foot.load, 'materials': Material.load, 'scenes': Scene.load}
+for kind, read in load.items():
+    for name in configuration.names(kind):
+        if not name.startswith('bench_'):
+            read(name)
+Robot.load('ch3r')
+about = metadata.metadata('ros_pad')
+print(json.dumps({'package': ros_pad.__file__, 'config': str(folder),
+    'files': sorted(str(each.relative_to(folder.parent)) for each in folder.parent.rglob('*.*')
+        if each.suffix != '.pyc'),
+    'about': about.json, 'version': ros_pad.__version__}))
+"""
+
+
+@pytest.fixture(scope='module')
+def found(programs: pathlib.Path) -> dict:
+    """Return where the installed package finds its files, and its metadata."""
+    return json.loads(run(programs / 'python', '-c', FOUND, cwd='/', env=outside()))
+
+
+def test_the_package_finds_its_own_files(found: dict, programs: pathlib.Path):
+    place = programs.parent
+    assert pathlib.Path(found['package']).is_relative_to(place)
+    assert found['config'] == str(place / 'share' / 'ros_pad' / 'config')
+    shipped = [
+        str(path.relative_to(ROOT))
+        for folder in ('config', 'launch')
+        for path in (ROOT / folder).rglob('*.*')
+        if path.suffix != '.pyc'
+    ]
+    assert found['files'] == sorted([*shipped, 'package.xml'])
+
+
+def test_the_metadata_are_those_of_package_xml(found: dict):
+    package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
+    about = found['about']
+    assert about['version'] == found['version'] == ros_pad.__version__
+    assert about['version'] == package.findtext('version')
+    assert about['license_expression'] == package.findtext('license')
+    urls = dict(each.split(', ', 1) for each in about['project_url'])
+    kinds = {'website': 'Documentation', 'repository': 'Source', 'bugtracker': 'Issues'}
+    for kind, label in kinds.items():
+        assert urls[label] == package.findtext(f'url[@type="{kind}"]')
+
+
+def test_links_of_the_readme_are_absolute_on_an_index_page(found: dict):
+    text = found['about']['description']
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    links = re.findall(r'\]\(([^)]*)\)', text)
+    own = re.findall(r'\]\(([^)]*)\)', readme)
+    assert len(links) == len(own)
+    for link, relative in zip(links, own, strict=True):
+        assert re.match(r'https://', link)
+        assert link.endswith(relative)
+    pictures = re.findall(r'!\[[^]]*\]\(([^)]*)\)', text)
+    assert len(pictures) == 2
+    assert all('/raw/' in each for each in pictures)
+    assert not any('/raw/' in each for each in set(links) - set(pictures))
+
+
+def test_pad_works_outside_of_a_checkout(pad, tmp_path: pathlib.Path):
+    assert 'hexapod_patches' in pad('scenes')
+    values = json.loads(pad('contact', '--pressure', '75e3', '--json'))
+    assert values
+    walk = ('run', 'leg_wet_flat', '--no-ros', '--cycles', '1', '--json')
+    summary = json.loads(pad(*walk, '--out', 'walk'))
+    assert summary['distance_m'] > 0.0
+    assert (tmp_path / 'walk' / 'report.html').stat().st_size > 1e5
+    text = pad('run', 'bench_press', status=1)
+    assert 'studies are only in the source' in text
+
+
+def test_without_matplotlib_pad_does_the_rest(pad, tmp_path: pathlib.Path):
+    missing = tmp_path / 'missing'
+    missing.mkdir()
+    (missing / 'matplotlib.py').write_text('raise ModuleNotFoundError("no matplotlib")\n')
+    without = {'PYTHONPATH': str(missing)}
+    walk = ('run', 'leg_dry_flat', '--no-ros', '--cycles', '1', '--out', 'walk')
+    assert 'report:   none: without Matplotlib' in pad(*walk, **without)
+    files = {path.name for path in (tmp_path / 'walk').iterdir()}
+    assert files == {'summary.json', 'learnt.yaml'}
+    thesis = ROOT / 'config' / 'measurements' / 'thesis.csv'
+    fit = ('calibrate', str(thesis), '--out', 'foot.yaml')
+    assert 'picture: none' in pad(*fit, **without)
+    assert (tmp_path / 'foot.yaml').is_file()
+    remedy = "pip install 'ros_pad[plot]'"
+    design = ('design', '--load', '5', '--sole-radius', '0.02')
+    pad(*design, **without)
+    for words in ([*design, '--figure', 'a.png'], [*fit, '--force', '--figure', 'a.png']):
+        assert remedy in pad(*words, status=2, **without)
+    assert not (tmp_path / 'a.png').exists()
+    study = (sys.executable, '-m', 'studies', 'contact')
+    assert remedy in run(*study, status=2, cwd=ROOT, env=outside(**without))
+
+
+def test_pip_install_target(wheel: pathlib.Path, tmp_path: pathlib.Path):
+    pip('--target', tmp_path / 'here', wheel)
+    libraries = f'{tmp_path / "here"}{os.pathsep}{LIBRARIES}'
+    code = 'from ros_pad.configuration import shared_folder; print(shared_folder())'
+    place = run(sys.executable, '-c', code, cwd='/', env=outside(PYTHONPATH=libraries)).strip()
+    assert place == str(tmp_path / 'here' / 'share' / 'ros_pad' / 'config')
