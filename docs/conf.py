@@ -33,6 +33,7 @@ SECTIONS = ('tutorials/README', 'how_to', 'model/README', 'reference', 'api/READ
 OUTSIDE = {
     'bags': 'bags/README.md',
     'changelog': 'CHANGELOG.md',
+    'contributing': 'CONTRIBUTING.md',
     'quality': 'QUALITY_DECLARATION.md',
     'readme': 'README.md',
 }
