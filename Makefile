@@ -20,6 +20,7 @@ help:
 	@echo 'make run    walk hexapod_patches on ROS 2 nodes: a bag, a report, a comparison'
 	@echo 'make test   the core, the nodes, one trial of each kind: a few minutes'
 	@echo 'make test-all  ruff, mypy, every test, one row of the matrix; what CI runs'
+	@echo 'make docs   the site of docs/, in build/site; its examples are run, its links checked'
 	@echo 'make test-matrix  the tests on other Pythons, and with old NumPy and SciPy'
 	@echo 'make studies  the evidence: charts and tables, written to runs'
 	@echo 'make examples  the pictures of docs/examples.md, anew'
@@ -48,6 +49,15 @@ lint: .venv/test.stamp
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
 	$(BIN)/python -m mypy
+
+# Warnings are errors. test_site.py looks at what is in SITE.
+.PHONY: docs
+docs: export OPENBLAS_NUM_THREADS := 1
+docs: export SITE := build/site
+docs: .venv/test.stamp
+	$(BIN)/python -m sphinx -q -E -W --keep-going docs $(SITE)
+	$(BIN)/python -m pytest test/test_site.py test/test_docs.py test/test_tutorials.py $(ARGS)
+	@echo 'site:     $(SITE)/index.html'
 
 STUDIES := contact meniscus capillary walk stability estimator hose film
 

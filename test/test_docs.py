@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Links, files, imports and commands on every page exist."""
+"""Links, files, imports and commands on every page exist; examples run."""
 
 from __future__ import annotations
 
 import ast
+import doctest
 import importlib
 import importlib.util
 import itertools
 import pathlib
 import re
 import shlex
+import shutil
 import urllib.parse
 from collections.abc import Iterator
 
@@ -25,10 +27,20 @@ PAGES = [
     *sorted(ROOT.glob('bags/*.md')),
     *sorted(ROOT.glob('docs/**/*.md')),
 ]
-FENCE = re.compile(r'^ *```(\w*)\n(.*?)^ *```$', re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r'^ *```(\S*)\n(.*?)^ *```$', re.DOTALL | re.MULTILINE)
+EXAMPLE = re.compile(rf'(?:^ *<!-- example: ([^>]*) -->\n)?{FENCE.pattern}', FENCE.flags)
+COMMAND = re.compile(
+    r'(?:pad (?!of )|(?:python3?|pip|ros2|make|sudo|sed|export|cd|rm|\.|dask|rviz2|\w+_node) )'
+)
 LINK = re.compile(r'\]\(([^)\s]+)\)')
 SOURCES = ('ros_pad', 'studies', 'test', 'config', 'launch')
 PAGE_NAME = re.compile(r'\bdocs/[\w/.-]+\.(?:md|json|png)')
+
+MODULES = sorted(
+    '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__')
+    for path in (ROOT / 'ros_pad').rglob('*.py')
+    if '>>> ' in path.read_text(encoding='utf-8')
+)
 
 
 def names(pages: list[pathlib.Path]) -> list[str]:
@@ -148,3 +160,66 @@ def test_the_readme_is_short_and_shows_python_early():
     text = (ROOT / 'README.md').read_text(encoding='utf-8')
     assert len(text.split()) <= 1000
     assert '```python' in '\n'.join(text.splitlines()[:40])
+
+
+def commands(block: str) -> list[str]:
+    """Return the commands in a block of a shell; a block of output has none."""
+    lines = block.replace('\\\n', ' ').splitlines()
+    return [line.strip() for line in lines if COMMAND.match(line.strip())]
+
+
+def examples(page: pathlib.Path) -> list[tuple[str, str, str]]:
+    """Return reason, kind and text of each example on a page."""
+    found = EXAMPLE.findall(page.read_text(encoding='utf-8'))
+    return [
+        each
+        for each in found
+        if each[1] == 'python' or (each[1] in ('', 'sh') and commands(each[2]))
+    ]
+
+
+WITH_EXAMPLES = [page for page in PAGES if any(not each[0] for each in examples(page))]
+
+
+@pytest.mark.parametrize('name', MODULES)
+def test_examples_of_docstrings(name: str):
+    module = importlib.import_module(name)
+    package = importlib.import_module('.'.join(name.split('.')[:2]))
+    public = {each: getattr(package, each) for each in getattr(package, '__all__', ())}
+    failed, tried = doctest.testmod(module, extraglobs=public)
+    assert tried
+    assert not failed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('page', WITH_EXAMPLES, ids=names(WITH_EXAMPLES))
+def test_examples_of_pages(
+    page: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / 'bags', tmp_path / 'bags')
+    shutil.copy(ROOT / 'config' / 'measurements' / 'thesis.csv', 'my_pads.csv')
+    known: dict[str, object] = {'__name__': '__main__'}
+    for reason, kind, text in examples(page):
+        if kind == 'python' and not reason:
+            exec(compile(text, str(page), 'exec'), known)
+        # CI runs make and installs with colcon, as the README describes.
+        elif not reason and page != ROOT / 'README.md':
+            for line in commands(text):
+                program, *words = shlex.split(line, comments=True)
+                assert program == 'pad', f'neither run nor marked: {line}'
+                different = words[0] == 'replay' and '--set' in words
+                assert cli.main(words) == different, line
+
+
+def test_reasons_for_examples_that_are_not_run_here():
+    """``pytest -rP`` lists them."""
+    tutorials = (ROOT / 'test' / 'test_tutorials.py').read_text(encoding='utf-8')
+    for page in PAGES:
+        for reason, _, text in examples(page):
+            if reason:
+                print(f'{page.relative_to(ROOT)}: {text.splitlines()[0]}: {reason}')
+                assert re.match('(run by|not run:) .', reason)
+                by = reason.removeprefix('run by ')
+                if by != reason:
+                    assert f'def {by}(' in tutorials or (ROOT / 'test' / by).is_file()

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The site: it builds without a warning, has every name, and fits a narrow screen."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import urllib.parse
+import xml.etree.ElementTree
+
+import pytest
+
+from ros_pad import cli
+from studies.__main__ import STUDIES
+
+pytest.importorskip('furo', reason='pip install "ros_pad[docs]"')
+inventory = pytest.importorskip('sphinx.util.inventory')
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DOCS = ROOT / 'docs'
+PACKAGES = sorted(page.stem for page in (DOCS / 'api').glob('*.md') if page.stem != 'README')
+CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
+ARGUMENTS = [
+    '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+    '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    '--blink-settings=imagesEnabled=false',
+]  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """Return the folder of the site, which `make docs` has built just before."""
+    if 'SITE' in os.environ:
+        return ROOT / os.environ['SITE']
+    folder = tmp_path_factory.mktemp('site')
+    words = ['-m', 'sphinx', '-q', '-E', '-W', '--keep-going', str(DOCS), str(folder)]
+    built = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+def pages(site: pathlib.Path) -> list[pathlib.Path]:
+    """Return the pages that are made from docs/."""
+    return [(site / page.relative_to(DOCS)).with_suffix('.html') for page in DOCS.rglob('*.md')]
+
+
+@pytest.mark.slow
+def test_every_public_name_has_an_entry(site: pathlib.Path):
+    data = inventory.InventoryFile.loads((site / 'objects.inv').read_bytes(), uri='').data
+    entries = {name for kind, names in data.items() if kind.startswith('py:') for name in names}
+    for package in PACKAGES:
+        module = importlib.import_module(f'ros_pad.{package}')
+        for name in getattr(module, '__all__', ()):
+            assert f'ros_pad.{package}.{name}' in entries
+    assert {path.parent.name for path in ROOT.glob('ros_pad/*/__init__.py')} - {
+        'commands', 'nodes', 'reports',
+    } <= set(PACKAGES)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_every_command_is_described(site: pathlib.Path):
+    text = (site / 'options.html').read_text(encoding='utf-8')
+    for command in cli.COMMANDS:
+        assert f'usage: pad {command}' in re.sub('<[^>]*>', '', text)
+
+
+@pytest.mark.slow
+def test_links_lead_to_pages_and_to_files_of_the_repository(site: pathlib.Path):
+    package = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
+    repository = package.findtext("url[@type='repository']")
+    texts = {page: page.read_text(encoding='utf-8') for page in pages(site)}
+    ids = {page: set(re.findall(r' id="([^"]*)"', text)) for page, text in texts.items()}
+    for page, text in texts.items():
+        for link in set(re.findall(r' (?:href|src)="([^"]*)"', text)):
+            path, _, anchor = urllib.parse.unquote(link).partition('#')
+            if path.startswith(repository):
+                name = re.sub('^/(blob|tree)/main/', '', path.removeprefix(repository))
+                assert (ROOT / name).exists(), f'{page}: {link}'
+            elif not re.match(r'\w+:', path):
+                target = (page.parent / path.partition('?')[0]).resolve() if path else page
+                assert target.exists(), f'{page}: {link}'
+                assert not anchor or anchor in ids.get(target, {anchor}), f'{page}: {link}'
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason='Chromium is not installed')
+def test_no_page_scrolls_sideways_on_a_narrow_screen(site: pathlib.Path):
+    playwright = pytest.importorskip('playwright.sync_api')
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        view = browser.new_page(viewport={'width': 390, 'height': 800})
+        excess = 'Math.max(...[...document.querySelectorAll("html, .article-container")]'
+        excess += '.map(each => each.scrollWidth - each.clientWidth))'
+        wide = {}
+        for page in pages(site):
+            view.goto(page.as_uri(), wait_until='domcontentloaded')
+            wide[str(page.relative_to(site))] = view.evaluate(excess)
+        browser.close()
+    assert not {name: pixels for name, pixels in wide.items() if pixels > 0}
+
+
+def test_the_gallery_has_every_chart_its_command_and_its_page():
+    text = (DOCS / 'gallery.md').read_text(encoding='utf-8')
+    shown = re.findall(r'^!\[.+\]\(charts/(.*)\.png\)\n\n((?:.+\n)+)', text, re.MULTILINE)
+    assert sorted(chart for chart, _ in shown) == sorted(
+        path.stem for path in (DOCS / 'charts').glob('*.png')
+    )
+    for chart, about in shown:
+        program, *words = re.findall(r'`((?:pad|python) [^`]*)`', about)[0].split()
+        (page,) = re.findall(r'\]\(([^)]*\.md)\)', about)
+        assert (DOCS / page).exists()
+        if program == 'pad':
+            assert callable(cli.parser(words[0]).parse_args(words).command)
+        elif words[0].startswith('examples/'):
+            assert (ROOT / words[0]).exists(), chart
+        else:
+            assert words[:2] == ['-m', 'studies'] and words[2] in STUDIES, chart
