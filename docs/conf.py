@@ -91,6 +91,10 @@ def read_page(app, docname, source):
         listed = re.findall(r'^- \[([^]]*)\]\(([^)#]+)\.md\)', text, re.MULTILINE)
         pages = [page if title.endswith('.md') else f'{title} <{page}>' for title, page in listed]
         text += '\n'.join(['', '```{toctree}', ':hidden:', '', *pages, '```', ''])
+    if docname == 'examples':  # the code, which a forge shows behind its link
+        pictures = r'^!\[[^]]*\]\(charts/example_(\w+)\.png\)$'
+        code = r'\g<0>\n\n```{literalinclude} ../examples/\1.py\n:language: python\n```'
+        text = re.sub(pictures, code, text, flags=re.MULTILINE)
     if docname == 'options':
         text += ''.join(helps())
     links = re.compile(r'\]\(([^)\s#:]+)(?=[)#])')
