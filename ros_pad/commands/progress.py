@@ -6,11 +6,13 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from contextlib import contextmanager
 
 from tqdm import tqdm
 
 from ros_pad.pace import Progress
+from ros_pad.signals import STOP
 
 _BEAT = 1.0  # s, between pictures of a bar without reports
 
@@ -28,18 +30,22 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
     stride: float | None = None
     terminal = sys.stderr.isatty()
     over = threading.Event()
-    with tqdm(
-        total=total,
-        desc=text,
-        unit=unit,
-        bar_format=shape,
-        file=sys.stderr,
-        delay=delay,
-        mininterval=0.1 if terminal else 60.0,
-        miniters=0,
-        smoothing=0.0,  # time left from the mean rate: others are wrong if reports are rare
-        disable=delay > 0.0 and not terminal,
-    ) as shown:
+    with ExitStack() as stack:
+        with STOP.deferred():  # or a bar that is just drawn would not be closed
+            shown = stack.enter_context(
+                tqdm(
+                    total=total,
+                    desc=text,
+                    unit=unit,
+                    bar_format=shape,
+                    file=sys.stderr,
+                    delay=delay,
+                    mininterval=0.1 if terminal else 60.0,
+                    miniters=0,
+                    smoothing=0.0,  # time left from the mean rate: reports may be rare
+                    disable=delay > 0.0 and not terminal,
+                )
+            )
 
         def show(place: float) -> None:
             nonlocal stride

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """``pad sweep`` as a user types it, also killed, stopped, and with bad input."""
 
+import contextlib
 import csv
 import json
 import os
 import pathlib
+import pty
 import re
 import signal
 import sqlite3
 import subprocess
 import sys
+import termios
+import threading
 import time
 from collections.abc import Sequence
 
@@ -153,15 +157,27 @@ def test_help_has_units_and_an_example(capsys: pytest.CaptureFixture[str]):
 
 
 class Child:
-    """A sweep in a process of its own, whose output goes to a file."""
+    """A sweep in a process of its own, on a terminal; what it shows goes to a file."""
 
     def __init__(self, arguments: list[str], folder: pathlib.Path) -> None:
         self._said = folder / 'said'
-        with self._said.open('w') as file:
-            self.process = subprocess.Popen(
-                [sys.executable, '-m', 'ros_pad.cli', *arguments], stdout=file, stderr=file
-            )
+        self._said.unlink(missing_ok=True)
+        own, other = pty.openpty()
+        termios.tcsetwinsize(other, (24, 120))
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'ros_pad.cli', *arguments], stdout=other, stderr=other
+        )
+        os.close(other)
+        self._reader = threading.Thread(target=self._read, args=[own], daemon=True)
+        self._reader.start()
         self.workers: list[int] = []
+
+    def _read(self, terminal: int) -> None:
+        # The end of the process is an error of its terminal.
+        with self._said.open('wb', buffering=0) as file, contextlib.suppress(OSError):
+            while data := os.read(terminal, 4096):
+                file.write(data)
+        os.close(terminal)
 
     def until(self, more: int) -> None:
         """Wait until the progress bar shows ``more`` trials above its first count."""
@@ -179,7 +195,9 @@ class Child:
 
     def said(self) -> str:
         """Return what the sweep has printed so far."""
-        return self._said.read_text()
+        if self.process.poll() is not None:
+            self._reader.join()
+        return self._said.read_text() if self._said.exists() else ''
 
 
 def children(pid: int) -> list[int]:

@@ -136,7 +136,9 @@ def test_policies_by_name():
     assert policy_named('flat') is flat
     with pytest.raises(InvalidInput, match=r"'oracle' needs the map of the floor"):
         policy_named('oracle')
-    with pytest.raises(InvalidInput, match="'brave': one of flat, dome, adaptive, oracle"):
+    with pytest.raises(
+        InvalidInput, match="policy = 'brave' is not allowed: one of flat, dome, adaptive, oracle"
+    ):
         policy_named('brave')
 
 
@@ -438,7 +440,7 @@ def test_beliefs_are_probabilities(belief):
 
 def test_unknown_legs_are_refused():
     controller = MorphologyController(FOOT, (1, 2), dome, LOAD)
-    with pytest.raises(InvalidInput, match='leg = 3: one of 1, 2'):
+    with pytest.raises(InvalidInput, match='leg = 3 is not allowed: one of 1, 2'):
         controller.update(3, LOAD, 0.5, (0.0, 0.0))
 
 

@@ -223,7 +223,7 @@ class Shown(html.parser.HTMLParser):
 
     def handle_starttag(self, tag, attributes):
         name = dict(attributes).get('id', '')
-        if name in ('walk-legs', 'walk-said'):
+        if name in ('walk-legs', 'walk-status'):
             self.inside = name
         elif self.inside == 'walk-legs' and tag == 'tr':
             self.rows.append([])
@@ -237,7 +237,7 @@ class Shown(html.parser.HTMLParser):
     def handle_data(self, data):
         if self.inside == 'walk-legs' and self.rows:
             self.rows[-1][-1] += data
-        elif self.inside == 'walk-said':
+        elif self.inside == 'walk-status':
             self.said += data
 
 
@@ -287,7 +287,7 @@ const image = () => document.getElementById('walk-near').toDataURL();
 const slider = document.getElementById('walk-time');
 const key = name => document.getElementById('walk').dispatchEvent(
   new KeyboardEvent('keydown', {key: name, bubbles: true}));
-const said = () => document.getElementById('walk-said').textContent;
+const said = () => document.getElementById('walk-status').textContent;
 const slide = frame => { slider.value = frame; slider.dispatchEvent(new Event('input')); };
 const found = [said()];
 slide(0);  // as wide as the page has become

@@ -371,6 +371,6 @@ def test_bad_period(period):
 @pytest.mark.parametrize('pressures', [[], [75e3] * 2, [math.nan], [math.inf]])
 def test_bad_pressures(pressures):
     leg = leg_of(SHIPPED)
-    with pytest.raises(InvalidInput, match=r'pressures = .* Pa: one finite number'):
+    with pytest.raises(InvalidInput, match=r'pressures = .* Pa is not allowed: one finite number'):
         leg.step(pressures)
     assert leg.time == 0.0
