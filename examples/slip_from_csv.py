@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slip and wetness of one foot from a CSV file of forces and positions.
 
-Columns: t [s], fx, fy, fz [N] (of the ground on the foot), x, y, z [m] (of a marker on the foot),
-pressure [Pa] (gauge). Run it: python slip_from_csv.py [picture.png]
+Columns, in any order: t [s], fx, fy, fz [N] (of the ground on the foot), x, y, z [m] (of a marker
+on the foot), pressure [Pa] (gauge). Run it: python slip_from_csv.py [picture.png]
 """
 
 import sys
@@ -14,8 +14,8 @@ from ros_pad.contact import Foot
 from ros_pad.estimation import Estimate, FootEstimator
 
 FILE, FOOT, LOAD = Path(__file__).with_name('slip.csv'), 'large37', 6.8  # <- your file, foot, N
-
 data = np.genfromtxt(FILE, delimiter=',', names=True)
+data = data[['t', 'fx', 'fy', 'fz', 'x', 'y', 'z', 'pressure']]  # in any order in the file
 time, estimator = data['t'], FootEstimator(Foot.load(FOOT), expected_load=LOAD)
 rows = [estimator.update(t, (fx, fy, fz), (x, y, z), p) for t, fx, fy, fz, x, y, z, p in data]
 found = {name: np.array(values) for name, *values in zip(Estimate._fields, *rows)}

@@ -174,6 +174,14 @@ def test_slip_from_csv(run: Run):
     assert slips == 3
 
 
+def test_columns_of_the_csv_have_any_order(run: Run, tmp_path: pathlib.Path):
+    rows = [
+        line.split(',')[::-1] for line in (ROOT / 'examples' / 'slip.csv').read_text().splitlines()
+    ]
+    (tmp_path / 'mine.csv').write_text('\n'.join(map(','.join, rows)))
+    assert run('slip_from_csv', "'mine.csv', 'large37', 6.8") == run('slip_from_csv')
+
+
 def test_the_csv_is_from_the_bag(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
     (program,) = re.findall(r'^```python\n(.*?)^```$', PAGE.read_text(), re.DOTALL | re.MULTILINE)
     (tmp_path / 'bags').symlink_to(ROOT / 'bags')
