@@ -18,10 +18,11 @@ from sphinx.domains.python import PyObject
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.typing import stringify_annotation
 
-# rosdoc2 runs a copy of this file from elsewhere; the package is one of its arguments.
+# rosdoc2 runs a copy of this file in another folder; the package is one of its arguments.
+ARGUMENTS = [pathlib.Path(os.environ.get('PWD', ''), each) for each in sys.argv]
 ROOT = next(
     folder
-    for folder in (*pathlib.Path(__file__).resolve().parents, *map(pathlib.Path, sys.argv))
+    for folder in (*pathlib.Path(__file__).resolve().parents, *ARGUMENTS)
     if (folder / 'package.xml').exists()
 ).resolve()
 DOCS = ROOT / 'docs'
@@ -99,7 +100,13 @@ def read_page(app, docname, source):
         text += ''.join(helps())
     links = re.compile(r'\]\(([^)\s#:]+)(?=[)#])')
     here = (DOCS / docname).parent
-    source[0] = links.sub(lambda link: f']({address(file.parent / link[1], here)}', text)
+    text = links.sub(lambda link: f']({address(file.parent / link[1], here)}', text)
+    page = pathlib.Path(app.srcdir, docname)
+    source[0] = re.sub(
+        r'(?<={literalinclude} )\S+',
+        lambda each: os.path.relpath(file.parent / each[0], page.parent),
+        text,
+    )
 
 
 def address(path, here):

@@ -9,26 +9,27 @@ import sys
 import matplotlib.pyplot as plt
 import numpy as np
 from ros_pad.configuration import shared_folder
-from ros_pad.contact import LARGE_PAD, Measurements, force_limit, inflate, press
+from ros_pad.contact import Foot, Measurements, force_limit, inflate, press
 
-PAD, MEASURED = LARGE_PAD, shared_folder() / 'measurements/thesis.csv'  # <- your pad and CSV file
+THESIS = shared_folder() / 'measurements/thesis.csv'
+FOOT, FILE, PRESSURE = 'large37', THESIS, 75e3  # <- your foot, CSV file and pressure, Pa
 
-points = Measurements.read(MEASURED).pressed
-pressure = points.pressure[0]
-limit = force_limit(PAD, pressure)
-loads = np.linspace(0.0, limit, 200)
-domes = press(PAD, pressure, loads)
-print(f'free dome: {1e3 * inflate(PAD, pressure).height:.3f} mm at {pressure / 1e3:g} kPa')
-print(f'force limit: {limit:.3f} N, gap {1e3 * domes.gap[-1]:.3f} mm')
-for load, gap in zip(points.force, points.height - points.depth, strict=True):
-    at_load = press(PAD, pressure, load).gap
+pad = Foot.load(FOOT).pad
+table = np.array(Measurements.read(FILE).pressed)
+_, forces, heights, depths, radii, gaps = table[:, np.isclose(table[0], PRESSURE)]
+gaps = np.where(np.isnan(gaps), heights - depths, gaps)
+loads = np.linspace(0.0, force_limit(pad, PRESSURE), 200)
+domes = press(pad, PRESSURE, loads)
+print(f'free dome: {1e3 * inflate(pad, PRESSURE).height:.3f} mm at {PRESSURE / 1e3:g} kPa')
+print(f'force limit: {loads[-1]:.3f} N, gap {1e3 * domes.gap[-1]:.3f} mm')
+for load, at_load, gap in zip(forces, press(pad, PRESSURE, forces).gap, gaps, strict=True):
     print(f'{load:.3f} N: gap {1e3 * at_load:.3f} mm, measured {1e3 * gap:.3f} mm')
 
 figure, axes = plt.subplots(figsize=(5.0, 3.5), layout='constrained')
 axes.plot(loads, 1e3 * domes.gap, 'C0', label='gap under the rim')
 axes.plot(loads, 1e3 * domes.contact_radius, 'C1', label='contact radius')
-axes.plot(points.force, 1e3 * (points.height - points.depth), 'C0o', label='measured')
-axes.plot(points.force, 1e3 * points.contact_radius, 'C1o')
-axes.set(xlabel='load of one pad [N]', ylabel='length [mm]', title=f'{pressure / 1e3:g} kPa')
+axes.plot(forces, 1e3 * gaps, 'C0o', label='measured')
+axes.plot(forces, 1e3 * radii, 'C1o')
+axes.set(xlabel='load of one pad [N]', ylabel='length [mm]', title=f'{PRESSURE / 1e3:g} kPa')
 axes.legend()
 plt.savefig(sys.argv[1], dpi=200) if len(sys.argv) > 1 else plt.show()

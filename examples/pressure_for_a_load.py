@@ -16,7 +16,7 @@ LOAD, RUBBER, RADIUS, THICKNESS = 0.18, 'dragon_skin_10', 1.5e-3, 0.4e-3  # <- y
 rubber = Material.load(RUBBER)
 soft, stiff = (Pad.of(rubber.times(f), RADIUS, THICKNESS) for f in rubber.factor_range)
 low, high = pressure_for(soft, LOAD) / 1e3, pressure_for(stiff, LOAD) / 1e3
-print(f'{LOAD:g} N needs {low:.1f} to {high:.1f} kPa')
+print(f'{LOAD:g} N needs {low:.1f} kPa of the softest, {high:.1f} kPa of the stiffest')
 if np.isnan(force_limit(soft, [1e3 * high])[0]):
     print(f'at {high:.1f} kPa the softest has no force limit: measure how high your pads rise')
 

@@ -15,12 +15,13 @@ CHANGES = {'wet_prior': 0.2}  # names as on the page of the parameters
 
 bag = open_bag(BAG)
 found = replay(bag, NodeSettings.of(bag).changed(CHANGES))
-print(f'{found.duration_s:.2f} s of legs {found.legs} with {CHANGES}: {found.verdict}')
+print(f'{found.duration_s:.2f} s of legs {found.legs} with {CHANGES}; compared: {found.verdict}')
 for leg in found.outcomes:
     (wet_was, wet), (was, switches) = leg.wet_ends, leg.switches
     print(f'leg {leg.leg}: wet stances {wet_was} -> {wet}, switches {was} -> {switches}')
 
-figure, panels = plt.subplots(len(found.legs), figsize=(6, 6), sharex=True, layout='constrained')
+figure = plt.figure(figsize=(6, 6), layout='constrained')
+panels = figure.subplots(len(found.legs), squeeze=False, sharex=True)[:, 0]
 for axes, leg in zip(panels, found.legs):
     for tracks, label in ((found.recorded, 'recorded'), (found.replayed, 'replayed')):
         wetness = tracks[leg, 'wetness']

@@ -9,15 +9,16 @@ import sys
 import matplotlib.pyplot as plt
 import numpy as np
 from ros_pad.capillary import Mesh, wet_pattern
-from ros_pad.contact import LARGE_PAD, WATER, force_limit, pads_in, press
+from ros_pad.contact import WATER, Foot, force_limit, pads_in, press
 
-PAD, LIQUID, PRESSURES = LARGE_PAD, WATER, (70e3, 80e3, 90e3)  # <- your pad, liquid, pressures, Pa
+FOOT, LIQUID, PRESSURES = 'large37', WATER, (70e3, 80e3, 90e3)  # <- your foot, liquid, Pa
 
-cell = 1.0 / pads_in(1.0, PAD.radius)  # m2 of floor under each pad
+pad = Foot.load(FOOT).pad
+cell = 1.0 / pads_in(1.0, pad.radius)  # m2 of floor under each pad
 figure, axes = plt.subplots(figsize=(5.0, 3.5), layout='constrained')
 for number, pressure in enumerate(PRESSURES):
-    loads = np.linspace(0.005, force_limit(PAD, pressure), 25)
-    pressed, levels = press(PAD, pressure, loads), np.full(loads.size, np.nan)
+    loads = np.linspace(0.005, force_limit(pad, pressure), 25)
+    pressed, levels = press(pad, pressure, loads), np.full(loads.size, np.nan)
     for k, load in enumerate(loads):
         dome = Mesh.dome(pressed.sphere_radius[k], pressed.contact_radius[k], pressed.gap[k])
         water = wet_pattern(dome, LIQUID, cell)

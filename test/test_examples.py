@@ -17,6 +17,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer
 from scipy.optimize import brentq
 
 from ros_pad.contact import LARGE_PAD
@@ -112,10 +114,14 @@ def test_dome_under_load(run: Run):
 def test_dome_of_somebody_else(run: Run, tmp_path: pathlib.Path):
     (tmp_path / 'mine.csv').write_text(
         'pressure [kPa], force [N], height [mm], depth [mm], contact_radius [mm]\n'
+        '60, 0.1, 1.6, 0.4, 0.7\n'
         '80, 0.1, 2.0, 0.4, 0.7\n'
     )
-    out = run('dome_under_load', "LARGE_PAD, 'mine.csv'")
-    assert numbers(out.splitlines()[2])[::2] == [0.1, 1.6]
+    (line,) = run('dome_under_load', "'large37', 'mine.csv', 80e3").splitlines()[2:]
+    assert numbers(line)[::2] == [0.1, 1.6]  # of domes at this pressure alone
+    (tmp_path / 'mine.csv').write_text('pressure [Pa], force [N], gap [mm]\n80000, 0.1, 1.5\n')
+    (line,) = run('dome_under_load', "'large37', 'mine.csv', 80e3").splitlines()[2:]
+    assert numbers(line)[::2] == [0.1, 1.5]
 
 
 def level_above_the_sole(load: float, pressure: float) -> float:
@@ -156,10 +162,12 @@ def test_slip_from_csv(run: Run):
     stiffness = Foot.load('large37').shear_stiffness
     contact = np.stack([data['x'] + data['fx'] / stiffness, data['y'] + data['fy'] / stiffness])
     loaded = data['fz'] > 0.5
-    landings = np.flatnonzero(np.diff(loaded.astype(int)) > 0) + 1
+    landings = np.flatnonzero(np.diff(loaded.astype(int), prepend=0) > 0)
     slips = 0
-    for line in run('slip_from_csv').splitlines():
-        begin, slip, wet = numbers(line)
+    lines = run('slip_from_csv').splitlines()
+    assert '\n'.join(lines) in PAGE.read_text(encoding='utf-8')
+    for line in lines:
+        begin, slip, wet = numbers(line)[:3]
         start = landings[np.argmin(abs(data['t'][landings] - begin))]
         end = start + (int(np.argmin(loaded[start:])) or len(data) - start)
         # Net motion of the contact, from five readings at either end of the stance.
@@ -170,8 +178,18 @@ def test_slip_from_csv(run: Run):
             slips += 1
         else:
             assert slip < 5.0
-        assert wet > 0.5  # the floor of this leg is wet, see docs/tutorials/replay.md
+        # The floor of this leg is wet, see docs/tutorials/replay.md; the first stance has no pull.
+        assert wet > 0.5 or (begin < 0.1 and 'not pulled' in line)
     assert slips == 3
+
+
+def test_columns_of_a_csv_are_found_by_name(run: Run, tmp_path: pathlib.Path):
+    shipped = (ROOT / 'examples' / 'slip.csv').read_text().splitlines()
+    (tmp_path / 'mine.csv').write_text(
+        '\n'.join('{7},{4},{5},{6},8,{1},{2},{3},{0}'.format(*each.split(',')) for each in shipped)
+    )
+    expected = run('slip_from_csv')
+    assert run('slip_from_csv', "'mine.csv', 'large37', 6.8") == expected
 
 
 def test_the_csv_is_from_the_bag(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
@@ -226,6 +244,21 @@ def test_replay_a_bag(run: Run):
         leg, was_wet, wet, was, _ = numbers(line)
         assert was == switches[leg]
         assert wet <= was_wet  # wet ground has become less probable
+
+
+def test_replay_of_one_leg(run: Run, tmp_path: pathlib.Path):
+    copy = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    with AnyReader([BAG]) as reader, copy as writer:
+        for name in ('/leg_6/wrench', '/leg_6/position'):
+            (found,) = (each for each in reader.connections if each.topic == name)
+            topic = writer.add_connection(
+                name, found.msgtype, msgdef=found.msgdef.data, rihs01=found.digest
+            )
+            for _, stamp, data in itertools.islice(reader.messages([found]), 100):
+                writer.write(topic, stamp, data)
+    first, leg = run('replay_a_bag', "'bag'").splitlines()
+    assert first.endswith('compared: nothing')
+    assert leg.startswith('leg 6: wet stances None -> 0')
 
 
 def test_without_a_name_nothing_is_written(tmp_path: pathlib.Path):

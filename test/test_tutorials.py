@@ -60,6 +60,17 @@ def test_first_walk(
     shown(capsys.readouterr().out, page, 'leg_wet_dome_75')
 
 
+def test_replay(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    page = TUTORIALS / 'replay.md'
+    monkeypatch.chdir(ROOT)
+    assert cli.main(commands(page)[0][1:]) == 0
+    said = capsys.readouterr().out.splitlines()
+    (block,) = (each for each in blocks(page) if each.startswith('bags/hexapod_patches/bag: '))
+    # Numbers that other processors do not round otherwise.
+    exact = [line for line in block.splitlines() if re.match(r'\d|bags|/leg_.*doubt', line)]
+    assert len(exact) == 4 and set(exact) <= set(said)
+
+
 def test_own_foot(
     tmp_path: pathlib.Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -7,5 +7,6 @@ try:
     import matplotlib  # noqa: F401
 except ModuleNotFoundError as error:
     raise ConfigError(
-        f"pages and pictures need Matplotlib ({error}): pip install 'ros_pad[plot]'"
+        f"pages and pictures need Matplotlib ({error}): pip install 'ros_pad[plot]', or for"
+        " pad explore 'ros_pad[explore]'"
     ) from error

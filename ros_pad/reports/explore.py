@@ -301,7 +301,7 @@ def explore(inputs: Inputs) -> Explored:
     touching = parts('load roughness', _touching, inputs, foot) or 0.0
     share = parts('load pads', lambda: inputs.load / inputs.pads)
     pressed = parts('pressure', press, pad, inputs.pressure, share)
-    ring = parts('', meniscus, pressed, LIQUIDS[inputs.liquid])
+    ring = parts('', _ring, inputs, pressed, parts)
     switching = parts('pressure bore hose', _switched, inputs, foot, parts)
     return Explored(
         inputs=inputs,
@@ -539,6 +539,17 @@ def _touching(inputs: Inputs, foot: Foot) -> float:
     """Return the share of a flat sole that touches."""
     conforming = _doubted(foot, inputs.roughness)[0].conforming_pressure
     return min(inputs.load / (conforming * foot.sole_area), 1.0)
+
+
+def _ring(inputs: Inputs, pressed: Pressed, parts: _Parts) -> Meniscus:
+    ring = meniscus(pressed, LIQUIDS[inputs.liquid])
+    if ring.ring_radius > inputs.radius:
+        parts.note(
+            'liquid',
+            f'the ring of liquid has a radius of {1e3 * ring.ring_radius:.3g} mm, wider than the'
+            ' pad: its balance, and so its height, is not valid there',
+        )
+    return ring
 
 
 def _switched(inputs: Inputs, foot: Foot, parts: _Parts) -> Switching | None:

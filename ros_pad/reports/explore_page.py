@@ -102,13 +102,16 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
     """
     try:
         from nicegui import app
+        from nicegui import core
         from nicegui import ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
     except ImportError as error:
         raise PadError(f"NiceGUI is missing ({error}): pip install 'ros_pad[explore]'") from error
     print(f'http://{HOST}:{port}/ shows {foot.source}; Ctrl-C ends it', flush=True)
-    # A page elsewhere whose name leads to this machine must not read this one.
+    # A page elsewhere whose name leads to this machine must not read this one, nor any other page
+    # open its socket: NiceGUI lets all of them.
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
+    core.sio.eio.cors_allowed_origins = [f'http://{name}:{port}' for name in (HOST, 'localhost')]
     ui.run(
         lambda: Page(Inputs.of(foot), out).build(),
         host=HOST,
@@ -223,7 +226,7 @@ class Page:
     def _number(self, field: Field) -> None:
         """Make a number and its slider, which move one another."""
         value = getattr(self._inputs, field.name)
-        shown = None if value is None else float(f'{value / field.unit:.9g}')
+        shown = None if value is None else float(f'{value / field.unit:.12g}')
 
         sliding = False
 
@@ -245,7 +248,7 @@ class Page:
                 ui.run_javascript(f'getHtmlElement({slider.id}).value = {number}')
 
         ui = self._ui
-        box = ui.number(field.label, value=shown, format='%.7g', on_change=changed)
+        box = ui.number(field.label, value=shown, format='%.12g', on_change=changed)
         box.props(f'dense outlined suffix="{field.shown}" name={field.name} step=any')
         slider = ui.element('input').props(
             f'type=range min={field.low} max={field.high} step={field.step}'

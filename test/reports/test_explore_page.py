@@ -146,16 +146,23 @@ def test_a_narrow_page_is_not_wider_than_its_window(page):
     assert page.evaluate('document.documentElement.scrollWidth') <= 390
 
 
-def test_other_names_of_this_machine_are_refused_and_ctrl_c_ends_it():
+def test_other_names_and_pages_are_refused_and_ctrl_c_ends_it():
     with study.served() as (address, child):
         with urllib.request.urlopen(address) as answer:
             assert answer.status == 200
-        request = urllib.request.Request(address, headers={'Host': 'elsewhere.example'})
-        with pytest.raises(urllib.error.HTTPError, match='400'):
-            urllib.request.urlopen(request)
+        socket_io = f'{address}_nicegui_ws/socket.io/?EIO=4&transport=polling'
+        for page, header in (address, 'Host'), (socket_io, 'Origin'):
+            request = urllib.request.Request(page, headers={header: 'http://elsewhere.example'})
+            with pytest.raises(urllib.error.HTTPError, match='400'):
+                urllib.request.urlopen(request)
+        own = urllib.request.Request(socket_io, headers={'Origin': address.rstrip('/')})
+        with urllib.request.urlopen(own) as answer:
+            assert answer.status == 200
         child.send_signal(signal.SIGINT)
         assert child.wait(timeout=60) == INTERRUPTED
-        assert child.stderr.read() == 'pad: stopped\n'
+        refused, *said = child.stderr.read().splitlines()
+        assert 'elsewhere.example is not an accepted origin' in refused
+        assert said == ['pad: stopped']
 
 
 def test_changes_that_come_meanwhile_are_answered_together():
