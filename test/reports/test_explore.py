@@ -28,6 +28,7 @@ from ros_pad.reports.explore_page import foot_file
 from ros_pad.simulation import Hose
 from ros_pad.simulation import PneumaticChannel
 from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation import Scene
 from ros_pad.simulation.pneumatics import time_to
 
 LARGE = Inputs.of(Foot.load('large37'))
@@ -77,15 +78,26 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
 
 def test_bands_hold_each_constant_halved_and_doubled():
     own = explore(LARGE).grip
-    for name in ('friction', 'shear_strength', 'boundary_friction', 'critical_film'):
+    assumed = 'friction shear_strength conforming_pressure boundary_friction critical_film'
+    found = {state: [own[state].value] for state in STATES}
+    for name in (*assumed.split(), 'film_exponent'):
         for factor in (0.5, 2.0):
             wrong = {name: factor * getattr(LARGE.foot, name)}
             foot = dataclasses.replace(LARGE.foot, **wrong)
             for state, span in changed(foot=foot).grip.items():
-                assert own[state].low <= span.value * (1 + 1e-12)
-                assert span.value <= own[state].high * (1 + 1e-12)
+                found[state].append(span.value)
+    for state in ('flat, dry', 'flat, wet', 'dome, dry'):
+        assert own[state][1:] == pytest.approx((min(found[state]), max(found[state])), rel=1e-12)
     # A wet dome without any dry contact has boundary friction alone.
     assert own['dome, wet'].low == pytest.approx(0.12 * LARGE.load, rel=1e-3)
+    assert own['dome, wet'].high == pytest.approx(max(found['dome, wet']), rel=1e-12)
+
+
+def test_film_time_and_hose_are_those_of_the_scene():
+    scene = Scene.load('hexapod_patches')
+    assert scene.floor.film_thickness == LARGE.film
+    assert scene.regulator == {'hose_diameter': LARGE.bore, 'hose_length': LARGE.hose}
+    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE.stand
 
 
 def test_the_limit_over_the_factor_of_a_material_is_that_of_each_factor():
