@@ -34,12 +34,15 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
         unit=unit,
         bar_format=shape,
         file=sys.stderr,
-        delay=delay,
+        delay=delay or 1.0,  # nothing is written before this block can end its line
         mininterval=0.1 if terminal else 60.0,
         miniters=0,
         smoothing=0.0,  # time left from the mean rate: others are wrong if reports are rare
         disable=delay > 0.0 and not terminal,
     ) as shown:
+        if not delay:
+            shown.delay = 0.0
+            shown.refresh()
 
         def show(place: float) -> None:
             nonlocal stride
@@ -58,6 +61,6 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
         finally:
             over.set()
             if terminal:
-                clock.join()
+                clock.join(_BEAT)  # without end where Ctrl-C comes while tqdm has its lock
         if stride is None or total - shown.n <= 1.01 * stride:
             shown.update(total - shown.n)
