@@ -275,6 +275,7 @@ def test_unknown_key_in_a_nested_table(tmp_path):
         ('a: !!timestamp soon', 'not valid YAML: '),
         ('a: ' + '[' * 5000, 'line 1, column 103: not valid YAML: nested more than 100 deep'),
         ('- ' * 5000, 'line 1, column 201: not valid YAML: nested more than 100 deep'),
+        ('a:\n\tb: 1', r'line 2, column 1: .* \(a tab: YAML is indented with spaces\)'),
         ('', 'expected a table of keys, found nothing'),
         ('- 1\n- 2', 'expected a table of keys'),
         ('word', 'expected a table of keys'),
@@ -284,6 +285,15 @@ def test_bad_yaml(tmp_path, text, message):
     with pytest.raises(ConfigError, match=message) as caught:
         table(text, tmp_path)
     assert 'some.yaml' in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('key', 'hint'), [('radus', "; is 'radus' a misspelling of it?"), ('ceiling', '')]
+)
+def test_a_missing_key_may_be_misspelt(tmp_path, key, hint):
+    with pytest.raises(ConfigError) as caught:
+        table(f'{key}: 1', tmp_path).number('radius', 'm')
+    assert str(caught.value).endswith(f"key 'radius' is missing{hint}")
 
 
 def test_what_aliases_make_vast_is_shown_in_short(tmp_path):

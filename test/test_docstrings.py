@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Docstrings of the public names: complete, with units and errors, and examples that are true."""
+"""Docstrings of the public names: complete, with units and errors; `test_docs` runs examples."""
 
 import ast
 import dataclasses
@@ -159,9 +159,6 @@ def test_what_a_constant_is_stands_below_it(name: str, package: str):
     assert any(re.search(assignment, each.read_text('utf-8')) for each in folder.glob('*.py'))
 
 
-MODULES = sorted({each.__module__ for each in DOCUMENTED.values()} - {'ros_pad.errors'})
-
-
 WITH_EXAMPLES = (
     'inflate press force_limit pressure_for contact_angle meniscus bridge pads_in foot_force'
     ' tangential_resistance Pad.of squeeze wet bath_meniscus FootEstimator BodyEstimator'
@@ -174,11 +171,6 @@ WITH_EXAMPLES = (
 def test_the_main_names_have_an_example(name: str):
     found = next(each for full, each in DOCUMENTED.items() if full.endswith(f'.{name}'))
     assert doctest.DocTestParser().get_examples(found.__doc__)
-
-
-@pytest.mark.parametrize('module', MODULES)
-def test_the_examples_are_true(module: str):
-    assert not doctest.testmod(importlib.import_module(module)).failed
 
 
 def undocumented_length(length: float, *, mass: float = 1.0) -> float:

@@ -7,7 +7,6 @@ import importlib
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import urllib.parse
@@ -17,6 +16,7 @@ import pytest
 
 from ros_pad import cli
 from studies.__main__ import STUDIES
+from studies.work_precision import explore as study
 
 pytest.importorskip('furo', reason='pip install "ros_pad[docs]"')
 inventory = pytest.importorskip('sphinx.util.inventory')
@@ -24,12 +24,6 @@ inventory = pytest.importorskip('sphinx.util.inventory')
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCS = ROOT / 'docs'
 PACKAGES = sorted(page.stem for page in (DOCS / 'api').glob('*.md') if page.stem != 'README')
-CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
-ARGUMENTS = [
-    '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--blink-settings=imagesEnabled=false',
-]  # fmt: skip
 
 
 @pytest.fixture(scope='module')
@@ -88,19 +82,17 @@ def test_links_lead_to_pages_and_to_files_of_the_repository(site: pathlib.Path):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason='Chromium is not installed')
+@pytest.mark.skipif(study.CHROMIUM is None, reason='Chromium is not installed')
 def test_no_page_scrolls_sideways_on_a_narrow_screen(site: pathlib.Path):
-    playwright = pytest.importorskip('playwright.sync_api')
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        view = browser.new_page(viewport={'width': 390, 'height': 800})
+    pytest.importorskip('playwright')
+    with study.browser() as chromium:
+        view = chromium.new_page(viewport={'width': 390, 'height': 800})
         excess = 'Math.max(...[...document.querySelectorAll("html, .article-container")]'
         excess += '.map(each => each.scrollWidth - each.clientWidth))'
         wide = {}
         for page in pages(site):
             view.goto(page.as_uri(), wait_until='domcontentloaded')
             wide[str(page.relative_to(site))] = view.evaluate(excess)
-        browser.close()
     assert not {name: pixels for name, pixels in wide.items() if pixels > 0}
 
 

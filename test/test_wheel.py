@@ -211,8 +211,10 @@ def test_pad_works_outside_of_a_checkout(pad, tmp_path: pathlib.Path):
 
 def test_without_matplotlib_pad_does_the_rest(pad, tmp_path: pathlib.Path):
     missing = tmp_path / 'missing'
-    missing.mkdir()
-    (missing / 'matplotlib.py').write_text('raise ModuleNotFoundError("no matplotlib")\n')
+    (missing / 'matplotlib').mkdir(parents=True)
+    (missing / 'matplotlib' / '__init__.py').touch()
+    # What it raises where it was built for another NumPy.
+    (missing / 'matplotlib' / 'figure.py').write_text('raise ImportError("numpy.core.multiarray")')
     without = {'PYTHONPATH': str(missing)}
     walk = ('run', 'leg_dry_flat', '--no-ros', '--cycles', '1', '--out', 'walk')
     assert 'report:   none: without Matplotlib' in pad(*walk, **without)

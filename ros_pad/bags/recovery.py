@@ -238,13 +238,17 @@ def _records(
         closed = False
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=_RECORD_SIZE_LIMIT)
         records = iter(reader.records)
-        with contextlib.suppress(Exception):  # damaged bytes can raise any exception
-            while (record := next(records, None)) is not None:
-                reached = stream.tell()
-                if progress:
-                    progress(reached / size)
-                closed = closed or isinstance(record, Footer)
-                yield from _opened(record, found)
+        while True:
+            record = None
+            with contextlib.suppress(Exception):  # damaged bytes can raise any exception
+                record = next(records, None)
+            if record is None:
+                break
+            reached = stream.tell()
+            if progress:
+                progress(reached / size)
+            closed = closed or isinstance(record, Footer)
+            yield from _opened(record, found)
         if not closed:
             found.closed = False
             found.unread_bytes += size - reached

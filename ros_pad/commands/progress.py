@@ -6,13 +6,11 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack
 from contextlib import contextmanager
 
 from tqdm import tqdm
 
 from ros_pad.pace import Progress
-from ros_pad.signals import STOP
 
 _BEAT = 1.0  # s, between pictures of a bar without reports
 
@@ -30,22 +28,21 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
     stride: float | None = None
     terminal = sys.stderr.isatty()
     over = threading.Event()
-    with ExitStack() as stack:
-        with STOP.deferred():  # or a bar that is just drawn would not be closed
-            shown = stack.enter_context(
-                tqdm(
-                    total=total,
-                    desc=text,
-                    unit=unit,
-                    bar_format=shape,
-                    file=sys.stderr,
-                    delay=delay,
-                    mininterval=0.1 if terminal else 60.0,
-                    miniters=0,
-                    smoothing=0.0,  # time left from the mean rate: reports may be rare
-                    disable=delay > 0.0 and not terminal,
-                )
-            )
+    with tqdm(
+        total=total,
+        desc=text,
+        unit=unit,
+        bar_format=shape,
+        file=sys.stderr,
+        delay=delay or 1.0,  # nothing is written before this block can end its line
+        mininterval=0.1 if terminal else 60.0,
+        miniters=0,
+        smoothing=0.0,  # time left from the mean rate: others are wrong if reports are rare
+        disable=delay > 0.0 and not terminal,
+    ) as shown:
+        if not delay:
+            shown.delay = 0.0
+            shown.refresh()
 
         def show(place: float) -> None:
             nonlocal stride
@@ -64,6 +61,6 @@ def bar(text: str, total: float, unit: str = 's', delay: float = 0.0) -> Iterato
         finally:
             over.set()
             if terminal:
-                clock.join()
+                clock.join(_BEAT)  # without end where Ctrl-C comes while tqdm has its lock
         if stride is None or total - shown.n <= 1.01 * stride:
             shown.update(total - shown.n)

@@ -114,6 +114,7 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
 
     Examples
     --------
+    >>> from ros_pad.contact import LARGE_PAD
     >>> round(press_membrane(LARGE_PAD, 75e3, 0.19).gap, 9)
     0.000755475
     """

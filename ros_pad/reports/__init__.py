@@ -4,8 +4,8 @@
 from ros_pad.errors import ConfigError
 
 try:
-    import matplotlib  # noqa: F401
-except ModuleNotFoundError as error:
+    import matplotlib.figure  # noqa: F401  # fails where NumPy is too new for it, too
+except ImportError as error:
     raise ConfigError(
         f"pages and pictures need Matplotlib ({error}): pip install 'ros_pad[plot]', or for"
         " pad explore 'ros_pad[explore]'"

@@ -166,7 +166,8 @@ class Latest:
                 self._show(await thread)
             except Exception as error:
                 self._wait(f'no answer: {error}')
-                raise
+                if not self._asked:
+                    raise
 
 
 class Page:
@@ -187,7 +188,6 @@ class Page:
         self._inputs, self._out = inputs, out
         self._latest = Latest(lambda: answer(self._inputs), self._show, self._set_pale)
         self._answers = 0
-        self._found: Explored | None = None
         self._controls: dict[str, Any] = {}
         self._remarks: dict[str, Any] = {}
         self._figures: dict[str, Any] = {}
@@ -281,9 +281,9 @@ class Page:
             each.classes(add='stale') if words else each.classes(remove='stale')
 
     def _show(self, answer: tuple[Explored, dict[str, str], str]) -> None:
-        self._found, figures, numbers = answer
+        found, figures, numbers = answer
         # A material has its stiffness from its law.
-        self._controls['stiffness'].set_visibility(self._inputs.material == MEASURED)
+        self._controls['stiffness'].set_visibility(found.inputs.material == MEASURED)
         self._answers += 1
         for name, figure in figures.items():
             self._figures[name].set_content(figure)
@@ -292,7 +292,7 @@ class Page:
                 ''.join(
                     f'<p class="remark{" error" if each.error else ""}" role="alert">'
                     f'{html.escape(each.text)}</p>'
-                    for each in self._found.remarks
+                    for each in found.remarks
                     if each.name == name
                 )
             )
@@ -301,13 +301,13 @@ class Page:
         )
         self._set_pale('')
 
-    def _export(self) -> None:
-        """Download the foot, and write it if a file was asked for."""
-        found = self._found
-        if found is None or found.foot is None:
+    async def _export(self) -> None:
+        """Download the foot of the present inputs, and write it if a file was asked for."""
+        foot = (await asyncio.to_thread(explore, self._inputs)).foot
+        if foot is None:
             self._ui.notify('There is no foot: mend what is marked at the inputs', type='warning')
             return
-        text = foot_file(found.foot)
+        text = foot_file(foot)
         if self._out is not None:
             try:
                 path = _write_new(self._out, text)
@@ -319,10 +319,10 @@ class Page:
             self._ui.notify(f'written: {path}')
         self._ui.download.content(text, 'my_foot.yaml')
 
-    def _picture(self) -> None:
-        if self._found is not None:
-            drawn = explore_drawings.picture(self._found)
-            self._ui.download.content(drawn, 'foot.svg')
+    async def _picture(self) -> None:
+        """Download the drawings of the present inputs."""
+        found = await asyncio.to_thread(explore, self._inputs)
+        self._ui.download.content(explore_drawings.picture(found), 'foot.svg')
 
 
 def _si(field: Field, number: float | None) -> float | None:

@@ -39,6 +39,7 @@ from ros_pad.bags import BagReader
 from ros_pad.bags import BagWriter
 from ros_pad.bags import annotate
 from ros_pad.bags import metadata
+from ros_pad.bags import storage
 from ros_pad.bags.definitions import message_definition
 from ros_pad.bags.definitions import type_hash
 from ros_pad.errors import BagError
@@ -713,3 +714,14 @@ def test_metadata_may_say_anything_of_compression(tmp_path, mode):
         return
     with pytest.raises(BagError, match='compression mode'):
         BagReader(folder)
+
+
+def test_each_file_has_its_share_of_the_progress(tmp_path):
+    files = [tmp_path / name for name in ('one', 'two')]
+    for file, size in zip(files, (100, 300), strict=True):
+        file.write_bytes(bytes(size))
+    done = []
+    for reach in storage.shares(files, done.append):
+        reach(0.5)
+        reach(1.0)
+    assert done == [0.125, 0.25, 0.625, 1.0]

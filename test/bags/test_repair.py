@@ -286,6 +286,16 @@ def test_any_cut_is_read_without_a_fall(trial, tmp_path):
         assert 0 <= found.messages <= 10_000
 
 
+def test_an_error_of_the_callback_is_no_damage(trial, tmp_path):
+    def progress(share: float) -> None:
+        if 0.1 < share < 0.5:  # while the bag is read, before anything is written
+            raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        recovery.repair(trial, tmp_path / 'repaired', progress)
+    assert not (tmp_path / 'repaired').exists()
+
+
 def test_metadata_that_is_wrong_is_repaired_too(trial, tmp_path, capsys):
     metadata = trial / 'metadata.yaml'
     text = metadata.read_text(encoding='utf-8')

@@ -129,6 +129,46 @@ def test_long_tasks_report_their_progress(
         assert any(0 < int(share) < 100 for share in shares), said
 
 
+INTERRUPTED = """
+import io, sys, threading, time
+from ros_pad.commands import progress
+
+class Terminal(io.StringIO):
+    isatty = lambda self: True
+    seen = False
+
+    def write(self, text):
+        super().write(text)
+        main = threading.current_thread() is threading.main_thread()
+        if main and sys.argv[1] in text and not self.seen:
+            self.seen = True
+            time.sleep(0.5)  # the clock of the bar waits for this picture
+            raise KeyboardInterrupt
+
+progress._BEAT = 0.1
+sys.stderr = Terminal()
+try:
+    with progress.bar('walk', 10.0) as reach:
+        while True:
+            reach(5.0)
+except KeyboardInterrupt:
+    print(repr(sys.stderr.getvalue()[-1]))
+"""
+
+
+@pytest.mark.parametrize('picture', ['walk   0%', 'walk  50%'])
+def test_an_interrupt_while_the_bar_is_drawn_ends_its_line(picture: str):
+    """It does so as well where the terminal stalls, and the clock of the bar waits."""
+    child = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED, picture],
+        cwd=pathlib.Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert child.stdout == "'\\n'\n"
+
+
 def test_ctrl_c_leaves_the_terminal_clean(tmp_path: pathlib.Path):
     """The message stands on a line of its own, below the bar; nothing of it is on stdout."""
     words = ['run', 'hexapod_patches', '--no-ros', '--no-compare', '--cycles', '9999', '--json']

@@ -13,6 +13,8 @@ import pytest
 from ros_pad import cli
 from ros_pad.contact import Film
 from ros_pad.contact import Foot
+from ros_pad.contact import Material
+from ros_pad.contact import MeasuredLimit
 from ros_pad.contact import Pad
 from ros_pad.contact import force_limit
 from ros_pad.contact import tangential_resistance
@@ -28,6 +30,7 @@ from ros_pad.reports.explore_page import foot_file
 from ros_pad.simulation import Hose
 from ros_pad.simulation import PneumaticChannel
 from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation import Scene
 from ros_pad.simulation.pneumatics import time_to
 
 LARGE = Inputs.of(Foot.load('large37'))
@@ -80,29 +83,50 @@ def test_grip_is_that_of_the_foot_on_its_film(roughness: float):
 
 def test_bands_hold_each_constant_halved_and_doubled():
     own = explore(LARGE).grip
-    for name in ('friction', 'shear_strength', 'boundary_friction', 'critical_film'):
+    assumed = 'friction shear_strength conforming_pressure boundary_friction critical_film'
+    found = {state: [own[state].value] for state in STATES}
+    for name in (*assumed.split(), 'film_exponent'):
         for factor in (0.5, 2.0):
             wrong = {name: factor * getattr(LARGE.foot, name)}
             foot = dataclasses.replace(LARGE.foot, **wrong)
             for state, span in changed(foot=foot).grip.items():
-                assert own[state].low <= span.value * (1 + 1e-12)
-                assert span.value <= own[state].high * (1 + 1e-12)
+                found[state].append(span.value)
+    for state in ('flat, dry', 'flat, wet', 'dome, dry'):
+        assert own[state][1:] == pytest.approx((min(found[state]), max(found[state])), rel=1e-12)
     # A wet dome without any dry contact has boundary friction alone.
     assert own['dome, wet'].low == pytest.approx(0.12 * LARGE.load, rel=1e-3)
+    assert own['dome, wet'].high == pytest.approx(max(found['dome, wet']), rel=1e-12)
+
+
+def test_film_time_and_hose_are_those_of_the_scene():
+    scene = Scene.load('hexapod_patches')
+    assert scene.floor.film_thickness == LARGE.film
+    assert scene.regulator == {'hose_diameter': LARGE.bore, 'hose_length': LARGE.hose}
+    assert 0.5 * scene.gait.duty * scene.gait.cycle == LARGE.stand
 
 
 def test_the_limit_over_the_factor_of_a_material_is_that_of_each_factor():
-    inputs = Inputs.of(Foot.load('small217'))
-    inputs = dataclasses.replace(inputs, criterion='thickness', pressure=8e3)
-    found = explore(inputs)
+    material = dataclasses.replace(Material.load('dragon_skin_10'), factor_range=(1.0, 1.4))
+    pad = Pad.of(material, 1.5e-3, 0.4e-3)
+    foot = dataclasses.replace(LARGE.foot, pad=pad, limit='wall', ceiling=46e3)
+    found = explore(dataclasses.replace(Inputs.of(foot), pressure=45e3, load=1.0))
     limits = []
-    for factor in np.linspace(*inputs.foot.pad.material.factor_range, 9):
-        material = inputs.foot.pad.material.times(factor)
-        pad = Pad.of(material, 0.5e-3, 0.2e-3)
-        limits.append(217 * force_limit(pad, 8e3, 'thickness'))
-    others = [217 * each for each in found.limits.values()]
-    assert found.limit.low == pytest.approx(min(limits + others), rel=1e-9)
-    assert found.limit.high == pytest.approx(max(limits + others), rel=1e-9)
+    for factor in np.linspace(1.0, 1.4, 9):
+        pad = Pad.of(material.times(factor), 1.5e-3, 0.4e-3)
+        limits.append(37 * force_limit(pad, 45e3, 'wall'))
+    others = [37 * each for each in found.limits.values()]
+    assert found.limit.low == pytest.approx(min(limits), rel=1e-9)
+    assert found.limit.high == max(others)
+    assert 0.0 < min(limits) < min(others)  # or this would test nothing
+
+
+def test_a_measured_limit_stays_with_its_pad():
+    pad = Pad(1.6e-3, 45.0, measured_limit=MeasuredLimit(0.3, 70e3, 5e-6))
+    foot = dataclasses.replace(LARGE.foot, pad=pad, limit='measured')
+    own = explore(Inputs.of(foot))
+    assert own.limits['measured'] == force_limit(pad, own.inputs.pressure, 'measured')
+    for other in ({'radius': 1.7e-3}, {'stiffness': 46.0}):
+        assert 'measured' not in explore(dataclasses.replace(own.inputs, **other)).limits
 
 
 def test_switching_is_that_of_the_channel():
@@ -111,6 +135,9 @@ def test_switching_is_that_of_the_channel():
     assert found.switching.fill == pytest.approx(
         time_to(channel, 76500.0, 0.9 * 76500.0), rel=0.01
     )
+    channel.step(76500.0, 5.0)
+    vent = time_to(channel, 0.0, 1e3)  # 1 kPa by docs/explore.md
+    assert found.switching.vent == pytest.approx(vent, rel=0.01)
     slow = changed(bore=0.5e-3, hose=50.0)
     assert slow.switching.fill == math.inf
     assert [each.name for each in slow.remarks] == ['liquid', 'hose']

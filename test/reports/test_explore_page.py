@@ -124,6 +124,17 @@ def test_the_foot_file_walks(page, tmp_path: pathlib.Path, capsys):
     assert (page.folder / 'mine.yaml').read_text() == path.read_text()
 
 
+def test_the_foot_file_is_of_the_last_change_though_its_answer_is_not_there_yet(page):
+    with page.expect_download() as loading:
+        page.locator('input[type=number][name=pads]').evaluate("""box => {
+          box.value = '43';
+          box.dispatchEvent(new Event('input', {bubbles: true}));
+          setTimeout(() => [...document.querySelectorAll('button')]
+            .find(each => each.innerText === 'Foot file').click());
+        }""")
+    assert '\npads: 43\n' in loading.value.path().read_text(encoding='utf-8')
+
+
 def test_the_picture_is_one_file(page, tmp_path: pathlib.Path):
     with page.expect_download() as loading:
         page.get_by_role('button', name='Picture').click()
@@ -207,6 +218,32 @@ def test_an_answer_that_fails_leaves_no_old_numbers_as_new():
     with ThreadPoolExecutor() as pool:
         pool.submit(asyncio.run, scenario()).result()
     assert said[-1] == 'no answer: broken'
+
+
+def test_a_change_during_an_answer_that_fails_is_answered():
+    asked, said = [], []
+
+    def compute() -> str:
+        asked.append(latest)
+        if len(asked) == 1:
+            loop.call_soon_threadsafe(latest.ask)
+            loop.call_soon_threadsafe(go.set)
+            go.wait()
+            raise ValueError('broken')
+        return 'answer'
+
+    async def scenario() -> None:
+        nonlocal latest, loop
+        loop = asyncio.get_running_loop()
+        latest = explore_page.Latest(compute, said.append, said.append)
+        latest.ask()
+        await latest._task
+
+    latest = loop = None
+    go = threading.Event()
+    with ThreadPoolExecutor() as pool:
+        pool.submit(asyncio.run, scenario()).result()
+    assert said[-2:] == ['no answer: broken', 'answer']
 
 
 def test_without_the_extra_the_remedy_is_printed(monkeypatch, capsys):
