@@ -197,7 +197,7 @@ class Page:
         ui = self._ui
         ui.add_css(_CSS)
         fields = {field.name: field for field in FIELDS}
-        with ui.element('main').classes('explore'):
+        with ui.element('div').classes('explore'):
             with ui.element('div').classes('top'):
                 ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
                 self._status = ui.label().props('role=status')
