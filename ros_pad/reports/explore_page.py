@@ -111,7 +111,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
     # A page elsewhere whose name leads to this machine must not read this one, nor any other page
     # open its socket: NiceGUI lets all of them.
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
-    core.sio.eio.cors_allowed_origins = [f'http://{name}:{port}' for name in (HOST, 'localhost')]
+    core.sio.eio.cors_allowed_origins = None
     ui.run(
         lambda: Page(Inputs.of(foot), out).build(),
         host=HOST,
