@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 
 from ros_pad.signals import INTERRUPTED
@@ -13,6 +14,9 @@ from ros_pad.signals import STOP
 def main() -> int:
     """Run the command line; return the exit status, see :func:`ros_pad.cli.main`."""
     STOP.install('pad: stopped\n')
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # As on stderr: a terminal without m³ shows its code instead of a traceback.
+        sys.stdout.reconfigure(errors='backslashreplace')
     try:
         from ros_pad import cli
 

@@ -39,7 +39,7 @@ _REPR.maxlevel = 2
 
 def shown(value: Any) -> str:
     """Return a value for an error message, shortened where YAML aliases make it very long."""
-    return _REPR.repr(value)
+    return _REPR.repr(value.item() if isinstance(value, np.generic) else value)
 
 
 def nearest(value: Any, known: Sequence[str]) -> str:

@@ -27,6 +27,7 @@ from ros_pad.contact.calibrate import foot_file
 from ros_pad.contact.measurements import Measurements
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.errors import PadError
 
 
 def add(commands: Commands) -> None:
@@ -169,6 +170,8 @@ def _write(contents: dict[pathlib.Path, bytes]) -> None:
             part.write_bytes(contents[path])
         for path, part in written.items():
             part.replace(path)
+    except OSError as error:
+        raise PadError(f'{path}: cannot be written: {error.strerror}') from error
     finally:
         for part in written.values():
             part.unlink(missing_ok=True)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from ros_pad.configuration import instance
 from ros_pad.configuration import integer
 from ros_pad.configuration import number
+from ros_pad.configuration import shown
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
@@ -496,8 +497,8 @@ class FootEstimator:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
         if time > self._time - LONGEST_GAP:
             raise InvalidInput(
-                f'time = {time!r} s is not allowed: it must be later than that of the last'
-                f' sample, {self._time!r} s'
+                f'time = {shown(time)} s is not allowed: it must be later than that of the last'
+                f' sample, {shown(self._time)} s'
             )
         self._gate.standing = False
         self._path.restart()
@@ -774,6 +775,8 @@ def _not_finite(
     if position_time is not None:
         values.append(('position_time', position_time, 's'))
     wrong = [
-        f'{name} = {value!r} {unit}' for name, value, unit in values if not math.isfinite(value)
+        f'{name} = {shown(value)} {unit}'
+        for name, value, unit in values
+        if not math.isfinite(value)
     ]
-    return InvalidInput(f'sample at {time!r} s: {", ".join(wrong)}: must be finite')
+    return InvalidInput(f'sample at {shown(time)} s: {", ".join(wrong)}: must be finite')

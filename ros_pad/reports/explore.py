@@ -287,7 +287,11 @@ def explore(inputs: Inputs) -> Explored:
     for field in FIELDS:
         value = getattr(inputs, field.name)
         if field.name != unused or (unused == 'thickness' and value is not None):
-            parts('', field.setting.accept, math.nan if value is None else value)
+            if value is None or math.isnan(value):
+                words = f'{field.setting.name} is missing: {field.setting.allowed} is needed'
+                parts.note(field.name, words, True)
+            else:
+                parts('', field.setting.accept, value)
     pad = parts('radius stiffness thickness', _pad, inputs)
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)

@@ -111,7 +111,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
     # A page elsewhere whose name leads to this machine must not read this one, nor any other page
     # open its socket: NiceGUI lets all of them.
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, 'localhost'])
-    core.sio.eio.cors_allowed_origins = [f'http://{name}:{port}' for name in (HOST, 'localhost')]
+    core.sio.eio.cors_allowed_origins = None
     ui.run(
         lambda: Page(Inputs.of(foot), out).build(),
         host=HOST,
@@ -197,7 +197,7 @@ class Page:
         ui = self._ui
         ui.add_css(_CSS)
         fields = {field.name: field for field in FIELDS}
-        with ui.element('main').classes('explore'):
+        with ui.element('div').classes('explore'):
             with ui.element('div').classes('top'):
                 ui.html(f'<h1>Foot {html.escape(self._inputs.foot.source)}</h1>', sanitize=False)
                 self._status = ui.label().props('role=status')

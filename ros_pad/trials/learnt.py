@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import pathlib
@@ -55,6 +56,8 @@ def save(path: str | os.PathLike[str], settings: dict[str, float], foot: Foot) -
         new.write_text(f"{_HEAD}foot: '{source}'\n{''.join(lines)}", encoding='utf-8')
         new.replace(path)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
         raise PadError(f'{os.fspath(path)}: cannot be written: {error.strerror}') from error
 
 

@@ -104,6 +104,16 @@ def test_bad_input_is_marked_where_it_is_and_the_rest_stays(page):
     assert study.slider(page, 'Load on the foot').input_value() == '5.6'
 
 
+def test_a_number_keeps_its_digits_when_it_is_left(page):
+    typed(page, 'stiffness', '40.3187483')  # as a calibration gives it
+    page.keyboard.press('Tab')
+    typed(page, 'film', '')
+    assert error_at(page, 'film') == 'film is missing: a number from 1e-06 to 0.01 m is needed'
+    assert page.locator('[name=stiffness]').input_value() == '40.3187483'
+    typed(page, 'film', '0.3')
+    typed(page, 'stiffness', '40')
+
+
 def test_the_foot_file_walks(page, tmp_path: pathlib.Path, capsys):
     typed(page, 'pads', '61')
     typed(page, 'sole_radius', '20')

@@ -266,6 +266,13 @@ def test_folders_that_hold_something_else_are_left_alone(tmp_path: pathlib.Path)
         Results(tmp_path / 'bad', {}, [])
 
 
+def test_a_full_disk_is_named(tmp_path: pathlib.Path):
+    with Results(tmp_path, {}, ['{}']) as results:
+        results._base.execute('PRAGMA max_page_count = 1')  # no page may be added
+        with pytest.raises(PadError, match=r'trials.sqlite cannot be written: .* full'):
+            results.add('{}', {'text': 'x' * 10_000})
+
+
 def test_a_folder_has_one_sweep_at_work_at_a_time(tmp_path: pathlib.Path):
     with (
         Results(tmp_path / 'sweep', {}, []),

@@ -103,17 +103,26 @@ class Results:
         # SQLite's transactions survive a kill in the middle of writing.
         self._base = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
-            self._open(about, set(keys))
-        except sqlite3.Error as error:
+            with self._named():
+                self._open(about, set(keys))
+        except BaseException:
             self._base.close()
+            raise
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Turn an error of the database into one that names its file."""
+        try:
+            yield
+        except sqlite3.Error as error:
             if 'locked' in str(error):
                 raise PadError(
                     f'{self.folder}: another sweep is running in this folder: wait for its end'
                 ) from error
-            raise PadError(f'{path} is damaged: {error}') from error
-        except BaseException:
-            self._base.close()
-            raise
+            # A full disk, or a folder without the right to write, damages nothing.
+            full = isinstance(error, sqlite3.OperationalError)
+            what = 'cannot be written' if full else 'is damaged'
+            raise PadError(f'{self.folder / RESULTS} {what}: {error}') from error
 
     def _open(self, about: Mapping[str, Any], keys: set[str]) -> None:
         base = self._base
@@ -165,7 +174,8 @@ class Results:
 
     def add(self, key: str, row: Row) -> None:
         """Write a row to the disk before returning; keep the row that a key has already."""
-        self._base.execute('INSERT OR IGNORE INTO trial VALUES (?, ?)', (key, json.dumps(row)))
+        with self._named():
+            self._base.execute('INSERT OR IGNORE INTO trial VALUES (?, ?)', (key, json.dumps(row)))
         self._rows.setdefault(key, row)
 
     def forget_failures(self) -> None:
