@@ -103,6 +103,14 @@ class Field(NamedTuple):
     shown: str
     unit: float
 
+    def check(self, value: float | None) -> None:
+        """Raise InvalidInput, in the unit of the page, if a value in SI is not allowed."""
+        low, high = self.setting.low / self.unit, self.setting.high / self.unit
+        allowed = replace(self.setting, low=low, high=high, unit=self.shown)
+        if value is None or math.isnan(value):
+            raise InvalidInput(f'{allowed.name} is missing: {allowed.allowed} is needed')
+        allowed.accept(value if self.unit == 1 else float(f'{value / self.unit:.12g}'))
+
 
 def _of(settings: Sequence[Setting], name: str, new: str = '') -> Setting:
     return replace(next(each for each in settings if each.name == name), name=new or name)
@@ -265,7 +273,7 @@ class _Parts:
             loaded = error.status == 'flattened' and not str(error).startswith('pressure = 0 ')
             self.note('load' if loaded else 'pressure', str(error), True)
         except InvalidInput as error:
-            name = str(error).partition(' = ')[0]
+            name = str(error).split()[0]
             self.note(_BLAMED.get(name, name), str(error), True)
         except ConfigError as error:
             self.note('material', str(error), True)
@@ -287,11 +295,7 @@ def explore(inputs: Inputs) -> Explored:
     for field in FIELDS:
         value = getattr(inputs, field.name)
         if field.name != unused or (unused == 'thickness' and value is not None):
-            if value is None or math.isnan(value):
-                words = f'{field.setting.name} is missing: {field.setting.allowed} is needed'
-                parts.note(field.name, words, True)
-            else:
-                parts('', field.setting.accept, value)
+            parts('', lambda field=field, value=value: field.check(value))
     pad = parts('radius stiffness thickness', _pad, inputs)
     criterion = parts('', _criterion, inputs, pad, parts)
     foot = parts('pads sole_radius supply', _foot, inputs, pad, criterion, parts)
@@ -376,7 +380,8 @@ def _foot(inputs: Inputs, pad: Pad, criterion: str, parts: _Parts) -> Foot:
 
 
 def _below_ceiling(inputs: Inputs, foot: Foot) -> None:
-    quantity('pressure', inputs.pressure, 'Pa, the ceiling of the foot', high=foot.ceiling)
+    ceiling = 1e-3 * foot.ceiling
+    quantity('pressure', 1e-3 * inputs.pressure, 'kPa, the ceiling of the foot', high=ceiling)
 
 
 def _places(inputs: Inputs, free: Inflated | None, parts: _Parts) -> tuple[Array, float]:

@@ -252,7 +252,7 @@ class Page:
         box.props(f'dense outlined suffix="{field.shown}" name={field.name} step=any')
         slider = ui.element('input').props(
             f'type=range min={field.low} max={field.high} step={field.step}'
-            f' aria-label="{field.label}, {field.shown}"'
+            f' aria-label="{", ".join(filter(None, (field.label, field.shown)))}"'
         )
         slider.on('input', slid, js_handler='(event) => emit(event.target.value)')
         place(shown)

@@ -157,10 +157,10 @@ BAD = [
     ({'pads': 600}, 'pads', 'at most 128', PRESSED | GRIP | FOOT | {'pitch'}),
     ({'pads': 3.5}, 'pads', 'a whole number', PRESSED | GRIP | FOOT | {'pitch'}),
     ({'thickness': 2e-3}, 'thickness', 'up to 0.0015 m', {'all'}),
-    ({'film': 2.0}, 'film', 'from 1e-06 to 0.01 m', {'grip-flat-wet', 'grip-dome-wet'}),
-    ({'roughness': -1.0}, 'roughness', 'from 0 to 0.001 m', GRIP),
-    ({'bore': 1e-9}, 'bore', 'from 0.0005 to 0.02 m', {'fill', 'vent'}),
-    ({'supply': 1.0}, 'supply', 'from 1000 to 1000000 Pa', GRIP | FOOT),
+    ({'film': 2.0}, 'film', 'from 0.001 to 10 mm', {'grip-flat-wet', 'grip-dome-wet'}),
+    ({'roughness': -1.0}, 'roughness', 'from 0 to 1000 µm', GRIP),
+    ({'bore': 1e-9}, 'bore', 'from 0.5 to 20 mm', {'fill', 'vent'}),
+    ({'supply': 1.0}, 'supply', 'from 1 to 1000 kPa', GRIP | FOOT),
     ({'material': 'nix'}, 'material', "no material named 'nix'", {'all'}),
 ]  # fmt: skip
 

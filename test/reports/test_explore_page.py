@@ -90,7 +90,7 @@ def test_a_slider_moves_the_numbers_to_those_of_pad_contact(page, capsys):
 def test_bad_input_is_marked_where_it_is_and_the_rest_stays(page):
     grip = shown(page, 'grip-flat-dry')
     typed(page, 'film', '50')
-    assert 'film = 0.05 is not allowed: a number from 1e-06 to 0.01 m' in error_at(page, 'film')
+    assert 'film = 50.0 is not allowed: a number from 0.001 to 10 mm' in error_at(page, 'film')
     assert page.locator('#grip-dome-wet').inner_text() == '–'
     assert shown(page, 'grip-flat-dry') == grip
     typed(page, 'film', '0.3')
@@ -108,7 +108,7 @@ def test_a_number_keeps_its_digits_when_it_is_left(page):
     typed(page, 'stiffness', '40.3187483')  # as a calibration gives it
     page.keyboard.press('Tab')
     typed(page, 'film', '')
-    assert error_at(page, 'film') == 'film is missing: a number from 1e-06 to 0.01 m is needed'
+    assert error_at(page, 'film') == 'film is missing: a number from 0.001 to 10 mm is needed'
     assert page.locator('[name=stiffness]').input_value() == '40.3187483'
     typed(page, 'film', '0.3')
     typed(page, 'stiffness', '40')
