@@ -142,7 +142,8 @@ def computed(foot: str, moves: int) -> dict[str, list[float]]:
 
 def slider(page: Any, label: str) -> Any:
     """Return a slider by the label of its field."""
-    return page.locator(f'input[type=range][aria-label^="{label},"]')
+    names = f'[aria-label="{label}"], [aria-label^="{label},"]'  # the second has a unit
+    return page.locator(f'input[type=range]:is({names})')
 
 
 def main(words: Sequence[str]) -> int:
