@@ -590,6 +590,8 @@ class Row(NamedTuple):
 def rows(found: Explored) -> Iterator[tuple[str, list[Row]]]:
     """Yield the numbers of the page by heading; a dash where there is none."""
     free, pressed, ring, switching = found.free, found.pressed, found.ring, found.switching
+    if ring is not None and ring.ring_radius > found.inputs.radius:
+        ring = None  # a height that is not valid: see _ring
 
     def length(of: Any, name: str, label: str, title: str) -> Row:
         value = math.nan if of is None else float(getattr(of, name))

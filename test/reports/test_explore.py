@@ -175,7 +175,7 @@ def test_where_a_model_ends_the_rest_stays(values: dict, name: str, words: str, 
     if gone == {'all'}:
         assert PRESSED | DOMED | {'fill', 'vent', 'free-height'} <= missing
     else:
-        assert missing == gone
+        assert missing == gone | {'ring-height'}  # wider than these pads
     assert 'nan' not in picture(found)
 
 
@@ -191,7 +191,7 @@ def test_a_foot_that_no_file_may_have_is_refused():
 def notes(**values: object) -> dict[str, str]:
     found = changed(**values)
     assert not any(each.error for each in found.remarks)
-    assert '–' not in texts(found).values()
+    assert {key for key, text in texts(found).items() if text == '–'} == {'ring-height'}
     return {each.name: each.text for each in found.remarks}
 
 
