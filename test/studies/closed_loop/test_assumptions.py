@@ -39,6 +39,7 @@ TUNED = {
     'control/morphology.py': ('MorphologyController',),
     'control/policies.py': ('adaptive',),
     'regulators/simulated.py': ('SimulatedRegulator',),
+    'reports/explore.py': ('Inputs',),
 }
 
 
