@@ -89,8 +89,8 @@ SAMPLE = Kind(
     'What sensors measure, or a body estimator finds from them.',
     (
         Field('force', 'N', 'force of the ground on the foot, z up', 'xyz'),
-        Field('moment', 'N m', 'yaw moment of the ground on the foot', ''),
-        Field('position', 'm', 'marker of the foot in world, or foot in odom; new ones only', 'xyz'),
+        Field('moment', 'N m', 'yaw moment of the ground on the foot'),
+        Field('position', 'm', 'marker in world, or foot in odom; new ones only', 'xyz'),
         Field('velocity', 'm/s', 'velocity of the contact over the floor, from joints', 'xy'),
         Field(
             'variance', 'm²/s²',
@@ -104,16 +104,16 @@ ESTIMATE = Kind(
     'What the estimator makes of the samples since its last estimate.',
     (
         Field('position', 'm', 'last position, if one has come since the last estimate', 'xy'),
-        Field('load', 'N', 'largest normal force since the last estimate', ''),
+        Field('load', 'N', 'largest normal force since the last estimate'),
         Field('slip', 'm/s', 'slip velocity along the tangential force', 'xy'),
-        Field('slip_speed', 'm/s', 'slip speed, positive where the foot gives way', ''),
-        Field('slip_speed_sd', 'm/s', 'standard deviation of the slip speed', ''),
-        Field('slipping', '', 'slip alarm: 1 on, 0 off', ''),
-        Field('wetness', '', 'probability that the ground is wet, 0 to 1', ''),
-        Field('friction', '', 'mean coefficient of friction', ''),
-        Field('friction_sd', '', 'its standard deviation', ''),
-        Field('margin', '', 'friction margin: 5 % quantile of friction less T/N', ''),
-        Field('doubt', '', 'code of the reason why the ground is unobservable; 0: none', ''),
+        Field('slip_speed', 'm/s', 'slip speed, positive where the foot gives way'),
+        Field('slip_speed_sd', 'm/s', 'standard deviation of the slip speed'),
+        Field('slipping', '', 'slip alarm: 1 on, 0 off'),
+        Field('wetness', '', 'probability that the ground is wet, 0 to 1'),
+        Field('friction', '', 'mean coefficient of friction'),
+        Field('friction_sd', '', 'its standard deviation'),
+        Field('margin', '', 'friction margin: 5 % quantile of friction less T/N'),
+        Field('doubt', '', 'code of the reason why the ground is unobservable; 0: none'),
         Field('detail', '', 'two numbers of the doubt', 'ab'),
     ),
 )  # fmt: skip
@@ -122,8 +122,8 @@ COMMAND = Kind(
     'command',
     'What the controller decides.',
     (
-        Field('dome', '', 'morphology: 1 dome, 0 flat', ''),
-        Field('setpoint', 'Pa', 'set-point, gauge; without one for long, the pad is vented', ''),
+        Field('dome', '', 'morphology: 1 dome, 0 flat'),
+        Field('setpoint', 'Pa', 'set-point, gauge; without one for long, the pad is vented'),
     ),
 )  # fmt: skip
 
@@ -131,10 +131,10 @@ PRESSURE = Kind(
     'pressure',
     'What the regulators answer.',
     (
-        Field('pressure', 'Pa', 'measured pressure, gauge', ''),
-        Field('setpoint', 'Pa', 'set-point in force, gauge', ''),
-        Field('pad', 'Pa', 'true pressure of a simulated pad, gauge', ''),
-        Field('fault', '', 'code of the fault of regulator or pad; 0: none', ''),
+        Field('pressure', 'Pa', 'measured pressure, gauge'),
+        Field('setpoint', 'Pa', 'set-point in force, gauge'),
+        Field('pad', 'Pa', 'true pressure of a simulated pad, gauge'),
+        Field('fault', '', 'code of the fault of regulator or pad; 0: none'),
         Field('detail', '', 'two numbers of the fault', 'ab'),
     ),
 )  # fmt: skip
