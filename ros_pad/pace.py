@@ -99,7 +99,7 @@ class RealTime:
         self._period = period_ns
         self._next_ns = now_ns + period_ns
         self._since_ns = now_ns
-        self._passed = self._reached = 0
+        self._passed = 0
 
     def due(self, now_ns: int) -> int:
         """Return how many periods to advance at a time, ns: more than 1 when samples are late."""
@@ -109,7 +109,6 @@ class RealTime:
         self._next_ns += due * self._period
         due = min(due, max(1, self.LONGEST_NS // self._period))
         self._passed += due
-        self._reached += 1
         return due
 
     def rate(self, now_ns: int) -> Rate:
@@ -117,8 +116,8 @@ class RealTime:
         elapsed = max(1, now_ns - self._since_ns) * 1e-9
         rate = Rate(
             1e9 / self._period,
-            self._reached / elapsed,
+            self._passed / elapsed,
             self._passed * self._period * 1e-9 / elapsed,
         )
-        self._since_ns, self._passed, self._reached = now_ns, 0, 0
+        self._since_ns, self._passed = now_ns, 0
         return rate

@@ -31,10 +31,15 @@ from ros_pad.bags.storage import batches
 from ros_pad.bags.storage import raw_messages
 from ros_pad.bags.storage import scan
 from ros_pad.bags.storage import shares
+from ros_pad.bags.wire import Wire
+from ros_pad.bags.wire import legs_of
+from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.errors import UnknownEncoding
 from ros_pad.errors import reason
 from ros_pad.pace import Progress
+from ros_pad.records import Block
+from ros_pad.records import Kind
 
 _RowReader: TypeAlias = Callable[[bytes, np.ndarray, np.ndarray], np.ndarray]
 _Parts: TypeAlias = dict[int, tuple[str, np.ndarray, np.ndarray]]
@@ -275,6 +280,59 @@ class BagReader:
         return {
             topic: (np.concatenate([t for t, _ in each]), np.concatenate([v for _, v in each]))
             for topic, each in found.items()
+        }
+
+    def records(
+        self, kinds: Mapping[str, Kind], progress: Progress | None = None
+    ) -> dict[str, tuple[tuple[int, ...], np.ndarray, Block]]:
+        """Return all records on some topics.
+
+        Parameters
+        ----------
+        kinds : mapping
+            Kind of the records, by topic; a topic without messages is left out.
+        progress : callable or None
+            Called now and then with the share that is done, 0 to 1.
+
+        Returns
+        -------
+        dict
+            By topic: numbers of the legs, log times, int64, ns, and the block of all records.
+
+        Raises
+        ------
+        BagError
+            When a message is no record of its kind, or a chunk of a closed file is damaged.
+        """
+        wires: dict[str, Wire] = {}
+        found: dict[str, list[tuple[np.ndarray, Block]]] = {}
+        for file, contents, reach in self._shared(progress):
+            channels = {each.id: each.topic for each in _channels(contents, kinds)}
+            for batch in batches(file, contents, channels, reach):
+                for channel_id, mine in _by_channel(batch):
+                    topic, starts, sizes = (
+                        channels[channel_id],
+                        batch.starts[mine],
+                        batch.sizes[mine],
+                    )
+                    try:
+                        if topic not in wires:
+                            first = batch.data[starts[0] : starts[0] + sizes[0]]
+                            wires[topic] = Wire(kinds[topic], legs_of(first))
+                        block = wires[topic].table(batch.data, starts, sizes)
+                    except BadMessage as error:
+                        raise BagError(f'{file}: a message on {topic}: {error}') from error
+                    times = batch.log_times[mine].astype(np.int64)
+                    found.setdefault(topic, []).append((times, block))
+        return {
+            topic: (
+                wires[topic].legs,
+                np.concatenate([times for times, _ in parts]),
+                Block(
+                    *(np.concatenate(each) for each in zip(*(b for _, b in parts), strict=True))
+                ),
+            )
+            for topic, parts in found.items()
         }
 
     def log_times(self, progress: Progress | None = None) -> dict[str, np.ndarray]:

@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topics of ros_pad: name, message type, unit, and the values that a trial reads.
+"""The topics of ros_pad: name, message type, unit, and the values that are read from them.
 
+Nodes of ros_pad send one another records of all feet. Robots of others publish by leg, and people
+look at single legs: :data:`OF_LEGS` has these topics, with the numbers of a record that they have.
 Nodes add message class and QoS to this table, in `ros_pad.nodes.topics`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from ros_pad.bags.wire import TYPE
+from ros_pad.records import COMMAND as COMMANDS
+from ros_pad.records import ESTIMATE as ESTIMATES
+from ros_pad.records import PRESSURE as PRESSURES
+from ros_pad.records import SAMPLE as SAMPLES
+from ros_pad.records import Kind
 
 STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 FRAME = 'header.frame_id'
@@ -27,9 +37,13 @@ class Topic:
     frame : str
         ``header.frame_id``, with ``{leg}`` as in the name; empty if ros_pad writes none.
     values : tuple of str
-        Fields of a message that a trial reads, such as ``wrench.force.x``: numbers, or one text.
+        Fields of a message that are read, such as ``wrench.force.x``: numbers, or one text.
     text : bool
         Whether the one value is a text.
+    record : Kind or None
+        Kind of the record that the message is, or of which it has some numbers of one leg.
+    columns : tuple of str
+        For the topic of a leg, the number of the record in each of the values.
     """
 
     pattern: str
@@ -38,6 +52,8 @@ class Topic:
     frame: str = ''
     values: tuple[str, ...] = ()
     text: bool = False
+    record: Kind | None = None
+    columns: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -49,53 +65,119 @@ class Topic:
         return self.pattern.format(leg=leg)
 
 
-PRESSURE = Topic(
-    'leg_{leg}/pressure',
-    'sensor_msgs/msg/FluidPressure',
-    'Pa absolute',
+def _record(name: str, kind: Kind, unit: str) -> Topic:
+    return Topic(f'feet/{name}', TYPE, unit, record=kind)
+
+
+SAMPLE = _record('sample', SAMPLES, 'N, N m, m, m/s')
+FORCE = _record('force', SAMPLES, 'N')
+ESTIMATE = _record('estimate', ESTIMATES, 'm, N, m/s')
+COMMAND = _record('command', COMMANDS, 'Pa gauge')
+PRESSURE = _record('pressure', PRESSURES, 'Pa gauge')
+
+RECORDS = (SAMPLE, FORCE, ESTIMATE, COMMAND, PRESSURE)
+"""Topics of records; ``feet/force`` has samples with forces alone, in the axes of the feet."""
+
+
+def _axes(path: str, axes: str = 'xyz') -> tuple[str, ...]:
+    return tuple(f'{path}.{axis}' for axis in axes)
+
+
+def _of_leg(
+    name: str,
+    type_name: str,
+    kind: Kind,
+    columns: Sequence[str],
+    values: Sequence[str],
+    unit: str = '',
+    frame: str = '',
+) -> Topic:
+    return Topic(
+        f'leg_{{leg}}/{name}',
+        type_name,
+        unit,
+        frame,
+        tuple(values),
+        record=kind,
+        columns=tuple(columns),
+    )
+
+
+def _number(name: str, column: str, type_name: str = 'std_msgs/msg/Float64') -> Topic:
+    return _of_leg(name, type_name, ESTIMATES, (column,), ('data',))
+
+
+_WRENCH = 'geometry_msgs/msg/WrenchStamped'
+_TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+_FLUID = 'sensor_msgs/msg/FluidPressure'
+_FORCES = ('force_x', 'force_y', 'force_z')
+# Variances of x and y; the matrix has rows of 6.
+_PLANE = (*_axes('twist.twist.linear', 'xy'), 'twist.covariance[0]', 'twist.covariance[7]')
+
+LEG_WRENCH = _of_leg(
+    'wrench', _WRENCH, SAMPLES, (*_FORCES, 'moment'),
+    (*_axes('wrench.force'), 'wrench.torque.z'), 'N', 'leg_{leg}_sole',
+)  # fmt: skip
+LEG_POSITION = _of_leg(
+    'position', 'geometry_msgs/msg/PointStamped', SAMPLES,
+    ('position_x', 'position_y', 'position_z'), _axes('point'), 'm', 'world',
+)  # fmt: skip
+LEG_VELOCITY = _of_leg(
+    'contact_velocity', _TWIST, SAMPLES,
+    ('velocity_x', 'velocity_y', 'variance_x', 'variance_y'), _PLANE, 'm/s', 'odom',
+)  # fmt: skip
+LEG_FOOT_WRENCH = _of_leg(
+    'foot_wrench', _WRENCH, SAMPLES, _FORCES, _axes('wrench.force'), 'N', 'leg_{leg}_foot'
+)
+LEG_PRESSURE = _of_leg(
+    'pressure', _FLUID, PRESSURES, ('pressure',), ('fluid_pressure',), 'Pa absolute',
     'leg_{leg}_pad',
-    ('fluid_pressure',),
-)
-PRESSURE_SETPOINT = Topic(
-    'leg_{leg}/pressure_setpoint',
-    'sensor_msgs/msg/FluidPressure',
-    'Pa absolute',
+)  # fmt: skip
+LEG_SETPOINT = _of_leg(
+    'pressure_setpoint', _FLUID, COMMANDS, ('setpoint',), ('fluid_pressure',), 'Pa absolute',
     'leg_{leg}_pad',
-    ('fluid_pressure',),
+)  # fmt: skip
+LEG_SLIP = _of_leg(
+    'slip', _TWIST, ESTIMATES, ('slip_x', 'slip_y', 'slip_speed_sd', 'slip_speed_sd'), _PLANE,
+    'm/s', 'world',
+)  # fmt: skip
+LEG_SLIPPING = _number('slipping', 'slipping', 'std_msgs/msg/Bool')
+LEG_WETNESS = _number('wetness', 'wetness')
+LEG_FRICTION = _number('friction', 'friction')
+LEG_MARGIN = _number('friction_margin', 'margin')
+LEG_LOAD = _number('contact_load', 'load')
+LEG_DOUBT = Topic(
+    'leg_{leg}/doubt', 'std_msgs/msg/String', values=('data',), text=True, record=ESTIMATES
 )
-WRENCH = Topic(
-    'leg_{leg}/wrench',
-    'geometry_msgs/msg/WrenchStamped',
-    'N',
-    'leg_{leg}_sole',
-    ('wrench.force.x', 'wrench.force.y', 'wrench.force.z'),
+LEG_MORPHOLOGY = Topic(
+    'leg_{leg}/morphology', 'std_msgs/msg/String', values=('data',), text=True, record=COMMANDS
 )
-POSITION = Topic(
-    'leg_{leg}/position',
-    'geometry_msgs/msg/PointStamped',
-    'm',
-    'world',
-    ('point.x', 'point.y', 'point.z'),
+
+OF_LEGS = (
+    *(LEG_WRENCH, LEG_POSITION, LEG_VELOCITY, LEG_FOOT_WRENCH, LEG_PRESSURE, LEG_SETPOINT),
+    *(LEG_SLIP, LEG_SLIPPING, LEG_WETNESS, LEG_FRICTION, LEG_MARGIN, LEG_LOAD),
+    *(LEG_DOUBT, LEG_MORPHOLOGY),
 )
+"""Topics that each leg has: from drivers of others by ``merge``, for people by ``views``."""
+
+FROM_DRIVERS = (
+    *(LEG_WRENCH, LEG_POSITION, LEG_VELOCITY, LEG_FOOT_WRENCH, LEG_PRESSURE, LEG_SETPOINT),
+)
+"""Those of them that become records."""
+
 BODY_POSE = Topic(
     'body/pose',
     'geometry_msgs/msg/PoseStamped',
     'm',
     'world',
-    (
-        *('pose.position.x', 'pose.position.y'),
-        *(f'pose.orientation.{name}' for name in 'xyzw'),
-    ),
+    (*_axes('pose.position', 'xy'), *_axes('pose.orientation', 'xyzw')),
 )
 ODOM = Topic(
     'odom',
     'nav_msgs/msg/Odometry',
     'm, m/s',
     'odom',
-    (
-        *(f'pose.pose.position.{axis}' for axis in 'xyz'),
-        *(f'pose.pose.orientation.{name}' for name in 'xyzw'),
-    ),
+    (*_axes('pose.pose.position'), *_axes('pose.pose.orientation', 'xyzw')),
 )
 BODY_DOUBT = Topic('body/doubt', 'std_msgs/msg/String', values=('data',), text=True)
 IMU = Topic(
@@ -103,69 +185,12 @@ IMU = Topic(
     'sensor_msgs/msg/Imu',
     'rad/s, m/s²',
     'imu_link',
-    (
-        *(f'angular_velocity.{axis}' for axis in 'xyz'),
-        *(f'linear_acceleration.{axis}' for axis in 'xyz'),
-    ),
+    (*_axes('angular_velocity'), *_axes('linear_acceleration')),
 )
-FOOT_WRENCH = Topic(
-    'leg_{leg}/foot_wrench',
-    'geometry_msgs/msg/WrenchStamped',
-    'N',
-    'leg_{leg}_foot',
-    ('wrench.force.x', 'wrench.force.y', 'wrench.force.z'),
-)
-CONTACT_VELOCITY = Topic(
-    'leg_{leg}/contact_velocity',
-    'geometry_msgs/msg/TwistWithCovarianceStamped',
-    'm/s',
-    'odom',
-    (
-        *('twist.twist.linear.x', 'twist.twist.linear.y'),
-        *('twist.covariance[0]', 'twist.covariance[7]'),
-    ),
-)
-SLIP = Topic(
-    'leg_{leg}/slip',
-    'geometry_msgs/msg/TwistWithCovarianceStamped',
-    'm/s',
-    'world',
-    (
-        *('twist.twist.linear.x', 'twist.twist.linear.y'),
-        *('twist.covariance[0]', 'twist.covariance[7]'),  # variances; the matrix has rows of 6
-    ),
-)
-CONTACT_LOAD = Topic('leg_{leg}/contact_load', 'std_msgs/msg/Float64', 'N', values=('data',))
-CONTACT_POSITION = Topic(
-    'leg_{leg}/contact_position',
-    'geometry_msgs/msg/PointStamped',
-    'm',
-    'world',
-    ('point.x', 'point.y', 'point.z'),
-)
-SLIPPING = Topic('leg_{leg}/slipping', 'std_msgs/msg/Bool', values=('data',))
-# The last topic of each estimate: it triggers a decision.
-WETNESS = Topic('leg_{leg}/wetness', 'std_msgs/msg/Float64', '0 to 1', values=('data',))
-FRICTION = Topic('leg_{leg}/friction', 'std_msgs/msg/Float64', values=('data',))
-FRICTION_MARGIN = Topic('leg_{leg}/friction_margin', 'std_msgs/msg/Float64', values=('data',))
-DOUBT = Topic('leg_{leg}/doubt', 'std_msgs/msg/String', values=('data',), text=True)
-MORPHOLOGY = Topic('leg_{leg}/morphology', 'std_msgs/msg/String', values=('data',), text=True)
-JOINT_STATES = Topic('joint_states', 'sensor_msgs/msg/JointState', 'rad')
+JOINT_STATES = Topic('joint_states', TYPE, 'rad')
 MARKERS = Topic('markers', 'visualization_msgs/msg/MarkerArray', 'm')
+FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
 
-TRIAL = {
-    topic.kind: topic
-    for topic in (
-        *(WRENCH, POSITION, BODY_POSE, PRESSURE, PRESSURE_SETPOINT, SLIP, SLIPPING),
-        *(WETNESS, FRICTION, FRICTION_MARGIN, DOUBT, MORPHOLOGY),
-        *(ODOM, BODY_DOUBT, CONTACT_VELOCITY),
-    )
-}
-"""The topics that a trial is read from, by kind."""
-
-OF_BODY = tuple(topic.kind for topic in (BODY_POSE, ODOM, BODY_DOUBT))
-"""Kinds of these topics that a robot has only once."""
-
-__all__ = ['OF_BODY', 'TRIAL', 'Topic']
+__all__ = ['FROM_DRIVERS', 'OF_LEGS', 'RECORDS', 'Topic']

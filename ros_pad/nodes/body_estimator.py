@@ -7,6 +7,7 @@ why the motion must not be relied on is published on ``body/doubt`` and on ``/di
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -20,33 +21,35 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
-from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.listening import message_class
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.messages import Outgoing
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.refusals import rate_status
+from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
+from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
+from ros_pad.records import SAMPLE
+from ros_pad.records import Block
 from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
 from ros_pad.sensing.mapping import Mapping
+from ros_pad.sensing.stage import SET_BACK_NS
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import foot_readings
+from ros_pad.sensing.stage import sample_of
 from ros_pad.sensing.stage import twist_of
 
 PARAMETERS = (
@@ -95,7 +98,6 @@ _SOURCES = {
 _RATE = tuple(f'angular_velocity.{axis}' for axis in 'xyz')
 _PULL = tuple(f'linear_acceleration.{axis}' for axis in 'xyz')
 _ABSENT = ('angular_velocity_covariance[0]', 'linear_acceleration_covariance[0]')
-_FORCE = tuple(f'wrench.force.{axis}' for axis in 'xyz')
 _MATRIX = [f'covariance[{place}]' for place in range(36)]
 _TWIST = [f'twist.{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz']
 
@@ -106,8 +108,6 @@ class BodyEstimatorNode(Node):
     Attributes
     ----------
     stage : SensingStage
-    forces : int
-        Number of messages with the force of a foot so far.
     messages : Messages
         Publishers and subscriptions.
 
@@ -127,21 +127,25 @@ class BodyEstimatorNode(Node):
         if self._mapping:
             values['force_axes'] = self._mapping.force_axes
         self._base: str = values['base_frame']
-        self.forces = 0
         self._force_source = ''  # as reported last
         self._rate = np.zeros(3)  # last angular velocity, IMU axes, rad/s
-        self.messages = Messages(self, 'body_estimator')
+        self.messages = Messages(self)
         self.stage = SensingStage(
             robot,
             estimator_of(robot, values),
-            self._publish,
+            self._take,
             self._publish_doubt,
             self._warn,
             values['forces'],
         )
         self._gyro_noise: float = values['gyro_noise']
         self._order = JointOrder(robot)
-        self._send = self.messages.joint_sender(self._outgoing(values['legs']))
+        self._pace = Pace(CONTROL_PERIOD_NS)
+        self._records: dict[int, np.ndarray] = {}  # rows of the next block, by stamp
+        self._seen = dict.fromkeys(('forces', 'imu', 'joints'), 0)  # last stamps, ns
+        self._sent_ns = 0
+        self._send = self.messages.record_output(topics.SAMPLE, values['legs'])
+        self._send_odom = self._odometry()
         self._doubts = self.messages.output(topics.BODY_DOUBT)
         self._send_tf = self._transforms() if values['publish_tf'] else None
         if self._mapping:
@@ -151,7 +155,6 @@ class BodyEstimatorNode(Node):
         self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
         self._diagnostics_pace = Pace(1_000_000_000)
         self._reported: str | None = None
-        self._simulated: bool = self.get_parameter('use_sim_time').value
         self._since_ns, self._counted = self.messages.now_ns(), 0
         self._health_pace = Pace(TICK_PERIOD_NS)
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
@@ -210,27 +213,17 @@ class BodyEstimatorNode(Node):
                 return
             if readings.gyro is not None:
                 self._rate = readings.gyro
-            self.forces += len(readings.forces)
             readings.pass_to(self.stage)
 
         return callback
 
-    def _outgoing(self, legs: list[int]) -> list[Outgoing]:
-        """Return the messages of one estimate: those of each foot, then odom."""
-        velocity = (*STAMP, *topics.CONTACT_VELOCITY.schema.values)
-        odom = {FRAME: topics.ODOM.schema.frame}
-        outgoing: list[Outgoing] = []
-        for leg in legs:
-            outgoing += (
-                Outgoing(topics.WRENCH, (*STAMP, *_FORCE), leg),
-                Outgoing(topics.POSITION, (*STAMP, *topics.POSITION.schema.values), leg, odom),
-                Outgoing(topics.CONTACT_VELOCITY, velocity, leg),
-            )
+    def _odometry(self) -> Callable[..., None]:
+        """Return a function that publishes odom."""
         pose, twist = ([f'{part}.{place}' for place in _MATRIX] for part in ('pose', 'twist'))
         paths = [*STAMP, *topics.ODOM.schema.values, *pose]
         paths += [*(f'twist.{each}' for each in _TWIST), *twist]
-        child = {'child_frame_id': self._base}
-        return [*outgoing, Outgoing(topics.ODOM, paths, constants=child)]
+        constants = {'child_frame_id': self._base}
+        return self.messages.sender(topics.ODOM, paths, constants=constants)
 
     def _transforms(self) -> Callable[[int, BodyEstimate], None]:
         """Return a function that publishes the transform from odom to the base."""
@@ -255,25 +248,20 @@ class BodyEstimatorNode(Node):
         return send
 
     def _subscribe(self, legs: list[int]) -> None:
-        receive = self.messages.receive
-        for index, leg in enumerate(legs):
-            receive(
-                topics.FOOT_WRENCH, self._force_callback(index, leg), (FRAME, *STAMP, *_FORCE), leg
-            )
-        receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *_RATE, *_PULL))
-        receive(topics.JOINT_STATES, self._on_joints, ())
+        messages = self.messages
+        messages.receive_record(topics.FORCE, legs, self._on_forces)
+        messages.receive(topics.IMU, self._on_imu, (*STAMP, *_ABSENT, *_RATE, *_PULL))
+        messages.receive(topics.JOINT_STATES, self._on_joints)
 
-    def _force_callback(self, index: int, leg: int) -> Callable[..., None]:
-        def callback(frame: str, sec: int, nanosec: int, *force: float) -> None:
-            self.forces += 1
-            try:
-                check_frame(frame, leg)
-            except InvalidInput as error:
-                self.stage.reject(error)
-                return
-            self.stage.force(index, sec * 1_000_000_000 + nanosec, force)
-
-        return callback
+    def _on_forces(self, block: Block) -> None:
+        if self.messages.simulated:
+            self.messages.advance(block.last_ns)
+            self._tick(block.last_ns)
+        for stamp_ns, rows in zip(block.stamps.tolist(), block.rows['force'], strict=True):
+            for index, force in enumerate(rows):
+                if math.isfinite(force.sum()):
+                    self.stage.force(index, stamp_ns, force)
+        self._settle('forces', block.last_ns)
 
     def _on_imu(
         self, sec: int, nanosec: int, no_gyro: float, no_accelerometer: float, *values: float
@@ -286,8 +274,11 @@ class BodyEstimatorNode(Node):
                 error = f'{name}_covariance[0] = -1: the IMU does not measure {name}, but it must'
                 self.stage.reject(InvalidInput(error))
                 return
-        self._rate = np.array(values[:3])
-        self.stage.imu(sec * 1_000_000_000 + nanosec, values[:3], values[3:])
+        stamp_ns = sec * 1_000_000_000 + nanosec
+        if math.isfinite(sum(values)):
+            self._rate = np.array(values[:3])
+            self.stage.imu(stamp_ns, values[:3], values[3:])
+        self._settle('imu', stamp_ns)
 
     def _on_joints(self, message: JointState) -> None:
         try:
@@ -295,28 +286,44 @@ class BodyEstimatorNode(Node):
         except InvalidInput as error:
             self.stage.reject(error)
             return
-        stamp = message.header.stamp
-        self.stage.joints(stamp.sec * 1_000_000_000 + stamp.nanosec, *values)
+        stamp_ns = nanoseconds(message.header.stamp)
+        if math.isfinite(values[0].sum()):
+            self.stage.joints(stamp_ns, *values)
+        self._settle('joints', stamp_ns)
 
-    def _publish(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+    def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        """Publish an estimate of the body, and collect what it shows of the feet."""
         if self.stage.force_source != self._force_source:
             self._force_source = self.stage.force_source
             text = _SOURCES[self._force_source]
             self.get_logger().info(f'forces of the feet: {text}', throttle_duration_sec=1.0)
-        stamp = split(stamp_ns)
         estimate = estimate._replace(doubt=estimate.doubt or self._lasting)
-        values: list[float] = []
-        for foot in foot_readings(estimate):
-            values += (*stamp, *foot.force, *stamp, *foot.position)
-            values += (*stamp, *foot.velocity, foot.variance, foot.variance)
-        values += (*stamp, *estimate.position.tolist(), *estimate.orientation.tolist())
+        values = [*split(stamp_ns), *estimate.position.tolist(), *estimate.orientation.tolist()]
         values += estimate.covariance[:6, :6].ravel().tolist()
         rate = self._robot.imu[:3, :3] @ self._rate
         velocity, covariance = twist_of(estimate, rate, self._gyro_noise)
         values += (*velocity.tolist(), *covariance.ravel().tolist())
-        self._send(*values)
+        self._send_odom(*values)
         if self._send_tf:
             self._send_tf(stamp_ns, estimate)
+        self._collect(stamp_ns, sample_of(estimate))
+
+    def _settle(self, source: str, stamp_ns: int) -> None:
+        """Note how far a source has come. A simulated moment without an estimate has none."""
+        self._seen[source] = stamp_ns
+        moment_ns = min(self._seen.values())
+        if self.messages.simulated and moment_ns not in self._records:
+            self._collect(moment_ns, SAMPLE.rows(len(self._robot.legs)))
+
+    def _collect(self, stamp_ns: int, rows: np.ndarray) -> None:
+        """Publish what was collected, if the estimates of the feet are due at this moment."""
+        if stamp_ns <= self._sent_ns < stamp_ns + SET_BACK_NS:
+            return  # the moment has been sent without it
+        self._records[stamp_ns] = rows
+        if self._pace.due(stamp_ns):
+            stamps = sorted(self._records)
+            self._send(Block(np.array(stamps), np.array([self._records[n] for n in stamps])))
+            self._records, self._sent_ns = {}, stamp_ns
 
     def _publish_doubt(self, doubt: str) -> None:
         self._doubts(String(data=doubt or self._lasting))
@@ -332,7 +339,7 @@ class BodyEstimatorNode(Node):
         if self._diagnostics_pace.due(now_ns) or kind != self._reported:
             self._reported = kind
             array = DiagnosticArray(status=[self._status(), *self.messages.refusals.statuses()])
-            if not self._simulated:
+            if not self.messages.simulated:
                 array.status.append(self._rate_status(now_ns))
             set_stamp(array.header.stamp, now_ns)
             self._diagnostics(array)
@@ -364,7 +371,7 @@ class BodyEstimatorNode(Node):
         rate = (self.stage.samples - self._counted) / elapsed
         self._since_ns, self._counted = now_ns, self.stage.samples
         age = (now_ns - self.stage.last_ns) * 1e-9
-        return rate_status(self.get_name(), '', rate, age, OLDEST)
+        return rate_status(self.get_name(), rate, age, OLDEST)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run a whole trial on the real nodes, in one process, in lock-step with ``/clock``.
+"""Run a whole trial on the real nodes, in one process, in lock-step.
 
-The simulator takes its next step only when estimator, controller and regulator have processed the
-last one. rclpy's EventsExecutor is used: it delivers messages in the order in which they were
-published, several times faster than other executors. It is safe only because all nodes publish
-from one thread. The bag is recorded at the publishers.
+Messages alone keep the step: samples become estimates, commands and pressures, and the simulator
+goes on when the pressure record that answers its last samples has come. rclpy's EventsExecutor is
+used, which is several times faster than others; it is safe only because all nodes publish from one
+thread.
 """
 
 from __future__ import annotations
 
 import copy
 import gc
+import itertools
 import json
 import os
 import time
@@ -36,16 +37,12 @@ from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.messages import Hooks
-from ros_pad.nodes.messages import hook
-from ros_pad.nodes.messages import unhook
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import values_of
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
 from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import Pace
 from ros_pad.pace import Progress
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
@@ -122,9 +119,7 @@ class ComposedTrial:
         self.stopped = False
         self._context = context
         self.executor = EventsExecutor(context=context)
-        self._done: Callable[[], bool] | None = None  # what _spin waits for
         self._nodes: list[Node] = []
-        self._pace = Pace(CONTROL_PERIOD_NS)
         try:
             tuning = tuning or tuning_for(scene, sensing)
             self._add_nodes(policy, seed, bag, fidelity, sensing, tuning)
@@ -169,12 +164,11 @@ class ComposedTrial:
 
         about = label(scene, policy, seed, fidelity, sensing=sensing)
         self.recorder = self._add(
-            partial(RecorderNode, about, False),
+            partial(RecorderNode, about),
             use_sim_time=True,
             legs=legs,
             folder=os.fspath(bag),
         )
-        hook(self._context, Hooks(self.recorder.record, self._on_received))
         # The node gets the options of the scene, not its name, because the scene in memory may
         # differ from its file.
         options = {
@@ -243,66 +237,42 @@ class ComposedTrial:
                 return False
         return True
 
-    def step(self) -> None:
-        """Advance by one sample, and wait until the nodes have processed it.
+    def _lock_step(self, step: Callable[[], bool], what: str) -> None:
+        """Call a function, and again whenever its step was answered, until there is no answer.
+
+        It returns whether its step will be answered.
 
         Raises
         ------
         PadError
-            When that takes more than ``PATIENCE``.
+            When an answer takes more than ``PATIENCE``.
         """
-        answered, emissions = self.regulator.answered, self.estimator.emissions
-        self.simulator.step()
-        now_ns = self.simulator.time_ns
-        legs = len(self.scene.legs)
-        samples = now_ns // self.simulator.period_ns * legs
-        control = self._pace.due(now_ns)
-        estimator, body = self.estimator, self.body_estimator
+        self._failure: BaseException | None = None
+        done, answers = Future(), itertools.count()
 
-        def settled() -> bool:
-            # The cheapest condition comes first, because it is evaluated after every message.
-            if body is None:
-                if estimator.samples < samples:
-                    return False
-            elif body.forces < samples or estimator.samples < body.stage.samples * legs:
-                return False  # where IMU or joints are silent, there are no samples
-            due = estimator.emissions - emissions
-            return self.regulator.answered == answered + due and (
-                not control or self._reported(now_ns)
-            )
+        def go_on() -> None:
+            next(answers)
+            try:
+                if step():
+                    return
+            except BaseException as error:  # the executor would end with a traceback
+                self._failure = error
+            done.set_result(None)
 
-        self._spin(settled, f'all nodes to process the sample of {now_ns * 1e-9:.3f} s')
-        if control and self.scene.faults:
-            # Messages carry measured pressures; the simulated robot needs the true ones.
-            self.simulator.pressures[:] = [
-                channel.regulator.pad_pressure for channel in self.regulator.channels.values()
-            ]
-
-    def _reported(self, now_ns: int) -> bool:
-        """Return whether each device has reported its present pressure, or failed to answer."""
-        return all(
-            now_ns in (stamp, channel.unread_ns)
-            for stamp, channel in zip(
-                self.simulator.pressure_stamps, self.regulator.channels.values(), strict=True
-            )
-        )
-
-    def _spin(self, done: Callable[[], bool], what: str) -> None:
-        """Run the nodes until a condition is true, which messages make true."""
-        if done():
-            return
-        self._done, self._future = done, Future()
-        self.executor.spin_until_future_complete(self._future, timeout_sec=PATIENCE)
-        self._done = None
-        if not self._future.done():
-            raise PadError(
-                f'waited more than {PATIENCE:g} s of wall time for {what}: pad doctor checks ROS 2'
-            )
-
-    def _on_received(self) -> None:
-        if self._done and self._done():
-            self._done = None
-            self._future.set_result(None)
+        self.simulator.answered = go_on
+        go_on()
+        seen = 0
+        while not done.done():
+            self.executor.spin_until_future_complete(done, timeout_sec=PATIENCE)
+            before, seen = seen, next(answers)
+            if not done.done() and seen == before + 1:
+                raise PadError(
+                    f'waited more than {PATIENCE:g} s of wall time for {what} at'
+                    f' {self.simulator.time_ns * 1e-9:.3f} s: pad doctor checks ROS 2'
+                )
+        self.simulator.answered = lambda: None
+        if self._failure:
+            raise self._failure
 
     def walk(self, progress: Progress | None = None) -> None:
         """Walk the scene to its end, to a verdict or until ``stopped`` is set; then vent the pads.
@@ -310,21 +280,25 @@ class ComposedTrial:
         Parameters
         ----------
         progress : callable, optional
-            Called every 25 samples with the simulated time, s.
+            Called with the simulated time, s.
 
         Raises
         ------
         PadError
-            When the nodes do not process a sample within ``PATIENCE``, or the pads do not vent.
+            When the nodes do not answer within ``PATIENCE``, or the pads do not vent.
         """
-        samples = round(self.scene.duration * 1e9) // self.simulator.period_ns
+        simulator = self.simulator
+        end_ns = round(self.scene.duration * 1e9) // simulator.period_ns * simulator.period_ns
+
+        def step() -> bool:
+            if simulator.time_ns >= end_ns or simulator.robot.verdict or self.stopped:
+                return False
+            if progress:
+                progress(simulator.robot.time)
+            return simulator.step(end_ns)
+
         try:
-            for sample in range(samples):
-                self.step()
-                if progress and sample % 25 == 0:
-                    progress(self.simulator.robot.time)
-                if self.simulator.robot.verdict or self.stopped:
-                    break
+            self._lock_step(step, 'the pressures that answer the samples')
             # While the pads vent, the controller receives no samples and would report faults.
             self.walked = copy.deepcopy(self.controller.controller)
         except BaseException:
@@ -337,13 +311,18 @@ class ComposedTrial:
         """Deactivate the regulator node, and advance time until the pads are flat."""
         self.regulator.trigger_deactivate()
         simulator, channels = self.simulator, self.regulator.channels.values()
-        for _ in range(round(_VENTING * 1e9) // simulator.period_ns):
-            simulator.tick()
-            if self._pace.due(simulator.time_ns):
-                self._spin(lambda: self._reported(simulator.time_ns), 'pressures of venting pads')
-                if all(channel.pressure < DOME_PRESSURE for channel in channels):
-                    return
-        if not self.scene.faults:  # a fault may keep a pad from venting
+        samples = max(1, CONTROL_PERIOD_NS // simulator.period_ns)
+        end_ns = simulator.time_ns + round(_VENTING * 1e9)
+
+        def step() -> bool:
+            flat = all(channel.pressure < DOME_PRESSURE for channel in channels)
+            if flat or simulator.time_ns >= end_ns:
+                return False
+            simulator.tick(samples)
+            return True
+
+        self._lock_step(step, 'pressures of venting pads')
+        if simulator.time_ns >= end_ns and not self.scene.faults:  # a fault may keep one filled
             raise PadError(
                 f'at least one pad is not vented (below {DOME_PRESSURE:g} Pa gauge) {_VENTING:g} s'
                 ' of simulated time after the command'
@@ -358,7 +337,6 @@ class ComposedTrial:
             for node in self._nodes:
                 self.executor.remove_node(node)
                 node.destroy_node()
-            unhook(self._context)
             self.executor.shutdown()
 
 
@@ -445,7 +423,11 @@ def run(
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    controller, stopped, shared = trial.walked, trial.stopped, trial.estimator.shared
+    controller, stopped, shared = (
+        trial.walked,
+        trial.stopped,
+        trial.estimator.stage.estimator.shared,
+    )
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()

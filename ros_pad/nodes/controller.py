@@ -22,9 +22,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
-from std_msgs.msg import String
 
-from ros_pad.bags.topics import STAMP
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.control import POLICIES
 from ros_pad.control import MorphologyController
@@ -36,14 +34,12 @@ from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
 from ros_pad.control.policies import IsWet
 from ros_pad.control.policies import Policy
-from ros_pad.control.stage import Decision
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.nodes import topics
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
 from ros_pad.nodes.parameters import LEGS
@@ -52,9 +48,9 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
-from ros_pad.nodes.stamps import split
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
+from ros_pad.records import Block
 from ros_pad.simulation.scene import Scene
 
 
@@ -67,7 +63,6 @@ PARAMETERS = (
     LEGS,
     FOOT,
     EXPECTED_LOAD,
-    AMBIENT_PRESSURE,
     Parameter('policy', 'adaptive', 'Policy that decides the morphology.', choices=POLICIES),
     *(
         Parameter(**vars(setting), live=True, change=lambda node, _: node.update_policy())
@@ -108,51 +103,6 @@ def _check_policy(values: Mapping[str, Any]) -> None:
         policy_of(values)
 
 
-class _LegTopics:
-    """Connect the topics of one leg to its decision stage."""
-
-    def __init__(self, node: ControllerNode, leg: int) -> None:
-        self._node, self.leg = node, leg
-        self.stage = DecisionStage(node.controller, leg, self._warn)
-        self._setpoint = node.messages.sender(
-            topics.PRESSURE_SETPOINT, (*STAMP, 'fluid_pressure'), leg
-        )
-        self._morphologies = node.messages.output(topics.MORPHOLOGY, leg)
-        inputs: tuple[tuple[topics.Topic, Callable[..., None], tuple[str, ...]], ...] = (
-            (topics.CONTACT_LOAD, self.stage.load, ('data',)),
-            (topics.CONTACT_POSITION, self.stage.position, ('point.x', 'point.y')),
-            (topics.PRESSURE, self._on_pressure, ('fluid_pressure',)),
-            (topics.FRICTION, self.stage.friction, ('data',)),
-            (topics.DOUBT, self.stage.doubt, ('data',)),
-            (topics.WETNESS, self._on_wetness, ('data',)),
-        )
-        for topic, callback, paths in inputs:
-            node.messages.receive(topic, callback, paths, leg)
-
-    def _on_pressure(self, pressure: float) -> None:
-        self.stage.pressure(pressure - self._node.ambient)
-
-    def _on_wetness(self, wet_probability: float) -> None:
-        now_ns = self._node.messages.now_ns()
-        decision = self.stage.estimate(now_ns * 1e-9, wet_probability)
-        refusal = self._node.controller.refusals.get(self.leg)
-        if refusal:
-            self._node.get_logger().warning(
-                f'leg {self.leg} stays flat: {refusal}', throttle_duration_sec=10.0
-            )
-        self.publish(decision, now_ns)
-
-    def _warn(self, error: InvalidInput) -> None:
-        self._node.get_logger().warning(f'estimate ignored: {error}', throttle_duration_sec=1.0)
-
-    def publish(self, decision: Decision, now_ns: int) -> None:
-        """Publish the morphology if it has changed, and the set-point if there is one."""
-        if decision.morphology is not None:
-            self._morphologies(String(data=decision.morphology))
-        if decision.setpoint is not None:
-            self._setpoint(*split(now_ns), decision.setpoint + self._node.ambient)
-
-
 class ControllerNode(Node):
     """Choose the morphology of a foot at each lift-off; publish a set-point with every estimate.
 
@@ -164,8 +114,7 @@ class ControllerNode(Node):
     ----------
     controller : MorphologyController
         Controller of all legs.
-    ambient : float
-        Ambient pressure, absolute Pa.
+    stage : DecisionStage
     messages : Messages
         Publishers and subscriptions.
 
@@ -206,13 +155,16 @@ class ControllerNode(Node):
             raise ConfigError(
                 f'node {self.get_name()}: {error} (parameter dome_pressure)'
             ) from error
-        self.ambient: float = values['ambient_pressure']
-        self.messages = Messages(self)
-        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
+        self._legs: list[int] = legs
+        self.stage = DecisionStage(self.controller, legs, self._warn)
+        self.messages = messages = Messages(self)
+        self._send = messages.record_output(topics.COMMAND, legs)
+        messages.receive_record(topics.ESTIMATE, legs, self._on_estimate)
+        messages.receive_record(topics.PRESSURE, legs, self.stage.pressure)
+        self._diagnostics = messages.output(topics.DIAGNOSTICS)
         self._reported_faults: list[str] = []
         self._tick_pace = Pace(TICK_PERIOD_NS)
         self._diagnostics_pace = Pace(1_000_000_000)
-        self._legs = [_LegTopics(self, leg) for leg in legs]
         regulator = f'{self.get_namespace().rstrip("/")}/regulator'
         self.create_subscription(
             ParameterEvent,
@@ -224,7 +176,7 @@ class ControllerNode(Node):
         self._regulator = None
         with suppress(RuntimeError):
             self._regulator = self.create_client(GetParameters, f'{regulator}/get_parameters')
-        self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def update_policy(self) -> None:
         """Decide with the present parameters from the next lift-off on."""
@@ -260,16 +212,30 @@ class ControllerNode(Node):
         self._regulator.call_async(request).add_done_callback(take)
         self._regulator = None
 
+    def _on_estimate(self, block: Block) -> None:
+        if self.messages.simulated:
+            self.messages.advance(block.last_ns)
+            self._tick(block.last_ns)
+        self._send(self.stage.decide(block))
+        for leg, refusal in self.controller.refusals.items():
+            self.get_logger().warning(
+                f'leg {leg} stays flat: {refusal}', throttle_duration_sec=10.0
+            )
+
+    def _warn(self, leg: int, error: InvalidInput) -> None:
+        self.get_logger().warning(
+            f'leg {leg}: estimate ignored: {error}', throttle_duration_sec=1.0
+        )
+
     def _tick(self, now_ns: int) -> None:
         """Observe legs without estimates, and publish diagnostics."""
         if not self._tick_pace.due(now_ns):
             return
         self._ask_for_timeout()
-        for each in self._legs:
-            decision = each.stage.tick(now_ns * 1e-9)
-            if decision:
-                each.publish(decision, now_ns)
-        faults = [self.controller.fault(each.leg) for each in self._legs]
+        command = self.stage.tick(now_ns)
+        if command:
+            self._send(command)
+        faults = [self.controller.fault(leg) for leg in self._legs]
         if self._diagnostics_pace.due(now_ns) or faults != self._reported_faults:
             self._reported_faults = faults
             self._diagnose(now_ns)
@@ -278,7 +244,7 @@ class ControllerNode(Node):
         array = DiagnosticArray()
         set_stamp(array.header.stamp, now_ns)
         controller = self.controller
-        for leg in (each.leg for each in self._legs):
+        for leg in self._legs:
             morphology, monitor = controller.morphology(leg), controller.monitor(leg)
             fault, remark = controller.fault(leg), controller.remark(leg)
             status = DiagnosticStatus(

@@ -13,7 +13,6 @@ import operator
 import time
 from collections import Counter
 from collections.abc import Callable
-from collections.abc import Sequence
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -30,7 +29,6 @@ class _Source:
 
     subscription: Subscription
     last: int | None = None
-    batches: Sequence[str] = ()  # topics on which the same messages come in batches
 
 
 class Intake:
@@ -62,7 +60,6 @@ class Intake:
         name: str,
         message: type,
         profile: Callable[[list[QoSProfile]], QoSProfile],
-        batches: Sequence[str] = (),
     ) -> None:
         """Subscribe to a topic.
 
@@ -75,12 +72,8 @@ class Intake:
         profile : callable
             Returns the QoS to request from the QoS that publishers are known to offer. It is
             called again when a publisher offers less.
-        batches : sequence of str
-            Full names of the topics on which the same messages may come in batches. While one has
-            a publisher, no loss is counted here.
         """
         self._subscribe(name, message, profile([]), profile)
-        self._sources[name].batches = batches
 
     def _subscribe(
         self,
@@ -101,8 +94,7 @@ class Intake:
             message, name, _unused, requested, raw=True,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=adapt),
         )  # fmt: skip
-        before = self._sources.get(name)
-        self._sources[name] = _Source(subscription, batches=before.batches if before else ())
+        self._sources[name] = _Source(subscription)
 
     def take(self, write: Callable[[str, bytes, int], None]) -> None:
         """Hand over topic, bytes and time of receipt, ns, of all messages, in order of receipt."""
@@ -130,8 +122,6 @@ class Intake:
         """Count the messages that are missing before the one with this number."""
         last, source.last = source.last, number
         if number is None or last is None or number <= last + 1:
-            return
-        if any(map(self._node.count_publishers, source.batches)):
             return
         # Each publisher has numbers of its own.
         if self._node.count_publishers(name) == 1:

@@ -20,11 +20,14 @@ SENSOR = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SENSOR_PUBLISH = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Publish measurements and estimates: reliable and best-effort subscribers both match."""
 
+RECORDS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Subscribe to records: a node that pauses for some tenths of a second loses none."""
+
 COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 """Publish set-points, or subscribe to them: only the newest is kept, and it must arrive."""
 
 COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-"""Batches of set-points: a batch may lack the legs of the one before it."""
+"""Commands: one may lack the legs of the one before it."""
 
 STATE = QoSProfile(
     depth=1,

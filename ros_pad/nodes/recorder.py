@@ -6,12 +6,13 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import json
+import struct
 import sys
 import time
 from collections.abc import Callable
-from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -34,16 +35,14 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from ros_pad.bags import BagWriter
-from ros_pad.bags.fields import FieldReader
+from ros_pad.bags.wire import Wire
 from ros_pad.bags.writer import FLUSH_PERIOD
 from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
-from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.messages import Once
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
@@ -67,6 +66,10 @@ PARAMETERS = (
 )
 
 
+_Write = Callable[[bytes, int], None]
+
+_STAMPS = [struct.Struct(order + '4xiI') for order in '><']  # by the byte order of a message
+
 INTAKE_PERIOD = 0.1
 """Time after which received messages are written, s; the middleware keeps them until then."""
 
@@ -89,11 +92,9 @@ class _Peer:
 class RecorderNode(Node):
     """Write every topic of `ros_pad.nodes.topics`, latched ones too, into a new bag.
 
-    Messages are written without decoding, so that tens of thousands a second can be recorded.
-    Their log time is the node's clock: with ``use_sim_time`` the time in the last ``/clock``
-    message, and 0 before the first one; otherwise, the time of receipt.
-
-    Composed nodes are recorded at the publisher: they pass their messages to :meth:`record`.
+    Messages are written without decoding, so that tens of thousands a second can be recorded; of
+    a block of records each is written alone. Their log time is the time of receipt; with
+    ``use_sim_time`` it is their stamp, and without one the time in the last ``/clock`` message.
 
     Messages reach the disk within about a second. Messages that were lost before they arrived are
     counted; the node reports the counts on ``/diagnostics``, and writes them into the bag under
@@ -107,8 +108,6 @@ class RecorderNode(Node):
         Texts about the trial, for the bag. Without it, the bag has the versions of ros_pad and its
         libraries, the parameters of all nodes in the namespace of this one, requested as the
         nodes appear, and later changes of these parameters.
-    subscribes : bool
-        Whether the node subscribes to the topics; False where others call :meth:`record`.
     **kwargs
         Passed on to `rclpy.node.Node`.
 
@@ -124,7 +123,6 @@ class RecorderNode(Node):
     def __init__(
         self,
         custom_data: Mapping[str, str] | None = None,
-        subscribes: bool = True,
         **kwargs: Any,
     ) -> None:
         super().__init__('recorder', **kwargs)
@@ -134,12 +132,8 @@ class RecorderNode(Node):
             recorded = topics.names(values['legs'])
             self._reliable: bool = values['reliable']
             self._simulated = self.get_parameter('use_sim_time').value
-            # Called for every message; replaced when the first /clock message arrives.
-            self._now: Callable[[], int] = self._before_clock if self._simulated else self._receipt
-            self._received_ns = 0  # of the message that is being written
             self._clock_ns = 0
             about = dict(custom_data or {label.MADE_WITH: json.dumps(label.made_with())})
-            about[label.RECORDED_AT] = 'receiver' if subscribes else 'publisher'
             self._bag = BagWriter(folder, about)
         except BaseException:
             super().destroy_node()
@@ -149,31 +143,18 @@ class RecorderNode(Node):
         messages = Messages(self)
         self._diagnostics, self._refusals = messages.output(topics.DIAGNOSTICS), messages.refusals
         self._failed = False  # whether writing has failed
-        self._writers: dict[str, Callable[[bytes], None]] = {}
-        self._once: dict[str, list[Once]] = {}  # by full name of a topic that batches have
+        self._writers: dict[str, _Write] = {}  # by full name of the topic
         for name, topic in recorded.items():
             full_name = self.resolve_topic_name(name)
             self._bag.add_topic(full_name, topic.type_name, qos.offered_profiles(topic.publish))
-            writer = self._clock_writer if topic is topics.CLOCK else self._writer
-            self._writers[full_name] = writer(full_name)
-            if subscribes:
-                batches = [
-                    self.resolve_topic_name(topics.BATCHES[source].name())
-                    for source in topic.sources
-                ]
-                profile = partial(self._profile, topic)
-                self._intake.add(full_name, topic.message, profile, batches)
-        if subscribes:
-            for source, topic in topics.BATCHES.items():
-                names = [n for n, each in recorded.items() if source in each.sources]
-                self._receive_batches(topic, list(map(self.resolve_topic_name, names)))
+            self._writers[full_name] = self._writer(full_name, topic, values['legs'])
+            self._intake.add(full_name, topic.message, partial(self._profile, topic))
         self._peers: dict[str, _Peer] = {}
         self._node_parameters: dict[str, dict[str, Any]] = {}  # by full name of the node
         # In wall time, independent of the clock of the trial.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(FLUSH_PERIOD, self._look, clock=steady)
-        if subscribes:
-            self.create_timer(INTAKE_PERIOD, self._take, clock=steady)
+        self.create_timer(INTAKE_PERIOD, self._take, clock=steady)
         self._collects_parameters = custom_data is None
         self._changes: list[tuple[int, str, str, Any]] = []
         if self._collects_parameters:
@@ -199,25 +180,13 @@ class RecorderNode(Node):
         return (each for each in super().subscriptions if each not in recorded)
 
     def _take(self) -> None:
-        self._intake.take(self._write_received)
-        self._received_ns = 0
-
-    def _write_received(self, name: str, data: bytes, received_ns: int) -> None:
-        self._received_ns = received_ns
-        if all(once.is_new(name, data) for once in self._once.get(name, ())):
-            self._writers[name](data)
-
-    def record(self, name: str, data: bytes) -> None:
-        """Write a message, as bytes, on the topic with this full name.
-
-        Raises
-        ------
-        BagError
-            When the disk is full; later messages are ignored.
-        KeyError
-            When the topic is not recorded.
-        """
-        self._writers[name](data)
+        try:
+            self._intake.take(lambda name, data, at_ns: self._writers[name](data, at_ns))
+        except BagError:
+            # Raise once only: later messages fail because the bag is closed.
+            if not self._failed:
+                self._failed = True
+                raise
 
     def describe(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data about the trial to the bag."""
@@ -364,75 +333,52 @@ class RecorderNode(Node):
         """Record changed parameters of the nodes whose parameters are in the bag."""
         if event.node not in self._node_parameters:
             return
-        now_ns = self._now()
+        now_ns = self._clock_ns if self._simulated else time.time_ns()
         for each in event.changed_parameters:
             with suppress(RuntimeError):  # skip a parameter of a type that ROS does not have
                 value = plain(parameter_value_to_python(each.value))
                 self._changes.append((now_ns, event.node, each.name, value))
         self._bag.describe({label.CHANGES: json.dumps(self._changes)})
 
-    def _receive_batches(self, topic: topics.Topic, names: Collection[str]) -> None:
-        """Write the messages of these topics in the batches of a topic."""
-        name, read, once = self.resolve_topic_name(topic.name()), BatchReader(), Once()
-        for each in names:
-            self._once.setdefault(each, []).append(once)
-        writers = {each: self._writers[each] for each in names}
-
-        def write(batch: bytes) -> None:
-            try:
-                messages = read(batch)
-            except BadMessage as error:
-                self._refusals(name, error)
-                return
-            for each, data in once.of_batch([each for each in messages if each[0] in writers]):
-                writers[each](data)
-
-        self._writers[name] = write
-        self._intake.add(name, topic.message, partial(self._profile, topic))
-
-    def _writer(self, name: str) -> Callable[[bytes], None]:
+    def _writer(self, name: str, topic: topics.Topic, legs: Sequence[int]) -> _Write:
+        """Return a function that writes a message: its bytes, and time of receipt, ns."""
         write = self._bag.write
+        if topic is topics.CLOCK:
+            return partial(self._write_clock, name)
+        if topic.schema.record and not topic.schema.columns:
+            return partial(self._write_records, name, Wire(topic.schema.record, legs).split)
+        if not self._simulated:
+            return lambda data, at_ns: write(name, data, at_ns)
+        if not topic.schema.frame:
+            return lambda data, _: write(name, data, self._clock_ns)
+        return lambda data, _: write(name, data, _stamp_of(data))
 
-        def callback(data: bytes) -> None:
-            try:
-                write(name, data, self._now())
-            except BagError:
-                # Raise once only: later messages fail because the bag is closed.
-                if not self._failed:
-                    self._failed = True
-                    raise
+    def _write_clock(self, name: str, data: bytes, at_ns: int) -> None:
+        if self._simulated:
+            at_ns = self._clock_ns = max(0, _stamp_of(data))  # a bag has no times before 0
+        self._bag.write(name, data, at_ns)
 
-        return callback
+    def _write_records(
+        self, name: str, split: Callable[[bytes], list[tuple[int, bytes]]], data: bytes, at_ns: int
+    ) -> None:
+        try:
+            records = split(data)
+        except BadMessage as error:
+            self._refusals(name, error)
+            records = [(at_ns, data)]  # it is kept all the same
+        last_ns = records[-1][0]
+        for stamp_ns, record in records:
+            time_ns = stamp_ns if self._simulated else at_ns - (last_ns - stamp_ns)
+            self._bag.write(name, record, max(0, time_ns))
 
-    def _clock_writer(self, name: str) -> Callable[[bytes], None]:
-        write = self._writer(name)
-        read = FieldReader(topics.CLOCK.message_type, topics.CLOCK.schema.values)
 
-        def callback(data: bytes) -> None:
-            with suppress(BadMessage):
-                seconds, fraction = read(data)
-                # A bag cannot have times before 0.
-                if seconds >= 0:
-                    self._clock_ns = seconds * 1_000_000_000 + fraction
-                    if self._simulated:
-                        self._now = self._simulated_time
-            write(data)
-
-        return callback
-
-    def _receipt(self) -> int:
-        return self._received_ns or time.time_ns()
-
-    def _simulated_time(self) -> int:
-        return self._clock_ns
-
-    def _before_clock(self) -> int:
-        self.get_logger().warning(
-            'use_sim_time is true and no /clock message has arrived: messages get the log time 0'
-            ' until one arrives',
-            once=True,
-        )
+def _stamp_of(data: bytes) -> int:
+    """Return the time, ns, with which a message in plain CDR begins; 0 before 1970."""
+    try:
+        seconds, rest = _STAMPS[data[1] & 1].unpack_from(data)
+    except (IndexError, struct.error):
         return 0
+    return int(max(0, seconds * 1_000_000_000 + rest))
 
 
 def main(args: list[str] | None = None) -> int:

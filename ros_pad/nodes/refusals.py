@@ -12,13 +12,13 @@ from rclpy.node import Node
 from ros_pad.pace import LATE
 
 
-def rate_status(name: str, of: str, rate: float, age: float, oldest: float) -> DiagnosticStatus:
+def rate_status(name: str, rate: float, age: float, oldest: float) -> DiagnosticStatus:
     """Return rate and age of the samples of a node for ``/diagnostics``.
 
     Parameters
     ----------
-    name, of : str
-        Name of the node, and what has these samples; empty for the node itself.
+    name : str
+        Name of the node.
     rate, age, oldest : float
         Samples a second, Hz; age of the last one, s, and from which on it is late, s.
     """
@@ -29,7 +29,7 @@ def rate_status(name: str, of: str, rate: float, age: float, oldest: float) -> D
         level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
         message=f'{LATE}, or clocks differ: {text}' if late else text,
         values=[
-            KeyValue(key=f'samples a second{of} (Hz)', value=f'{rate:.1f}'),
+            KeyValue(key='samples a second (Hz)', value=f'{rate:.1f}'),
             KeyValue(key='age of the last sample (s)', value=f'{age:.3f}'),
         ],
     )

@@ -7,7 +7,6 @@ import sys
 import time
 from array import array
 from dataclasses import fields
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -20,18 +19,13 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
-from ros_pad.bags.topics import FRAME
-from ros_pad.bags.topics import STAMP
 from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.errors import ConfigError
-from ros_pad.errors import PadError
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes import topics
-from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import FOOT
 from ros_pad.nodes.parameters import LEGS
@@ -39,11 +33,12 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
-from ros_pad.nodes.stamps import split
 from ros_pad.pace import Pace
+from ros_pad.records import Block
 from ros_pad.regulators import BACKENDS
 from ros_pad.regulators import create
 from ros_pad.regulators.protocol import CEILING
+from ros_pad.regulators.supervision import Supervision
 from ros_pad.regulators.supervisor import CEILING_TOLERANCE
 from ros_pad.regulators.supervisor import ON_FAULT
 from ros_pad.regulators.supervisor import SLEW_LIMIT
@@ -65,7 +60,6 @@ def _supervision(setting: Setting) -> Parameter:
 PARAMETERS = (
     LEGS,
     FOOT,
-    AMBIENT_PRESSURE,
     Parameter('backend', 'simulated', 'Kind of regulator.', choices=tuple(BACKENDS)),
     Parameter(
         'scene', '',
@@ -98,16 +92,17 @@ class RegulatorNode(LifecycleNode):
     """Serve one regulator for each leg, as a lifecycle node; see :data:`PARAMETERS`.
 
     *configure* opens the devices and vents them, *activate* accepts set-points, *deactivate*
-    vents the pads, *cleanup* closes the devices. Set-points whose frame names another leg are
-    refused; these and others that :class:`~ros_pad.regulators.supervisor.SupervisedChannel`
-    refuses are reported on ``/diagnostics``. The service ``~/vent`` deactivates the node: the pads
-    stay vented until the node is activated again. Options of the backend are parameters
-    ``backend_options.*``.
+    vents the pads, *cleanup* closes the devices. Set-points that
+    :class:`~ros_pad.regulators.supervisor.SupervisedChannel` refuses are reported on
+    ``/diagnostics``. The service ``~/vent`` deactivates the node: the pads stay vented until the
+    node is activated again. Options of the backend are parameters ``backend_options.*``.
 
     Attributes
     ----------
     channels : dict
         The :class:`SupervisedChannel` of each leg; empty while the devices are closed.
+    supervision : Supervision
+        All of them.
     tick_ns : int
         Time of the last tick, ns, on the clock of the stamps.
     messages : Messages
@@ -131,27 +126,21 @@ class RegulatorNode(LifecycleNode):
         self._foot: Foot = self._values['foot']
         self._simulated_time: bool = self.get_parameter('use_sim_time').value
         self._check_parameters()
-        self._ambient = self._values['ambient_pressure']
+        self.supervision = Supervision(())
         self._pace = Pace(round(1e9 / self._values['publish_rate']))
         self._diagnostics_pace = Pace(1_000_000_000)
         self._check_pace = Pace(_CHECK_PERIOD_NS)
         self._problems: list[str] = []  # problems in the last message on /diagnostics
-        self._mismatches: dict[int, str] = {}  # warning of a mismatch of QoS, by leg
+        self._mismatch = ''  # warning of a mismatch of QoS
         self.tick_ns = 0
         self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why the last configuration failed
         self.messages = Messages(self)
         self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
-        paths = (*STAMP, 'fluid_pressure')
-        self._pressures = {
-            leg: self.messages.sender(topics.PRESSURE, paths, leg) for leg in self._values['legs']
-        }
-        for leg in self._values['legs']:
-            self.messages.receive(
-                topics.PRESSURE_SETPOINT, partial(self._on_setpoint, leg), (FRAME, *paths), leg,
-                on_mismatch=partial(self._mismatches.__setitem__, leg),
-            )  # fmt: skip
+        legs = self._values['legs']
+        self._send = self.messages.record_output(topics.PRESSURE, legs)
+        self.messages.receive_record(topics.COMMAND, legs, self._on_command, self._mismatched)
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
         self.messages.on_tick(min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick)
@@ -198,11 +187,6 @@ class RegulatorNode(LifecycleNode):
             channel.settings = settings
 
     @property
-    def answered(self) -> int:
-        """Number of set-points accepted or refused so far."""
-        return sum(each.accepted + each.refused for each in self.channels.values())
-
-    @property
     def active(self) -> bool:
         """Whether set-points are accepted."""
         return any(each.active for each in self.channels.values())
@@ -224,6 +208,7 @@ class RegulatorNode(LifecycleNode):
                 channel = SupervisedChannel(leg, regulator, settings, self.get_logger())
                 channel.open()
                 self.channels[leg] = channel
+            self.supervision = Supervision(tuple(self.channels.values()))
         except Exception as error:  # rclpy would discard it without a message
             self._close('the configuration failed')
             error.args = (f'node {self.get_name()}: {error}',)
@@ -267,12 +252,14 @@ class RegulatorNode(LifecycleNode):
         """Accept set-points from now on, also for pads that were held."""
         for channel in self.channels.values():
             channel.activate(self._elapsed(self.tick_ns))
+        self.messages.follows_clock = False
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Vent every pad and accept no more set-points."""
         for channel in self.channels.values():
             channel.deactivate('the node was deactivated')
+        self.messages.follows_clock = True  # without commands there are no moments but those of it
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -306,6 +293,7 @@ class RegulatorNode(LifecycleNode):
         for channel in self.channels.values():
             channel.close(reason)
         self.channels.clear()
+        self.supervision = Supervision(())
 
     # --- messages and time ---------------------------------------------------------------------
 
@@ -328,25 +316,22 @@ class RegulatorNode(LifecycleNode):
             )
         return response
 
-    def _on_setpoint(self, leg: int, frame: str, sec: int, nanosec: int, pressure: float) -> None:
-        channel = self.channels.get(leg)
-        if channel is None or not channel.active:
-            return
+    def _mismatched(self, warning: str) -> None:
+        self._mismatch = warning
+
+    def _on_command(self, block: Block) -> None:
         now_ns = self.messages.now_ns()
-        elapsed_ns = self._elapsed(now_ns)
-        # Many set-points of one leg may delay the tick that vents the pad of another leg.
-        for each in self.channels.values():
-            each.expire(elapsed_ns)
-        try:
-            check_frame(frame, leg)
-        except PadError as error:
-            channel.refuse(error)
+        if not self.messages.simulated or self.messages.follows_clock:
+            self.supervision.command(block, now_ns, self._elapsed(now_ns))
             return
-        # Adding and subtracting the ambient pressure leaves rounding errors below 1 uPa.
-        gauge = round(pressure - self._ambient, 6)
-        age = (now_ns - sec * 1_000_000_000 - nanosec) * 1e-9
-        if channel.command(gauge, age, elapsed_ns):
-            self._mismatches.pop(leg, None)
+        # The record may come before the message of /clock of its moment.
+        now_ns = max(now_ns, block.last_ns)
+        self.messages.advance(block.last_ns)
+        self._supervise(now_ns)
+        if self.channels:
+            answer = self.supervision.read(block.last_ns, now_ns)
+            self.supervision.command(block, now_ns, now_ns)
+            self._send(answer)  # who waits for it finds the command carried out
 
     def _last_tick(self) -> float:
         """Return the time of the last tick, s; this is the clock of simulated regulators."""
@@ -357,19 +342,16 @@ class RegulatorNode(LifecycleNode):
         return now_ns if self._simulated_time else time.monotonic_ns()
 
     def _tick(self, now_ns: int) -> None:
+        self._supervise(now_ns)
+        if self._pace.due(now_ns) and self.channels:
+            self._send(self.supervision.read(now_ns, self._elapsed_ns))
+
+    def _supervise(self, now_ns: int) -> None:
+        """Vent pads without commands, and report on ``/diagnostics``."""
         self.tick_ns, self._elapsed_ns = now_ns, self._elapsed(now_ns)
-        for channel in self.channels.values():
-            channel.tick(self._elapsed_ns)
-        if self._pace.due(now_ns):
-            for channel in self.channels.values():
-                self._publish(channel, now_ns)
+        self.supervision.tick(self._elapsed_ns)
         if self._check_pace.due(now_ns):
             self._diagnose(now_ns)
-
-    def _publish(self, channel: SupervisedChannel, now_ns: int) -> None:
-        pressure = channel.read(self._elapsed_ns)
-        if pressure is not None:
-            self._pressures[channel.leg](*split(now_ns), pressure + self._ambient)
 
     def _diagnose(self, now_ns: int) -> None:
         """Publish the health of the pads once a second, and at once when a problem changes."""
@@ -396,9 +378,9 @@ class RegulatorNode(LifecycleNode):
 
     def _health(self, channel: SupervisedChannel) -> Health:
         """Return the health of a channel; without set-points it names a mismatch of QoS."""
-        health, mismatch = channel.health(), self._mismatches.get(channel.leg)
-        if mismatch and health.level == Level.STALE:
-            return health._replace(message=f'{health.message}; {mismatch}')
+        health = channel.health()
+        if self._mismatch and health.level == Level.STALE:
+            return health._replace(message=f'{health.message}; {self._mismatch}')
         return health
 
     def _status(self, name: str, part: str, health: Health) -> DiagnosticStatus:

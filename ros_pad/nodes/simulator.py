@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -25,8 +26,6 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.messages import Outgoing
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
 from ros_pad.nodes.parameters import SCENE
 from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
@@ -34,10 +33,13 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
+from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import LATE
 from ros_pad.pace import Pace
 from ros_pad.pace import Rate
 from ros_pad.pace import RealTime
+from ros_pad.records import SAMPLE
+from ros_pad.records import Block
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
@@ -76,7 +78,6 @@ PARAMETERS = (
         0.0,
         60.0,
     ),
-    AMBIENT_PRESSURE,
 )
 
 HIGHEST = 1e6
@@ -84,6 +85,7 @@ HIGHEST = 1e6
 
 _SLOWEST = 50.0  # Hz, lowest rate that scenes allow
 _REPORT_PERIOD_NS = 1_000_000_000
+_LATEST_NS = 50_000_000  # difference of stamps from the clock up to which they stay even
 
 
 class SimulatorNode(Node):
@@ -108,10 +110,11 @@ class SimulatorNode(Node):
         Period of samples and simulated time, ns.
     pressures : list of float
         Last pressure of each pad, gauge Pa, in the order of ``scene.legs``.
-    pressure_stamps : list of int
-        Stamps of these pressures, ns; 0 before the first one.
     messages : Messages
         Publishers and subscriptions.
+    answered : callable
+        Called with a pressure record that answers the last block of samples, where a program steps
+        the robot.
 
     Raises
     ------
@@ -146,15 +149,11 @@ class SimulatorNode(Node):
         if joints:
             count = len(self.robot.joint_names)
             self._body_sensors = BodySensors(self.scene, values['seed'], count)
-        self._ambient = values['ambient_pressure']
         self.time_ns = 0
         self.pressures = [0.0] * len(self.scene.legs)
-        self.pressure_stamps = [0] * len(self.scene.legs)
+        self._pace = Pace(CONTROL_PERIOD_NS)
         self.messages = Messages(self)
-        for index, leg in enumerate(self.scene.legs):
-            self.messages.receive(
-                topics.PRESSURE, self._pressure_callback(index), (*STAMP, 'fluid_pressure'), leg
-            )
+        self.messages.receive_record(topics.PRESSURE, self.scene.legs, self._on_pressure)
         rate = values['markers_rate']
         self._markers = WalkMarkers(self.scene, self.floor) if rate else None
         self._markers_pace = Pace(round(1e9 / rate)) if rate else None
@@ -162,6 +161,8 @@ class SimulatorNode(Node):
         self._advertise()
         # Without a timer, the caller of step() reports fidelity level and verdict.
         self._ended = False
+        self.answered: Callable[[], None] = lambda: None
+        self._last_ns = 0  # stamp of the last sample
         if values['free_running']:
             choice = fidelity.choose(self.scene, level)
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
@@ -170,86 +171,53 @@ class SimulatorNode(Node):
             self._report_ns = 0  # time of the next message on /diagnostics
             # The timer cannot follow the clock that this node publishes.
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(self.period_ns * 1e-9, self._on_timer, clock=steady)
+            period = max(self.period_ns, CONTROL_PERIOD_NS)
+            self.create_timer(period * 1e-9, self._on_timer, clock=steady)
 
     def _advertise(self) -> None:
         """Create the publishers."""
-        legs, joints = self.scene.legs, self.robot.joint_names
-        self._marker_output = self.messages.output(topics.MARKERS) if self._markers else None
-        self._clock_output = None
-        if self._simulated:
-            values = topics.CLOCK.schema.values
-            self._clock_output = self.messages.sender(topics.CLOCK, values)
+        messages, joints = self.messages, self.robot.joint_names
+        self._send_markers = messages.output(topics.MARKERS) if self._markers else None
+        self._send_clock = (
+            messages.sender(topics.CLOCK, topics.CLOCK.schema.values) if self._simulated else None
+        )
         pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
-        body = Outgoing(topics.BODY_POSE, (*STAMP, *pose))
-        if self._body_sensors:
-            self._advertise_body()
-            self._pose = self.messages.joint_sender([body])
-            return
-        forces = (*(f'wrench.force.{axis}' for axis in 'xyz'), 'wrench.torque.z')
-        point = (*STAMP, *topics.POSITION.schema.values)
-        readings: list[Outgoing] = []
-        for leg in legs:
-            readings.append(Outgoing(topics.WRENCH, (*STAMP, *forces), leg))
-            readings.append(Outgoing(topics.POSITION, point, leg))
-        readings.append(body)
-        if joints:
-            angles = (*STAMP, *(f'position[{place}]' for place in range(len(joints))))
-            still = {'name': joints, 'position': [0.0] * len(joints)}
-            readings.append(Outgoing(topics.JOINT_STATES, angles, constants=still))
-        self._readings = self.messages.joint_sender(readings)
-
-    def _advertise_body(self) -> None:
-        """Create the publishers of IMU, joints, and forces in the axes of the feet."""
-        noise, joints = self.scene.sensors, self.robot.joint_names
-        sender, schema = self.messages.joint_sender, topics.FOOT_WRENCH.schema
-        paths = (*STAMP, *schema.values)
-        feet = [Outgoing(topics.FOOT_WRENCH, paths, leg) for leg in self.scene.legs]
-        self._send_forces = sender(feet)
-        still = {
-            'orientation_covariance': [-1.0] + [0.0] * 8,  # it measures no orientation
-            'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
-            'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
-        }
-        imu = (*STAMP, *topics.IMU.schema.values)
-        self._send_imu = sender([Outgoing(topics.IMU, imu, constants=still)])
-        parts = ('position', 'velocity', 'effort')
+        self._send_pose = messages.sender(topics.BODY_POSE, (*STAMP, *pose))
+        record = topics.FORCE if self._body_sensors else topics.SAMPLE
+        self._send_block = messages.record_output(record, self.scene.legs)
+        parts = ('position', 'velocity', 'effort') if self._body_sensors else ('position',)
         angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
         zeros = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
-        self._send_joints = sender(
-            [Outgoing(topics.JOINT_STATES, (*STAMP, *angles), constants=zeros)]
-        )
+        if joints:
+            self._send_joints = messages.sender(
+                topics.JOINT_STATES, (*STAMP, *angles), constants=zeros
+            )
+        if self._body_sensors:
+            noise = self.scene.sensors
+            still = {
+                'orientation_covariance': [-1.0] + [0.0] * 8,  # it measures no orientation
+                'angular_velocity_covariance': np.diag([noise.gyro**2] * 3).ravel(),
+                'linear_acceleration_covariance': np.diag([noise.accelerometer**2] * 3).ravel(),
+            }
+            imu = (*STAMP, *topics.IMU.schema.values)
+            self._send_imu = messages.sender(topics.IMU, imu, constants=still)
 
-    def _send_body(self, stamp: tuple[int, int]) -> None:
-        """Publish readings of the forces, then IMU and joints where they are not silent."""
-        assert self._body_sensors
-        assert isinstance(self.robot, FullRobot)
-        reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        self._send_forces(*(value for force in reading.forces for value in (*stamp, *force)))
-        if reading.imu:
-            gyro, accelerometer = reading.imu
-            self._send_imu(*stamp, *gyro, *accelerometer)
-        if reading.joints:
-            positions, velocities, efforts = reading.joints
-            self._send_joints(*stamp, *positions, *velocities, *efforts)
-
-    def _pressure_callback(self, index: int) -> Any:
-        def callback(sec: int, nanosec: int, pressure: float) -> None:
-            gauge = pressure - self._ambient
-            if not math.isfinite(gauge):
-                return
+    def _on_pressure(self, block: Block) -> None:
+        rows = block.rows[-1]
+        # The true pressure acts on the pads, not what a faulty device reports.
+        gauges = np.where(np.isfinite(rows['pad']), rows['pad'], rows['pressure']).tolist()
+        for index, gauge in enumerate(gauges):
             if gauge > HIGHEST:
                 self.get_logger().warning(
                     f'leg {self.scene.legs[index]}: pressure of {gauge:g} Pa gauge ignored: at'
                     f' most {HIGHEST:g} Pa is allowed',
                     throttle_duration_sec=1.0,
                 )
-                return
-            # A sensor at rest may read slightly below ambient; the pad is flat then.
-            self.pressures[index] = max(0.0, gauge)
-            self.pressure_stamps[index] = sec * 1_000_000_000 + nanosec
-
-        return callback
+            elif math.isfinite(gauge):
+                # A sensor at rest may read slightly below ambient; the pad is flat then.
+                self.pressures[index] = max(0.0, gauge)
+        if block.last_ns == self._last_ns:
+            self.answered()
 
     def _on_timer(self) -> None:
         now_ns = time.monotonic_ns()
@@ -259,7 +227,7 @@ class SimulatorNode(Node):
         # Half a period ahead, because a timer of the same period may come early or late.
         due = self._real_time.due(now_ns + self.period_ns // 2)
         if due:
-            self.step(due)
+            self._send(due)
         if self.robot.verdict and not self._ended:
             self._ended = True
             self.get_logger().error(
@@ -286,49 +254,74 @@ class SimulatorNode(Node):
             ],
         )
         array = DiagnosticArray(status=[status, *self.messages.refusals.statuses()])
-        set_stamp(array.header.stamp, self._stamp_ns())
+        set_stamp(array.header.stamp, self.time_ns if self._simulated else self.messages.now_ns())
         self._diagnostics(array)
 
-    def _stamp_ns(self) -> int:
-        """Return the time for stamps, ns."""
-        return self.time_ns if self._simulated else self.messages.now_ns()
+    def step(self, end_ns: int) -> bool:
+        """Advance the robot to the next control moment, and publish what its sensors read.
 
-    def step(self, samples: int = 1) -> None:
-        """Advance the robot by some samples, and publish the readings of its sensors."""
-        for _ in range(samples):
+        The walk may end before, at a simulated time, ns, or with a verdict. Return whether the
+        samples will be answered: those before a control moment are not.
+        """
+        samples, due = 0, False
+        while not due and self.time_ns + samples * self.period_ns < end_ns:
+            samples += 1
+            due = self._pace.due(self.time_ns + samples * self.period_ns)
+        return self._send(samples) == samples and due
+
+    def _send(self, samples: int) -> int:
+        """Advance the robot by some samples, fewer if its walk ends; publish and count them."""
+        first_ns = self.time_ns + self.period_ns
+        if not self._simulated:
+            # Stamps are even, unless time was lost.
+            first_ns = self._last_ns + self.period_ns
+            begun_ns = self.messages.now_ns() - (samples - 1) * self.period_ns
+            if abs(first_ns - begun_ns) > _LATEST_NS:
+                first_ns = begun_ns
+        stamps = first_ns + self.period_ns * np.arange(samples)
+        rows = SAMPLE.rows(samples, len(self.scene.legs))
+        # Forces go first: a reading of the joints waits for them only until the next one.
+        later: list[tuple[Callable[..., None], tuple[float, ...]]] = []
+        for count, (row, stamp_ns) in enumerate(zip(rows, stamps.tolist(), strict=True), 1):
             self.robot.step(self.pressures)
-        self.tick(samples)
-        stamp_ns = self._stamp_ns()
-        stamp = split(stamp_ns)
-        x, y, heading = self.robot.body
-        pose = (*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
-        if self._body_sensors:
-            self._send_body(stamp)
-            self._pose(*pose)
-        else:
-            self._send_feet(stamp, pose)
-        if self._markers and self._markers_pace and self._markers_pace.due(stamp_ns):
-            assert self._marker_output
-            self._marker_output(self._markers.message(self.robot, self.pressures, stamp_ns))
-        self.messages.flush()
+            stamp = split(stamp_ns)
+            x, y, heading = self.robot.body
+            self._send_pose(*stamp, x, y, math.sin(0.5 * heading), math.cos(0.5 * heading))
+            if self._body_sensors:
+                row[:] = self._sense(stamp, later)
+            else:
+                row[:] = self._sensors.sample(self.robot)
+            if self.robot.verdict and self._simulated:
+                break
+        self._last_ns = int(stamps[count - 1])
+        self.tick(count)
+        self._send_block(Block(stamps[:count], rows[:count]))
+        for send, values in later:
+            send(*values)
+        if self.robot.joint_names and not self._body_sensors:
+            self._send_joints(*split(self._last_ns), *self.robot.joint_positions)
+        if self._markers and self._markers_pace and self._markers_pace.due(self._last_ns):
+            assert self._send_markers
+            self._send_markers(self._markers.message(self.robot, self.pressures, self._last_ns))
+        return count
 
-    def _send_feet(self, stamp: tuple[int, int], pose: tuple[float, ...]) -> None:
-        """Publish wrenches and markers, body, and joint positions."""
-        readings: list[float] = []
-        for (force, point), moment in zip(
-            self._sensors.read(self.robot), self._sensors.read_moments(self.robot), strict=True
-        ):
-            readings += (*stamp, *force, moment or 0.0, *stamp, *point)
-        readings += pose
-        if self.robot.joint_names:
-            readings += (*stamp, *self.robot.joint_positions)
-        self._readings(*readings)
+    def _sense(self, stamp: tuple[int, int], later: list[tuple[Any, Any]]) -> np.ndarray:
+        """Return readings of the feet in their own axes; add those of IMU and joints."""
+        assert self._body_sensors
+        assert isinstance(self.robot, FullRobot)
+        reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
+        gyro, accelerometer = reading.imu
+        later.append((self._send_imu, (*stamp, *gyro, *accelerometer)))
+        positions, velocities, efforts = reading.joints
+        later.append((self._send_joints, (*stamp, *positions, *velocities, *efforts)))
+        return reading.rows
 
     def tick(self, samples: int = 1) -> None:
-        """Advance simulated time, but not the robot; :meth:`step` calls this."""
+        """Advance simulated time, but not the robot; :meth:`step` does both."""
         self.time_ns += samples * self.period_ns
-        if self._clock_output:
-            self._clock_output(*split(self.time_ns))
+        if self._send_clock:
+            self._last_ns = self.time_ns
+            self._send_clock(*split(self.time_ns))
 
 
 def main(args: list[str] | None = None) -> int:

@@ -33,7 +33,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_msgs.msg import Float64
 from std_msgs.msg import String
-from std_msgs.msg import UInt8MultiArray
 from visualization_msgs.msg import MarkerArray
 
 from ros_pad.bags import topics as schemas
@@ -62,15 +61,12 @@ class Topic:
         Message class.
     publish, subscribe : QoSProfile
         QoS that publishers offer, and QoS that subscriptions request.
-    sources : tuple of str
-        The nodes of ros_pad that may send it in batches too; empty where none does.
     """
 
     schema: schemas.Topic
     message: type
     publish: QoSProfile
     subscribe: QoSProfile
-    sources: tuple[str, ...] = ()
 
     @property
     def pattern(self) -> str:
@@ -160,78 +156,61 @@ def _owner(peer: TopicEndpointInfo, topic: str) -> str:
     return f'node {peer.node_namespace.rstrip("/")}/{peer.node_name}'
 
 
-def _measured(topic: schemas.Topic, message: type, *sources: str) -> Topic:
-    return Topic(topic, message, qos.SENSOR_PUBLISH, qos.SENSOR, sources)
-
-
-PRESSURE = _measured(schemas.PRESSURE, FluidPressure, 'regulator')
-PRESSURE_SETPOINT = Topic(
-    schemas.PRESSURE_SETPOINT, FluidPressure, qos.COMMAND, qos.COMMAND, ('controller',)
-)
-WRENCH = _measured(schemas.WRENCH, WrenchStamped, 'simulator', 'body_estimator')
-POSITION = _measured(schemas.POSITION, PointStamped, 'simulator', 'body_estimator')
-FOOT_WRENCH = _measured(schemas.FOOT_WRENCH, WrenchStamped, 'simulator')
-CONTACT_VELOCITY = _measured(
-    schemas.CONTACT_VELOCITY, TwistWithCovarianceStamped, 'body_estimator'
-)
-SLIP = _measured(schemas.SLIP, TwistWithCovarianceStamped, 'estimator')
-WETNESS = _measured(schemas.WETNESS, Float64, 'estimator')
-FRICTION = _measured(schemas.FRICTION, Float64, 'estimator')
-FRICTION_MARGIN = _measured(schemas.FRICTION_MARGIN, Float64, 'estimator')
-CONTACT_LOAD = _measured(schemas.CONTACT_LOAD, Float64, 'estimator')
-CONTACT_POSITION = _measured(schemas.CONTACT_POSITION, PointStamped, 'estimator')
-SLIPPING = _measured(schemas.SLIPPING, Bool, 'estimator')
-DOUBT = Topic(schemas.DOUBT, String, qos.STATE, qos.STATE)
-MORPHOLOGY = Topic(schemas.MORPHOLOGY, String, qos.STATE, qos.STATE)
-BODY_POSE = _measured(schemas.BODY_POSE, PoseStamped, 'simulator')
-IMU = _measured(schemas.IMU, Imu, 'simulator')
-ODOM = _measured(schemas.ODOM, Odometry, 'body_estimator')
-BODY_DOUBT = Topic(schemas.BODY_DOUBT, String, qos.STATE, qos.STATE)
-JOINT_STATES = _measured(schemas.JOINT_STATES, JointState, 'simulator')
-MARKERS = Topic(schemas.MARKERS, MarkerArray, qos.SENSOR_PUBLISH, qos.SENSOR)
-CLOCK = Topic(schemas.CLOCK, Clock, qos.CLOCK_PUBLISH, qos.CLOCK)
-DIAGNOSTICS = Topic(schemas.DIAGNOSTICS, DiagnosticArray, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
-
-_BATCHES = 'std_msgs/msg/UInt8MultiArray'
-BATCHES = {
+_CLASSES = {
     **{
-        source: _measured(schemas.Topic(f'_batches/{source}', _BATCHES), UInt8MultiArray)
-        for source in ('simulator', 'regulator', 'body_estimator', 'estimator')
+        f'{each.__module__.split(".")[0]}/msg/{each.__name__}': each
+        for each in (
+            *(PointStamped, PoseStamped, TwistWithCovarianceStamped, WrenchStamped),
+            *(FluidPressure, Imu, JointState, Odometry, Bool, Float64, String),
+            *(Clock, DiagnosticArray, MarkerArray),
+        )
     },
-    'controller': Topic(
-        schemas.Topic('_batches/controller', _BATCHES), UInt8MultiArray, qos.COMMANDS, qos.COMMANDS
-    ),
 }
-"""The topic with the batches of each node that sends some, see `ros_pad.nodes.batches`."""
 
-LEG_TOPICS = (
-    PRESSURE,
-    PRESSURE_SETPOINT,
-    WRENCH,
-    POSITION,
-    FOOT_WRENCH,
-    CONTACT_VELOCITY,
-    SLIP,
-    WETNESS,
-    FRICTION,
-    FRICTION_MARGIN,
-    CONTACT_LOAD,
-    CONTACT_POSITION,
-    SLIPPING,
-    DOUBT,
-    MORPHOLOGY,
+
+def _topic(schema: schemas.Topic, publish: QoSProfile, subscribe: QoSProfile) -> Topic:
+    return Topic(schema, _CLASSES[schema.type_name], publish, subscribe)
+
+
+def _measured(schema: schemas.Topic) -> Topic:
+    return _topic(schema, qos.SENSOR_PUBLISH, qos.SENSOR)
+
+
+SAMPLE, FORCE, ESTIMATE, PRESSURE = (
+    _topic(schema, qos.SENSOR_PUBLISH, qos.RECORDS)
+    for schema in (schemas.SAMPLE, schemas.FORCE, schemas.ESTIMATE, schemas.PRESSURE)
 )
-"""The topics that every leg has."""
+COMMAND = _topic(schemas.COMMAND, qos.COMMANDS, qos.COMMANDS)
+RECORDS = (SAMPLE, FORCE, ESTIMATE, COMMAND, PRESSURE)
+
+BODY_POSE = _measured(schemas.BODY_POSE)
+IMU = _measured(schemas.IMU)
+ODOM = _measured(schemas.ODOM)
+JOINT_STATES = _measured(schemas.JOINT_STATES)
+MARKERS = _measured(schemas.MARKERS)
+FEET_MARKERS = _measured(schemas.FEET_MARKERS)
+BODY_DOUBT = _topic(schemas.BODY_DOUBT, qos.STATE, qos.STATE)
+CLOCK = _topic(schemas.CLOCK, qos.CLOCK_PUBLISH, qos.CLOCK)
+DIAGNOSTICS = _topic(schemas.DIAGNOSTICS, qos.DIAGNOSTICS, qos.DIAGNOSTICS)
 
 COMMON_TOPICS = (
-    *(CLOCK, BODY_POSE, IMU, JOINT_STATES),
+    *(CLOCK, *RECORDS, BODY_POSE, IMU, JOINT_STATES),
     *(ODOM, BODY_DOUBT, MARKERS, DIAGNOSTICS),
 )
 """The topics that a robot has only once."""
 
 
-def names(legs: Sequence[int]) -> dict[str, Topic]:
-    """Return every topic by name: ``/clock``, other common topics, then those of each leg.
+def of_leg(schema: schemas.Topic) -> Topic:
+    """Return a topic that each leg has; see :data:`ros_pad.bags.topics.OF_LEGS`."""
+    if schema.text:
+        return _topic(schema, qos.STATE, qos.STATE)
+    if schema is schemas.LEG_SETPOINT:
+        return _topic(schema, qos.COMMAND, qos.COMMAND)
+    return _measured(schema)
+
+
+def check_legs(legs: Sequence[int]) -> None:
+    """Refuse numbers of legs that no robot has.
 
     Raises
     ------
@@ -243,5 +222,18 @@ def names(legs: Sequence[int]) -> dict[str, Topic]:
             f'legs = {list(legs)} is not allowed: a list of different whole numbers from 1 to 8 is'
             ' needed'
         )
+
+
+def names(legs: Sequence[int]) -> dict[str, Topic]:
+    """Return every topic by name: common ones, then those that drivers have for each leg.
+
+    Raises
+    ------
+    ConfigError
+        When the legs are not allowed, see :func:`check_legs`.
+    """
+    check_legs(legs)
     common = {topic.name(): topic for topic in COMMON_TOPICS}
-    return common | {topic.name(leg): topic for leg in legs for topic in LEG_TOPICS}
+    return common | {
+        schema.name(leg): of_leg(schema) for leg in legs for schema in schemas.FROM_DRIVERS
+    }

@@ -23,6 +23,7 @@ from ros_pad.configuration import Setting
 from ros_pad.configuration import choice
 from ros_pad.configuration import quantity
 from ros_pad.errors import InvalidInput
+from ros_pad.records import SAMPLE
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from ros_pad.robots.rotation import matrix
@@ -131,36 +132,15 @@ def estimator_of(robot: Robot, values: Mapping[str, Any]) -> BodyEstimator:
     return BodyEstimator(robot, **own | {'contact_share': own['contact_share'] or None})
 
 
-class FootReadings(NamedTuple):
-    """What a body estimate shows of one foot, in odom axes, as the stage of a foot receives it.
-
-    Attributes
-    ----------
-    force, position : tuple of float
-        Force of the ground, N, and position in odom, m.
-    velocity : tuple of float
-        Velocity of the contact point over the floor, x and y, m/s.
-    variance : float
-        Variance of each component, m²/s²; -1 if the body is in doubt.
-    """
-
-    force: tuple[float, float, float]
-    position: tuple[float, float, float]
-    velocity: tuple[float, float]
-    variance: float
-
-
-def foot_readings(estimate: BodyEstimate) -> list[FootReadings]:
-    """Return what a body estimate shows of each foot, as plain numbers."""
-    certain = not estimate.doubt
-    readings = []
-    for foot in estimate.feet:
-        fx, fy, fz = foot.force.tolist()
-        x, y, z = foot.position.tolist()
-        slip_x, slip_y = foot.slip_velocity.tolist()
-        variance = foot.slip_velocity_sd**2 if certain else -1.0
-        readings.append(FootReadings((fx, fy, fz), (x, y, z), (slip_x, slip_y), variance))
-    return readings
+def sample_of(estimate: BodyEstimate) -> np.ndarray:
+    """Return what a body estimate shows of the feet, in odom axes, as rows of a sample."""
+    rows = SAMPLE.rows(len(estimate.feet))
+    rows['force'] = [foot.force for foot in estimate.feet]
+    rows['position'] = [foot.position for foot in estimate.feet]
+    rows['velocity'] = [foot.slip_velocity for foot in estimate.feet]
+    sds = np.array([foot.slip_velocity_sd for foot in estimate.feet])
+    rows['variance'] = np.inf if estimate.doubt else sds[:, None] ** 2
+    return rows
 
 
 class JointOrder:

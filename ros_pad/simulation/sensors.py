@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ros_pad.records import SAMPLE
 from ros_pad.simulation.faults import BODY_KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import sensor_faults_of
@@ -87,6 +88,16 @@ class Sensors:
             self._last = readings
         return readings
 
+    def sample(self, robot: SimulatedRobot) -> np.ndarray:
+        """Return the next reading of all feet as rows of a sample."""
+        rows = SAMPLE.rows(self._legs)
+        readings = self.read(robot)
+        rows['force'] = [force for force, _ in readings]
+        rows['position'] = [position for _, position in readings]
+        if self._moment_noise:
+            rows['moment'] = self.read_moments(robot)
+        return rows
+
     def read_moments(self, robot: SimulatedRobot) -> list[float | None]:
         """Return the yaw moment of each foot, N m, with noise; None where it is not measured.
 
@@ -135,17 +146,17 @@ class BodyReading(NamedTuple):
 
     Attributes
     ----------
-    imu : tuple or None
-        Angular velocity, rad/s, and specific force, m/s²; None where the IMU is silent.
-    joints : tuple or None
-        Positions, velocities and efforts; None where the joints are silent.
-    forces : list of tuple of float
-        Force on each foot, N, in the axes of its link.
+    imu : tuple of list
+        Angular velocity, rad/s, and specific force, m/s²; NaN where the IMU is silent.
+    joints : tuple of list
+        Positions, velocities and efforts; NaN where the joints are silent.
+    rows : structured array (feet,)
+        Rows of a sample with the force on each foot, N, in the axes of its link.
     """
 
-    imu: tuple[list[float], list[float]] | None
-    joints: tuple[list[float], list[float], list[float]] | None
-    forces: list[Vector]
+    imu: tuple[list[float], list[float]]
+    joints: tuple[list[float], list[float], list[float]]
+    rows: np.ndarray
 
 
 class BodySensors:
@@ -200,10 +211,13 @@ class BodySensors:
             forces[index], _ = _faulty((forces[index], nowhere), (before, nowhere), faults, time)
         self._last = forces
         silent = {fault.kind for fault in self._faults if fault.acts_at(time)}
+        none = [np.nan] * 3, [np.nan] * len(positions)
+        rows = SAMPLE.rows(len(forces))
+        rows['force'] = forces
         return BodyReading(
-            None if 'imu_silent' in silent else (gyro, accelerometer),
-            None if 'joints_silent' in silent else (positions, velocities, efforts),
-            forces,
+            (none[0], none[0]) if 'imu_silent' in silent else (gyro, accelerometer),
+            (none[1],) * 3 if 'joints_silent' in silent else (positions, velocities, efforts),
+            rows,
         )
 
 
