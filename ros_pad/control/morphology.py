@@ -8,12 +8,13 @@ becomes flat, or keeps its morphology; the other feet are not affected.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
+from typing import Any
 from typing import NamedTuple
 
 from ros_pad.configuration import Setting
@@ -22,6 +23,10 @@ from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
+from ros_pad.control.faults import NONE
+from ros_pad.control.faults import Fault
+from ros_pad.control.faults import Kind
+from ros_pad.control.faults import joined
 from ros_pad.control.footprints import Footprints
 from ros_pad.control.footprints import FrictionFelt
 from ros_pad.control.monitor import PadMonitor
@@ -67,6 +72,10 @@ FURTHEST_LEAD = 3
 """Largest lead of a leg with a slow hose, steps."""
 
 
+SOUND = (NONE,) * 5
+"""Faults of a leg that has none, see `_LegState.present`."""
+
+
 class FootState(NamedTuple):
     """Inputs of a decision about a foot, all of one time.
 
@@ -82,8 +91,8 @@ class FootState(NamedTuple):
         Position of the foot, x and y, m; NaN if it is old or missing.
     pressure : float or None
         Gauge pressure of the pad, Pa; None without a reading since the last estimate.
-    sensor_fault : str
-        Why the sensors of the foot cannot be used; empty if they can.
+    doubt : float
+        Code of the doubt of the estimator if sensors of the foot cannot be used; 0 if they can.
     friction : float
         Mean coefficient of friction below the foot; NaN if it is not known.
     """
@@ -93,7 +102,7 @@ class FootState(NamedTuple):
     load: float
     position: tuple[float, float]
     pressure: float | None
-    sensor_fault: str
+    doubt: float = 0.0
     friction: float = math.nan
 
 
@@ -109,14 +118,26 @@ class FootFault:
         Time at which the fault was found, s.
     end : float or None
         Time at which its end was found, s; None while the fault lasts.
-    reason : str
-        Last description of the fault, with numbers.
+    fault : Fault
+        The fault, with the numbers found last.
     """
 
     leg: int
     start: float
     end: float | None
-    reason: str
+    fault: Fault
+
+    @property
+    def reason(self) -> str:
+        """Text of the fault, with numbers."""
+        return str(self.fault)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON: leg, start, end, and the fault as kind and reason."""
+        return {
+            'leg': self.leg, 'start': self.start, 'end': self.end, 'kind': self.fault.label,
+            'reason': self.reason,
+        }  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -168,10 +189,10 @@ class _Air:
 class _Faults:
     """Faults of a leg except those of its air, and its faults in the list that still last."""
 
-    sensors: str = ''
-    timeout: str = ''
-    no_step: str = ''
-    open: dict[str, FootFault] = field(default_factory=dict)
+    timeout: Fault = NONE
+    no_step: Fault = NONE
+    sensors: Fault = NONE
+    open: dict[int, FootFault] = field(default_factory=dict)  # by place in `_LegState.present`
 
 
 @dataclass(slots=True)
@@ -198,6 +219,12 @@ class _LegState:
     probing: bool = False
     decided: int = 0  # number of this leg's last decision, counted over all legs
     setpoint: float = 0.0
+
+    @property
+    def present(self) -> tuple[Fault, ...]:
+        """Its faults of all sorts, each at its place; ``NONE`` for those that it does not have."""
+        faults, monitor = self.faults, self.air.monitor
+        return faults.timeout, faults.no_step, faults.sensors, monitor.silence, monitor.fault
 
     @property
     def lead(self) -> int:
@@ -362,9 +389,10 @@ class MorphologyController:
             For a leg that is not controlled.
         """
         state = self._state(leg)
-        if not state.air.monitor.reason:
-            return state.morphology
-        return DOME if state.air.holds else FLAT
+        monitor = state.air.monitor
+        if monitor.fault or monitor.silence:
+            return DOME if state.air.holds else FLAT
+        return state.morphology
 
     def setpoint(self, leg: int) -> float:
         """Return the set-point of a leg.
@@ -404,10 +432,7 @@ class MorphologyController:
         InvalidInput
             For a leg that is not controlled.
         """
-        state = self._state(leg)
-        faults = state.faults
-        reasons = (faults.timeout, faults.no_step, faults.sensors, state.air.monitor.reason)
-        return '; '.join(filter(None, reasons))
+        return joined(*self._state(leg).present)
 
     def remark(self, leg: int) -> str:
         """Return warnings about a leg that are no faults, such as a slow hose.
@@ -434,7 +459,7 @@ class MorphologyController:
                 f'slow hose: a fill takes {state.air.monitor.fill_time:.2f} s, a swing'
                 f' {state.timing.swing.value:.2f} s'
             )
-        return '; '.join(filter(None, (self.refusals.get(leg), state.air.shortfall, slow)))
+        return joined(self.refusals.get(leg), state.air.shortfall, slow)
 
     def lead(self, leg: int) -> int:
         """Return by how much the fill of a leg's pad takes longer than its swing.
@@ -496,15 +521,13 @@ class MorphologyController:
         InvalidInput
             For a leg that is not controlled, or a probability outside 0 to 1.
         """
-        self.observe(leg, state.time, state.pressure, state.sensor_fault)
+        self.observe(leg, state.time, state.pressure, state.doubt)
         x, y = state.position
         if not math.isfinite(state.load + state.wet_probability + x + y):
             return None
         return self.update(leg, state.load, state.wet_probability, state.position, state.friction)
 
-    def observe(
-        self, leg: int, time: float, pressure: float | None, sensor_fault: str = ''
-    ) -> None:
+    def observe(self, leg: int, time: float, pressure: float | None, doubt: float = 0.0) -> None:
         """Process the measurements of a leg that can arrive without an estimate.
 
         Call it before the :meth:`update` of the same time.
@@ -518,9 +541,10 @@ class MorphologyController:
         pressure : float or None
             Reading, gauge Pa; None without a reading. The air is monitored only after a first
             reading.
-        sensor_fault : str
-            Why the sensors of the foot cannot be used; empty if they can. A foot with such a fault
-            adds no footprints and does not probe; it uses the footprints of the other feet.
+        doubt : float
+            Code of the doubt of the estimator if sensors of the foot cannot be used; 0 if they
+            can. A foot with such a fault adds no footprints and does not probe; it uses the
+            footprints of the other feet.
 
         Raises
         ------
@@ -528,75 +552,70 @@ class MorphologyController:
             For a leg that is not controlled.
         """
         state = self._state(leg)
-        timing, air = state.timing, state.air
-        state.faults.sensors = sensor_fault
-        if (
-            not 0.0 <= time - timing.now <= self.command_timeout
-        ):  # the first time, or after a pause
+        timing, air, faults = state.timing, state.air, state.faults
+        if doubt != faults.sensors.a:
+            faults.sensors = Fault(Kind.DOUBT, doubt) if doubt else NONE
+        if not 0.0 <= time - timing.now <= self.command_timeout:
+            # the first time, or after a pause
             timing.updated = time
             timing.lifted = math.nan
         timing.now = time
         monitor = air.monitor
-        faulty = monitor.fault
+        before = monitor.fault
         monitor.update(time, air.sent, pressure)
-        if faulty and not monitor.fault:
+        if monitor.fault is not before:
+            self._follow_fault(air, before)
+        age = time - timing.updated
+        if age <= self.command_timeout:
+            faults.timeout = NONE
+        elif not faults.timeout:
+            faults.timeout = Fault(Kind.TIMEOUT, age)
+            self._time_out(leg, state)
+        missed = self._decisions - state.decided
+        if missed <= 2 * len(self._legs):
+            faults.no_step = NONE
+        elif not faults.no_step:
+            faults.no_step = Fault(Kind.NO_STEP, missed)
+        self._list_faults(leg, state)
+
+    def _follow_fault(self, air: _Air, before: Fault) -> None:
+        """Wait with the next dome when a fault of the air begins; try all legs when one ends."""
+        if not air.monitor.fault:
             # If the supply is back, the pads of the other legs can be filled again, too.
             air.patience = FIRST_WAIT
             for other in self._legs.values():
                 other.air.wait = 0
-        elif monitor.fault and not faulty:
+        elif not before:
             air.wait = air.patience
-        self._find_timeout(leg, state)
-        self._find_missing_steps(state)
-        self._list_faults(leg, state)
 
-    def _find_timeout(self, leg: int, state: _LegState) -> None:
-        """Make a leg flat if it has had no estimate for the command timeout."""
-        age = state.timing.now - state.timing.updated
-        if age <= self.command_timeout:
-            state.faults.timeout = ''
-        elif not state.faults.timeout:
-            state.faults.timeout = f'no load, position or estimate for {age:.1f} s'
-            if state.morphology == DOME:
-                self.switches[leg] += 1
-            self._apply(leg, Choice(FLAT))
-            state.steps = math.inf
-            state.air.sent = None  # the regulator vents after its own timeout
-
-    def _find_missing_steps(self, state: _LegState) -> None:
-        """Set or clear the fault of a leg that has no lift-offs while the other legs step."""
-        missed = self._decisions - state.decided
-        if missed <= 2 * len(self._legs):
-            state.faults.no_step = ''
-        elif not state.faults.no_step:
-            state.faults.no_step = (
-                f'no step measured while the other legs took {missed}:'
-                ' its load is not measured, or the leg does not step'
-            )
+    def _time_out(self, leg: int, state: _LegState) -> None:
+        """Make a leg flat that has had no estimate for the command timeout."""
+        if state.morphology == DOME:
+            self.switches[leg] += 1
+        self._apply(leg, Choice(FLAT))
+        state.steps = math.inf
+        state.air.sent = None  # the regulator vents after its own timeout
 
     def _list_faults(self, leg: int, state: _LegState) -> None:
         """Update the list of faults: one entry from the start of a fault to its end."""
-        monitor, faults = state.air.monitor, state.faults
-        none = not (monitor.reason or faults.timeout or faults.no_step or faults.sensors)
-        if none and not faults.open:
+        faults, now = state.present, state.timing.now
+        lasting = state.faults.open
+        if faults == SOUND and not lasting:
             return
-        for kind, reason in (
-            ('fault', monitor.fault), ('silence', monitor.silence),
-            ('timeout', faults.timeout), ('no step', faults.no_step),
-            ('sensors', faults.sensors),
-        ):  # fmt: skip
-            entry = faults.open.get(kind)
+        for place, fault in enumerate(faults):
+            entry = lasting.get(place)
             if entry is None:
-                if reason:
-                    faults.open[kind] = FootFault(leg, state.timing.now, None, reason)
-                    self.faults.append(faults.open[kind])
-            elif entry.reason != reason:
-                if reason:  # the same fault with a new description
-                    now = faults.open[kind] = dataclasses.replace(entry, reason=reason)
+                if fault:
+                    lasting[place] = FootFault(leg, now, None, fault)
+                    self.faults.append(lasting[place])
+            elif entry.fault != fault:
+                # Either the same fault with new numbers, or its end.
+                changed = replace(entry, fault=fault) if fault else replace(entry, end=now)
+                self.faults[self.faults.index(entry)] = changed
+                if fault:
+                    lasting[place] = changed
                 else:
-                    now = dataclasses.replace(entry, end=state.timing.now)
-                    del faults.open[kind]
-                self.faults[self.faults.index(entry)] = now
+                    del lasting[place]
 
     def update(
         self,

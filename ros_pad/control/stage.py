@@ -1,171 +1,163 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decision stage of one leg: collect its inputs, and decide when an estimate arrives.
+"""Decision stage of a robot: collect the inputs of all legs, and decide at each estimate.
 
-The controller node, the loop without ROS and replay use the same class. Only the probability of
-wet ground (``wetness``) triggers a decision, because the estimator publishes it last of the values
-of an estimate.
+The controller node, the loop without ROS and replay use the same class.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from ros_pad.control.faults import sensor_fault_text
 from ros_pad.control.morphology import FootState
 from ros_pad.control.morphology import MorphologyController
+from ros_pad.control.policies import DOME
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import sensor_fault
-from ros_pad.estimation.stage import Emission
 from ros_pad.pace import TICK_PERIOD_NS
+from ros_pad.records import COMMAND
+from ros_pad.records import Block
 
 OLD = 0.2
 """Age above which the last position of a foot is not used, s."""
 
-NOWHERE = (math.nan, math.nan)
+_ROW = COMMAND.dtype
 
 
-class Decision(NamedTuple):
-    """Result of an estimate.
+@dataclass(slots=True)
+class _Inputs:
+    """What is remembered of the inputs of a leg."""
 
-    Attributes
-    ----------
-    setpoint : float or None
-        Gauge pressure, Pa; None if load, position or estimate is missing, rejected or not finite.
-        A channel that receives no set-points vents its pad after the command timeout.
-    morphology : str or None
-        ``flat`` or ``dome`` if it differs from that of the last decision, else None.
-    """
+    position: tuple[float, float] = (math.nan, math.nan)
+    positioned: float = 0.0  # time of the last estimate with a new position, s
+    largest: float = -math.inf  # largest load since the last decision, N
+    pressure: float | None = None  # last reading since the last observation
+    observed: float = math.nan  # time of the controller's last observation, s
+    doubt: float = 0.0  # code of the doubt, if it is a fault of the sensors
 
-    setpoint: float | None
-    morphology: str | None
+    def take_pressure(self, now: float) -> float | None:
+        pressure, self.pressure = self.pressure, None
+        self.observed = now
+        return pressure
 
 
 class DecisionStage:
-    """Collect loads, positions, pressures, friction and doubts of a leg; decide at each estimate.
+    """Collect estimates and pressures of all legs; decide at each estimate.
 
     A decision uses the largest load since the last one, because a bounce is not a step, and the
-    last position. Each pressure is used once.
+    last position, unless it is older than :data:`OLD`. Each pressure is used once. What a leg
+    lacks concerns this leg only.
 
     Parameters
     ----------
     controller : MorphologyController
-        Controller, which all legs share.
-    leg : int
-        Number of the leg.
+        Controller of all legs.
+    legs : sequence of int
+        Numbers of the legs, in the order of the rows of records.
     reject : callable or None
-        Called with the error when an estimate is rejected; no set-point follows from it.
+        Called with the leg and the error when an estimate is rejected; no set-point follows from
+        it.
     """
 
     def __init__(
         self,
         controller: MorphologyController,
-        leg: int,
-        reject: Callable[[InvalidInput], None] | None = None,
+        legs: Sequence[int],
+        reject: Callable[[int, InvalidInput], None] | None = None,
     ) -> None:
         self.controller = controller
-        self.leg = leg
         self._reject = reject
-        self._position = NOWHERE
-        self._new_position = False
-        self._position_time = 0.0  # time of the last estimate with a new position, s
-        self._load, self._largest = math.nan, -math.inf
-        self._friction = math.nan
-        self._pressure: float | None = None  # last reading since the last observation
-        self._observed: float | None = None  # time of the controller's last observation, s
-        self._morphology = ''
-        self._sensor_fault = ''
+        self._legs = {leg: _Inputs() for leg in legs}
+        self._domes: list[bool] = []  # morphologies of the last command
 
-    def load(self, load: float) -> None:
-        """Process a normal force, N."""
-        self._load = load
-        if self._largest < load < math.inf:
-            self._largest = load
+    def pressure(self, record: Block) -> None:
+        """Store the readings of a PRESSURE record; NaN is none."""
+        pressures = record.rows[-1]['pressure'].tolist()
+        for inputs, pressure in zip(self._legs.values(), pressures, strict=True):
+            if not math.isnan(pressure):
+                inputs.pressure = pressure
 
-    def position(self, x: float, y: float) -> None:
-        """Store a position of the foot, m."""
-        self._position = x, y
-        self._new_position = True
+    def decide(self, record: Block) -> Block:
+        """Process an ESTIMATE record, and return the COMMAND record of the same time.
 
-    def pressure(self, gauge: float) -> None:
-        """Store a gauge pressure of the pad, Pa."""
-        self._pressure = gauge
-
-    def friction(self, friction: float) -> None:
-        """Store an estimate of the coefficient of friction."""
-        self._friction = friction
-
-    def doubt(self, doubt: str) -> None:
-        """Process a doubt of the estimator; only faults of sensors change decisions."""
-        self._sensor_fault = sensor_fault(doubt)
-
-    def estimate(self, now: float, wet_probability: float) -> Decision:
-        """Process an estimate, and decide.
-
-        Parameters
-        ----------
-        now : float
-            Present time, s; the same clock for all legs.
-        wet_probability : float
-            Probability of wet ground, 0 to 1.
+        The set-point of a leg is NaN if its load, position or probability of wet ground is missing
+        or not allowed. A channel that receives no set-points vents its pad after the command
+        timeout.
         """
-        state = self._state(now, wet_probability)
-        setpoint = None
+        now, row = record.last_ns * 1e-9, record.rows[-1]
+        names = ('wetness', 'load', 'position', 'friction', 'doubt')
+        estimates = zip(*(row[name].tolist() for name in names), strict=True)
+        setpoints = [
+            self._decide(leg, now, *estimate)
+            for leg, estimate in zip(self._legs, estimates, strict=True)
+        ]
+        return self._command(record.last_ns, setpoints)
+
+    def tick(self, now_ns: int) -> Block | None:
+        """Observe the legs that have no estimates; call it every ``pace.TICK_PERIOD_NS``.
+
+        Return a COMMAND record without set-points if a morphology has changed, else None.
+        """
+        now, observed = now_ns * 1e-9, False
+        for leg, inputs in self._legs.items():
+            if math.isnan(inputs.observed):
+                inputs.observed = now
+            elif abs(now - inputs.observed) > TICK_PERIOD_NS * 1e-9:
+                self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
+                observed = True
+        if not observed:
+            return None
+        before = self._domes
+        record = self._command(now_ns, [math.nan] * len(self._legs))
+        return record if self._domes != before else None
+
+    def _decide(
+        self,
+        leg: int,
+        now: float,
+        wetness: float,
+        load: float,
+        position: Sequence[float],
+        friction: float,
+        doubt: float,
+    ) -> float:
+        """Return the set-point of a leg, gauge Pa; NaN if there is none."""
+        inputs = self._legs[leg]
+        if inputs.largest < load < math.inf:
+            inputs.largest = load
+        x, y = position
+        if not math.isnan(x + y):
+            inputs.position, inputs.positioned = (x, y), now
+        if not math.isnan(doubt):  # else the last one lasts
+            inputs.doubt = doubt if sensor_fault_text(doubt) else 0.0
+        current = now - inputs.positioned <= OLD
+        state = FootState(
+            now,
+            wetness,
+            inputs.largest if math.isfinite(load) else load,
+            inputs.position if current else (math.nan, math.nan),
+            inputs.take_pressure(now),
+            inputs.doubt,
+            friction,
+        )
         try:
-            setpoint = self.controller.decide(self.leg, state)
+            setpoint = self.controller.decide(leg, state)
         except InvalidInput as error:
             if self._reject:
-                self._reject(error)
-        if setpoint is not None:
-            self._largest = -math.inf
-        return Decision(setpoint, self._new_morphology())
+                self._reject(leg, error)
+            return math.nan
+        if setpoint is None:
+            return math.nan
+        inputs.largest = -math.inf
+        return setpoint
 
-    def take(self, now: float, emission: Emission) -> Decision:
-        """Process an emission of the estimation stage at the present time, s, and decide."""
-        self.load(emission.load)
-        if emission.position is not None:
-            self.position(*emission.position)
-        self.friction(emission.estimate.friction_mean)
-        return self.estimate(now, emission.estimate.wet_probability)
-
-    def tick(self, now: float) -> Decision | None:
-        """Observe a leg that has no estimates; call it every ``pace.TICK_PERIOD_NS``.
-
-        Return a decision without a set-point, or None if the leg has had an estimate.
-        """
-        if self._observed is None:
-            self._observed = now
-        elif abs(now - self._observed) > TICK_PERIOD_NS * 1e-9:
-            self.controller.observe(self.leg, now, self._take_pressure(now), self._sensor_fault)
-            return Decision(None, self._new_morphology())
-        return None
-
-    def _state(self, now: float, wet_probability: float) -> FootState:
-        """Return the inputs of a decision; NaN for those that are missing."""
-        if self._new_position:
-            self._new_position = False
-            self._position_time = now
-        current = now - self._position_time <= OLD
-        load = self._load
-        return FootState(
-            time=now,
-            wet_probability=wet_probability,
-            # If no load has arrived since the last decision, the last load is used again.
-            load=max(self._largest, load) if math.isfinite(load) else load,
-            position=self._position if current else NOWHERE,
-            pressure=self._take_pressure(now),
-            sensor_fault=self._sensor_fault,
-            friction=self._friction,
-        )
-
-    def _take_pressure(self, now: float) -> float | None:
-        pressure, self._pressure = self._pressure, None
-        self._observed = now
-        return pressure
-
-    def _new_morphology(self) -> str | None:
-        morphology = self.controller.morphology(self.leg)
-        if morphology == self._morphology:
-            return None
-        self._morphology = morphology
-        return morphology
+    def _command(self, stamp_ns: int, setpoints: Sequence[float]) -> Block:
+        controller = self.controller
+        self._domes = [controller.morphology(leg) == DOME for leg in self._legs]
+        rows = np.empty(len(setpoints), _ROW)
+        rows['dome'], rows['setpoint'] = self._domes, setpoints
+        return Block.of(stamp_ns, rows)

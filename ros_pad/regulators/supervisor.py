@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Supervision of pressure regulators: which set-points reach a pad, and when it is vented.
+"""Supervision of the pressure regulator of one pad: which set-points reach it, and its vents.
 
-A :class:`SupervisedChannel` stands between a controller and the regulator of one pad. It needs no
-ROS: its driver (the regulator node, or the closed loop without ROS) gives it commands and times.
+A :class:`SupervisedChannel` stands between a controller and the regulator of one pad;
+:class:`ros_pad.regulators.supervision.Supervision` gives it commands and times.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -16,13 +15,16 @@ from typing import NamedTuple
 from typing import Protocol
 
 from ros_pad.configuration import Setting
+from ros_pad.control.faults import NONE
+from ros_pad.control.faults import Fault
+from ros_pad.control.faults import Kind
+from ros_pad.control.faults import joined
 from ros_pad.control.monitor import PadMonitor
 from ros_pad.control.morphology import COMMAND_TIMEOUT
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.errors import PadError
 from ros_pad.errors import ProtocolError
-from ros_pad.regulators.protocol import Reading
 from ros_pad.regulators.protocol import Regulator
 from ros_pad.regulators.protocol import permitted
 
@@ -118,12 +120,113 @@ class NoLog:
     warning = error = info
 
 
+class Answers:
+    """Count the answers to commands, and report refusals.
+
+    Attributes
+    ----------
+    accepted, refused : int
+        Numbers of accepted and of refused commands.
+    refusal : str
+        Reason of the last refusal that :meth:`report` has not returned yet.
+    """
+
+    def __init__(self) -> None:
+        self.accepted = self.refused = 0
+        self.refusal = ''
+        self._reported = False  # whether the last report had a refusal
+
+    @property
+    def due(self) -> bool:
+        """Whether a refusal should be reported at once, because the last report had none."""
+        return bool(self.refusal) and not self._reported
+
+    def refuse(self, reason: str) -> None:
+        """Count a refused command."""
+        self.refused += 1
+        self.refusal = reason
+
+    def report(self, health: Health) -> Health:
+        """Add the last refusal to a health; each refusal is reported once."""
+        refusal, self.refusal = self.refusal, ''
+        self._reported = bool(refusal)
+        if refusal and health.level == Level.ERROR:
+            return Health(Level.ERROR, f'{health.message}; refused: {refusal}')
+        return Health(Level.WARN, refusal) if refusal else health
+
+
+class Outlet:
+    """Set-point of the regulator of one pad, and its way to the last command.
+
+    Attributes
+    ----------
+    regulator : Regulator
+        The regulator.
+    target : float
+        Last accepted command, gauge Pa; 0 after a vent.
+    sent : float or None
+        Last set-point that the regulator accepted, gauge Pa; None before the first vent, and after
+        an error of the device.
+    vented : bool
+        Whether the last set-point is zero and the regulator accepted it; True at first.
+    moved_ns : int
+        Time of the last set-point under the slew limit, ns.
+    """
+
+    def __init__(self, regulator: Regulator) -> None:
+        self.regulator = regulator
+        self.target = 0.0
+        self.sent: float | None = None
+        self.vented = True
+        self.moved_ns = 0
+
+    def vent(self) -> bool:
+        """Vent, and return whether the pad was not vented before; raise errors of the device."""
+        self.target = 0.0
+        before, self.vented, self.sent = self.vented, False, None
+        self.regulator.vent()
+        self.vented, self.sent = True, 0.0
+        return not before
+
+    def approach(self, target: float, last: float, limit: float, elapsed_ns: int) -> None:
+        """Send the set-point nearest to a target that the slew limit allows by now.
+
+        Parameters
+        ----------
+        target : float
+            Pressure, gauge Pa.
+        last : float
+            Where to begin if it is not known which set-point is in force, gauge Pa.
+        limit : float
+            Slew limit, Pa/s; 0: none.
+        elapsed_ns : int
+            Present time, ns.
+        """
+        setpoint = target
+        if limit:
+            step = limit * max(0, elapsed_ns - self.moved_ns) * 1e-9
+            start = last if self.sent is None else self.sent
+            setpoint = min(max(target, start - step), start + step)
+        # Set even if sending fails, so that this time does not enlarge the next step.
+        self.moved_ns = elapsed_ns
+        try:
+            self.regulator.set_pressure(setpoint)
+        except (InvalidInput, LimitError):
+            raise  # the old set-point and target stay in force
+        except PadError:
+            self.vented, self.sent = False, None  # the device may have received it nevertheless
+            raise
+        self.target, self.sent = target, setpoint
+        self.vented = setpoint == target == 0.0
+
+
 class SupervisedChannel:
     """Supervise the regulator of one pad.
 
     A command is refused when it is too old or from the future, not a finite number, negative or
     above the ceiling. The pad is vented when no command is accepted for ``command_timeout``, and
-    when the clock is set back; a vent that fails is repeated at each :meth:`tick`. A pad whose
+    when the clock is set back; a vent that fails is repeated at each
+    tick. A pad whose
     pressure passes the ceiling by more than ``ceiling_tolerance`` is vented and held: its commands
     are refused until :meth:`activate`. With ``on_fault`` = ``vent``, a pad that the device or the
     monitor reports as faulty is also vented and held. The monitor needs ten readings a second, and
@@ -144,25 +247,18 @@ class SupervisedChannel:
     ----------
     pressure, setpoint : float
         Last values from the device, gauge Pa.
-    target : float
-        Last accepted command, gauge Pa; 0 after a vent.
-    sent : float or None
-        Last set-point that the regulator accepted, gauge Pa; None before :meth:`open`, and after
-        an error of the device.
-    vented : bool
-        Whether the last set-point is zero and the regulator accepted it; True before :meth:`open`.
+    outlet : Outlet
+        Set-point of the regulator.
+    answers : Answers
+        Numbers of accepted and refused commands, and the last refusal.
+    monitor : PadMonitor
+        Compares readings with set-points, and measures the times to fill and to vent.
     active : bool
         Whether commands are accepted.
     held : str
         Reason why all commands are refused; empty when they are not.
-    accepted, refused : int
-        Numbers of accepted and of refused commands.
-    refusal : str
-        Reason of the last refusal that :meth:`report` has not returned yet.
-    monitor : PadMonitor
-        Compares readings with set-points, and measures the times to fill and to vent.
-    unread_ns : int or None
-        Time of the last reading that failed, ns; None if none has failed.
+    commanded_ns : int or None
+        Time of the last accepted command, ns; None after a vent.
     """
 
     def __init__(
@@ -173,44 +269,36 @@ class SupervisedChannel:
         log: Log | None = None,
     ) -> None:
         self.leg = leg
-        self.regulator = regulator
         self.settings = settings
+        self.outlet = Outlet(regulator)
+        self.answers = Answers()
         self.monitor = PadMonitor(regulator.ceiling)
-        self.pressure = 0.0
-        self.setpoint = 0.0
-        self.target = 0.0
-        self.sent: float | None = None
-        self.vented = True
+        self.pressure = self.setpoint = 0.0
         self.active = False
         self.held = ''
-        self.accepted = 0
-        self.refused = 0
-        self.refusal = ''
-        self.unread_ns: int | None = None
+        self.commanded_ns: int | None = None
+        self._hold = NONE
         self._log: Log = log or NoLog()
         self._device_faults: tuple[str, ...] = ()
-        self._refusal_reported = False  # whether the last report had a refusal
-        self._commanded_ns: int | None = None  # time of the last accepted command
-        self._moved_ns = 0  # time of the last set-point under the slew limit
-        self._ticked_ns = 0
 
     @property
     def fault(self) -> str:
         """Faults of device and pad, separated by semicolons; empty when there are none."""
-        if not self._device_faults:
-            return self.monitor.reason
-        return '; '.join(filter(None, (*self._device_faults, self.monitor.reason)))
+        return joined(*self._device_faults, self.monitor.reason)
+
+    @property
+    def present(self) -> Fault:
+        """The fault for records: of pad or device, or that for which the pad is held."""
+        monitor = self.monitor
+        if self._device_faults:
+            return monitor.silence or Fault(Kind.DEVICE)
+        return monitor.silence or monitor.fault or self._hold
 
     @property
     def sags(self) -> bool:
         """Whether the pad is faulty with a pressure below its set-point."""
-        monitor, sent = self.monitor, self.sent
+        monitor, sent = self.monitor, self.outlet.sent
         return bool(monitor.fault and sent and monitor.pressure < sent - monitor.tolerance)
-
-    @property
-    def refusal_due(self) -> bool:
-        """Whether a refusal should be reported at once, because the last report had none."""
-        return bool(self.refusal) and not self._refusal_reported
 
     def open(self) -> None:
         """Open the device and vent it, because its last set-point is unknown.
@@ -220,27 +308,20 @@ class SupervisedChannel:
         PadError
             When the device cannot be opened or vented; it is closed then.
         """
-        self.regulator.open()
+        self.outlet.regulator.open()
         try:
-            self.regulator.vent()
+            self.outlet.vent()
         except BaseException:
             self.close('its first vent failed')
             raise
-        self.sent = 0.0
 
     def activate(self, elapsed_ns: int) -> None:
-        """Accept commands from now on, also of a pad that was held.
-
-        Parameters
-        ----------
-        elapsed_ns : int
-            Present time, ns, on the clock of :meth:`tick`.
-        """
-        self.held = ''
-        self.monitor = PadMonitor(self.regulator.ceiling)
+        """Accept commands from now on, at a time, ns, also of a pad that was held."""
+        self.held, self._hold = '', NONE
+        self.monitor = PadMonitor(self.outlet.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
-        self._ticked_ns = self._moved_ns = elapsed_ns
+        self.outlet.moved_ns = elapsed_ns
         self.active = True
 
     def deactivate(self, reason: str) -> None:
@@ -252,7 +333,7 @@ class SupervisedChannel:
         """Vent the pad and close the device; errors are logged, not raised."""
         self.deactivate(f'closing the device: {reason}')
         try:
-            self.regulator.close()
+            self.outlet.regulator.close()
         except Exception as error:
             self._log.error(f'leg {self.leg}: cannot close the device: {error}')
 
@@ -266,7 +347,7 @@ class SupervisedChannel:
         age : float
             Time since the command was given, s; negative if its time stamp is in the future.
         elapsed_ns : int
-            Present time, ns, on the clock of :meth:`tick`.
+            Present time, ns, on the clock of the ticks.
 
         Returns
         -------
@@ -281,41 +362,23 @@ class SupervisedChannel:
         except PadError as error:
             self.refuse(error)
             return False
-        self.accepted += 1
-        self._commanded_ns = elapsed_ns
+        self.answers.accepted += 1
+        self.commanded_ns = elapsed_ns
         return True
 
     def refuse(self, error: PadError) -> None:
         """Count, log and report a refused command; the driver calls it for its own checks."""
-        self.refused += 1
-        self.refusal = str(error)
+        self.answers.refuse(str(error))
         self._log.warning(f'leg {self.leg}: set-point refused: {error}', throttle_duration_sec=1.0)
 
-    def tick(self, elapsed_ns: int) -> None:
-        """Vent a pad whose command is too old or whose clock was set back; repeat failed vents.
-
-        Parameters
-        ----------
-        elapsed_ns : int
-            Present time, ns, on a clock that does not follow the time of day. Call this at every
-            step of that clock, at least every 10 ms.
-        """
-        set_back = elapsed_ns < self._ticked_ns
-        self._ticked_ns = elapsed_ns
-        if set_back and self._commanded_ns is not None:
-            self.vent('the clock was set back')  # the age of the command is unknown
-        self.expire(elapsed_ns)
-        if self._commanded_ns is None and not self.vented:
-            self.vent(self.held or 'an earlier vent was not confirmed')
-
     def expire(self, elapsed_ns: int) -> None:
-        """Vent a pad whose last command is too old; for drivers between two ticks."""
-        if self._commanded_ns is None:
+        """Vent the pad if its last command is too old at a time, ns."""
+        if self.commanded_ns is None:
             return
         timeout = self.settings.command_timeout
         # abs(): the time of a command may be ahead of the tick, because /clock and commands
         # arrive separately.
-        if abs(elapsed_ns - self._commanded_ns) > timeout * 1e9:
+        if abs(elapsed_ns - self.commanded_ns) > timeout * 1e9:
             self.vent(self.held or f'no set-point for {timeout:g} s')
 
     def read(self, elapsed_ns: int) -> float | None:
@@ -324,20 +387,20 @@ class SupervisedChannel:
         Parameters
         ----------
         elapsed_ns : int
-            Present time, ns, on the clock of :meth:`tick`.
+            Present time, ns, on the clock of the ticks.
 
         Returns
         -------
         float or None
             Measured pressure, gauge Pa; None when the device gave no valid reading.
         """
-        known = self.monitor.reason
-        time = elapsed_ns * 1e-9
+        monitor, outlet, time = self.monitor, self.outlet, elapsed_ns * 1e-9
+        known = monitor.silence, monitor.fault
         # While the slew limit moves the set-point, the pad lags behind: the monitor gets None.
-        aim = self.sent if self.sent == self.target else None
+        aim = outlet.sent if outlet.sent == outlet.target else None
         pressure = None
         try:
-            reading = self.regulator.read()
+            reading = outlet.regulator.read()
             if not math.isfinite(reading.pressure):
                 raise ProtocolError(
                     f'the device reports a pressure of {reading.pressure!r} Pa: a finite number is'
@@ -345,74 +408,68 @@ class SupervisedChannel:
                 )
         except PadError as error:
             self._device_faults = (str(error),)
-            self.unread_ns = elapsed_ns
-            self.monitor.update(time, aim, None)
-            lasting = self.monitor.reason  # one lost reading is no reason to vent
+            monitor.update(time, aim, None)
             self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
         else:
-            pressure = reading.pressure
             self._device_faults = reading.faults
-            self.monitor.update(time, aim, pressure)
-            lasting = self.fault
-            self._check_ceiling(reading)
-        if self.monitor.reason and self.monitor.reason != known:
-            self._log.error(f'leg {self.leg}: {self.monitor.reason}')
-        if lasting and self.settings.on_fault == 'vent':
-            self.hold(lasting)
+            self.pressure = pressure = reading.pressure
+            self.setpoint = reading.setpoint
+            monitor.update(time, aim, pressure)
+            ceiling = outlet.regulator.ceiling
+            if pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
+                fault = Fault(Kind.CEILING, pressure, ceiling)
+                self.hold(str(fault), fault)
+        if known != (monitor.silence, monitor.fault) and monitor.reason:
+            self._log.error(f'leg {self.leg}: {monitor.reason}')
+        if self.settings.on_fault == 'vent':
+            # One lost reading is no reason to vent.
+            lasting = monitor.reason if pressure is None else self.fault
+            if lasting:
+                self.hold(lasting, self.present)
         self._continue(elapsed_ns)
         return pressure
 
     def vent(self, reason: str) -> None:
-        """Vent the pad; a failure is logged, and :meth:`tick` tries again."""
-        self._commanded_ns = None
-        self.target = 0.0
+        """Vent the pad; a failure is logged, and the next tick tries again."""
+        self.commanded_ns = None
         try:
-            self.regulator.vent()
+            news = self.outlet.vent()
         except Exception as error:  # no error of one device may stop the vents of the others
-            self.vented, self.sent = False, None
             self._log.error(f'leg {self.leg}: cannot vent: {error}', throttle_duration_sec=1.0)
             return
-        if not self.vented:
+        if news:
             self._log.info(f'leg {self.leg}: vented: {reason}')
-        self.vented, self.sent = True, 0.0
 
-    def hold(self, reason: str) -> None:
-        """Vent the pad and refuse its commands until the next activation."""
+    def hold(self, reason: str, fault: Fault) -> None:
+        """Vent the pad for a fault and refuse its commands until the next activation."""
         if not self.held:
-            self.held = f'{reason}; vented until the node is activated again'
+            self._hold = Fault(Kind.HELD, fault.kind.code)
+            self.held = f'{reason}; {self._hold}'
             self._log.error(f'leg {self.leg}: {self.held}')
             self.vent(reason)
 
     def health(self) -> Health:
         """Return level and message of device and pad, without refusals."""
-        faults = [self.held]
-        if self.fault not in self.held:
-            faults.append(self.fault)
-        timed_out = self._commanded_ns is None
-        if timed_out and not self.vented:
-            faults.append('the pad cannot be vented')
-        if any(faults):
-            return Health(Level.ERROR, '; '.join(filter(None, faults)))
+        timed_out, vented = self.commanded_ns is None, self.outlet.vented
+        faults = joined(
+            self.held,
+            self.fault not in self.held and self.fault,
+            timed_out and not vented and 'the pad cannot be vented',
+        )
+        if faults:
+            return Health(Level.ERROR, faults)
         if timed_out and self.active:
             return Health(Level.STALE, 'no set-points are received: vented')
-        return Health(Level.OK, 'vented' if self.vented else 'under pressure')
-
-    def report(self, health: Health) -> Health:
-        """Add the last refusal to a health; each refusal is reported once."""
-        refusal, self.refusal = self.refusal, ''
-        self._refusal_reported = bool(refusal)
-        if refusal and health.level == Level.ERROR:
-            return Health(Level.ERROR, f'{health.message}; refused: {refusal}')
-        return Health(Level.WARN, refusal) if refusal else health
+        return Health(Level.OK, 'vented' if vented else 'under pressure')
 
     def figures(self) -> dict[str, str]:
         """Return the values of the diagnostic status, by name with unit."""
         return {
             'pressure (Pa gauge)': f'{self.pressure:.0f}',
             'set-point (Pa gauge)': f'{self.setpoint:.0f}',
-            'command (Pa gauge)': f'{self.target:.0f}',
-            'set-points accepted': str(self.accepted),
-            'set-points refused': str(self.refused),
+            'command (Pa gauge)': f'{self.outlet.target:.0f}',
+            'set-points accepted': str(self.answers.accepted),
+            'set-points refused': str(self.answers.refused),
             'time to fill (s)': f'{self.monitor.fill_time:.2f}',
             'time to vent (s)': f'{self.monitor.vent_time:.2f}',
         }
@@ -426,57 +483,21 @@ class SupervisedChannel:
                 f'stamp of the set-point is {stamped}: at most {limit:g} s is accepted;'
                 ' synchronise the clocks'
             )
-        gauge = permitted(gauge_pa, self.regulator.ceiling)
+        gauge = permitted(gauge_pa, self.outlet.regulator.ceiling)
         if self.held:
             raise LimitError(f'set-point {gauge:g} Pa is not allowed: {self.held}')
         return gauge
 
     def _approach(self, target: float, elapsed_ns: int) -> None:
-        """Send the set-point nearest to a target that the slew limit allows by now."""
-        limit = self.settings.slew_limit
-        elapsed = max(0, elapsed_ns - self._moved_ns) * 1e-9
-        step = limit * elapsed if limit else math.inf
-        start = self.setpoint if self.sent is None else self.sent
-        setpoint = min(max(target, start - step), start + step)
-        # Set even if sending fails, so that this time does not enlarge the next step.
-        self._moved_ns = elapsed_ns
-        try:
-            self.regulator.set_pressure(setpoint)
-        except (InvalidInput, LimitError):
-            raise  # the old set-point and target stay in force
-        except PadError:
-            self.vented, self.sent = False, None  # the device may have received it nevertheless
-            raise
-        self.target, self.sent = target, setpoint
-        self.vented = setpoint == target == 0.0
+        self.outlet.approach(target, self.setpoint, self.settings.slew_limit, elapsed_ns)
 
     def _continue(self, elapsed_ns: int) -> None:
         """Continue towards a target that the slew limit did not allow at once."""
-        if self.sent == self.target:
-            self._moved_ns = elapsed_ns
-        elif self.sent is not None:
+        outlet = self.outlet
+        if outlet.sent == outlet.target:
+            outlet.moved_ns = elapsed_ns
+        elif outlet.sent is not None:
             try:
-                self._approach(self.target, elapsed_ns)
+                self._approach(outlet.target, elapsed_ns)
             except PadError as error:
                 self._log.error(f'leg {self.leg}: {error}', throttle_duration_sec=1.0)
-
-    def _check_ceiling(self, reading: Reading) -> None:
-        """Store a reading; hold a pad that is above its ceiling."""
-        self.pressure, self.setpoint = reading.pressure, reading.setpoint
-        ceiling = self.regulator.ceiling
-        if reading.pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
-            self.hold(f'{reading.pressure:.0f} Pa is above the ceiling of {ceiling:.0f} Pa')
-
-
-def supply_health(channels: Iterable[SupervisedChannel]) -> Health:
-    """Return level and message of the air supply that all channels share."""
-    filled = [each for each in channels if each.sent]
-    sagging = [str(each.leg) for each in filled if each.sags]
-    # One sagging pad has a leak; when most of them sag, the supply is low.
-    if len(sagging) > max(1, len(filled) // 2):
-        return Health(
-            Level.ERROR,
-            f'the supply of air is low: pads of legs {", ".join(sagging)} are below their'
-            ' set-points',
-        )
-    return Health(Level.OK, 'the supply of air is not low')

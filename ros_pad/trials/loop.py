@@ -14,6 +14,8 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ros_pad.configuration import choice
 from ros_pad.configuration import instance
 from ros_pad.control import MorphologyController
@@ -22,6 +24,7 @@ from ros_pad.control import policy_named
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
+from ros_pad.estimation import DOUBTS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation import estimators_of
@@ -32,8 +35,11 @@ from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.pace import Progress
+from ros_pad.records import ESTIMATE
+from ros_pad.records import Block
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
+from ros_pad.regulators.supervision import Supervision
 from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
 from ros_pad.regulators.supervisor import SupervisedChannel
 from ros_pad.sensing import BodyEstimate
@@ -80,8 +86,6 @@ class LegStages:
     Attributes
     ----------
     estimation : EstimationStage
-    decision : DecisionStage
-    channel : SupervisedChannel
     pressure : float
         Gauge pressure that the regulator reported last, Pa.
     """
@@ -90,14 +94,11 @@ class LegStages:
         self,
         leg: int,
         estimator: FootEstimator,
-        controller: MorphologyController,
-        channel: SupervisedChannel,
         period_ns: int,
     ) -> None:
-        self.channel = channel
-        self.decision = DecisionStage(controller, leg)
+        self.leg = leg
         self.estimation = EstimationStage(
-            estimator, period_ns, self._take, self.decision.doubt, _ignore
+            estimator, period_ns, self._take, lambda _: None, _ignore
         )
         self.pressure = 0.0
         self._emission: Emission | None = None  # waits for a decision
@@ -108,7 +109,6 @@ class LegStages:
     def tick(self, now_ns: int) -> None:
         """Detect missing inputs; the loop calls this every ``pace.TICK_PERIOD_NS``."""
         self.estimation.tick(now_ns)
-        self.decision.tick(now_ns * 1e-9)
 
     def sample(self, stamp_ns: int, reading: Reading, moment: float | None) -> None:
         """Pass a sample of the sensors to the stages."""
@@ -122,22 +122,24 @@ class LegStages:
         variance = reading.variance
         self.estimation.contact_velocity(stamp_ns, *reading.velocity, variance, variance)
 
-    def report(self, now_ns: int) -> None:
-        """Read the pressure from the regulator, and pass it to estimation and decision."""
-        pressure = self.channel.read(now_ns)
-        if pressure is not None:
+    def report(self, pressure: float) -> None:
+        """Pass a pressure to the estimation."""
+        if pressure == pressure:
             self.pressure = pressure
             self.estimation.pressure(pressure)
-            self.decision.pressure(pressure)
 
-    def decide(self, now_ns: int) -> bool:
-        """Pass an estimate to the decision, and its set-point to the regulator, if it is new."""
-        if self._emission is None:
+    def estimate(self, row: np.void) -> bool:
+        """Write an estimate, if there is a new one, into the row of a record."""
+        emission, self._emission = self._emission, None
+        doubt = self.estimation.doubt
+        if doubt is not None:
+            row['doubt'] = DOUBTS.index(doubt.partition(':')[0])
+        if emission is None:
             return False
-        setpoint = self.decision.take(now_ns * 1e-9, self._emission).setpoint
-        self._emission = None
-        if setpoint is not None:
-            self.channel.command(setpoint, 0.0, now_ns)
+        row['load'], row['wetness'] = emission.load, emission.estimate.wet_probability
+        row['friction'] = emission.estimate.friction_mean
+        if emission.position is not None:
+            row['position'] = emission.position
         return True
 
 
@@ -286,7 +288,8 @@ class ClosedLoop:
                 raise TransportError(
                     f'scene {scene.name!r}, leg {channel.leg}: {error}'
                 ) from error
-            channel.activate(0)
+        self.supervision = Supervision(self._channels)
+        self.supervision.activate(0)
         self.pads = [0.0] * len(scene.legs)
         self._tick_pace = Pace(TICK_PERIOD_NS)
         self.connect(estimators, controller)
@@ -314,9 +317,10 @@ class ClosedLoop:
             self.controller = controller
         self._pace = Pace(period_ns)
         self.legs = [
-            LegStages(channel.leg, estimator, self.controller, channel, period_ns)
+            LegStages(channel.leg, estimator, period_ns)
             for channel, estimator in zip(self._channels, self.estimators, strict=True)
         ]
+        self.decision = DecisionStage(self.controller, [leg.leg for leg in self.legs])
 
     def _clock(self) -> float:
         return self._stamp_ns * 1e-9
@@ -339,22 +343,27 @@ class ClosedLoop:
         """
         self._stamp_ns += self.period_ns
         now_ns, legs = self._stamp_ns, self.legs
-        for channel in self._channels:
-            channel.tick(now_ns)
+        self.supervision.tick(now_ns)
         if self._tick_pace.due(now_ns):
             if self.body:
                 self.body.stage.tick(now_ns)
             for leg in legs:
                 leg.tick(now_ns)
+            self.decision.tick(now_ns)
         self.robot.step(self.pads)
         self._measure(now_ns, log)
         if self._pace.due(now_ns):
-            for leg in legs:
-                leg.report(now_ns)
-            self.pads = [regulator.pad_pressure for regulator in self._regulators]
+            pressures = self.supervision.read(now_ns, now_ns)
+            self.pads = pressures.rows[0]['pad'].tolist()
+            self.decision.pressure(pressures)
+            for leg, pressure in zip(legs, pressures.rows[0]['pressure'].tolist(), strict=True):
+                leg.report(pressure)
         # Without markers the first estimate after a silence may come between control steps.
-        decided = [leg.decide(now_ns) for leg in legs]
-        if any(decided):
+        rows = ESTIMATE.rows(len(legs))
+        fresh = [leg.estimate(row) for leg, row in zip(legs, rows, strict=True)]
+        if any(fresh):
+            commands = self.decision.decide(Block.of(now_ns, rows))
+            self.supervision.command(commands, now_ns, now_ns)
             estimates = [each.estimate for each in self.estimators]
             log.control(now_ns * 1e-9, self.pressures, estimates, self.controller)
 
@@ -376,8 +385,7 @@ class ClosedLoop:
 
     def close(self) -> None:
         """Vent and close the regulators."""
-        for channel in self._channels:
-            channel.close('the trial ends')
+        self.supervision.close('the trial ends')
 
 
 def run(

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import numpy as np
 
 from ros_pad.contact.pad import DOME_PRESSURE
@@ -39,7 +37,7 @@ def summarise(
         wet_accuracy=wet_accuracy(trial, LOAD_GATE * scene.expected_load),
         verdict=robot.verdict,
         refusals=[f'leg {leg}: {why}' for leg, why in sorted(controller.refusals.items())],
-        faults=[asdict(fault) for fault in controller.faults],
+        faults=[fault.as_dict() for fault in controller.faults],
         underpressure=[controller.underpressure[leg] for leg in trial.legs],
         goal_m=goal,
         time_to_goal_s=None if goal is None else time_to(trial, goal, scene.settle),

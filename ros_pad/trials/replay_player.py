@@ -8,6 +8,7 @@ The player keeps their output beside the recorded output of the nodes.
 from __future__ import annotations
 
 import bisect
+import math
 from array import array
 from collections.abc import Callable
 from collections.abc import Mapping
@@ -21,10 +22,10 @@ from ros_pad.bags.topics import BODY_DOUBT
 from ros_pad.bags.topics import CLOCK
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
-from ros_pad.control.stage import Decision
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import DOUBTS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import estimators_of
 from ros_pad.estimation.stage import Emission
@@ -32,6 +33,9 @@ from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.pace import Progress
+from ros_pad.records import ESTIMATE
+from ros_pad.records import PRESSURE
+from ros_pad.records import Block
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.node_settings import NodeSettings
 
@@ -88,7 +92,7 @@ class ReplayedLeg:
     def __init__(
         self, player: Player, leg: int, settings: NodeSettings, estimator: FootEstimator
     ) -> None:
-        self._player = player
+        self._player, self._leg = player, leg
         self._ambient = settings.ambient_pressure
         self._output = {kind: player.replayed[leg, kind] for kind in ESTIMATES + DECISIONS}
         self._period_ns = round(1e9 / settings.publish_rate)
@@ -99,7 +103,8 @@ class ReplayedLeg:
             self._take_doubt,
             self._reject,
         )
-        self.decision = DecisionStage(player.controller, leg)
+        self.decision = DecisionStage(player.controller, [leg])
+        self._doubt, self._morphology = math.nan, ''
         self._recorded_setpoints = player.recorded[leg, 'pressure_setpoint']
         self._diverged = False  # whether the set-point differs from the recorded one
         self.first_stamp_ns = -1
@@ -147,14 +152,18 @@ class ReplayedLeg:
         gauge = values[2] - self._ambient
         self.estimation.pressure(gauge)
         if not self._diverged:
-            self.decision.pressure(gauge)
+            self._press(gauge)
 
     def tick(self, now_ns: int) -> None:
         """Detect missing inputs at a time, ns."""
         self.estimation.tick(now_ns)
-        decision = self.decision.tick(now_ns * 1e-9)
-        if decision:
-            self._take_morphology(decision)
+        if self.decision.tick(now_ns):
+            self._take_morphology()
+
+    def _press(self, gauge: float) -> None:
+        rows = PRESSURE.rows(1)
+        rows['pressure'] = gauge
+        self.decision.pressure(Block.of(self._player.now_ns, rows))
 
     def _follow_stance(self, log_ns: int) -> None:
         standing = self.estimation.estimator.estimate.standing
@@ -175,14 +184,23 @@ class ReplayedLeg:
 
     def _take_doubt(self, doubt: str) -> None:
         self._output['doubt'].add_text(self._player.log_ns, doubt)
-        self._player.later.append(partial(self.decision.doubt, doubt))
+        self._player.later.append(partial(self._take_code, DOUBTS.index(doubt.partition(':')[0])))
+
+    def _take_code(self, code: float) -> None:
+        self._doubt = code
 
     def _decide(self, log_ns: int, emission: Emission) -> None:
         self._substitute_pressure()
-        decision = self.decision.take(self._player.now_ns * 1e-9, emission)
-        self._take_morphology(decision, log_ns)
-        if decision.setpoint is not None:
-            setpoint = decision.setpoint + self._ambient
+        rows = ESTIMATE.rows(1)
+        rows['load'], rows['wetness'] = emission.load, emission.estimate.wet_probability
+        rows['friction'], rows['doubt'] = emission.estimate.friction_mean, self._doubt
+        if emission.position is not None:
+            rows['position'] = emission.position
+        command = self.decision.decide(Block.of(self._player.now_ns, rows))
+        self._take_morphology(log_ns)
+        setpoint = command.rows[0, 0]['setpoint'].item()
+        if not math.isnan(setpoint):
+            setpoint += self._ambient
             self._output['pressure_setpoint'].add(log_ns, (setpoint,), emission.stamp_ns)
 
     def _substitute_pressure(self) -> None:
@@ -201,12 +219,14 @@ class ReplayedLeg:
         elif place and recorded.times[place - 1] > until_ns - self._period_ns:
             self._diverged = recorded.numbers[place - 1] != replayed.numbers[-1]
         if self._diverged:
-            self.decision.pressure(replayed.numbers[-1] - self._ambient)
+            self._press(replayed.numbers[-1] - self._ambient)
 
-    def _take_morphology(self, decision: Decision, log_ns: int | None = None) -> None:
-        if decision.morphology is not None:
+    def _take_morphology(self, log_ns: int | None = None) -> None:
+        morphology = self._player.controller.morphology(self._leg)
+        if morphology != self._morphology:
+            self._morphology = morphology
             log_ns = self._player.log_ns if log_ns is None else log_ns
-            self._output['morphology'].add_text(log_ns, decision.morphology)
+            self._output['morphology'].add_text(log_ns, morphology)
 
     def _reject(self, error: InvalidInput) -> None:
         self.rejected += 1

@@ -55,7 +55,7 @@ class Metrics:
         Why feet that should be domes were flat at the end; empty if there are none.
     faults : list of dict
         Faults of legs that the controller found: ``leg``, ``start``, ``end`` (s; None for a fault
-        that lasts to the end) and ``reason``.
+        that lasts to the end), ``kind`` and ``reason``, a text with numbers.
     underpressure : list of int
         Number of touch-downs of each foot as a dome with less pressure than its load needs.
     goal_m : float or None
@@ -94,7 +94,7 @@ def fault_lines(faults: Iterable[dict[str, Any]]) -> list[str]:
     """
     alike: dict[tuple[int, str], list[dict[str, Any]]] = {}
     for fault in faults:
-        alike.setdefault((fault['leg'], fault['reason'].partition(':')[0]), []).append(fault)
+        alike.setdefault((fault['leg'], fault['kind']), []).append(fault)
     lines = []
     for (leg, kind), found in alike.items():
         if len(found) > OFTEN:

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of pads, regulators and legs: codes with two numbers, and their texts.
+
+Records hold a fault as three numbers; its text is made where a person reads it.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import sensor_fault
+
+
+def sensor_fault_text(doubt: float) -> str:
+    """Return the kind of a doubt of the estimator, given its code; empty if no sensor is faulty.
+
+    NaN, a doubt that is not known, is no fault.
+    """
+    known = 0 <= doubt < len(DOUBTS)
+    return sensor_fault(DOUBTS[int(doubt)]) if known else ''
+
+
+class Kind(Enum):
+    """Kinds of fault.
+
+    In a text {a} and {b} are the two numbers, and {p} and {q} the same as pressures in kPa.
+
+    Attributes
+    ----------
+    code : int
+        Code in records.
+    label : str
+        The kind in a few words.
+    template : str
+        Text with numbers.
+    numbers : str
+        Meaning of the two numbers; empty for a fault without them.
+    """
+
+    NONE = 0, '', '', ''
+    SENSOR = (
+        1, 'its pressure sensor is faulty',
+        'reads {p}, which no pad can have: its pressure sensor is faulty', 'reading, Pa',
+    )  # fmt: skip
+    CEILING = (
+        2, 'above the ceiling', '{p} is above the ceiling of {q}', 'pressure, Pa; ceiling, Pa',
+    )  # fmt: skip
+    STUCK = 3, 'stuck', 'stuck: {p}, neither fills nor vents', 'pressure, Pa'
+    RISES = 4, 'rises', 'rises: {p} at a set-point of {q}', 'pressure, Pa; set-point, Pa'
+    SAGS = 5, 'sags', 'sags: {p} at a set-point of {q}', 'pressure, Pa; set-point, Pa'
+    NO_VENT = (
+        6, 'does not vent', 'does not vent: {p} {b:.1f} s after the command',
+        'pressure, Pa; time since the command, s',
+    )  # fmt: skip
+    NO_FILL = (
+        7, 'does not fill', 'does not fill: {p} {b:.1f} s after the command',
+        'pressure, Pa; time since the command, s',
+    )  # fmt: skip
+    LEAK = (
+        8, 'leaks or lacks air', 'leaks or lacks air: {p}, {q} below the set-point',
+        'pressure, Pa; missing pressure, Pa',
+    )  # fmt: skip
+    SILENCE = (
+        9, 'no reading', 'no reading for {a:.1f} s, the last was {q}',
+        'time without a reading, s; last reading, Pa',
+    )  # fmt: skip
+    DEVICE = 10, 'device error', 'device error', ''
+    HELD = (
+        11, 'held', 'vented until the node is activated again',
+        'code of the fault for which the pad is held',
+    )  # fmt: skip
+    TIMEOUT = (
+        12, 'no estimate', 'no load, position or estimate for {a:.1f} s',
+        'time without an estimate, s',
+    )  # fmt: skip
+    NO_STEP = (
+        13, 'no step measured',
+        'no step measured while the other legs took {a:.0f}: its load is not measured, or the leg'
+        ' does not step', 'steps of the other legs',
+    )  # fmt: skip
+    DOUBT = 14, 'sensors', 'sensors', 'code of the doubt of the estimator'
+
+    def __init__(self, code: int, label: str, template: str, numbers: str) -> None:
+        self.code, self.label, self.template, self.numbers = code, label, template, numbers
+
+
+KINDS = {kind.code: kind for kind in Kind}
+"""Kinds of fault by their codes."""
+
+
+class Fault(NamedTuple):
+    """A fault; false if it is none. Its text is ``str(fault)``.
+
+    Attributes
+    ----------
+    kind : Kind
+        Kind of the fault.
+    a, b : float
+        Its two numbers, see :attr:`Kind.numbers`.
+    """
+
+    kind: Kind = Kind.NONE
+    a: float = 0.0
+    b: float = 0.0
+
+    def __bool__(self) -> bool:
+        return self.kind is not Kind.NONE
+
+    def __str__(self) -> str:
+        if self.kind is Kind.DOUBT:
+            return self.label
+        kilo = (f'{1e-3 * each:.1f} kPa' for each in (self.a, self.b))
+        return self.kind.template.format(a=self.a, b=self.b, p=next(kilo), q=next(kilo))
+
+    @property
+    def label(self) -> str:
+        """The kind in a few words."""
+        return sensor_fault_text(self.a) if self.kind is Kind.DOUBT else self.kind.label
+
+
+NONE = Fault()
+"""No fault."""
+
+
+def text(code: float, a: float, b: float) -> str:
+    """Return the text of a fault in a record; empty for none, and for codes not known."""
+    return str(Fault(KINDS.get(int(code), Kind.NONE) if code >= 0.0 else Kind.NONE, a, b))
+
+
+def joined(*faults: object) -> str:
+    """Return texts of faults with semicolons between them, without those that are none."""
+    return '; '.join(str(each) for each in faults if each)
