@@ -14,7 +14,6 @@ from collections import deque
 
 from ros_pad.configuration import number
 from ros_pad.control.faults import NONE
-from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 

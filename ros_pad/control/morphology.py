@@ -484,8 +484,8 @@ class MorphologyController:
             Reading, gauge Pa; None without a reading. The air is monitored only after a first
             reading.
         doubt : float
-            Code of the doubt of the estimator if sensors of the foot cannot be used; 0 if they
-            can. A foot with such a fault adds no footprints and does not probe; it uses the
+            Code (no unit) of the doubt of the estimator if sensors of the foot cannot be used; 0
+            if they can. A foot with such a fault adds no footprints and does not probe; it uses the
             footprints of the other feet.
 
         Raises
