@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The merge node: joins what drivers of others publish by leg into records.
 
-Drivers may publish ``leg_i/wrench``, ``leg_i/position``, ``leg_i/pressure`` and the other topics of
-:data:`ros_pad.bags.topics.FROM_DRIVERS`; all other nodes of ros_pad receive records alone. A record
-that somebody else publishes is not published here, too: two sources would contradict each other.
+Drivers may publish ``leg_i/wrench``, ``leg_i/position``, ``leg_i/pressure`` and the other topics
+of :data:`ros_pad.bags.topics.FROM_DRIVERS`; all other nodes of ros_pad receive records alone. A
+record that somebody else publishes is not published here: two sources would contradict each other.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import Pace
+from ros_pad.records import COMMAND
+from ros_pad.records import PRESSURE
+from ros_pad.records import SAMPLE
 from ros_pad.records import Block
 
 PARAMETERS = (
@@ -43,6 +46,12 @@ PARAMETERS = (
     Parameter(
         'source', 'markers', 'What a sample needs beside the force: position, or velocity, too.',
         choices=SOURCES,
+    ),
+    Parameter(
+        'topics', 'wrench, position, foot_wrench, pressure',
+        'Topics of each leg that are joined, with commas between them; also contact_velocity and'
+        ' pressure_setpoint.',
+        read=lambda text: topics.chosen(text, schemas.FROM_DRIVERS),
     ),
 )  # fmt: skip
 
@@ -74,13 +83,13 @@ class MergeNode(Node):
                 self, topic, Joiner(topic.schema.record, self._legs, fields, wait)
             )
             for topic, fields, wait in (
-                (topics.SAMPLE, needed, WAIT_NS),
-                (topics.FORCE, ('force',), WAIT_NS),
-                (topics.PRESSURE, (), 0),
-                (topics.COMMAND, (), 0),
+                (topics.SAMPLE, SAMPLE, needed, WAIT_NS),
+                (topics.FORCE, SAMPLE, ('force',), WAIT_NS),
+                (topics.PRESSURE, PRESSURE, (), 0),
+                (topics.COMMAND, COMMAND, (), 0),
             )
         }
-        for schema in schemas.FROM_DRIVERS:
+        for schema in values['topics']:
             assert schema.record
             name = 'force' if schema is schemas.LEG_FOOT_WRENCH else schema.record.name
             record, topic = self._records[f'feet/{name}'], topics.of_leg(schema)

@@ -282,7 +282,9 @@ class SimulatorNode(Node):
         rows = SAMPLE.rows(samples, len(self.scene.legs))
         # Forces go first: a reading of the joints waits for them only until the next one.
         later: list[tuple[Callable[..., None], tuple[float, ...]]] = []
-        for count, (row, stamp_ns) in enumerate(zip(rows, stamps.tolist(), strict=True), 1):
+        count = 0
+        for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
+            count += 1
             self.robot.step(self.pressures)
             stamp = split(stamp_ns)
             x, y, heading = self.robot.body

@@ -209,6 +209,24 @@ def of_leg(schema: schemas.Topic) -> Topic:
     return _measured(schema)
 
 
+def chosen(text: str, known: Sequence[schemas.Topic]) -> list[schemas.Topic]:
+    """Return the topics of each leg that a text names, with commas between them.
+
+    Raises
+    ------
+    ConfigError
+        When one is not known.
+    """
+    kinds = {schema.kind: schema for schema in known}
+    names = [each.strip() for each in text.split(',') if each.strip()]
+    for name in names:
+        if name not in kinds:
+            raise ConfigError(
+                f'{name!r} is no topic of a leg: some of {", ".join(kinds)} are needed'
+            )
+    return [kinds[name] for name in names]
+
+
 def check_legs(legs: Sequence[int]) -> None:
     """Refuse numbers of legs that no robot has.
 
