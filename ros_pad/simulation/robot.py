@@ -13,6 +13,7 @@ import numpy as np
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.scene import LeggedBody
@@ -130,6 +131,10 @@ class SimulatedRobot(Protocol):
     @property
     def feet(self) -> list[FootState]:
         """State of each foot, in the order of ``legs``; the objects stay the same."""
+
+    @property
+    def contacts(self) -> Array:
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
 
     @property
     def body(self) -> Vector:
