@@ -225,13 +225,13 @@ class SimulatorNode(Node):
         assert self._body_sensors
         assert isinstance(self.robot, FullRobot)
         reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        self._send_forces(*(value for force in reading.forces for value in (*stamp, *force)))
-        if reading.imu:
-            gyro, accelerometer = reading.imu
-            self._send_imu(*stamp, *gyro, *accelerometer)
-        if reading.joints:
-            positions, velocities, efforts = reading.joints
-            self._send_joints(*stamp, *positions, *velocities, *efforts)
+        forces = reading.rows['force'].tolist()
+        self._send_forces(*(value for force in forces for value in (*stamp, *force)))
+        imu, joints = reading.imu.ravel().tolist(), reading.joints.ravel().tolist()
+        if not math.isnan(imu[0]):
+            self._send_imu(*stamp, *imu)
+        if not math.isnan(joints[0]):
+            self._send_joints(*stamp, *joints)
 
     def _pressure_callback(self, index: int) -> Any:
         def callback(sec: int, nanosec: int, pressure: float) -> None:

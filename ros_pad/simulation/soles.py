@@ -144,7 +144,7 @@ class Soles:
 
     @property
     def contacts(self) -> Array:
-        """See :attr:`ros_pad.simulation.robot.SimulatedRobot.contacts`."""
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
         return self._rows.T
 
     @property

@@ -7,6 +7,7 @@ set-points between them, in the same order as the composed nodes.
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -184,12 +185,13 @@ class BodySensing:
         """Measure and estimate; return what the estimate shows of each foot, or nothing."""
         self.estimate = None
         reading = self._sensors.read(self._robot.proprioception(), self._robot.time)
-        for index, force in enumerate(reading.forces):
+        for index, force in enumerate(reading.rows['force'].tolist()):
             self.stage.force(index, stamp_ns, force)
-        if reading.imu:
-            self.stage.imu(stamp_ns, *reading.imu)
-        if reading.joints:
-            self.stage.joints(stamp_ns, *reading.joints)
+        imu, joints = reading.imu.tolist(), reading.joints.tolist()
+        if not math.isnan(imu[0][0]):
+            self.stage.imu(stamp_ns, *imu)
+        if not math.isnan(joints[0][0]):
+            self.stage.joints(stamp_ns, *joints)
         return foot_readings(self.estimate) if self.estimate else []
 
     @property
