@@ -312,10 +312,8 @@ class SimulatorNode(Node):
         assert self._body_sensors
         assert isinstance(self.robot, FullRobot)
         reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        gyro, accelerometer = reading.imu
-        later.append((self._send_imu, (*stamp, *gyro, *accelerometer)))
-        positions, velocities, efforts = reading.joints
-        later.append((self._send_joints, (*stamp, *positions, *velocities, *efforts)))
+        later.append((self._send_imu, (*stamp, *reading.imu.ravel().tolist())))
+        later.append((self._send_joints, (*stamp, *reading.joints.ravel().tolist())))
         return reading.rows
 
     def tick(self, samples: int = 1) -> None:
