@@ -23,8 +23,6 @@ from ros_pad.simulation.scene import SensorNoise
 _BLOCK = 1000  # samples drawn at once, because a call of NumPy costs more than the numbers
 
 
-Reading = tuple[Vector, Vector]
-"""Force, N, and position, m, of a foot."""
 
 
 class Sensors:
