@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ros_pad.bags.wire import TYPE
 from ros_pad.records import COMMAND as COMMANDS
 from ros_pad.records import ESTIMATE as ESTIMATES
@@ -137,10 +139,7 @@ LEG_SETPOINT = _of_leg(
     'pressure_setpoint', _FLUID, COMMANDS, ('setpoint',), ('fluid_pressure',), 'Pa absolute',
     'leg_{leg}_pad',
 )  # fmt: skip
-LEG_SLIP = _of_leg(
-    'slip', _TWIST, ESTIMATES, ('slip_x', 'slip_y', 'slip_speed_sd', 'slip_speed_sd'), _PLANE,
-    'm/s', 'world',
-)  # fmt: skip
+LEG_SLIP = _of_leg('slip', _TWIST, ESTIMATES, ('slip_x', 'slip_y'), _PLANE[:2], 'm/s', 'world')
 LEG_SLIPPING = _number('slipping', 'slipping', 'std_msgs/msg/Bool')
 LEG_WETNESS = _number('wetness', 'wetness')
 LEG_FRICTION = _number('friction', 'friction')
@@ -193,4 +192,45 @@ FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
 
-__all__ = ['FROM_DRIVERS', 'OF_LEGS', 'RECORDS', 'Topic']
+TRIAL = (SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT) + tuple(
+    topic for topic in OF_LEGS if topic.columns and topic is not LEG_FOOT_WRENCH
+)
+"""The topics that a trial is read from."""
+
+
+def to_record(topic: Topic, values: np.ndarray, ambient: float) -> np.ndarray:
+    """Return the numbers of a record that values of messages of a leg are.
+
+    Parameters
+    ----------
+    topic : Topic
+        One of :data:`OF_LEGS`.
+    values : array (..., values)
+        Values, in the order of ``topic.values``.
+    ambient : float
+        Ambient pressure, Pa: messages of a leg have absolute pressures.
+
+    Returns
+    -------
+    array (..., columns)
+    """
+    numbers = np.array(values, float)
+    if topic.record in (PRESSURES, COMMANDS):
+        # Adding and subtracting the ambient pressure leaves rounding errors below 1 uPa.
+        return np.round(numbers - ambient, 6)
+    if topic is LEG_VELOCITY:  # below 0: it must not be used
+        numbers[..., 2:] = np.where(numbers[..., 2:] < 0.0, np.inf, numbers[..., 2:])
+    return numbers
+
+
+def from_record(topic: Topic, numbers: np.ndarray, ambient: float) -> np.ndarray:
+    """Return the values of messages of a leg from numbers of a record; see :func:`to_record`."""
+    values = np.array(numbers, float)
+    if topic.record in (PRESSURES, COMMANDS):
+        return values + ambient
+    if topic is LEG_VELOCITY:
+        values[..., 2:] = np.where(np.isinf(values[..., 2:]), -1.0, values[..., 2:])
+    return values
+
+
+__all__ = ['FROM_DRIVERS', 'OF_LEGS', 'RECORDS', 'TRIAL', 'Topic', 'from_record', 'to_record']

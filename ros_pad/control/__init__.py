@@ -4,7 +4,6 @@
 from ros_pad.control.monitor import PadMonitor
 from ros_pad.control.morphology import COMMAND_TIMEOUT
 from ros_pad.control.morphology import FootFault
-from ros_pad.control.morphology import FootState
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import POLICIES
 from ros_pad.control.policies import POLICY_PARAMETERS
@@ -24,7 +23,6 @@ __all__ = [
     'POLICY_PARAMETERS',
     'Choice',
     'FootFault',
-    'FootState',
     'LiftOff',
     'MorphologyController',
     'PadMonitor',

@@ -39,54 +39,42 @@ class Kind(Enum):
         Meaning of the two numbers; empty for a fault without them.
     """
 
+    # fmt: off
     NONE = 0, '', '', ''
-    SENSOR = (
-        1, 'its pressure sensor is faulty',
-        'reads {p}, which no pad can have: its pressure sensor is faulty', 'reading, Pa',
-    )  # fmt: skip
-    CEILING = (
-        2, 'above the ceiling', '{p} is above the ceiling of {q}', 'pressure, Pa; ceiling, Pa',
-    )  # fmt: skip
+    SENSOR = (1, 'its pressure sensor is faulty',
+              'reads {p}, which no pad can have: its pressure sensor is faulty', 'reading, Pa')
+    CEILING = 2, 'above the ceiling', '{p} is above the ceiling of {q}', 'pressure and ceiling, Pa'
     STUCK = 3, 'stuck', 'stuck: {p}, neither fills nor vents', 'pressure, Pa'
-    RISES = 4, 'rises', 'rises: {p} at a set-point of {q}', 'pressure, Pa; set-point, Pa'
-    SAGS = 5, 'sags', 'sags: {p} at a set-point of {q}', 'pressure, Pa; set-point, Pa'
-    NO_VENT = (
-        6, 'does not vent', 'does not vent: {p} {b:.1f} s after the command',
-        'pressure, Pa; time since the command, s',
-    )  # fmt: skip
-    NO_FILL = (
-        7, 'does not fill', 'does not fill: {p} {b:.1f} s after the command',
-        'pressure, Pa; time since the command, s',
-    )  # fmt: skip
-    LEAK = (
-        8, 'leaks or lacks air', 'leaks or lacks air: {p}, {q} below the set-point',
-        'pressure, Pa; missing pressure, Pa',
-    )  # fmt: skip
-    SILENCE = (
-        9, 'no reading', 'no reading for {a:.1f} s, the last was {q}',
-        'time without a reading, s; last reading, Pa',
-    )  # fmt: skip
+    RISES = 4, 'rises', 'rises: {p} at a set-point of {q}', 'pressure and set-point, Pa'
+    SAGS = 5, 'sags', 'sags: {p} at a set-point of {q}', 'pressure and set-point, Pa'
+    NO_VENT = (6, 'does not vent', 'does not vent: {p} {b:.1f} s after the command',
+               'pressure, Pa, and time since the command, s')
+    NO_FILL = (7, 'does not fill', 'does not fill: {p} {b:.1f} s after the command',
+               'pressure, Pa, and time since the command, s')
+    LEAK = (8, 'leaks or lacks air', 'leaks or lacks air: {p}, {q} below the set-point',
+            'pressure, and what is missing, Pa')
+    SILENCE = (9, 'no reading', 'no reading for {a:.1f} s, the last was {q}',
+               'time without a reading, s, and last reading, Pa')
     DEVICE = 10, 'device error', 'device error', ''
-    HELD = (
-        11, 'held', 'vented until the node is activated again',
-        'code of the fault for which the pad is held',
-    )  # fmt: skip
-    TIMEOUT = (
-        12, 'no estimate', 'no load, position or estimate for {a:.1f} s',
-        'time without an estimate, s',
-    )  # fmt: skip
-    NO_STEP = (
-        13, 'no step measured',
-        'no step measured while the other legs took {a:.0f}: its load is not measured, or the leg'
-        ' does not step', 'steps of the other legs',
-    )  # fmt: skip
-    DOUBT = 14, 'sensors', 'sensors', 'code of the doubt of the estimator'
+    HELD = (11, 'held', 'vented until the node is activated again',
+            'code of the fault for which the pad is held')
+    TIMEOUT = (12, 'no estimate', 'no load, position or estimate for {a:.1f} s',
+               'time without an estimate, s')
+    NO_STEP = (13, 'no step measured',
+               'no step measured while the other legs took {a:.0f}: its load is not measured, or'
+               ' the leg does not step', 'steps of the other legs')
+    DOUBT = 14, 'sensors', '', 'code of the doubt of the estimator'
+    # fmt: on
 
     def __init__(self, code: int, label: str, template: str, numbers: str) -> None:
         self.code, self.label, self.template, self.numbers = code, label, template, numbers
 
+    def __call__(self, a: float = 0.0, b: float = 0.0) -> Fault:
+        """Return a fault of this kind with its two numbers."""
+        return Fault(self, a, b)
 
-KINDS = {kind.code: kind for kind in Kind}
+
+KINDS: dict[float, Kind] = {kind.code: kind for kind in Kind}
 """Kinds of fault by their codes."""
 
 
@@ -101,18 +89,16 @@ class Fault(NamedTuple):
         Its two numbers, see :attr:`Kind.numbers`.
     """
 
-    kind: Kind = Kind.NONE
-    a: float = 0.0
-    b: float = 0.0
+    kind: Kind
+    a: float
+    b: float
 
     def __bool__(self) -> bool:
         return self.kind is not Kind.NONE
 
     def __str__(self) -> str:
-        if self.kind is Kind.DOUBT:
-            return self.label
-        kilo = (f'{1e-3 * each:.1f} kPa' for each in (self.a, self.b))
-        return self.kind.template.format(a=self.a, b=self.b, p=next(kilo), q=next(kilo))
+        p, q = (f'{1e-3 * each:.1f} kPa' for each in self[1:])
+        return self.kind.template.format(a=self.a, b=self.b, p=p, q=q) or self.label
 
     @property
     def label(self) -> str:
@@ -120,13 +106,13 @@ class Fault(NamedTuple):
         return sensor_fault_text(self.a) if self.kind is Kind.DOUBT else self.kind.label
 
 
-NONE = Fault()
+NONE = Kind.NONE()
 """No fault."""
 
 
 def text(code: float, a: float, b: float) -> str:
     """Return the text of a fault in a record; empty for none, and for codes not known."""
-    return str(Fault(KINDS.get(int(code), Kind.NONE) if code >= 0.0 else Kind.NONE, a, b))
+    return str(KINDS.get(code, Kind.NONE)(a, b))
 
 
 def joined(*faults: object) -> str:

@@ -14,7 +14,6 @@ from collections import deque
 
 from ros_pad.configuration import number
 from ros_pad.control.faults import NONE
-from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 
@@ -233,19 +232,8 @@ class PadMonitor:
     """
 
     __slots__ = (
-        '_arrived',
-        '_ceiling',
-        '_changes',
-        '_motion',
-        '_read',
-        '_repair',
-        '_rests',
-        '_setpoint',
-        '_time',
-        'fault',
-        'pressure',
-        'silence',
-        'tolerance',
+        '_arrived', '_ceiling', '_changes', '_motion', '_read', '_repair', '_rests', '_setpoint',
+        '_time', 'fault', 'pressure', 'silence', 'tolerance',
     )  # fmt: skip
 
     def __init__(self, ceiling: float) -> None:
@@ -322,7 +310,7 @@ class PadMonitor:
         if pressure is None or not math.isfinite(pressure):
             silent = time - self._read
             if silent > SILENT and not math.isnan(self.pressure) and not self.silence:
-                self.silence = Fault(Kind.SILENCE, silent, self.pressure)
+                self.silence = Kind.SILENCE(silent, self.pressure)
             return
         first, last_read, self._read = math.isnan(self.pressure), self._read, time
         self.pressure = pressure
@@ -378,15 +366,15 @@ class PadMonitor:
         stuck = bool(self.fault) and side * repair.side < 0
         repair.side = side
         if side == 0:
-            self.fault = Fault(Kind.SENSOR, pressure)
+            self.fault = Kind.SENSOR(pressure)
         elif over:
-            self.fault = Fault(Kind.CEILING, pressure, self._ceiling)
+            self.fault = Kind.CEILING(pressure, self._ceiling)
         elif stuck:
-            self.fault = Fault(Kind.STUCK, pressure)
+            self.fault = Kind.STUCK(pressure)
         elif self._arrived:
-            self.fault = Fault(Kind.RISES if side > 0 else Kind.SAGS, pressure, aim)
+            self.fault = (Kind.RISES if side > 0 else Kind.SAGS)(pressure, aim)
         elif side > 0 or pressure < self.tolerance:
             kind = Kind.NO_VENT if side > 0 else Kind.NO_FILL
-            self.fault = Fault(kind, pressure, time - self._changes.commanded)
+            self.fault = kind(pressure, time - self._changes.commanded)
         else:
-            self.fault = Fault(Kind.LEAK, pressure, aim - pressure)
+            self.fault = Kind.LEAK(pressure, aim - pressure)

@@ -13,9 +13,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
-from dataclasses import replace
 from typing import Any
-from typing import NamedTuple
 
 from ros_pad.configuration import Setting
 from ros_pad.configuration import choice as one_of
@@ -76,37 +74,7 @@ SOUND = (NONE,) * 5
 """Faults of a leg that has none, see `_LegState.present`."""
 
 
-class FootState(NamedTuple):
-    """Inputs of a decision about a foot, all of one time.
-
-    Attributes
-    ----------
-    time : float
-        Time of the inputs, s; the same clock for all legs.
-    wet_probability : float
-        Probability of wet ground below the foot, 0 to 1.
-    load : float
-        Largest normal force since the last estimate, N; NaN if there was none.
-    position : tuple of float
-        Position of the foot, x and y, m; NaN if it is old or missing.
-    pressure : float or None
-        Gauge pressure of the pad, Pa; None without a reading since the last estimate.
-    doubt : float
-        Code of the doubt of the estimator if sensors of the foot cannot be used; 0 if they can.
-    friction : float
-        Mean coefficient of friction below the foot; NaN if it is not known.
-    """
-
-    time: float
-    wet_probability: float
-    load: float
-    position: tuple[float, float]
-    pressure: float | None
-    doubt: float = 0.0
-    friction: float = math.nan
-
-
-@dataclass(frozen=True)
+@dataclass
 class FootFault:
     """A fault of a leg, with its start and end.
 
@@ -501,32 +469,6 @@ class MorphologyController:
         """
         return self._state(leg).air.monitor
 
-    def decide(self, leg: int, state: FootState) -> float | None:
-        """Process an estimate with all its inputs: :meth:`observe`, then :meth:`update`.
-
-        Parameters
-        ----------
-        leg : int
-            Number of the leg.
-        state : FootState
-            Inputs of the decision, all of one time.
-
-        Returns
-        -------
-        float or None
-            Set-point, gauge Pa; None if load, position or probability is not finite.
-
-        Raises
-        ------
-        InvalidInput
-            For a leg that is not controlled, or a probability outside 0 to 1.
-        """
-        self.observe(leg, state.time, state.pressure, state.doubt)
-        x, y = state.position
-        if not math.isfinite(state.load + state.wet_probability + x + y):
-            return None
-        return self.update(leg, state.load, state.wet_probability, state.position, state.friction)
-
     def observe(self, leg: int, time: float, pressure: float | None, doubt: float = 0.0) -> None:
         """Process the measurements of a leg that can arrive without an estimate.
 
@@ -542,8 +484,8 @@ class MorphologyController:
             Reading, gauge Pa; None without a reading. The air is monitored only after a first
             reading.
         doubt : float
-            Code of the doubt of the estimator if sensors of the foot cannot be used; 0 if they
-            can. A foot with such a fault adds no footprints and does not probe; it uses the
+            Code (no unit) of the doubt of the estimator if sensors of the foot cannot be used; 0
+            if they can. A foot with such a fault adds no footprints and does not probe; it uses the
             footprints of the other feet.
 
         Raises
@@ -554,7 +496,7 @@ class MorphologyController:
         state = self._state(leg)
         timing, air, faults = state.timing, state.air, state.faults
         if doubt != faults.sensors.a:
-            faults.sensors = Fault(Kind.DOUBT, doubt) if doubt else NONE
+            faults.sensors = Kind.DOUBT(doubt) if doubt else NONE
         if not 0.0 <= time - timing.now <= self.command_timeout:
             # the first time, or after a pause
             timing.updated = time
@@ -569,13 +511,13 @@ class MorphologyController:
         if age <= self.command_timeout:
             faults.timeout = NONE
         elif not faults.timeout:
-            faults.timeout = Fault(Kind.TIMEOUT, age)
+            faults.timeout = Kind.TIMEOUT(age)
             self._time_out(leg, state)
         missed = self._decisions - state.decided
         if missed <= 2 * len(self._legs):
             faults.no_step = NONE
         elif not faults.no_step:
-            faults.no_step = Fault(Kind.NO_STEP, missed)
+            faults.no_step = Kind.NO_STEP(missed)
         self._list_faults(leg, state)
 
     def _follow_fault(self, air: _Air, before: Fault) -> None:
@@ -608,14 +550,10 @@ class MorphologyController:
                 if fault:
                     lasting[place] = FootFault(leg, now, None, fault)
                     self.faults.append(lasting[place])
-            elif entry.fault != fault:
-                # Either the same fault with new numbers, or its end.
-                changed = replace(entry, fault=fault) if fault else replace(entry, end=now)
-                self.faults[self.faults.index(entry)] = changed
-                if fault:
-                    lasting[place] = changed
-                else:
-                    del lasting[place]
+            elif not fault:
+                lasting.pop(place).end = now
+            else:
+                entry.fault = fault  # it may have new numbers
 
     def update(
         self,

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ros_pad.control.faults import sensor_fault_text
-from ros_pad.control.morphology import FootState
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
 from ros_pad.errors import InvalidInput
@@ -134,23 +133,17 @@ class DecisionStage:
             inputs.position, inputs.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
             inputs.doubt = doubt if sensor_fault_text(doubt) else 0.0
-        current = now - inputs.positioned <= OLD
-        state = FootState(
-            now,
-            wetness,
-            inputs.largest if math.isfinite(load) else load,
-            inputs.position if current else (math.nan, math.nan),
-            inputs.take_pressure(now),
-            inputs.doubt,
-            friction,
-        )
+        self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
+        old = now - inputs.positioned > OLD
+        if old or not math.isfinite(load + wetness + sum(inputs.position)):
+            return math.nan
         try:
-            setpoint = self.controller.decide(leg, state)
+            setpoint = self.controller.update(
+                leg, inputs.largest, wetness, inputs.position, friction
+            )
         except InvalidInput as error:
             if self._reject:
                 self._reject(leg, error)
-            return math.nan
-        if setpoint is None:
             return math.nan
         inputs.largest = -math.inf
         return setpoint

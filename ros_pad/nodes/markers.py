@@ -177,6 +177,16 @@ class WalkMarkers:
         return marker
 
 
+def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Marker:
+    """Return a foot at a place, m, in a colour from dry to wet by its P(wet), 0 to 1."""
+    marker = _marker('feet', leg, Marker.SPHERE)
+    marker.pose.position = Point(x=x, y=y, z=0.01)
+    marker.scale = Vector3(x=0.02, y=0.02, z=0.02)
+    red, green, blue = (d + wetness * (w - d) for d, w in zip(_DRY, _WET, strict=True))
+    marker.color = _colour((red, green, blue))
+    return marker
+
+
 def _rectangles(wet: np.ndarray) -> Iterator[tuple[int, int, int, int]]:
     """Yield rectangles (left, right, bottom, top) that together are the wet cells.
 

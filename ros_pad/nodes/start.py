@@ -17,6 +17,8 @@ def _start(name: str) -> int:
 body_estimator = partial(_start, 'body_estimator')
 controller = partial(_start, 'controller')
 estimator = partial(_start, 'estimator')
+merge = partial(_start, 'merge')
 recorder = partial(_start, 'recorder')
 regulator = partial(_start, 'regulator')
 simulator = partial(_start, 'simulator')
+views = partial(_start, 'views')

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ros_pad.errors import PadError
 from ros_pad.records import PRESSURE
 from ros_pad.records import Block
-from ros_pad.regulators.protocol import Regulator
 from ros_pad.regulators.supervisor import Health
 from ros_pad.regulators.supervisor import Level
 from ros_pad.regulators.supervisor import SupervisedChannel
@@ -107,27 +105,8 @@ class Supervision:
 
     def read(self, stamp_ns: int, elapsed_ns: int) -> Block:
         """Read all devices, and return the PRESSURE record of a time stamp, ns."""
-        channels = self.channels
-        rows = np.empty(len(channels), _ROW)
-        pressures = [channel.read(elapsed_ns) for channel in channels]
-        faults = [channel.present for channel in channels]
-        rows['pressure'] = pressures  # None becomes NaN
-        rows['setpoint'] = [
-            each.setpoint if pressure is not None else math.nan
-            for each, pressure in zip(channels, pressures, strict=True)
-        ]
-        rows['pad'] = [_pad_pressure(channel.outlet.regulator) for channel in channels]
-        rows['fault'] = [each.kind.code for each in faults]
-        rows['detail'] = [(each.a, each.b) for each in faults]
+        rows = np.array([channel.row(elapsed_ns) for channel in self.channels], _ROW)
         return Block.of(stamp_ns, rows)
-
-
-def _pad_pressure(regulator: Regulator) -> float:
-    """Return the true pressure of a simulated pad, gauge Pa; NaN for others."""
-    try:
-        return getattr(regulator, 'pad_pressure', math.nan)
-    except PadError:
-        return math.nan
 
 
 def supply_health(channels: Sequence[SupervisedChannel]) -> Health:

@@ -8,6 +8,7 @@ A :class:`SupervisedChannel` stands between a controller and the regulator of on
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -291,7 +292,7 @@ class SupervisedChannel:
         """The fault for records: of pad or device, or that for which the pad is held."""
         monitor = self.monitor
         if self._device_faults:
-            return monitor.silence or Fault(Kind.DEVICE)
+            return monitor.silence or Kind.DEVICE()
         return monitor.silence or monitor.fault or self._hold
 
     @property
@@ -417,7 +418,7 @@ class SupervisedChannel:
             monitor.update(time, aim, pressure)
             ceiling = outlet.regulator.ceiling
             if pressure > ceiling * (1.0 + self.settings.ceiling_tolerance):
-                fault = Fault(Kind.CEILING, pressure, ceiling)
+                fault = Kind.CEILING(pressure, ceiling)
                 self.hold(str(fault), fault)
         if known != (monitor.silence, monitor.fault) and monitor.reason:
             self._log.error(f'leg {self.leg}: {monitor.reason}')
@@ -428,6 +429,20 @@ class SupervisedChannel:
                 self.hold(lasting, self.present)
         self._continue(elapsed_ns)
         return pressure
+
+    def row(self, elapsed_ns: int) -> tuple[float, float, float, float, tuple[float, float]]:
+        """Read the device at a time, ns, and return the row of a PRESSURE record."""
+        pressure, setpoint, pad, fault = (
+            self.read(elapsed_ns),
+            self.setpoint,
+            math.nan,
+            self.present,
+        )
+        if pressure is None:
+            pressure = setpoint = math.nan
+        with suppress(PadError):  # of a device that is closed
+            pad = getattr(self.outlet.regulator, 'pad_pressure', pad)
+        return pressure, setpoint, pad, fault.kind.code, fault[1:]
 
     def vent(self, reason: str) -> None:
         """Vent the pad; a failure is logged, and the next tick tries again."""
@@ -443,7 +458,7 @@ class SupervisedChannel:
     def hold(self, reason: str, fault: Fault) -> None:
         """Vent the pad for a fault and refuse its commands until the next activation."""
         if not self.held:
-            self._hold = Fault(Kind.HELD, fault.kind.code)
+            self._hold = Kind.HELD(fault.kind.code)
             self.held = f'{reason}; {self._hold}'
             self._log.error(f'leg {self.leg}: {self.held}')
             self.vent(reason)

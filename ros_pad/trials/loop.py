@@ -1,41 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed loop of a trial without ROS: a robot, and the three stages of each of its legs.
+"""The closed loop of a trial without ROS: a robot, the pipeline, and supervised regulators.
 
-The stages are estimation, decision and regulator. The loop only passes samples, pressures and
-set-points between them, in the same order as the composed nodes.
+The loop only passes records between them, in the same order as the composed nodes.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
 from collections.abc import Mapping
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ros_pad.configuration import choice
 from ros_pad.configuration import instance
+from ros_pad.contact.resistance import Foot
 from ros_pad.control import MorphologyController
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import TransportError
-from ros_pad.estimation import DOUBTS
-from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import estimators_of
-from ros_pad.estimation.stage import Emission
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.pace import Progress
-from ros_pad.records import ESTIMATE
+from ros_pad.pipeline import Pipeline
+from ros_pad.records import SAMPLE
 from ros_pad.records import Block
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.regulators import create
@@ -44,9 +41,8 @@ from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
 from ros_pad.regulators.supervisor import SupervisedChannel
 from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import SensingStage
-from ros_pad.sensing.stage import FootReadings
 from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import foot_readings
+from ros_pad.sensing.stage import sample_of
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.full_robot import FullRobot
@@ -54,7 +50,6 @@ from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.sensors import BodySensors
-from ros_pad.simulation.sensors import Reading
 from ros_pad.simulation.sensors import Sensors
 from ros_pad.simulation.terms import with_terms
 from ros_pad.trials.learnt import settings_of
@@ -80,73 +75,6 @@ def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> S
     return regulator
 
 
-class LegStages:
-    """The stages of one leg, connected.
-
-    Attributes
-    ----------
-    estimation : EstimationStage
-    pressure : float
-        Gauge pressure that the regulator reported last, Pa.
-    """
-
-    def __init__(
-        self,
-        leg: int,
-        estimator: FootEstimator,
-        period_ns: int,
-    ) -> None:
-        self.leg = leg
-        self.estimation = EstimationStage(
-            estimator, period_ns, self._take, lambda _: None, _ignore
-        )
-        self.pressure = 0.0
-        self._emission: Emission | None = None  # waits for a decision
-
-    def _take(self, emission: Emission) -> None:
-        self._emission = emission
-
-    def tick(self, now_ns: int) -> None:
-        """Detect missing inputs; the loop calls this every ``pace.TICK_PERIOD_NS``."""
-        self.estimation.tick(now_ns)
-
-    def sample(self, stamp_ns: int, reading: Reading, moment: float | None) -> None:
-        """Pass a sample of the sensors to the stages."""
-        force, position = reading
-        self.estimation.sample(stamp_ns, force, moment, position)
-
-    def motion(self, stamp_ns: int, reading: FootReadings) -> None:
-        """Pass what a body estimator shows of the foot to the stages, in the order of its node."""
-        self.estimation.wrench(stamp_ns, reading.force, None)
-        self.estimation.position(stamp_ns, reading.position)
-        variance = reading.variance
-        self.estimation.contact_velocity(stamp_ns, *reading.velocity, variance, variance)
-
-    def report(self, pressure: float) -> None:
-        """Pass a pressure to the estimation."""
-        if pressure == pressure:
-            self.pressure = pressure
-            self.estimation.pressure(pressure)
-
-    def estimate(self, row: np.void) -> bool:
-        """Write an estimate, if there is a new one, into the row of a record."""
-        emission, self._emission = self._emission, None
-        doubt = self.estimation.doubt
-        if doubt is not None:
-            row['doubt'] = DOUBTS.index(doubt.partition(':')[0])
-        if emission is None:
-            return False
-        row['load'], row['wetness'] = emission.load, emission.estimate.wet_probability
-        row['friction'] = emission.estimate.friction_mean
-        if emission.position is not None:
-            row['position'] = emission.position
-        return True
-
-
-def _ignore(error: InvalidInput) -> None:
-    """Ignore a rejected sample: the stage reports repeated rejections as a doubt."""
-
-
 class BodySensing:
     """Simulated IMU, joints and forces of the feet, and the sensing stage that they feed.
 
@@ -157,49 +85,47 @@ class BodySensing:
         Seed of the noise.
     robot : FullRobot
         The simulated robot.
-    emit_doubt : callable
-        Called with the doubt of the body when its kind has changed.
 
     Attributes
     ----------
     stage : SensingStage
-    estimate : BodyEstimate or None
-        Estimate of the present sample; None if it has none.
+    odom : tuple of float
+        Estimated position x and y, m, and heading, rad, of the body; NaN before the first.
     """
 
-    def __init__(
-        self, scene: Scene, seed: int, robot: FullRobot, emit_doubt: Callable[[str], None]
-    ) -> None:
+    def __init__(self, scene: Scene, seed: int, robot: FullRobot) -> None:
         self._robot = robot
         self._sensors = BodySensors(scene, seed, len(robot.joint_names))
         assert isinstance(scene.body, LeggedBody)
         model, values = scene.body.robot, body_settings_for(scene)
         self.stage = SensingStage(
-            model, estimator_of(model, values), self._take, emit_doubt, _ignore, values['forces']
+            model,
+            estimator_of(model, values),
+            self._take,
+            lambda doubt: None,
+            lambda error: None,  # the stage reports repeated rejections as a doubt
+            values['forces'],
         )
-        self.estimate: BodyEstimate | None = None
+        self._rows: np.ndarray | None = None
+        self.odom = (math.nan, math.nan, math.nan)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
-        self.estimate = estimate
+        self._rows = sample_of(estimate)
+        x, y, _ = estimate.position.tolist()
+        self.odom = x, y, heading(*estimate.orientation.tolist())
 
-    def sample(self, stamp_ns: int) -> list[FootReadings]:
-        """Measure and estimate; return what the estimate shows of each foot, or nothing."""
-        self.estimate = None
+    def sample(self, stamp_ns: int) -> np.ndarray | None:
+        """Measure and estimate; return rows of a sample, or None if there is no estimate."""
+        self._rows = None
         reading = self._sensors.read(self._robot.proprioception(), self._robot.time)
-        for index, force in enumerate(reading.forces):
+        for index, force in enumerate(reading.rows['force']):
             self.stage.force(index, stamp_ns, force)
-        if reading.imu:
+        # A silent sensor reads nothing.
+        if math.isfinite(reading.imu[0][0]):
             self.stage.imu(stamp_ns, *reading.imu)
-        if reading.joints:
+        if math.isfinite(reading.joints[0][0]):
             self.stage.joints(stamp_ns, *reading.joints)
-        return foot_readings(self.estimate) if self.estimate else []
-
-    @property
-    def odom(self) -> Vector:
-        """Estimated position x and y, m, and heading, rad, of the body."""
-        assert self.estimate
-        x, y, _ = self.estimate.position.tolist()
-        return x, y, heading(*self.estimate.orientation.tolist())
+        return self._rows
 
 
 class ClosedLoop:
@@ -227,10 +153,10 @@ class ClosedLoop:
     ----------
     body : BodySensing or None
         None with markers.
-    estimators : list of FootEstimator
-        One for each leg; see :meth:`connect`.
+    pipeline : Pipeline
+        Estimation and decision; see :meth:`connect`.
+    supervision : Supervision
     controller : MorphologyController
-    legs : list of LegStages
     pads : list of float
         True gauge pressures of the pads at the last control step, Pa.
 
@@ -265,8 +191,7 @@ class ClosedLoop:
         self.body: BodySensing | None = None
         if sensing == 'joints':
             assert isinstance(self.robot, FullRobot)
-            self.body = BodySensing(scene, seed, self.robot, self._doubt_body)
-        estimators, _ = estimators_of(len(scene.legs), scene.foot, scene.expected_load, tuning)
+            self.body = BodySensing(scene, seed, self.robot)
         controller = MorphologyController(
             scene.foot,
             scene.legs,
@@ -276,112 +201,96 @@ class ClosedLoop:
             fixed_pressure=scene.dome_pressure,
             command_timeout=SUPERVISION.command_timeout,
         )
-        self._regulators = [simulated_regulator(scene, leg, self._clock) for leg in scene.legs]
-        self._channels = [
-            SupervisedChannel(leg, regulator, SUPERVISION)
-            for leg, regulator in zip(scene.legs, self._regulators, strict=True)
+        channels = [
+            SupervisedChannel(leg, simulated_regulator(scene, leg, self._clock), SUPERVISION)
+            for leg in scene.legs
         ]
-        for channel in self._channels:
+        for channel in channels:
             try:
                 channel.open()
             except TransportError as error:
                 raise TransportError(
                     f'scene {scene.name!r}, leg {channel.leg}: {error}'
                 ) from error
-        self.supervision = Supervision(self._channels)
+        self.supervision = Supervision(channels)
         self.supervision.activate(0)
         self.pads = [0.0] * len(scene.legs)
         self._tick_pace = Pace(TICK_PERIOD_NS)
-        self.connect(estimators, controller)
+        self._scene, self._tuning = scene, tuning
+        self._block: list[tuple[int, np.ndarray | None, Vector, Vector]] = []
+        self.connect(controller)
 
     def connect(
         self,
-        estimators: Sequence[FootEstimator] | None = None,
-        controller: MorphologyController | None = None,
+        controller: MorphologyController,
+        foot: Foot | None = None,
         period_ns: int = CONTROL_PERIOD_NS,
     ) -> None:
-        """Build the stages of all legs, before the first :meth:`tick`.
+        """Build the stages of estimation and decision, before the first :meth:`tick`.
 
         Parameters
         ----------
-        estimators : sequence of FootEstimator or None
-            One for each leg; None keeps the present ones.
-        controller : MorphologyController or None
-            None keeps the present one.
+        controller : MorphologyController
+        foot : Foot or None
+            What the estimator takes the feet to be; None: what they are.
         period_ns : int
             Period of estimates, decisions and readings of the regulators, ns.
         """
-        if estimators is not None:
-            self.estimators = list(estimators)
-        if controller is not None:
-            self.controller = controller
+        scene, self.controller = self._scene, controller
         self._pace = Pace(period_ns)
-        self.legs = [
-            LegStages(channel.leg, estimator, period_ns)
-            for channel, estimator in zip(self._channels, self.estimators, strict=True)
-        ]
-        self.decision = DecisionStage(self.controller, [leg.leg for leg in self.legs])
+        estimation = EstimationStage(
+            foot or scene.foot, scene.expected_load, self._tuning, scene.legs, period_ns
+        )
+        self.pipeline = Pipeline(estimation, DecisionStage(controller, scene.legs))
 
     def _clock(self) -> float:
         return self._stamp_ns * 1e-9
 
-    def _doubt_body(self, doubt: str) -> None:
-        for leg in self.legs:
-            leg.estimation.body_doubt(doubt)
-
-    @property
-    def pressures(self) -> list[float]:
-        """Gauge pressures that the regulators reported last, Pa."""
-        return [leg.pressure for leg in self.legs]
-
     def tick(self, log: TrialLog) -> None:
-        """Advance by one sample, and log it.
-
-        First the robot moves, and each foot is estimated with the last reported pressure. At
-        control steps the regulators then report. Where there are new estimates, the controller
-        decides, and the regulators receive its set-points.
-        """
+        """Advance by one sample; at control moments, process the samples since the last one."""
         self._stamp_ns += self.period_ns
-        now_ns, legs = self._stamp_ns, self.legs
+        self.robot.step(self.pads)
+        if self.body:
+            rows, odom = self.body.sample(self._stamp_ns), self.body.odom
+        else:
+            rows, odom = self.sensors.sample(self.robot), ()
+        self._block.append((self._stamp_ns, rows, self.robot.body, odom))
+        if self._pace.due(self._stamp_ns):
+            self._process(log)
+
+    def _process(self, log: TrialLog) -> None:
+        """Process the samples since the last control moment."""
+        now_ns = self._stamp_ns
         self.supervision.tick(now_ns)
         if self._tick_pace.due(now_ns):
             if self.body:
                 self.body.stage.tick(now_ns)
-            for leg in legs:
-                leg.tick(now_ns)
-            self.decision.tick(now_ns)
-        self.robot.step(self.pads)
-        self._measure(now_ns, log)
-        if self._pace.due(now_ns):
-            pressures = self.supervision.read(now_ns, now_ns)
-            self.pads = pressures.rows[0]['pad'].tolist()
-            self.decision.pressure(pressures)
-            for leg, pressure in zip(legs, pressures.rows[0]['pressure'].tolist(), strict=True):
-                leg.report(pressure)
-        # Without markers the first estimate after a silence may come between control steps.
-        rows = ESTIMATE.rows(len(legs))
-        fresh = [leg.estimate(row) for leg, row in zip(legs, rows, strict=True)]
-        if any(fresh):
-            commands = self.decision.decide(Block.of(now_ns, rows))
-            self.supervision.command(commands, now_ns, now_ns)
-            estimates = [each.estimate for each in self.estimators]
-            log.control(now_ns * 1e-9, self.pressures, estimates, self.controller)
+            self.pipeline.tick(now_ns)
+        block = self._samples(log)
+        for estimate, command in self.pipeline.process(block):
+            pressure = self.supervision.read(now_ns, now_ns)
+            self.supervision.command(command, now_ns, now_ns)
+            self.pipeline.pressure(pressure)
+            self.pads = pressure.rows[0]['pad'].tolist()
+            log.control(estimate, command, pressure)
 
-    def _measure(self, now_ns: int, log: TrialLog) -> None:
-        """Read the sensors, pass what they measure to the legs, and log it."""
-        if self.body:
-            feet = self.body.sample(now_ns)
-            if feet:
-                for leg, foot in zip(self.legs, feet, strict=True):
-                    leg.motion(now_ns, foot)
-                felt = [(foot.force, foot.position) for foot in feet]
-                log.sample(now_ns * 1e-9, self.robot.body, felt, self.body.odom)
-            return
-        readings = self.sensors.read(self.robot)
-        moments = self.sensors.read_moments(self.robot)
-        for leg, reading, moment in zip(self.legs, readings, moments, strict=True):
-            leg.sample(now_ns, reading, moment)
-        log.sample(now_ns * 1e-9, self.robot.body, readings)
+    def _samples(self, log: TrialLog) -> Block:
+        """Return the collected samples, and log them; a control moment without one has NaN."""
+        taken, self._block = self._block, []
+        *rest, last = taken
+        if last[1] is None:
+            last = (last[0], SAMPLE.rows(len(self._scene.legs)), *last[2:])
+        stamps, rows, body, odom = zip(
+            *(each for each in rest if each[1] is not None), last, strict=True
+        )
+        block = Block(np.array(stamps), np.array(rows))
+        log.samples(block, body, odom if self.body else None)
+        return block
+
+    def finish(self, log: TrialLog) -> None:
+        """Log the samples since the last control moment, which nobody processes."""
+        if self._block:
+            self._samples(log)
 
     def close(self) -> None:
         """Vent and close the regulators."""
@@ -460,9 +369,10 @@ def run(
                 progress(loop.robot.time)
             if loop.robot.verdict:
                 break
+        loop.finish(log)
     finally:
         loop.close()
     wall = time.perf_counter() - started
     trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
-    trial.settings['learnt'] = settings_of(loop.estimators[0].ground.shared)
+    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.estimator.shared)
     return trial

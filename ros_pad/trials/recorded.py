@@ -1,111 +1,63 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read trials from bags, simulated or of a robot: their series and metrics.
 
-A bag of ``pad run`` gives the same series as the loop without ROS to the bit, with two exceptions:
-the body's heading, which is published as a quaternion (1e-15 rad), and pressures that are no whole
-number of Pa, because absolute pressures are published (1e-11 Pa). The bag of a robot may have
-other rates, gaps, missing legs and a namespace: a series repeats the last message, and is NaN
-before the first one.
+A bag of ``pad run`` gives the same series as the loop without ROS to the bit, but for
+the body's heading, which is published as a quaternion (1e-15 rad). The bag of a robot may have
+other rates, gaps, missing legs and a namespace, and messages by leg in place of records: a series
+repeats the last value, and is NaN before the first one.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import datetime
 import difflib
 import json
-import math
 import os
 import pathlib
 import re
-from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.recovery import KEY as REPAIR
+from ros_pad.bags.topics import BODY_POSE
 from ros_pad.bags.topics import DIAGNOSTICS
-from ros_pad.bags.topics import OF_BODY
+from ros_pad.bags.topics import ODOM
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
+from ros_pad.bags.topics import to_record
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import DOUBTS
 from ros_pad.pace import LATE
 from ros_pad.pace import Progress
 from ros_pad.pace import part
+from ros_pad.records import KINDS
+from ros_pad.records import Block
+from ros_pad.records import Kind
 from ros_pad.simulation.scene import FloorPlan
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import KEY
 from ros_pad.trials.label import LOST
-from ros_pad.trials.label import RECORDED_AT
+from ros_pad.trials.series import Records
+from ros_pad.trials.series import by_row
+from ros_pad.trials.series import held
+from ros_pad.trials.series import series
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 from ros_pad.trials.trial import heading
 
-_TOPIC = re.compile(r'(?P<namespace>.*?/)(?:leg_(?P<leg>\d+)/)?(?P<kind>\w+(?:/pose|/doubt)?)')
+_OF_LEG = re.compile(r'(?P<namespace>.*?/)leg_(?P<leg>\d+)/(?P<kind>\w+)')
+_KNOWN = {topic.pattern: topic for topic in TRIAL}
 # A log time after 2001 is a date, an earlier one is simulated time.
 _FIRST_DATE_NS = 10**18
-
-
-def _doubt_code(text: str) -> float:
-    kind = text.partition(':')[0]
-    return DOUBTS.index(kind) if kind in DOUBTS else -1
-
-
-def _is_dome(text: str) -> float:
-    return text == 'dome'
-
-
-_CODES: dict[str, Callable[[str], float]] = {'doubt': _doubt_code, 'morphology': _is_dome}
-"""Functions that turn the text of a message into a number, by kind of topic."""
-
-OF_ROBOT = -1
-"""In place of the number of a leg, for what a robot has only once."""
-
-
-def _each(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
-    """Apply a function of ``math`` to the rows of the last axis.
-
-    The loop without ROS uses ``math``; NumPy's functions differ from it in the last bit.
-    """
-    columns = values.reshape(-1, values.shape[-1]).T.tolist()
-    return np.reshape(list(map(function, *columns)), values.shape[:-1])
-
-
-@dataclasses.dataclass
-class _Series:
-    """Time stamps, ns, and values of the messages on one topic, in the order of the stamps."""
-
-    stamps: np.ndarray
-    values: np.ndarray
-
-    @classmethod
-    def of(cls, topic: Topic, log_times: np.ndarray, table: np.ndarray) -> _Series:
-        """Return the series of a table of the values and, if the topic has them, stamps."""
-        width = len(topic.values)
-        stamps, values = log_times, table[:, :width]
-        if topic.frame:
-            seconds, nanoseconds = table[:, width:].astype(np.int64).T
-            stamps = seconds * 10**9 + nanoseconds
-            # A driver may leave the stamp empty.
-            stamps = np.where(stamps == 0, log_times, stamps)
-        if code := _CODES.get(topic.kind):
-            values = np.array([[code(text)] for (text,) in values]).reshape(len(stamps), width)
-        order = np.argsort(stamps, kind='stable')
-        return cls(stamps[order], values[order])
-
-    def at(self, grid: np.ndarray) -> np.ndarray:
-        """Return the last values up to each time, ns, of the grid: shape (len(grid), width)."""
-        rows = np.searchsorted(self.stamps, grid, side='right')
-        first = np.full((1, self.values.shape[1]), np.nan)
-        return np.concatenate([first, self.values])[rows]
 
 
 def load(
@@ -145,25 +97,17 @@ def load(
     bag = BagReader(folder, part(progress, 0.0, 0.4))
     wanted = wanted_topics(bag, namespace, remaps)
     first = 0.4 if bag.problem else 0.0  # a bag without damage is opened at once
-    series = _read(bag, wanted, part(progress, first, 0.8))
-    legs = tuple(sorted({leg for leg, _ in series if leg != OF_ROBOT}))
-
-    def columns(kind: str, times: np.ndarray) -> np.ndarray:
-        return np.stack([_column(series, kind, leg, times) for leg in legs], axis=1)
-
-    def slow(kind: str) -> np.ndarray:
-        return columns(kind, slow_ns)[:, :, 0]
-
-    fast_ns = _grid(series, 'wrench', 'position', 'body/pose', 'odom')
-    slow_ns = _grid(series, 'wetness', 'pressure', *TRIAL)
-    slip = columns('slip', slow_ns)
-    odom = np.zeros((0, 3))
-    body = _pose_of(_column(series, 'body/pose', OF_ROBOT, fast_ns))
-    if (OF_ROBOT, 'odom') in series:
-        odom = _pose_of(np.delete(_column(series, 'odom', OF_ROBOT, fast_ns), 2, axis=1))
-        if (OF_ROBOT, 'body/pose') not in series:
-            body = odom
     trial = _described(bag)
+    ambient = trial['settings']['ambient_pressure']
+    legs, records, log_times = read_records(bag, wanted, ambient, part(progress, first, 0.8))
+    found = series(records)
+    fast_ns = found.pop('time')
+    slow_ns = found.pop('slow_time')
+    odom = np.zeros((0, 3))
+    body = _poses(bag, wanted, BODY_POSE, fast_ns)
+    if (estimated := _poses(bag, wanted, ODOM, fast_ns)) is not None:
+        odom = estimated
+        body = odom if body is None else body
     zero_ns = 0
     if bag.start > _FIRST_DATE_NS:
         zero_ns = bag.start
@@ -176,34 +120,127 @@ def load(
         trial['settings']['late'] = late(bag, part(progress, 0.8, 1.0))
     if progress:
         progress(1.0)
-    ambient = trial['settings']['ambient_pressure']
-    found = Trial(
+    read = Trial(
         **trial,
+        **found,
         legs=legs,
         time=(fast_ns - zero_ns) * 1e-9,
-        body=body,
-        force=columns('wrench', fast_ns),
-        position=columns('position', fast_ns),
         slow_time=(slow_ns - zero_ns) * 1e-9,
-        pressure=slow('pressure') - ambient,
-        setpoint=slow('pressure_setpoint') - ambient,
-        wet_probability=slow('wetness'),
-        friction=slow('friction'),
-        margin=slow('friction_margin'),
-        slip_speed=_each(math.hypot, slip[:, :, :2]),
-        slipping=slow('slipping') == 1.0,
-        dome=slow('morphology') == 1.0,
-        doubt=np.nan_to_num(slow('doubt'), nan=-1.0).astype(int),
+        body=np.full((len(fast_ns), 3), np.nan) if body is None else body,
         odom=odom,
     )
     if len(odom):
-        found.move_to_world()
-    return found
+        read.move_to_world()
+    return read
 
 
-def _pose_of(values: np.ndarray) -> np.ndarray:
-    """Return x and y, m, and heading, rad, of positions x, y and quaternions: shape (n, 3)."""
-    return np.column_stack([values[:, :2], _each(heading, values[:, 2:])])
+def _poses(
+    bag: BagReader, wanted: Mapping[str, Wanted], topic: Topic, grid: np.ndarray
+) -> np.ndarray | None:
+    """Return x and y, m, and heading, rad, at times, ns, (n, 3); None if they are not recorded."""
+    name = next((name for name, each in wanted.items() if each.topic is topic), None)
+    if name is None:
+        return None
+    stamps, values = _stamped(*bag.tables({name: (*STAMP, *topic.values)})[name])
+    poses = np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
+    return held(stamps, poses, grid)
+
+
+def _stamped(log_times: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return stamps, ns, and values of a table that begins with stamps, in their order."""
+    seconds, nanoseconds = table[:, :2].astype(np.int64).T
+    stamps = seconds * 10**9 + nanoseconds
+    stamps = np.where(stamps == 0, log_times, stamps)  # a driver may leave the stamp empty
+    order = np.argsort(stamps, kind='stable')
+    return stamps[order], table[order, 2:]
+
+
+def read_records(
+    bag: BagReader,
+    wanted: Mapping[str, Wanted],
+    ambient: float,
+    progress: Progress | None = None,
+) -> tuple[tuple[int, ...], Records, dict[str, np.ndarray]]:
+    """Return the records of a robot in a bag, also those that its drivers published by leg.
+
+    Parameters
+    ----------
+    bag : BagReader
+    wanted : mapping
+        What each topic is, see :func:`wanted_topics`.
+    ambient : float
+        Ambient pressure, Pa: drivers publish absolute pressures.
+    progress : callable or None
+        Called now and then with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    legs : tuple of int
+    records : Records
+        In the order of their stamps.
+    log_times : dict of array
+        Log time of each of them, ns, by kind.
+
+    Raises
+    ------
+    BagError
+        When a message cannot be read, or records of two kinds have other legs.
+    """
+    kinds = {name: each.topic.record for name, each in wanted.items() if each.leg is None}
+    found = bag.records({n: kind for n, kind in kinds.items() if kind}, part(progress, 0.0, 0.5))
+    blocks: dict[str, list[tuple[tuple[int, ...], np.ndarray, Block]]] = {}
+    for name, read in found.items():
+        kind = kinds[name]
+        assert kind
+        blocks.setdefault(kind.name, []).append(read)
+    paths = {
+        name: (*(STAMP if each.topic.frame else ()), *each.topic.values)
+        for name, each in wanted.items()
+        if each.leg is not None and each.topic.columns
+    }
+    for name, table in bag.tables(paths, part(progress, 0.5, 1.0)).items():
+        kind = wanted[name].topic.record
+        assert kind
+        blocks.setdefault(kind.name, []).append(_of_leg(wanted[name], *table, ambient))
+    legs = tuple(sorted({leg for parts in blocks.values() for part in parts for leg in part[0]}))
+    joined = {kind.name: _joined(kind, legs, blocks.get(kind.name, ())) for kind in KINDS}
+    return (
+        legs,
+        Records(*(block for block, _ in joined.values())),
+        {name: times for name, (_, times) in joined.items()},
+    )
+
+
+def _of_leg(
+    wanted: Wanted, log_times: np.ndarray, table: np.ndarray, ambient: float
+) -> tuple[tuple[int, ...], np.ndarray, Block]:
+    """Return the records that the messages of a leg are; other fields are missing."""
+    topic, leg = wanted.topic, wanted.leg
+    assert topic.record and leg is not None
+    stamps, values = log_times, table
+    if topic.frame:
+        stamps, values = _stamped(log_times, table)
+    rows = topic.record.rows(len(stamps), 1)
+    numbers = rows.view('f8').reshape(len(stamps), -1)
+    places = [topic.record.columns.index(column) for column in topic.columns]
+    numbers[:, places] = to_record(topic, values, ambient)
+    return (leg,), np.sort(log_times) if topic.frame else log_times, Block(stamps, rows)
+
+
+def _joined(
+    kind: Kind, legs: tuple[int, ...], parts: Sequence[tuple[tuple[int, ...], np.ndarray, Block]]
+) -> tuple[Block, np.ndarray]:
+    """Return the records of several sources as one block with all legs, and their log times."""
+    count = sum(len(block.stamps) for _, _, block in parts)
+    rows, stamps = kind.rows(count, len(legs)), np.empty(count, np.int64)
+    times, start = np.empty(count, np.int64), 0
+    for own, log_times, block in parts:
+        place = slice(start, start + len(block.stamps))
+        columns = [legs.index(leg) for leg in own]
+        rows[place, columns], stamps[place], times[place] = block.rows, block.stamps, log_times
+        start = place.stop
+    order = np.argsort(stamps, kind='stable')
+    return Block(stamps[order], rows[order]), times[order]
 
 
 def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
@@ -211,8 +248,6 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
 
     The callback is called now and then with the share that is done, 0 to 1.
     """
-    if bag.custom_data.get(RECORDED_AT) == 'publisher':
-        return []  # composed nodes wait for one another
     if bag.topics.get(DIAGNOSTICS.pattern) != DIAGNOSTICS.type_name:
         return []
     found: dict[str, list[tuple[float, str]]] = {}
@@ -225,26 +260,6 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
         f'{name}, reported {len(each)} times from {each[0][0]:.1f} s on: {each[-1][1]}'
         for name, each in found.items()
     ]
-
-
-def _grid(series: Mapping[tuple[int, str], _Series], *kinds: str) -> np.ndarray:
-    """Return the time stamps, ns, of the first of these kinds that was recorded.
-
-    They are those of the leg with the most messages of this kind.
-    """
-    for kind in kinds:
-        stamps = [series[key].stamps for key in sorted(series) if key[1] == kind]
-        if stamps:
-            return np.unique(max(stamps, key=len))
-    return np.empty(0, dtype=np.int64)
-
-
-def _column(
-    series: Mapping[tuple[int, str], _Series], kind: str, leg: int, times: np.ndarray
-) -> np.ndarray:
-    if (leg, kind) not in series:
-        return np.full((len(times), len(TRIAL[kind].values)), np.nan)
-    return series[leg, kind].at(times)
 
 
 def _described(bag: BagReader) -> dict[str, Any]:
@@ -276,10 +291,19 @@ def _described(bag: BagReader) -> dict[str, Any]:
         ) from error
 
 
+class Wanted(NamedTuple):
+    """What a topic of a bag is: a topic of ros_pad, and the number of the leg if it has one."""
+
+    topic: Topic
+    leg: int | None
+
+
 def wanted_topics(
     bag: BagReader, namespace: str | None = None, remaps: Mapping[str, str] | None = None
-) -> dict[str, tuple[int, str]]:
-    """Return leg (-1 for those of the body) and kind of each topic that a trial is read from.
+) -> dict[str, Wanted]:
+    """Return what each topic is that a trial is read from.
+
+    Where there are records, what drivers published by leg for them is left out.
 
     Parameters
     ----------
@@ -301,22 +325,21 @@ def wanted_topics(
         When a remap is of a topic that ros_pad does not have, or to one that the bag does not
         have; when two remaps name the same topic, or only one side of a remap has ``{leg}``.
     """
-    found: dict[str, dict[str, tuple[int, str]]] = {}
+    found: dict[str, dict[str, Wanted]] = {}
     for name, own_name in _names(bag, namespace, remaps or {}):
-        match = _TOPIC.fullmatch(own_name)
-        if not match or match['kind'] not in TRIAL or not bag.counts[name]:
+        prefix, own, leg = _parsed(own_name)
+        if own not in _KNOWN or not bag.counts[name]:
             continue
-        if (match['kind'] in OF_BODY) != (match['leg'] is None):
-            continue
-        expected = TRIAL[match['kind']].type_name
-        if bag.topics[name] != expected:
-            raise BagError(f'{bag.path}: {name} is a {bag.topics[name]}: {expected} is needed')
-        leg = int(match['leg'] or OF_ROBOT)
-        found.setdefault(match['namespace'], {})[name] = leg, match['kind']
+        topic = _KNOWN[own]
+        if bag.topics[name] != topic.type_name:
+            raise BagError(
+                f'{bag.path}: {name} is a {bag.topics[name]}: {topic.type_name} is needed'
+            )
+        found.setdefault(prefix, {})[name] = Wanted(topic, leg)
     robots = {
-        prefix: topics
+        prefix: _without_copies(topics)
         for prefix, topics in found.items()
-        if any(leg != OF_ROBOT for leg, _ in topics.values())
+        if any(each.topic.record for each in topics.values())
     }
     if namespace is not None:
         prefix = _prefix(namespace)
@@ -328,6 +351,24 @@ def wanted_topics(
     if len(robots) != 1:
         raise BagError(f'{bag.path}: one robot is needed, the bag has {_listed(robots)}')
     return next(iter(robots.values()))
+
+
+def _parsed(name: str) -> tuple[str, str, int | None]:
+    """Return the namespace of a topic, its name with ``{leg}`` for the number, and the number."""
+    if match := _OF_LEG.fullmatch(name):
+        return match['namespace'], f'leg_{{leg}}/{match["kind"]}', int(match['leg'])
+    own = next((own for own in _KNOWN if name.endswith(f'/{own}')), '')
+    return name.removesuffix(own), own, None
+
+
+def _without_copies(topics: dict[str, Wanted]) -> dict[str, Wanted]:
+    """Return topics without those of legs of which there are records."""
+    whole = {each.topic.record for each in topics.values() if each.leg is None}
+    return {
+        name: each
+        for name, each in topics.items()
+        if each.leg is None or each.topic.record not in whole
+    }
 
 
 def _prefix(namespace: str | None) -> str:
@@ -342,16 +383,14 @@ def _names(
     renamed: dict[str, str] = {}  # topic of the bag by its name in ros_pad
     for own, other in remaps.items():
         given = f'--remap {own}:={other}'
-        kind = own.removeprefix('/').partition('/')[2]
-        leg = own.removeprefix('/').partition('/')[0].removeprefix('leg_')
-        if not (own in OF_BODY or (kind in TRIAL and (leg.isdecimal() or leg == '{leg}'))):
-            near = difflib.get_close_matches(kind or own, TRIAL, n=1)
-            hint = f' Did you mean leg_{{leg}}/{near[0]}?' if near else ''
+        _, known, number = _parsed(f'/{own.removeprefix("/")}'.replace('{leg}', '0'))
+        if known not in _KNOWN:
+            near = difflib.get_close_matches(own, _KNOWN, n=1)
+            hint = f' Did you mean {near[0]}?' if near else ''
             raise InvalidInput(
-                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: {", ".join(OF_BODY)}, and'
-                f' leg_{{leg}}/ or leg_1/ before one of'
-                f' {", ".join(each for each in TRIAL if each not in OF_BODY)}'
+                f'{given}: {own} is no topic of ros_pad.{hint} Allowed: {", ".join(_KNOWN)}'
             )
+        leg = '{leg}' if '{leg}' in own else str(number)
         if (leg == '{leg}') != ('{leg}' in other):
             raise InvalidInput(f'{given}: {{leg}} is needed on both sides of := or on neither')
         full = other if other.startswith('/') else prefix + other
@@ -364,8 +403,8 @@ def _names(
                 f'{given}: {bag.path} has no topic {full}; similar ones are {", ".join(near)}'
             )
         for match in matches:
-            number = match.groupdict().get('leg') or leg
-            name = own.removeprefix('/').replace('{leg}', number)
+            found = match.groupdict().get('leg') or leg
+            name = own.removeprefix('/').replace('{leg}', found)
             if renamed.setdefault(prefix + name, match[0]) != match[0]:
                 raise InvalidInput(
                     f'{given}: another remap already takes {name} from {renamed[prefix + name]}'
@@ -379,18 +418,6 @@ def _names(
 
 def _listed(robots: Iterable[str]) -> str:
     return ', '.join(f'legs in {prefix}' for prefix in sorted(robots)) or 'no topics of legs'
-
-
-def _read(
-    bag: BagReader, wanted: Mapping[str, tuple[int, str]], progress: Progress
-) -> dict[tuple[int, str], _Series]:
-    """Return the series of the topics of a bag by leg and kind."""
-    topics = {name: TRIAL[kind] for name, (_, kind) in wanted.items()}
-    paths = {
-        name: (*topic.values, *(STAMP if topic.frame else ())) for name, topic in topics.items()
-    }
-    tables = bag.tables(paths, progress)
-    return {key: _Series.of(topics[name], *tables[name]) for name, key in wanted.items()}
 
 
 __all__ = ['load']

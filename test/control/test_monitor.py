@@ -275,7 +275,7 @@ def test_a_pad_of_which_nothing_was_asked_is_not_accused():
     assert watch.read(None, (60e3, 2.0), (0.0, 2.0)) == ''
     assert watch.pressure == 0.0
     assert watch.read(70e3, (0.0, 0.3)) == ''
-    assert 'does not fill: 0.0 kPa 0.5 s after' in watch.read(70e3, (0.0, 0.5))
+    assert 'does not fill: 0.0 kPa 0.5 s after the command' in watch.read(70e3, (0.0, 0.5))
 
 
 @pytest.mark.parametrize('jump', [-100.0, 3.0])

@@ -15,6 +15,7 @@ from ros_pad.control import MorphologyController
 from ros_pad.control import dome
 from ros_pad.control import flat
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import DOUBTS
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -38,7 +39,7 @@ class Walk:
         self.x = 0.0
         self.shapes = []  # morphologies of all legs after each stride
         self.readings = True
-        self.sensor_faults = {}  # by leg
+        self.sensor_faults = {}  # kinds of doubt by leg
         self.deaf = set()  # legs without estimates
         self.weightless = set()  # legs whose load reads zero
 
@@ -50,8 +51,8 @@ class Walk:
         for leg in self.legs:
             setpoint = self.controller.setpoint(leg)
             reading = self.pads(leg, setpoint, self.time) if self.readings else None
-            fault = self.sensor_faults.get(leg, '')
-            self.controller.observe(leg, self.time, reading, fault)
+            doubt = DOUBTS.index(self.sensor_faults.get(leg, ''))
+            self.controller.observe(leg, self.time, reading, doubt)
             if leg not in self.deaf:
                 felt = 0.0 if leg in self.weightless else load
                 self.controller.update(leg, felt, self.belief, (self.x, 0.1 * leg))
@@ -205,7 +206,7 @@ def test_footprints_that_are_not_sure_are_not_kept(why):
     walk.stride(1)
     walk.x = 20.0  # far from all footprints
     walk.readings = why != 'silence'
-    walk.sensor_faults[1] = 'saturated' if why == 'doubt' else ''
+    walk.sensor_faults[1] = 'force out of range' if why == 'doubt' else ''
     walk.stride(3)
     known = walk.controller.footprints.wet_probability(walk.x, 0.1)
     assert known == pytest.approx(0.85 if why == 'sound' else 0.5, abs=0.06)

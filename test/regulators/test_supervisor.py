@@ -6,22 +6,29 @@ import math
 import re
 from functools import partial
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from ros_pad.control.faults import KINDS
+from ros_pad.control.faults import Kind
+from ros_pad.control.faults import text
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import ProtocolError
 from ros_pad.errors import TransportError
+from ros_pad.records import COMMAND
+from ros_pad.records import Block
 from ros_pad.regulators import Reading
 from ros_pad.regulators import create
 from ros_pad.regulators.protocol import permitted
+from ros_pad.regulators.supervision import Supervision
+from ros_pad.regulators.supervision import supply_health
 from ros_pad.regulators.supervisor import Health
 from ros_pad.regulators.supervisor import Level
 from ros_pad.regulators.supervisor import SupervisedChannel
 from ros_pad.regulators.supervisor import SupervisorSettings
-from ros_pad.regulators.supervisor import supply_health
 
 MS = 1_000_000
 TICK_NS = 10 * MS
@@ -105,28 +112,39 @@ class Rig:
         return rig.start()
 
     def start(self):
+        self.supervision = Supervision(self.channels)
         for channel in self.channels:
             channel.open()
-            channel.activate(self.now_ns)
+        self.supervision.activate(self.now_ns)
         return self
 
     def tick(self, seconds=0.01):
         """Advance in steps of 10 ms; devices are read at every second step."""
         for _ in range(round(seconds * 1e9) // TICK_NS):
             self.now_ns += TICK_NS
-            for channel in self.channels:
-                channel.tick(self.now_ns)
-                if self.now_ns % (2 * TICK_NS) == 0:
-                    channel.read(self.now_ns)
+            self.supervision.tick(self.now_ns)
+            if self.now_ns % (2 * TICK_NS) == 0:
+                self.record = self.supervision.read(self.now_ns, self.now_ns)
 
     def send(self, gauge, age=0.0, leg=1):
         return self.channels[leg - 1].command(gauge, age, self.now_ns)
 
+    def command(self, *gauges, age_ns=0):
+        """Command pressures by a record."""
+        rows = COMMAND.rows(len(gauges))
+        rows['setpoint'] = gauges
+        record = Block.of(self.now_ns - age_ns, rows)
+        self.supervision.command(record, self.now_ns, self.now_ns)
+
+    def faults(self):
+        """Return the faults in the last record of pressures, as texts."""
+        rows = self.record.rows[0]
+        return [text(row['fault'], *row['detail']) for row in rows]
+
     def hold(self, gauges, seconds):
         """Command the pressures of all pads every 20 ms, as a controller does."""
         for _ in range(round(seconds / 0.02)):
-            for leg, gauge in enumerate(gauges, start=1):
-                self.send(gauge, leg=leg)
+            self.command(*gauges)
             self.tick(0.02)
 
     def first(self, level, seconds, gauges, leg=1):
@@ -204,14 +222,14 @@ def test_a_bad_command_is_refused_and_reported_once(case):
     rig, channel, device = device_rig()
     assert rig.send(30e3)
     assert not rig.send(*command)
-    assert (channel.accepted, channel.refused) == (1, 1)
+    assert (channel.answers.accepted, channel.answers.refused) == (1, 1)
     assert device.setpoint == 30e3
-    assert channel.refusal_due
-    level, words = channel.report(channel.health())
+    assert channel.answers.due
+    level, words = channel.answers.report(channel.health())
     assert level == Level.WARN
     assert words.startswith(message)
-    assert not channel.refusal_due
-    assert channel.report(channel.health()) == Health(Level.OK, 'under pressure')
+    assert not channel.answers.due
+    assert channel.answers.report(channel.health()) == Health(Level.OK, 'under pressure')
     assert rig.log.texts('warning') == [f'leg 1: set-point refused: {words}']
     assert rig.send(50e3)
     assert device.setpoint == 50e3
@@ -220,9 +238,9 @@ def test_a_bad_command_is_refused_and_reported_once(case):
 def test_a_second_refusal_waits_for_the_next_regular_report():
     rig, channel, _ = device_rig()
     rig.send(math.nan)
-    channel.report(channel.health())
+    channel.answers.report(channel.health())
     rig.send(math.nan)
-    assert not channel.refusal_due
+    assert not channel.answers.due
 
 
 def test_the_ceiling_itself_is_allowed():
@@ -235,7 +253,7 @@ def test_an_inactive_channel_sends_nothing():
     rig, channel, device = device_rig()
     channel.deactivate('deactivated')
     assert not rig.send(50e3)
-    assert (device.received, channel.accepted, channel.refused) == ([], 0, 0)
+    assert (device.received, channel.answers.accepted, channel.answers.refused) == ([], 0, 0)
 
 
 # --- vents ---------------------------------------------------------------------------------------
@@ -274,13 +292,49 @@ def test_without_commands_a_pad_is_vented():
     assert channel.health() == Health(Level.OK, 'under pressure')
 
 
+def test_a_command_concerns_the_legs_that_it_names():
+    """A set-point that is missing or refused changes nothing for the other legs."""
+    rig = Rig(Device(), Device(), Device()).start()
+    rig.command(50e3, 60e3, 70e3)
+    rig.command(math.nan, CEILING + 1.0, 20e3)
+    _, second, third = rig.channels
+    assert [each.outlet.sent for each in rig.channels] == [50e3, 60e3, 20e3]
+    assert [each.answers.accepted for each in rig.channels] == [1, 1, 2]
+    assert [each.answers.refused for each in rig.channels] == [0, 1, 0]
+    rig.command(math.nan, 10e3, 10e3, age_ns=501 * MS)
+    assert [each.outlet.sent for each in rig.channels] == [50e3, 60e3, 20e3]
+    assert '0.501 s old' in second.answers.refusal and '0.501 s old' in third.answers.refusal
+
+
+def test_commands_of_other_legs_do_not_keep_a_pad_up():
+    """A record vents pads that have been without a set-point for too long, before any tick."""
+    rig = Rig(Device(), Device()).start()
+    rig.command(50e3, 50e3)
+    for _ in range(6):
+        rig.now_ns += 100 * MS
+        rig.command(math.nan, 50e3)
+    assert [each.outlet.sent for each in rig.channels] == [0.0, 50e3]
+
+
+def test_a_device_that_fails_keeps_no_other_pad_up():
+    rig = Rig(Device(), Device()).start()
+    one, other = (each.outlet.regulator for each in rig.channels)
+    rig.command(50e3, 50e3)
+    one.broken = TransportError('cable')
+    rig.tick(0.52)
+    assert (one.setpoint, other.setpoint) == (50e3, 0.0)
+    one.broken = None
+    rig.tick()
+    assert one.setpoint == 0.0
+
+
 def test_refused_commands_do_not_keep_a_pad_up():
     rig, channel, device = device_rig(command_timeout=0.3)
     rig.send(60e3)
     for _ in range(40):
         rig.send(60e3, age=0.4)
         rig.tick(0.02)
-    assert channel.refused == 40
+    assert channel.answers.refused == 40
     assert device.setpoint == 0.0
 
 
@@ -317,12 +371,12 @@ def test_a_vent_that_fails_is_repeated_until_the_device_obeys(error):
     rig.send(50e3)
     device.broken = error
     channel.vent('a test')
-    assert not channel.vented
+    assert not channel.outlet.vented
     assert device.setpoint == 50e3
     assert channel.health().message.endswith('cannot be vented')
     device.broken = None
     rig.tick()
-    assert (device.setpoint, channel.vented) == (0.0, True)
+    assert (device.setpoint, channel.outlet.vented) == (0.0, True)
 
 
 def test_a_command_without_an_answer_is_vented():
@@ -370,7 +424,7 @@ def test_each_fault_is_an_error_within_a_second(case):
     assert not [text for text in rig.log.texts('error') if 'leg 2' in text]
     assert supply_health(rig.channels).level == Level.OK  # one pad shows no loss of supply
     if case != 'silence':
-        assert rig.channels[0].refused == 0  # the fault is only reported
+        assert rig.channels[0].answers.refused == 0  # the fault is only reported
 
 
 def test_a_low_supply_is_distinguished_from_a_leak():
@@ -401,7 +455,7 @@ def test_a_faulty_pad_is_held_until_the_next_activation():
     first, second = rig.channels
     assert first.setpoint == 0.0
     assert second.pressure == pytest.approx(40e3, abs=500.0)
-    assert 0 < first.refused == 100 - first.accepted
+    assert 0 < first.answers.refused == 100 - first.answers.accepted
     level, message = first.health()
     assert level == Level.ERROR
     assert message.startswith('sags: ')
@@ -452,10 +506,10 @@ def test_a_pad_above_the_ceiling_is_vented_at_once_and_held():
     assert device.setpoint == 0.0
     assert not rig.send(70e3)
     assert device.setpoint == 0.0
-    held = '81700 Pa .* 80000 Pa'
-    assert re.search(f'set-point 70000 Pa .* {held}', channel.refusal)
+    held = '81.7 kPa .* 80.0 kPa'
+    assert re.search(f'set-point 70000 Pa .* {held}', channel.answers.refusal)
     assert re.search(held, channel.health().message)
-    assert channel.report(channel.health()).message.endswith(channel.refusal)
+    assert channel.answers.report(channel.health()).message.endswith(channel.answers.refusal)
     assert any(re.search(f'leg 1: .* {held}', text) for text in rig.log.texts('info'))
 
 
@@ -465,7 +519,42 @@ def test_a_reading_that_is_not_finite_is_none(value):
     device.reads = value
     assert channel.read(rig.now_ns) is None
     assert f'{value!r} Pa' in channel.health().message
-    assert channel.unread_ns == rig.now_ns
+    (row,) = rig.supervision.read(5, rig.now_ns).rows[0]
+    assert math.isnan(row['pressure']) and math.isnan(row['setpoint'])
+    assert row['fault'] == Kind.DEVICE.code
+
+
+def test_a_record_has_the_readings_and_faults_of_all_legs():
+    leak = '{kind: leak, start: 1.0, conductance: 1.0e-8}'
+    drift = '{kind: sensor_drift, start: 1.0, offset: 5.0e3}'
+    silent = '{kind: silence, start: 1.5}'
+    rig = Rig.simulated([], [leak], [drift], [silent], on_fault='vent')
+    rig.hold([60e3] * 4, 0.6)
+    assert rig.record.last_ns == rig.now_ns
+    row = rig.record.rows[0]
+    assert row['pressure'][[0, 2]] == pytest.approx([60e3] * 2, abs=500.0)
+    assert row['setpoint'][[0, 2]].tolist() == [60e3] * 2
+    assert row['pad'][2] == pytest.approx(55e3, abs=500.0)  # what the sensor does not show
+    assert np.isnan([row['pressure'][3], row['setpoint'][3]]).all()
+    assert row['pad'][3] == pytest.approx(60e3, abs=500.0)
+    faults = rig.faults()
+    assert (faults[0], faults[2], faults[3]) == ('', '', 'device error')
+    rig.hold([60e3] * 4, 0.6)
+    assert re.fullmatch(r'leaks or lacks air: .*', rig.faults()[1])
+    assert rig.faults()[3].startswith('no reading for 0.5 s, the last was 60.')
+
+
+def test_a_pad_that_is_held_says_so_in_records():
+    rig, _, device = device_rig()
+    rig.command(70e3)
+    device.reads = 90e3
+    rig.tick(0.02)
+    device.reads = None
+    rig.tick(0.02)
+    assert rig.faults() == ['vented until the node is activated again']
+    (row,) = rig.record.rows[0]
+    assert KINDS[row['detail'][0]] is Kind.CEILING
+    assert math.isnan(row['pad'])  # not known of a real device
 
 
 # --- slew ----------------------------------------------------------------------------------------
@@ -573,12 +662,12 @@ class Trial:
     def tick(self, step_ns):
         self.now_ns += step_ns
         timeout_ns = self.settings.command_timeout * 1e9
+        self.rig.supervision.tick(self.now_ns)
         for leg, channel in self.channels.items():
-            channel.tick(self.now_ns)
             old = abs(self.now_ns - self.accepted_ns[leg]) > timeout_ns
             if not self.devices[leg].broken and (step_ns < 0 or old):
                 assert self.devices[leg].setpoint == 0.0
-                assert channel.vented
+                assert channel.outlet.vented
 
     def read(self, leg):
         channel, device = self.channels[leg], self.devices[leg]
@@ -590,7 +679,7 @@ class Trial:
 
     def vent(self, leg):
         self.channels[leg].vent('a test')
-        assert self.channels[leg].vented == (not self.devices[leg].broken)
+        assert self.channels[leg].outlet.vented == (not self.devices[leg].broken)
 
     def deactivate(self, leg):
         self.channels[leg].deactivate('a test')
@@ -616,7 +705,7 @@ class Trial:
         for leg, device in self.devices.items():
             assert all(math.isfinite(each) and 0.0 <= each <= CEILING for each in device.received)
             if not self.channels[leg].active and not device.broken:
-                self.channels[leg].tick(self.now_ns)
+                self.rig.supervision.tick(self.now_ns)
                 assert device.setpoint == 0.0
 
 

@@ -278,8 +278,8 @@ def test_faults_are_listed(tmp_path):
 def test_what_the_controller_found_is_listed(tmp_path):
     trial = made_up()
     found = [
-        {'leg': 2, 'start': 3.48, 'end': None, 'reason': 'leaks'},
-        {'leg': 1, 'start': 4.0, 'end': 9.5, 'reason': 'does not vent'},
+        {'leg': 2, 'start': 3.48, 'end': None, 'kind': 'leaks', 'reason': 'leaks'},
+        {'leg': 1, 'start': 4.0, 'end': 9.5, 'kind': 'x', 'reason': 'does not vent'},
     ]
     trial.metrics = dataclasses.replace(trial.metrics, faults=found)
     report.write(trial, tmp_path / 'r.html')
@@ -291,11 +291,17 @@ def test_what_the_controller_found_is_listed(tmp_path):
 def test_what_comes_and_goes_has_one_line(tmp_path):
     trial = made_up()
     found = [
-        {'leg': leg, 'start': k, 'end': k + 0.1, 'reason': f'force out of range: z = {k} N'}
+        {
+            'leg': leg,
+            'start': k,
+            'end': k + 0.1,
+            'kind': 'force out of range',
+            'reason': f'force out of range: z = {k} N',
+        }
         for k in range(30)
         for leg in (1, 2)
     ]
-    found.append({'leg': 2, 'start': 12.0, 'end': None, 'reason': 'leaks'})
+    found.append({'leg': 2, 'start': 12.0, 'end': None, 'kind': 'leaks', 'reason': 'leaks'})
     trial.metrics = dataclasses.replace(trial.metrics, faults=found)
     report.write(trial, tmp_path / 'r.html')
     text = page(tmp_path / 'r.html').text

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.control import FootFault
+from ros_pad.control.faults import Kind
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import Trial
@@ -112,7 +113,7 @@ def test_a_summary_has_the_values_of_the_robot():
         body=(3.0, -0.2, 0.1), time=SCENE.settle + 20.0 * SCENE.gait.cycle, feet=feet,
         dissipation=7.0, verdict=None,
     )  # fmt: skip
-    fault = FootFault(1, 0.5, None, 'leaks')
+    fault = FootFault(1, 0.5, None, Kind.STUCK(5e3))
     controller = types.SimpleNamespace(
         switches={1: 4}, refusals={1: 'too heavy'}, faults=[fault], underpressure={1: 2}
     )
@@ -128,7 +129,15 @@ def test_a_summary_has_the_values_of_the_robot():
     assert metrics.verdict is None
     said = json.loads(json.dumps(metrics.as_dict()))
     assert said['switches'] == [4]
-    assert said['faults'] == [{'leg': 1, 'start': 0.5, 'end': None, 'reason': 'leaks'}]
+    assert said['faults'] == [
+        {
+            'leg': 1,
+            'start': 0.5,
+            'end': None,
+            'kind': 'stuck',
+            'reason': 'stuck: 5.0 kPa, neither fills nor vents',
+        }
+    ]
     assert said['underpressure'] == [2]
 
 

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The series of a trial from its records, whether they come from the loop or from a bag."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from collections.abc import Sequence
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_pad.estimation import doubt as doubts
+from ros_pad.records import COMMAND
+from ros_pad.records import ESTIMATE
+from ros_pad.records import PRESSURE
+from ros_pad.records import SAMPLE
+from ros_pad.records import Block
+from ros_pad.records import Kind
+
+
+class Records(NamedTuple):
+    """All records of a trial, each kind in the order of its stamps.
+
+    Attributes
+    ----------
+    sample, estimate, command, pressure : Block
+    """
+
+    sample: Block
+    estimate: Block
+    command: Block
+    pressure: Block
+
+
+def joined(kind: Kind, legs: int, blocks: Sequence[Block]) -> Block:
+    """Return the records of several blocks as one block, for so many legs if there are none."""
+    if not blocks:
+        return Block(np.empty(0, np.int64), kind.rows(0, legs))
+    return Block(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
+
+
+def by_row(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
+    """Apply a function of ``math`` to the rows of the last axis.
+
+    NumPy's functions differ from it in the last bit.
+    """
+    columns = values.reshape(-1, values.shape[-1]).T.tolist()
+    return np.reshape(list(map(function, *columns)), values.shape[:-1])
+
+
+def held(stamps: np.ndarray, values: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Return the last known values up to each time of a grid, NaN before the first ones.
+
+    Parameters
+    ----------
+    stamps, grid : array of int (n,), (m,)
+        Times, ns, ascending.
+    values : array (n, ...)
+        NaN where a value is not known.
+
+    Returns
+    -------
+    array (m, ...)
+    """
+    places = np.arange(1, len(stamps) + 1).reshape(-1, *[1] * (values.ndim - 1))
+    last = np.maximum.accumulate(np.where(np.isnan(values), 0, places), axis=0)
+    last = np.concatenate([np.zeros_like(last[:1], shape=(1, *values.shape[1:])), last])
+    first = np.full((1, *values.shape[1:]), np.nan)
+    rows = last[np.searchsorted(stamps, grid, side='right')]
+    return np.take_along_axis(np.concatenate([first, values]), rows, axis=0)
+
+
+def series(records: Records) -> dict[str, Any]:
+    """Return the series of :class:`ros_pad.trials.trial.Trial` by name, times in ns.
+
+    Fast series have a row for each sample of any foot; slow ones for each estimate with a sample
+    or, without estimates, for each pressure.
+    """
+    sample, estimate, command, pressure = records
+    fast = sample.stamps[np.isfinite(sample.rows['force']).all(axis=2).any(axis=1)]
+    slow = estimate.stamps[np.isfinite(estimate.rows['load']).any(axis=1)]
+    if not len(estimate.stamps):
+        slow = pressure.stamps
+    fast, slow = np.unique(fast), np.unique(slow)
+
+    def of(block: Block, name: str, grid: np.ndarray = slow) -> np.ndarray:
+        return held(block.stamps, block.rows[name], grid)
+
+    code = of(estimate, 'doubt')
+    return {
+        'time': fast,
+        'force': of(sample, 'force', fast),
+        'position': of(sample, 'position', fast),
+        'slow_time': slow,
+        'pressure': of(pressure, 'pressure'),
+        'setpoint': of(command, 'setpoint'),
+        'wet_probability': of(estimate, 'wetness'),
+        'friction': of(estimate, 'friction'),
+        'margin': of(estimate, 'margin'),
+        'slip_speed': by_row(math.hypot, of(estimate, 'slip')),
+        'slipping': of(estimate, 'slipping') == 1.0,
+        'dome': of(command, 'dome') == 1.0,
+        'doubt': np.vectorize(doubts.place, otypes=[int])(code),
+    }
+
+
+def empty(legs: int) -> Records:
+    """Return no records of so many legs."""
+    return Records(*(joined(kind, legs, ()) for kind in (SAMPLE, ESTIMATE, COMMAND, PRESSURE)))

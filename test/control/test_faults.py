@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+from ros_pad.control.faults import KINDS
+from ros_pad.control.faults import NONE
+from ros_pad.control.faults import Kind
+from ros_pad.control.faults import joined
+from ros_pad.control.faults import text
+from ros_pad.estimation import DOUBTS
+
+
+def test_codes_are_the_places_in_the_table():
+    assert list(KINDS) == list(range(len(Kind)))
+    assert not any(kind.numbers for kind in (Kind.NONE, Kind.DEVICE))
+    for kind in Kind:
+        used = [name for name in 'abpq' if f'{{{name}' in kind.template]
+        assert not used or kind.numbers
+
+
+def test_a_fault_is_text_for_people_and_three_numbers_for_records():
+    fault = Kind.LEAK(45e3, 25e3)
+    assert fault
+    assert str(fault) == 'leaks or lacks air: 45.0 kPa, 25.0 kPa below the set-point'
+    assert text(fault.kind.code, fault.a, fault.b) == str(fault)
+    assert str(Kind.SILENCE(0.52, 70e3)) == 'no reading for 0.5 s, the last was 70.0 kPa'
+
+
+def test_no_fault_is_false_and_has_no_text():
+    assert not NONE
+    assert str(NONE) == text(0.0, math.nan, math.nan) == joined(NONE, '', None) == ''
+    assert text(math.nan, 0.0, 0.0) == text(99.0, 0.0, 0.0) == text(0.5, 1.0, 1.0) == ''
+
+
+def test_a_doubt_about_sensors_names_itself():
+    doubt = Kind.DOUBT(DOUBTS.index('marker lost'))
+    assert (str(doubt), doubt.label) == ('marker lost', 'marker lost')
+    assert joined(Kind.STUCK(5e3), doubt) == (
+        'stuck: 5.0 kPa, neither fills nor vents; marker lost'
+    )
