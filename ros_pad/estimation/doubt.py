@@ -100,11 +100,14 @@ def doubt(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) ->
 
 def text(code, a, b):
     from ros_pad.estimation import DOUBTS
+
     return DOUBTS[int(code)]
 
 
 def of_sensors(code):
-    from ros_pad.estimation import DOUBTS, sensor_fault
+    from ros_pad.estimation import DOUBTS
+    from ros_pad.estimation import sensor_fault
+
     return bool(sensor_fault(DOUBTS[int(code)]))
 
 

@@ -16,13 +16,10 @@ from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.faults import sensor_faults_of
 from ros_pad.simulation.robot import Proprioception
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
 
 _BLOCK = 1000  # samples drawn at once, because a call of NumPy costs more than the numbers
-
-
 
 
 class Sensors:

@@ -3,6 +3,7 @@
 
 from ros_pad.trials.loop import run
 from ros_pad.trials.node_settings import NodeSettings
+
 try:
     from ros_pad.trials.replay import Outcome
     from ros_pad.trials.replay import Replay
