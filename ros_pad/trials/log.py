@@ -71,6 +71,17 @@ class TrialLog:
         self._commands.append(command)
         self._pressures.append(pressure)
 
+    @property
+    def records(self) -> Records:
+        """All records until now."""
+        legs = len(self._scene.legs)
+        return Records(
+            joined(SAMPLE, legs, self._samples),
+            joined(ESTIMATE, legs, self._estimates),
+            joined(COMMAND, legs, self._commands),
+            joined(PRESSURE, legs, self._pressures),
+        )
+
     def finish(
         self,
         robot: SimulatedRobot,
@@ -79,13 +90,7 @@ class TrialLog:
         real_time_factor: float | None,
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
-        legs = len(self._scene.legs)
-        records = Records(
-            joined(SAMPLE, legs, self._samples),
-            joined(ESTIMATE, legs, self._estimates),
-            joined(COMMAND, legs, self._commands),
-            joined(PRESSURE, legs, self._pressures),
-        )
+        records = self.records
         found = series(records)
         rows = np.isin(records.sample.stamps, found['time'])
         found |= {name: found[name] * 1e-9 for name in ('time', 'slow_time')}
