@@ -131,6 +131,7 @@ class Soles:
         self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
         self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
         self._felt = data.sensordata  # force and moment of each foot's contact
+        self._loads = self._felt[::6]
         # The axes of a contact with level ground are z, y, -x.
         self._order = (6 * np.arange(count) + np.array([[2], [1], [0], [3]])).ravel()
         self._rows = np.zeros((7, count))  # of `contacts`, whose rows are columns here
@@ -140,7 +141,6 @@ class Soles:
             self._rows[:4], self._rows[:4].reshape(-1), self._rows[0], self._rows[:2],
             self._shear[:2], self._places.T, self._rows[4:],
         )  # fmt: skip
-        self._loads = [0.0] * count
 
     @property
     def contacts(self) -> Array:
@@ -189,7 +189,7 @@ class Soles:
 
     def rub(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last."""
-        for sole, load in zip(self._soles, self._loads, strict=True):
+        for sole, load in zip(self._soles, self._loads.tolist(), strict=True):
             if load > LIGHT:
                 sole.ahead = None
                 self.press(sole, load, self._dt)
@@ -208,10 +208,6 @@ class Soles:
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
         row[0] = row[1] = ratio
         row[2] = self.lever * ratio
-
-    def read(self) -> None:
-        """Read the loads of the feet in the last step of MuJoCo."""
-        self._loads = self._felt[::6].tolist()
 
     def update(self) -> None:
         """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
