@@ -13,7 +13,7 @@ import statistics
 from collections import deque
 
 from ros_pad.configuration import number
-from ros_pad.control.faults import NONE
+from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 
@@ -189,11 +189,11 @@ class PadMonitor:
     ----------
     pressure : float
         Last reading, gauge Pa; NaN before the first one.
-    fault : Fault
-        The fault, or ``NONE``. A fault ends when the pad has done what it failed to do: a pad that
+    fault : Fault or None
+        The fault. A fault ends when the pad has done what it failed to do: a pad that
         did not fill must fill, and a pad that did not vent must vent.
-    silence : Fault
-        The fault while readings are missing; ``NONE`` otherwise, and before the first reading.
+    silence : Fault or None
+        The fault while readings are missing; None also before the first reading.
     tolerance : float
         Largest allowed difference between reading and set-point, Pa.
 
@@ -227,7 +227,8 @@ class PadMonitor:
         self._ceiling = number('ceiling', ceiling, 'Pa', above=True)
         self.tolerance = TOLERANCE * ceiling
         self.pressure = math.nan
-        self.fault = self.silence = NONE
+        self.fault: Fault | None = None
+        self.silence: Fault | None = None
         self._setpoint = math.nan  # NaN: none
         self._time = self._read = -math.inf
         self._arrived = False  # whether the pad has reached the present set-point
@@ -297,7 +298,7 @@ class PadMonitor:
         first, last_read, self._read = math.isnan(self.pressure), self._read, time
         self.pressure = reading
         if self.silence:
-            self.silence = NONE
+            self.silence = None
             self._wait(time)
         if setpoint is not None:
             if first:
@@ -328,7 +329,7 @@ class PadMonitor:
             self._motion.restart(time)
             self._arrived = True
             if self.fault and self._repair.done(time, aim, pressure, tolerance):
-                self.fault = NONE
+                self.fault = None
             self._rests = not self.fault
             return
         self._repair.restart()

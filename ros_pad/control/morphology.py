@@ -21,7 +21,6 @@ from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
-from ros_pad.control.faults import NONE
 from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
@@ -68,10 +67,6 @@ LONGEST_WAIT = 40
 
 FURTHEST_LEAD = 3
 """Largest lead of a leg with a slow hose, steps."""
-
-
-SOUND = (NONE,) * 5
-"""Faults of a leg that has none, see `_LegState.present`."""
 
 
 @dataclass
@@ -172,9 +167,9 @@ class _LegState:
     ground: _Ground
     air: _Air
     morphology: str
-    timeout: Fault = NONE
-    no_step: Fault = NONE
-    sensors: Fault = NONE
+    timeout: Fault | None = None
+    no_step: Fault | None = None
+    sensors: Fault | None = None
     lasting: dict[int, FootFault] = field(default_factory=dict)  # by place in `present`
     timing: _Timing = field(default_factory=_Timing)
     steps: float = math.inf  # steps since the morphology changed last
@@ -183,8 +178,8 @@ class _LegState:
     setpoint: float = 0.0
 
     @property
-    def present(self) -> tuple[Fault, ...]:
-        """Its faults of all sorts, each at its place; ``NONE`` for those that it does not have."""
+    def present(self) -> tuple[Fault | None, ...]:
+        """Its faults of all sorts, each at its place; None for those that it does not have."""
         monitor = self.air.monitor
         return self.timeout, self.no_step, self.sensors, monitor.silence, monitor.fault
 
@@ -490,8 +485,8 @@ class MorphologyController:
         """
         state = self._state(leg)
         timing, air = state.timing, state.air
-        if doubt != state.sensors.a:
-            state.sensors = Kind.DOUBT(doubt) if doubt else NONE
+        if doubt or state.sensors:
+            state.sensors = Kind.DOUBT(doubt) if doubt else None
         if not 0.0 <= time - timing.now <= self.command_timeout:
             # the first time, or after a pause
             timing.updated = time
@@ -504,18 +499,20 @@ class MorphologyController:
             self._follow_fault(air, before)
         age = time - timing.updated
         if age <= self.command_timeout:
-            state.timeout = NONE
+            state.timeout = None
         elif not state.timeout:
             state.timeout = Kind.TIMEOUT(age)
             self._time_out(state)
         missed = self._decisions - state.decided
         if missed <= 2 * len(self._legs):
-            state.no_step = NONE
+            state.no_step = None
         elif not state.no_step:
             state.no_step = Kind.NO_STEP(missed)
-        self._list_faults(state)
+        own = state.timeout or state.no_step or state.sensors
+        if own or monitor.fault or monitor.silence or state.lasting:
+            self._list_faults(state)
 
-    def _follow_fault(self, air: _Air, before: Fault) -> None:
+    def _follow_fault(self, air: _Air, before: Fault | None) -> None:
         """Wait with the next dome when a fault of the air begins; try all legs when one ends."""
         if not air.monitor.fault:
             # If the supply is back, the pads of the other legs can be filled again, too.
@@ -536,8 +533,6 @@ class MorphologyController:
     def _list_faults(self, state: _LegState) -> None:
         """Update the list of faults: one entry from the start of a fault to its end."""
         faults, lasting, now = state.present, state.lasting, state.timing.now
-        if faults == SOUND and not lasting:
-            return
         for place, fault in enumerate(faults):
             entry = lasting.get(place)
             if entry is None:
