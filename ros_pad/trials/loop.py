@@ -128,12 +128,16 @@ class LegStages:
             self.pressure = pressure
             self.estimation.pressure(pressure)
 
-    def estimate(self, row: np.void) -> bool:
-        """Write an estimate, if there is a new one, into the row of a record."""
-        emission, self._emission = self._emission, None
+    def doubt(self, row: np.void) -> None:
+        """Write the present doubt into the row of a record."""
         doubt = self.estimation.doubt
         if doubt is not None:
             row['doubt'] = DOUBTS.index(doubt.partition(':')[0])
+
+    def estimate(self, row: np.void) -> bool:
+        """Write an estimate, if there is a new one, into the row of a record."""
+        emission, self._emission = self._emission, None
+        self.doubt(row)
         if emission is None:
             return False
         row['load'], row['wetness'] = emission.load, emission.estimate.wet_probability
@@ -316,6 +320,7 @@ class ClosedLoop:
         if controller is not None:
             self.controller = controller
         self._pace = Pace(period_ns)
+        self._doubts: list[str | None] = []
         self.legs = [
             LegStages(channel.leg, estimator, period_ns)
             for channel, estimator in zip(self._channels, self.estimators, strict=True)
@@ -349,7 +354,14 @@ class ClosedLoop:
                 self.body.stage.tick(now_ns)
             for leg in legs:
                 leg.tick(now_ns)
+            doubts = [leg.estimation.doubt for leg in legs]
+            if doubts != self._doubts:
+                rows = ESTIMATE.rows(len(legs))
+                for leg, row in zip(legs, rows, strict=True):
+                    leg.doubt(row)
+                self.decision.decide(Block.of(now_ns, rows))
             self.decision.tick(now_ns)
+            self._doubts = doubts
         self.robot.step(self.pads)
         self._measure(now_ns, log)
         if self._pace.due(now_ns):
