@@ -7,12 +7,14 @@ Records hold a fault as three numbers; its text is made where a person reads it.
 from __future__ import annotations
 
 from enum import Enum
+from functools import lru_cache
 from typing import NamedTuple
 
 from ros_pad.estimation import DOUBTS
 from ros_pad.estimation import sensor_fault
 
 
+@lru_cache(64)
 def sensor_fault_text(doubt: float) -> str:
     """Return the kind of a doubt of the estimator, given its code; empty if no sensor is faulty.
 
@@ -79,7 +81,7 @@ KINDS: dict[float, Kind] = {kind.code: kind for kind in Kind}
 
 
 class Fault(NamedTuple):
-    """A fault; false if it is none. Its text is ``str(fault)``.
+    """A fault, whose text is ``str(fault)``. Where there is none, there is None instead.
 
     Attributes
     ----------
@@ -93,9 +95,6 @@ class Fault(NamedTuple):
     a: float
     b: float
 
-    def __bool__(self) -> bool:
-        return self.kind is not Kind.NONE
-
     def __str__(self) -> str:
         p, q = (f'{1e-3 * each:.1f} kPa' for each in self[1:])
         return self.kind.template.format(a=self.a, b=self.b, p=p, q=q) or self.label
@@ -104,10 +103,6 @@ class Fault(NamedTuple):
     def label(self) -> str:
         """The kind in a few words."""
         return sensor_fault_text(self.a) if self.kind is Kind.DOUBT else self.kind.label
-
-
-NONE = Kind.NONE()
-"""No fault."""
 
 
 def text(code: float, a: float, b: float) -> str:

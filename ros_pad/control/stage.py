@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -87,11 +88,10 @@ class DecisionStage:
         or not allowed. A channel that receives no set-points vents its pad after the command
         timeout.
         """
-        now, row = record.last_ns * 1e-9, record.rows[-1]
         names = ('wetness', 'load', 'position', 'friction', 'doubt')
-        estimates = zip(*(row[name].tolist() for name in names), strict=True)
+        estimates = zip(*(record.rows[-1][name].tolist() for name in names), strict=True)
         setpoints = [
-            self._decide(leg, now, *estimate)
+            self._decide(leg, record.last_ns * 1e-9, estimate)
             for leg, estimate in zip(self._legs, estimates, strict=True)
         ]
         return self._command(record.last_ns, setpoints)
@@ -114,21 +114,12 @@ class DecisionStage:
         record = self._command(now_ns, [math.nan] * len(self._legs))
         return record if self._domes != before else None
 
-    def _decide(
-        self,
-        leg: int,
-        now: float,
-        wetness: float,
-        load: float,
-        position: Sequence[float],
-        friction: float,
-        doubt: float,
-    ) -> float:
+    def _decide(self, leg: int, now: float, estimate: tuple[Any, ...]) -> float:
         """Return the set-point of a leg, gauge Pa; NaN if there is none."""
+        wetness, load, (x, y), friction, doubt = estimate
         inputs = self._legs[leg]
         if inputs.largest < load < math.inf:
             inputs.largest = load
-        x, y = position
         if not math.isnan(x + y):
             inputs.position, inputs.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts

@@ -8,7 +8,6 @@ A :class:`SupervisedChannel` stands between a controller and the regulator of on
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -16,7 +15,6 @@ from typing import NamedTuple
 from typing import Protocol
 
 from ros_pad.configuration import Setting
-from ros_pad.control.faults import NONE
 from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
@@ -81,6 +79,7 @@ class SupervisorSettings:
 
 
 DEFAULTS = SupervisorSettings()
+NO_FAULT = Kind.NONE()
 
 
 class Level(IntEnum):
@@ -278,7 +277,7 @@ class SupervisedChannel:
         self.active = False
         self.held = ''
         self.commanded_ns: int | None = None
-        self._hold = NONE
+        self._hold: Fault | None = None
         self._log: Log = log or NoLog()
         self._device_faults: tuple[str, ...] = ()
 
@@ -291,9 +290,8 @@ class SupervisedChannel:
     def present(self) -> Fault:
         """The fault for records: of pad or device, or that for which the pad is held."""
         monitor = self.monitor
-        if self._device_faults:
-            return monitor.silence or Kind.DEVICE()
-        return monitor.silence or monitor.fault or self._hold
+        device = Kind.DEVICE() if self._device_faults else None
+        return monitor.silence or device or monitor.fault or self._hold or NO_FAULT
 
     @property
     def sags(self) -> bool:
@@ -318,7 +316,7 @@ class SupervisedChannel:
 
     def activate(self, elapsed_ns: int) -> None:
         """Accept commands from now on, at a time, ns, also of a pad that was held."""
-        self.held, self._hold = '', NONE
+        self.held, self._hold = '', None
         self.monitor = PadMonitor(self.outlet.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
@@ -430,19 +428,16 @@ class SupervisedChannel:
         self._continue(elapsed_ns)
         return pressure
 
-    def row(self, elapsed_ns: int) -> tuple[float, float, float, float, tuple[float, float]]:
+    def row(self, elapsed_ns: int) -> tuple[Any, ...]:
         """Read the device at a time, ns, and return the row of a PRESSURE record."""
-        pressure, setpoint, pad, fault = (
-            self.read(elapsed_ns),
-            self.setpoint,
-            math.nan,
-            self.present,
-        )
-        if pressure is None:
-            pressure = setpoint = math.nan
-        with suppress(PadError):  # of a device that is closed
-            pad = getattr(self.outlet.regulator, 'pad_pressure', pad)
-        return pressure, setpoint, pad, fault.kind.code, fault[1:]
+        pressure = self.read(elapsed_ns)
+        fault = self.present
+        try:
+            pad = getattr(self.outlet.regulator, 'pad_pressure', math.nan)
+        except PadError:  # the device is closed
+            pad = math.nan
+        known = (math.nan, math.nan) if pressure is None else (pressure, self.setpoint)
+        return *known, pad, fault.kind.code, fault[1:]
 
     def vent(self, reason: str) -> None:
         """Vent the pad; a failure is logged, and the next tick tries again."""
