@@ -7,21 +7,9 @@ Records hold a fault as three numbers; its text is made where a person reads it.
 from __future__ import annotations
 
 from enum import Enum
-from functools import lru_cache
 from typing import NamedTuple
 
-from ros_pad.estimation import DOUBTS
-from ros_pad.estimation import sensor_fault
-
-
-@lru_cache(64)
-def sensor_fault_text(doubt: float) -> str:
-    """Return the kind of a doubt of the estimator, given its code; empty if no sensor is faulty.
-
-    NaN, a doubt that is not known, is no fault.
-    """
-    known = 0 <= doubt < len(DOUBTS)
-    return sensor_fault(DOUBTS[int(doubt)]) if known else ''
+from ros_pad.estimation import doubt as doubts
 
 
 class Kind(Enum):
@@ -102,7 +90,7 @@ class Fault(NamedTuple):
     @property
     def label(self) -> str:
         """The kind in a few words."""
-        return sensor_fault_text(self.a) if self.kind is Kind.DOUBT else self.kind.label
+        return doubts.kind(self.a) if self.kind is Kind.DOUBT else self.kind.label
 
 
 def text(code: float, a: float, b: float) -> str:

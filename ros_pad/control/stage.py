@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.control.faults import sensor_fault_text
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import doubt as doubts
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.records import COMMAND
 from ros_pad.records import Block
@@ -123,7 +123,7 @@ class DecisionStage:
         if not math.isnan(x + y):
             inputs.position, inputs.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
-            inputs.doubt = doubt if sensor_fault_text(doubt) else 0.0
+            inputs.doubt = doubt if doubts.is_fault(doubt) else 0.0
         self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
         old = now - inputs.positioned > OLD
         if old or not math.isfinite(load + wetness + sum(inputs.position)):
