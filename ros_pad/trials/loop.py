@@ -134,17 +134,21 @@ class LegStages:
         if doubt is not None:
             row['doubt'] = DOUBTS.index(doubt.partition(':')[0])
 
-    def estimate(self, row: np.void) -> bool:
+    @property
+    def fresh(self) -> bool:
+        """Whether there is a new estimate."""
+        return self._emission is not None
+
+    def estimate(self, row: np.void) -> None:
         """Write an estimate, if there is a new one, into the row of a record."""
         emission, self._emission = self._emission, None
         self.doubt(row)
         if emission is None:
-            return False
+            return
         row['load'], row['wetness'] = emission.load, emission.estimate.wet_probability
         row['friction'] = emission.estimate.friction_mean
         if emission.position is not None:
             row['position'] = emission.position
-        return True
 
 
 def _ignore(error: InvalidInput) -> None:
@@ -371,9 +375,10 @@ class ClosedLoop:
             for leg, pressure in zip(legs, pressures.rows[0]['pressure'].tolist(), strict=True):
                 leg.report(pressure)
         # Without markers the first estimate after a silence may come between control steps.
-        rows = ESTIMATE.rows(len(legs))
-        fresh = [leg.estimate(row) for leg, row in zip(legs, rows, strict=True)]
-        if any(fresh):
+        if any(leg.fresh for leg in legs):
+            rows = ESTIMATE.rows(len(legs))
+            for leg, row in zip(legs, rows, strict=True):
+                leg.estimate(row)
             commands = self.decision.decide(Block.of(now_ns, rows))
             self.supervision.command(commands, now_ns, now_ns)
             estimates = [each.estimate for each in self.estimators]
