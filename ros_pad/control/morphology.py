@@ -53,10 +53,8 @@ MARGIN = Setting(
 )  # fmt: skip
 
 LIFT_OFF = Setting(
-    'lift_off_share', LIFT_OFF_SHARE,
-    'Share of the expected load below which a foot has lifted off; it stands again at this share'
-    ' plus 0.3.',
-    '', 0.01, 0.6,
+    'lift_off_share', LIFT_OFF_SHARE, 'Share of the expected load below which a foot has lifted'
+    ' off; it stands again at this share plus 0.3.', '', 0.01, 0.6,
 )  # fmt: skip
 
 FIRST_WAIT = 5

@@ -88,13 +88,14 @@ class DecisionStage:
         or not allowed. A channel that receives no set-points vents its pad after the command
         timeout.
         """
+        now_ns, row = record.last_ns, record.rows[-1]
         names = ('wetness', 'load', 'position', 'friction', 'doubt')
-        estimates = zip(*(record.rows[-1][name].tolist() for name in names), strict=True)
+        estimates = zip(*(row[name].tolist() for name in names), strict=True)
         setpoints = [
-            self._decide(leg, record.last_ns * 1e-9, estimate)
+            self._decide(leg, now_ns * 1e-9, estimate)
             for leg, estimate in zip(self._legs, estimates, strict=True)
         ]
-        return self._command(record.last_ns, setpoints)
+        return self._command(now_ns, setpoints)
 
     def tick(self, now_ns: int) -> Block | None:
         """Observe the legs that have no estimates; call it every ``pace.TICK_PERIOD_NS``.
@@ -123,7 +124,7 @@ class DecisionStage:
         if not math.isnan(x + y):
             inputs.position, inputs.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
-            inputs.doubt = doubt if doubts.is_fault(doubt) else 0.0
+            inputs.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
         self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
         old = now - inputs.positioned > OLD
         if old or not math.isfinite(load + wetness + sum(inputs.position)):

@@ -28,15 +28,12 @@ from ros_pad.regulators.protocol import Regulator
 from ros_pad.regulators.protocol import permitted
 
 SLEW_LIMIT = Setting(
-    'slew_limit', 0.0,
-    'Largest rate of change of the set-point in force, except for vents; 0: no limit.',
-    'Pa/s', 0.0, 1e7,
+    'slew_limit', 0.0, 'Largest rate of change of the set-point in force, except for vents; 0: no'
+    ' limit.', 'Pa/s', 0.0, 1e7,
 )  # fmt: skip
 CEILING_TOLERANCE = Setting(
-    'ceiling_tolerance', 0.02,
-    'Share of the ceiling by which the pressure of a pad may exceed the ceiling; above that, the'
-    ' pad is vented and held.',
-    '', 0.005, 0.2,
+    'ceiling_tolerance', 0.02, 'Share of the ceiling by which the pressure of a pad may exceed the'
+    ' ceiling; above that, the pad is vented and held.', '', 0.005, 0.2,
 )  # fmt: skip
 ON_FAULT = Setting(
     'on_fault', 'report', 'Reaction to a faulty pad: only report it, or vent and hold it.',
@@ -79,7 +76,6 @@ class SupervisorSettings:
 
 
 DEFAULTS = SupervisorSettings()
-NO_FAULT = Kind.NONE()
 
 
 class Level(IntEnum):
@@ -277,7 +273,7 @@ class SupervisedChannel:
         self.active = False
         self.held = ''
         self.commanded_ns: int | None = None
-        self._hold: Fault | None = None
+        self._hold = Kind.NONE()
         self._log: Log = log or NoLog()
         self._device_faults: tuple[str, ...] = ()
 
@@ -291,7 +287,7 @@ class SupervisedChannel:
         """The fault for records: of pad or device, or that for which the pad is held."""
         monitor = self.monitor
         device = Kind.DEVICE() if self._device_faults else None
-        return monitor.silence or device or monitor.fault or self._hold or NO_FAULT
+        return monitor.silence or device or monitor.fault or self._hold
 
     @property
     def sags(self) -> bool:
@@ -316,7 +312,7 @@ class SupervisedChannel:
 
     def activate(self, elapsed_ns: int) -> None:
         """Accept commands from now on, at a time, ns, also of a pad that was held."""
-        self.held, self._hold = '', None
+        self.held, self._hold = '', Kind.NONE()
         self.monitor = PadMonitor(self.outlet.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
