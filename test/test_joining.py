@@ -21,7 +21,8 @@ class Fields(Joiner):
         values = {}
         for name, value in fields.items():
             axes = ('_x', '_y', '_z') if np.ndim(value) else ('',)
-            values |= {name + axis: each for axis, each in zip(axes, np.atleast_1d(value), strict=False)}
+            numbers = zip(axes, np.atleast_1d(value), strict=False)
+            values |= {name + axis: each for axis, each in numbers}
         return super().add(leg, stamp_ns, values)
 
 
