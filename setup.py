@@ -15,7 +15,10 @@ ROOT = pathlib.Path(os.path.realpath(__file__)).parent
 PACKAGE = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
 URLS = {each.get('type'): each.text for each in PACKAGE.iter('url')}
 NAME = 'ros_pad'
-NODES = ['body_estimator', 'controller', 'estimator', 'recorder', 'regulator', 'simulator']
+NODES = [
+    *('body_estimator', 'controller', 'estimator', 'merge', 'recorder', 'regulator', 'simulator'),
+    'views',
+]
 DOCS = ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4.0', 'sphinx>=8.1']
 
 

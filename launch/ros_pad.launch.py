@@ -36,6 +36,16 @@ ARGUMENTS = {
         'What slip is estimated from: markers, or joints, IMU and forces in the axes of the feet,'
         ' for which a body estimator is started. [markers, joints]',
     ),
+    'merge': (
+        '',
+        'Join what drivers publish by leg (leg_i/wrench, leg_i/position, leg_i/pressure) into'
+        ' records; empty: where nothing is simulated. [true, false]',
+    ),
+    'views': (
+        'false',
+        'Publish single legs of records (leg_i/wetness, leg_i/pressure_setpoint and others) and'
+        ' markers of the feet, for people and for drivers. [true, false]',
+    ),
     'record': ('true', 'Record every topic into a bag. [true, false]'),
     'folder': (
         '',
@@ -49,6 +59,13 @@ ARGUMENTS = {
     ),
 }
 """Default and description of each launch argument."""
+
+
+VIEWS_BESIDE_DRIVERS = (
+    'contact_velocity, pressure_setpoint, slip, slipping, wetness, friction, friction_margin,'
+    ' contact_load, doubt, morphology'
+)
+"""Topics of the node views where drivers publish wrench, position and pressure of each leg."""
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -113,6 +130,14 @@ def nodes(context: LaunchContext) -> list[Node]:
     shared = {'use_sim_time': use_sim_time, **legs, **foot}
     chosen.append(node('estimator_node', **shared, **estimator))
     chosen.append(node('controller_node', **shared))
+    merges = flag('merge') if text('merge') else not simulate
+    if merges:
+        chosen.append(node('merge_node', use_sim_time=use_sim_time, source=sensing, **legs))
+    if flag('views'):
+        own = {'frame': 'odom'} if joints else {}
+        # What drivers publish themselves is theirs.
+        theirs = {'topics': VIEWS_BESIDE_DRIVERS} if merges else {}
+        chosen.append(node('views_node', use_sim_time=use_sim_time, **legs, **own, **theirs))
     if simulate:
         chosen.append(node('simulator_node', publish_clock=use_sim_time, scene=scene, **simulator))
     return chosen

@@ -192,8 +192,9 @@ FEET_MARKERS = Topic('feet/markers', 'visualization_msgs/msg/MarkerArray', 'm')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 's', values=('clock.sec', 'clock.nanosec'))
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
 
-TRIAL = (SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT) + tuple(
-    topic for topic in OF_LEGS if topic.columns and topic is not LEG_FOOT_WRENCH
+TRIAL = (
+    *(SAMPLE, ESTIMATE, COMMAND, PRESSURE, BODY_POSE, ODOM, BODY_DOUBT),
+    *(topic for topic in OF_LEGS if topic.columns and topic is not LEG_FOOT_WRENCH),
 )
 """The topics that a trial is read from."""
 

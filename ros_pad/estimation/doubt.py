@@ -96,3 +96,20 @@ def doubt(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) ->
         f'undecided: friction {stance.friction_mean:.2f} ± {stance.friction_sd:.2f} fits wet'
         f' ground ({prior.flat_wet:.2f}) and dry ({prior.flat_dry:.2f})'
     )
+
+
+def text(code, a, b):
+    from ros_pad.estimation import DOUBTS
+
+    return DOUBTS[int(code)]
+
+
+def of_sensors(code):
+    from ros_pad.estimation import DOUBTS
+    from ros_pad.estimation import sensor_fault
+
+    return bool(sensor_fault(DOUBTS[int(code)]))
+
+
+def place(code):
+    return -1 if code != code else int(code)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The merge node: joins what drivers of others publish by leg into records.
 
-Drivers may publish ``leg_i/wrench``, ``leg_i/position``, ``leg_i/pressure`` and the other topics of
-:data:`ros_pad.bags.topics.FROM_DRIVERS`; all other nodes of ros_pad receive records alone. A record
-that somebody else publishes is not published here, too: two sources would contradict each other.
+Drivers may publish ``leg_i/wrench``, ``leg_i/position``, ``leg_i/pressure`` and the other topics
+of :data:`ros_pad.bags.topics.FROM_DRIVERS`; all other nodes of ros_pad receive records alone. A
+record that somebody else publishes is not published here: two sources would contradict each other.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
+from ros_pad.joining import WAIT_NS
 from ros_pad.joining import Joiner
 from ros_pad.nodes import topics
 from ros_pad.nodes.frames import check_frame
@@ -35,6 +36,9 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import Pace
+from ros_pad.records import COMMAND
+from ros_pad.records import PRESSURE
+from ros_pad.records import SAMPLE
 from ros_pad.records import Block
 
 PARAMETERS = (
@@ -44,10 +48,13 @@ PARAMETERS = (
         'source', 'markers', 'What a sample needs beside the force: position, or velocity, too.',
         choices=SOURCES,
     ),
+    Parameter(
+        'topics', 'wrench, position, foot_wrench, pressure',
+        'Topics of each leg that are joined, with commas between them; also contact_velocity and'
+        ' pressure_setpoint.',
+        read=lambda text: topics.chosen(text, schemas.FROM_DRIVERS),
+    ),
 )  # fmt: skip
-
-WAIT_NS = 10_000_000
-"""Longest time for which a record waits for the messages of other legs, ns."""
 
 
 class MergeNode(Node):
@@ -68,19 +75,16 @@ class MergeNode(Node):
         self.messages = messages = Messages(self)
         self.refused: dict[str, int] = {}
         needed = ('force', 'position') + (('velocity',) if values['source'] == 'joints' else ())
-        # What is measured at one moment waits for the other legs; commands and pressures do not.
         self._records = {
-            topic.name(): _Record(
-                self, topic, Joiner(topic.schema.record, self._legs, fields, wait)
-            )
-            for topic, fields, wait in (
-                (topics.SAMPLE, needed, WAIT_NS),
-                (topics.FORCE, ('force',), WAIT_NS),
-                (topics.PRESSURE, (), 0),
-                (topics.COMMAND, (), 0),
+            topic.name(): _Record(self, topic, Joiner(kind, self._legs, fields))
+            for topic, kind, fields in (
+                (topics.SAMPLE, SAMPLE, needed),
+                (topics.FORCE, SAMPLE, ('force',)),
+                (topics.PRESSURE, PRESSURE, ()),
+                (topics.COMMAND, COMMAND, ()),
             )
         }
-        for schema in schemas.FROM_DRIVERS:
+        for schema in values['topics']:
             assert schema.record
             name = 'force' if schema is schemas.LEG_FOOT_WRENCH else schema.record.name
             record, topic = self._records[f'feet/{name}'], topics.of_leg(schema)
@@ -114,7 +118,16 @@ class MergeNode(Node):
             return
         stamp_ns = seconds * 1_000_000_000 + fraction or self.messages.now_ns()
         numbers = schemas.to_record(schema, np.array(values), self._ambient)
-        record.add(leg, stamp_ns, schema.columns, numbers.tolist())
+        found = dict(zip(schema.columns, numbers.tolist(), strict=True))
+        assert schema.record
+        fields = {
+            field.name: [found[each] for each in field.columns]
+            if field.axes
+            else found[field.name]
+            for field in schema.record.fields
+            if field.columns[0] in found
+        }
+        record.add(leg, stamp_ns, fields)
 
     def _tick(self, now_ns: int) -> None:
         for record in self._records.values():
@@ -145,9 +158,9 @@ class _Record:
         self._node, self._topic, self._joiner = node, topic, joiner
         self._publish: Callable[[Block], None] | None = None
 
-    def add(self, leg: int, stamp_ns: int, columns: tuple[str, ...], numbers: list[float]) -> None:
-        """Add what a message of a leg has: numbers of columns of the record."""
-        self._send(self._joiner.add(leg, stamp_ns, dict(zip(columns, numbers, strict=True))))
+    def add(self, leg: int, stamp_ns: int, fields: dict[str, Any]) -> None:
+        """Add what a message of a leg has: values of fields of the record."""
+        self._send(self._joiner.add(leg, stamp_ns, **fields))
 
     def expire(self, now_ns: int) -> None:
         """Publish what has waited too long."""

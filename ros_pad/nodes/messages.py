@@ -60,7 +60,7 @@ class Messages:
         self.simulated: bool = node.get_parameter('use_sim_time').value
         self._node = node
         self.follows_clock = False
-        self._record_ns = -TICK_PERIOD_NS
+        self._record_ns = 0
 
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
         """Return a function that publishes whole messages."""

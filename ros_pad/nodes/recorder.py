@@ -129,7 +129,7 @@ class RecorderNode(Node):
         try:
             values = declare(self, PARAMETERS)
             folder = values['folder'] or f'trial_{datetime.datetime.now():%Y_%m_%d-%H_%M_%S}'
-            recorded = topics.names(values['legs'])
+            recorded = topics.names()
             self._reliable: bool = values['reliable']
             self._simulated = self.get_parameter('use_sim_time').value
             self._clock_ns = 0

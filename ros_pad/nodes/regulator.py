@@ -39,6 +39,7 @@ from ros_pad.regulators import BACKENDS
 from ros_pad.regulators import create
 from ros_pad.regulators.protocol import CEILING
 from ros_pad.regulators.supervision import Supervision
+from ros_pad.regulators.supervision import supply_health
 from ros_pad.regulators.supervisor import CEILING_TOLERANCE
 from ros_pad.regulators.supervisor import ON_FAULT
 from ros_pad.regulators.supervisor import SLEW_LIMIT
@@ -46,7 +47,6 @@ from ros_pad.regulators.supervisor import Health
 from ros_pad.regulators.supervisor import Level
 from ros_pad.regulators.supervisor import SupervisedChannel
 from ros_pad.regulators.supervisor import SupervisorSettings
-from ros_pad.regulators.supervisor import supply_health
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.faults import parsed
 from ros_pad.simulation.scene import Scene
@@ -303,7 +303,7 @@ class RegulatorNode(LifecycleNode):
             self.trigger_deactivate()
         else:
             self.vent('~/vent was called')
-        failed = [str(leg) for leg, channel in self.channels.items() if not channel.vented]
+        failed = [str(leg) for leg, channel in self.channels.items() if not channel.outlet.vented]
         response.success = bool(self.channels) and not failed
         if not self.channels:
             response.message = 'no device is open: configure the node first'
@@ -360,7 +360,7 @@ class RegulatorNode(LifecycleNode):
         supply = supply_health(channels)
         # Filled and vented are both healthy, so a change between them is not reported at once.
         problems = [health.message if health.level else '' for health in (*found, supply)]
-        refused = any(each.refusal_due for each in channels)
+        refused = any(each.answers.due for each in channels)
         if not (self._diagnostics_pace.due(now_ns) or problems != self._problems or refused):
             return
         self._problems = problems
@@ -368,7 +368,7 @@ class RegulatorNode(LifecycleNode):
         set_stamp(array.header.stamp, now_ns)
         for channel, health in zip(channels, found, strict=True):
             name = f'leg {channel.leg} regulator'
-            status = self._status(name, str(channel.leg), channel.report(health))
+            status = self._status(name, str(channel.leg), channel.answers.report(health))
             status.values = [KeyValue(key=k, value=v) for k, v in channel.figures().items()]
             array.status.append(status)
         if channels:

@@ -282,7 +282,9 @@ class SimulatorNode(Node):
         rows = SAMPLE.rows(samples, len(self.scene.legs))
         # Forces go first: a reading of the joints waits for them only until the next one.
         later: list[tuple[Callable[..., None], tuple[float, ...]]] = []
-        for count, (row, stamp_ns) in enumerate(zip(rows, stamps.tolist(), strict=True), 1):
+        count = 0
+        for row, stamp_ns in zip(rows, stamps.tolist(), strict=True):
+            count += 1
             self.robot.step(self.pressures)
             stamp = split(stamp_ns)
             x, y, heading = self.robot.body
@@ -310,10 +312,8 @@ class SimulatorNode(Node):
         assert self._body_sensors
         assert isinstance(self.robot, FullRobot)
         reading = self._body_sensors.read(self.robot.proprioception(), self.robot.time)
-        gyro, accelerometer = reading.imu
-        later.append((self._send_imu, (*stamp, *gyro, *accelerometer)))
-        positions, velocities, efforts = reading.joints
-        later.append((self._send_joints, (*stamp, *positions, *velocities, *efforts)))
+        later.append((self._send_imu, (*stamp, *reading.imu.ravel().tolist())))
+        later.append((self._send_joints, (*stamp, *reading.joints.ravel().tolist())))
         return reading.rows
 
     def tick(self, samples: int = 1) -> None:

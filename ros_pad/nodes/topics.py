@@ -209,31 +209,24 @@ def of_leg(schema: schemas.Topic) -> Topic:
     return _measured(schema)
 
 
-def check_legs(legs: Sequence[int]) -> None:
-    """Refuse numbers of legs that no robot has.
+def chosen(text: str, known: Sequence[schemas.Topic]) -> list[schemas.Topic]:
+    """Return the topics of each leg that a text names, with commas between them.
 
     Raises
     ------
     ConfigError
-        When `legs` is empty, repeats a leg, or has a number outside 1 to 8.
+        When one is not known.
     """
-    if not legs or len(set(legs)) < len(legs) or not set(legs) <= set(range(1, MOST_LEGS + 1)):
-        raise ConfigError(
-            f'legs = {list(legs)} is not allowed: a list of different whole numbers from 1 to 8 is'
-            ' needed'
-        )
+    kinds = {schema.kind: schema for schema in known}
+    names = [each.strip() for each in text.split(',') if each.strip()]
+    for name in names:
+        if name not in kinds:
+            raise ConfigError(
+                f'{name!r} is no topic of a leg: some of {", ".join(kinds)} are needed'
+            )
+    return [kinds[name] for name in names]
 
 
-def names(legs: Sequence[int]) -> dict[str, Topic]:
-    """Return every topic by name: common ones, then those that drivers have for each leg.
-
-    Raises
-    ------
-    ConfigError
-        When the legs are not allowed, see :func:`check_legs`.
-    """
-    check_legs(legs)
-    common = {topic.name(): topic for topic in COMMON_TOPICS}
-    return common | {
-        schema.name(leg): of_leg(schema) for leg in legs for schema in schemas.FROM_DRIVERS
-    }
+def names() -> dict[str, Topic]:
+    """Return every topic that a robot has once by name; they are what a bag has."""
+    return {topic.name(): topic for topic in COMMON_TOPICS}

@@ -37,9 +37,18 @@ from ros_pad.nodes.stamps import split
 from ros_pad.pace import Pace
 from ros_pad.records import Block
 
+SHOWN = [each for each in schemas.OF_LEGS if each is not schemas.LEG_FOOT_WRENCH]
+"""Topics of a leg that records have."""
+
 PARAMETERS = (
     LEGS,
     AMBIENT_PRESSURE,
+    Parameter(
+        'topics',
+        ', '.join(each.kind for each in SHOWN),
+        'Topics of each leg that are published, with commas between them: not those of a driver.',
+        read=lambda text: topics.chosen(text, SHOWN),
+    ),
     Parameter(
         'frame', 'world', 'Frame of the positions of the feet: world, or odom without markers.'
     ),
@@ -54,8 +63,6 @@ Show = Callable[[int, Any], None]
 
 class ViewsNode(Node):
     """Publish what records say of single legs; parameters are in :data:`PARAMETERS`.
-
-    What drivers of others publish by leg themselves is not repeated.
 
     Attributes
     ----------
@@ -72,9 +79,7 @@ class ViewsNode(Node):
         texts = {schemas.LEG_DOUBT: _doubt, schemas.LEG_MORPHOLOGY: _morphology}
         shows: dict[str, list[tuple[int, Show]]] = {}
         for index, leg in enumerate(self._legs):
-            for schema in schemas.OF_LEGS:
-                if schema is schemas.LEG_FOOT_WRENCH:
-                    continue  # it is not in a sample
+            for schema in values['topics']:
                 assert schema.record
                 show = self._text(schema, leg, texts[schema]) if schema.text else None
                 show = show or self._numbers(schema, leg)
@@ -82,7 +87,7 @@ class ViewsNode(Node):
         for topic in topics.RECORDS:
             if topic is not topics.FORCE:
                 messages.receive_record(
-                    topic, self._legs, partial(self._show, shows[topic.name()])
+                    topic, self._legs, partial(self._show, shows.get(topic.name(), []))
                 )
         messages.receive_record(topics.ESTIMATE, self._legs, self._mark)
         self._send_markers = messages.output(topics.FEET_MARKERS)

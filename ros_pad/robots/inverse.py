@@ -40,33 +40,36 @@ class LegSolver:
 
     def __init__(self, joints: Sequence[Joint], foot: Array, home: Sequence[float]) -> None:
         hip, thigh, knee = joints
-        self._home = home
-        self._far = max(map(abs, home)) > 0.5 * math.pi
         turn = thigh.at[:3, :3] @ knee.at[:3, :3]
         across = thigh.at[:3, :3] @ thigh.axis  # axis of the thigh, in the link of the hip
         ahead = _normal_to(across)
         up = cross(across, ahead)
-        self._base: list[list[float]] = hip.at[:3, :3].T.tolist()
+        lean = float(hip.axis @ across)
+        sine = math.sqrt(1.0 - lean * lean)
+        # In the axes of the hip: normal to the leg's plane, in the plane, and its own axis.
+        inside = cross(hip.axis, across) / sine
+        frame = np.array((cross(inside, hip.axis), inside, hip.axis))
+        self._base: list[list[float]] = (frame @ hip.at[:3, :3].T).tolist()
         self._at: list[float] = hip.at[:3, 3].tolist()
-        self._frame = [each.tolist() for each in (hip.axis, across, cross(hip.axis, across))]
-        self._plane = [each.tolist() for each in (ahead, up, thigh.at[:3, 3])]
+        self._plane = [(frame @ each).tolist() for each in (thigh.at[:3, 3], ahead, up)]
         upper = thigh.at[:3, :3] @ knee.at[:3, 3]
         lower = turn @ foot[:3, 3]
-        self._side = float(across @ (thigh.at[:3, 3] + upper + lower))
-        self._lean = float(hip.axis @ across)
-        self._upper = (float(ahead @ upper), float(up @ upper))
-        self._lengths = (
-            math.hypot(*self._upper), math.hypot(float(ahead @ lower), float(up @ lower))
-        )  # fmt: skip
-        self._fold = math.atan2(float(up @ lower), float(ahead @ lower)) - math.atan2(
-            self._upper[1], self._upper[0]
-        )
+        self._side = (float(across @ (thigh.at[:3, 3] + upper + lower)), lean, sine)
+        upper_x, upper_y = float(ahead @ upper), float(up @ upper)
+        lower_x, lower_y = float(ahead @ lower), float(up @ lower)
+        one, two = math.hypot(upper_x, upper_y), math.hypot(lower_x, lower_y)
+        self._links = one, two, one * one, two * two, 2.0 * one * two
+        self._start = math.atan2(upper_y, upper_x)
+        self._fold = math.atan2(lower_y, lower_x) - self._start
         self._sense = 1.0 if float(turn @ knee.axis @ across) > 0.0 else -1.0
         bend = math.remainder(self._sense * home[2] + self._fold, math.tau)
         self._knee = 1.0 if bend >= 0.0 else -1.0
         place = Chains([joints], foot[None]).solve(np.array([home])).positions[0]
-        middle = self._hip_turn(self._in_hip(*place.tolist()))[0]
+        near, far, _ = np.array(self._base) @ (place - hip.at[:3, 3])
+        middle = math.atan2(far, near)
         self._hip = 1.0 if math.remainder(home[0] - middle, math.tau) >= 0.0 else -1.0
+        self._home = home
+        self._far = max(map(abs, home)) > 0.5 * math.pi
 
     @staticmethod
     def fits(joints: Sequence[Joint], foot: Array) -> bool:
@@ -81,27 +84,7 @@ class LegSolver:
         apart = min(np.abs(link).max() for link in links) > _SHORTEST
         return bool(parallel and apart and np.abs(cross(hip.axis, across)).max() > 1e-3)
 
-    def _in_hip(self, x: float, y: float, z: float) -> list[float]:
-        """Return a place of the base, m, in the axes of the hip."""
-        at = self._at
-        x, y, z = x - at[0], y - at[1], z - at[2]
-        return [row[0] * x + row[1] * y + row[2] * z for row in self._base]
-
-    def _hip_turn(self, p: Sequence[float]) -> tuple[float, float]:
-        """Return middle and half of the difference of the two hip angles that fit, rad."""
-        axis, across, ahead = self._frame
-        along = axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]
-        near = across[0] * p[0] + across[1] * p[1] + across[2] * p[2] - self._lean * along
-        far = ahead[0] * p[0] + ahead[1] * p[1] + ahead[2] * p[2]
-        size, side = math.hypot(near, far), self._side - self._lean * along
-        if abs(side) > size * (1.0 + _ROUNDING):
-            raise InvalidInput(
-                f'foot {size:.4g} m from the axis of the hip is out of reach: at least'
-                f' {abs(side):.4g} m is needed'
-            )
-        return math.atan2(far, near), math.acos(max(-1.0, min(1.0, side / size if size else 1.0)))
-
-    def angles(self, x: float, y: float, z: float) -> Place:
+    def angles(self, x: float, y: float, z: float) -> list[float]:
         """Return the joint angles, rad, for a place of the foot in the base, m.
 
         Raises
@@ -109,52 +92,66 @@ class LegSolver:
         InvalidInput
             When the place is too far or too close for the leg.
         """
-        p = self._in_hip(x, y, z)
+        (at_x, at_y, at_z), (normal, inside, axis) = self._at, self._base
+        x, y, z = x - at_x, y - at_y, z - at_z
+        near = normal[0] * x + normal[1] * y + normal[2] * z
+        far = inside[0] * x + inside[1] * y + inside[2] * z
+        along = axis[0] * x + axis[1] * y + axis[2] * z
         # The hip turns the plane of the other two joints until the foot is in it.
-        middle, half = self._hip_turn(p)
-        hip = math.remainder(middle + self._hip * half, math.tau)
+        side, lean, sine = self._side
+        side, size = side - lean * along, sine * math.hypot(near, far)
+        share = side / size if size else math.inf
+        if not -1.0 <= share <= 1.0:
+            share = self._cosine(side, size)
+        hip = math.remainder(math.atan2(far, near) + self._hip * math.acos(share), math.tau)
         c, s = math.cos(hip), math.sin(hip)
-        # The same point in the link of the hip, which has turned by this angle.
-        ax, ay, az = self._frame[0]
-        dot = (ax * p[0] + ay * p[1] + az * p[2]) * (1.0 - c)
-        w = (
-            c * p[0] - s * (ay * p[2] - az * p[1]) + dot * ax,
-            c * p[1] - s * (az * p[0] - ax * p[2]) + dot * ay,
-            c * p[2] - s * (ax * p[1] - ay * p[0]) + dot * az,
-        )
-        one, two, origin = self._plane
-        w = (w[0] - origin[0], w[1] - origin[1], w[2] - origin[2])
-        u = one[0] * w[0] + one[1] * w[1] + one[2] * w[2]
-        v = two[0] * w[0] + two[1] * w[1] + two[2] * w[2]
-        upper, lower = self._lengths
-        bend = (u * u + v * v - upper * upper - lower * lower) / (2.0 * upper * lower)
-        if abs(bend) > 1.0 + _ROUNDING:
+        # The same place in the link of the hip, which has turned by this angle.
+        origin, one, two = self._plane
+        near, far = c * near + s * far - origin[0], c * far - s * near - origin[1]
+        # This product is `along` but for its rounding, and walks hang on the last bit.
+        along = c * along + along * (1.0 - c) - origin[2]
+        u = one[0] * near + one[1] * far + one[2] * along
+        v = two[0] * near + two[1] * far + two[2] * along
+        upper, lower, upper2, lower2, double = self._links
+        bend = (u * u + v * v - upper2 - lower2) / double
+        if not -1.0 <= bend <= 1.0:
+            bend = self._bent(bend, math.hypot(u, v))
+        fold = self._knee * math.acos(bend)
+        end = math.atan2(lower * math.sin(fold), upper + lower * math.cos(fold))
+        thigh = math.remainder(math.atan2(v, u) - end - self._start, math.tau)
+        knee = math.remainder(self._sense * (fold - self._fold), math.tau)
+        found = [hip, thigh, knee]
+        return self._near_home(found) if self._far else found
+
+    @staticmethod
+    def _cosine(side: float, size: float) -> float:
+        """Return the cosine of half of the difference of the two hip angles that fit."""
+        if abs(side) > size * (1.0 + _ROUNDING):
             raise InvalidInput(
-                f'foot {math.hypot(u, v):.4g} m from the second joint of the leg is out of reach:'
+                f'foot {size:.4g} m from the axis of the hip is out of reach: at least'
+                f' {abs(side):.4g} m is needed'
+            )
+        return math.copysign(1.0, side) if size else 1.0
+
+    def _bent(self, bend: float, away: float) -> float:
+        """Return the cosine of the fold of the knee for a foot that far away, m."""
+        if abs(bend) > 1.0 + _ROUNDING:
+            upper, lower = self._links[:2]
+            raise InvalidInput(
+                f'foot {away:.4g} m from the second joint of the leg is out of reach:'
                 f' {abs(upper - lower):.4g} to {upper + lower:.4g} m is needed, with the hip on'
                 ' the side of home'
             )
-        fold = self._knee * math.acos(max(-1.0, min(1.0, bend)))
-        turned = fold - self._fold  # of the last link against the one before
-        side_x, side_y = self._upper
-        start = math.atan2(side_y, side_x)
-        end_x = upper + lower * math.cos(fold)
-        end_y = lower * math.sin(fold)
-        thigh = math.atan2(v, u) - math.atan2(end_y, end_x) - start
-        found = (
-            hip,
-            math.remainder(thigh, math.tau),
-            math.remainder(self._sense * turned, math.tau),
-        )
-        return self._within_half_a_turn(found) if self._far else found
+        return math.copysign(1.0, bend)
 
-    def _within_half_a_turn(self, angles: Place) -> Place:
+    def _near_home(self, angles: Sequence[float]) -> list[float]:
         """Return the same angles, rad, at most half a turn from home."""
-        hip, thigh, knee = (
-            angle + math.tau * round((home - angle) / math.tau)
+        return [
+            angle
+            if abs(home - angle) <= math.pi
+            else angle + math.tau * round((home - angle) / math.tau)
             for angle, home in zip(angles, self._home, strict=True)
-        )
-        return hip, thigh, knee
+        ]
 
 
 class FeetSolver:
@@ -188,8 +185,8 @@ class FeetSolver:
             return found
         angles: list[float] = []
         try:
-            for leg, place in zip(self._legs, feet, strict=True):
-                angles += leg.angles(*place)
+            for leg, (x, y, z) in zip(self._legs, feet, strict=True):
+                angles += leg.angles(x, y, z)
         except InvalidInput as error:
             raise InvalidInput(f'leg {self._robot.legs[len(angles) // 3]}: {error}') from error
         return angles

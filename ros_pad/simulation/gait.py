@@ -11,11 +11,14 @@ first cycle and then stays.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 SHORTEST_OVERLAP = 0.02
 """Least share of the cycle in which a foot takes over its load."""
+
+Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,11 @@ class WalkingGait:
         middle = self.cycle / 4.0
         return self.body_advance(middle + half) - self.body_advance(middle)
 
+    def stroke(self, index: int, time: float) -> tuple[float, float] | None:
+        """Return :meth:`swing` of a leg at a time, s; None while its foot stands."""
+        phase = self.phase(index, time)
+        return self.swing(phase) if phase >= self.duty else None
+
     def swing(self, phase: float) -> tuple[float, float]:
         """Return the progress of a swing, 0 to 1, and the height of the foot, m, at a phase.
 
@@ -107,3 +115,66 @@ class WalkingGait:
         share = (phase - self.duty) / (1.0 - self.duty)
         rise = math.sin(math.pi * share)
         return 0.5 - 0.5 * math.cos(math.pi * share), self.lift * rise * rise
+
+
+class FootPath:
+    """Positions of the feet in the body that the gait prescribes.
+
+    Parameters
+    ----------
+    gait : WalkingGait
+        Gait, whose clock starts at zero; the feet are placed as if the gait had run before.
+    homes : sequence of (float, float, float)
+        Home positions of the feet in the body, fore, left and up, m.
+
+    Attributes
+    ----------
+    feet : list of tuple
+        Positions of the feet in the body: fore, left and up, m.
+    swings : list of bool
+        For each of these feet, whether it is in swing.
+    """
+
+    def __init__(self, gait: WalkingGait, homes: Sequence[Place]) -> None:
+        self._gait = gait
+        self._homes = homes
+        self._reach = gait.reach()
+        self._advance = gait.body_advance(0.0)
+        # Legs of one group have one phase: only that of the first of them is computed.
+        self._firsts = [gait.middles.index(each) for each in dict.fromkeys(gait.middles)]
+        self._groups = [self._firsts.index(gait.middles.index(each)) for each in gait.middles]
+        self._offsets: list[tuple[float, float]] = []
+        for leg in range(len(homes)):
+            phase = gait.phase(leg, 0.0)
+            if phase < gait.duty:
+                ahead = self._reach + gait.body_advance(-phase * gait.cycle)
+            else:
+                ahead = (2.0 * gait.swing(phase)[0] - 1.0) * self._reach
+            self._offsets.append((ahead, 0.0))
+        self._lifted = list(self._offsets)
+        self.swings = [gait.phase(leg, 0.0) >= gait.duty for leg in range(len(homes))]
+        self.feet = list(homes)
+        self.move(0.0, 0.0)
+
+    def move(self, time: float, turn: float) -> None:
+        """Move the feet to a time of the gait, s, to turn the body by an angle, rad, meanwhile."""
+        before, self._advance = self._advance, self._gait.body_advance(time)
+        advance = self._advance - before
+        strokes = [self._gait.stroke(first, time) for first in self._firsts]
+        offsets, feet, swings = self._offsets, self.feet, self.swings
+        self.swings = [strokes[group] is not None for group in self._groups]
+        for index, (home_x, home_y, home_z) in enumerate(self._homes):
+            x, y = offsets[index]
+            stroke = strokes[self._groups[index]]
+            if stroke is None:
+                # The foot moves in the body against the motion of the body.
+                height = 0.0
+                x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
+            else:
+                if not swings[index]:
+                    self._lifted[index] = (x, y)
+                progress, height = stroke
+                from_x, from_y = self._lifted[index]
+                x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
+            offsets[index] = (x, y)
+            feet[index] = (home_x + x, home_y + y, home_z + height)

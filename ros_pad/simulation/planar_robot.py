@@ -22,6 +22,7 @@ from ros_pad.configuration import integer
 from ros_pad.configuration import number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import NoConvergence
+from ros_pad.records import Array
 from ros_pad.simulation import compiled
 from ros_pad.simulation import planar_step
 from ros_pad.simulation.gait import WalkingGait
@@ -218,16 +219,21 @@ class PlanarRobot:
             self.verdict = f'tip-over at {body[planar_step.TIPPED_AT]:.3f} s: {why}'
 
     @property
+    def contacts(self) -> Array:
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
+        return np.array([self.table[row] for row in _SHOWN[:7]]).T
+
+    @property
     def feet(self) -> list[FootState]:
         """State of each foot, updated on access; the objects stay the same."""
         if self._fresh:
             return self._feet
         self._fresh = True
         table = self.table if isinstance(self.table, list) else self.table.tolist()
-        for state, (x, y, height, fx, fy, load, moment, cap, wet, speed, path, overload) in zip(
+        for state, (fx, fy, load, moment, x, y, z, cap, wet, speed, path, overload) in zip(
             self._feet, zip(*(table[row] for row in _SHOWN), strict=True), strict=True
         ):
-            state.position = (x, y, height)
+            state.position = (x, y, z)
             state.force = (fx, fy, load)
             state.moment = moment
             state.standing = load > 0.0
@@ -238,11 +244,11 @@ class PlanarRobot:
         return self._feet
 
 
-# Rows of the table that become attributes of FootState.
+# Rows of the table that become attributes of FootState; the first seven are the contacts.
 _SHOWN = (
-    planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
     planar_step.FORCE_X, planar_step.FORCE_Y, planar_step.LOAD,
     planar_step.MOMENT,
+    planar_step.MARKER_X, planar_step.MARKER_Y, planar_step.HEIGHT,
     planar_step.CAP, planar_step.WET,
     planar_step.SLIP_SPEED, planar_step.SLIP_PATH, planar_step.OVERLOAD,
 )  # fmt: skip

@@ -23,9 +23,11 @@ from ros_pad.configuration import number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import InvalidInput
+from ros_pad.records import Array
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.robot import check_pressures
+from ros_pad.simulation.robot import contacts_of
 from ros_pad.simulation.scene import RAIL_LEG
 from ros_pad.simulation.scene import RailBody
 from ros_pad.simulation.scene import RailGait
@@ -108,6 +110,11 @@ class RailLeg:
         share = (since - gait.stance) / gait.swing
         height = gait.lift * math.sin(math.pi * share) ** 2
         return False, -0.5 * gait.stroke * math.cos(math.pi * share), height
+
+    @property
+    def contacts(self) -> Array:
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
+        return contacts_of(self.feet)
 
     def step(self, pressures: Sequence[float]) -> None:
         """Advance by ``period``.

@@ -13,6 +13,7 @@ import numpy as np
 
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.scene import LeggedBody
@@ -89,6 +90,11 @@ class FootState:
         self.overload_time = 0.0
 
 
+def contacts_of(feet: Sequence[FootState]) -> Array:
+    """Return :attr:`SimulatedRobot.contacts` of states of feet."""
+    return np.array([(*foot.force, foot.moment, *foot.position) for foot in feet])
+
+
 class SimulatedRobot(Protocol):
     """A simulated robot: step it with the pads' gauge pressures, then read its feet and body.
 
@@ -100,8 +106,6 @@ class SimulatedRobot(Protocol):
         Length of a step, s.
     time : float
         Simulated time, s.
-    dissipation : float
-        Work lost in feet that slip or turn, J.
     verdict : str or None
         Why the walk is no longer valid, for instance a tip-over; None while it is valid.
     joint_names : tuple of str
@@ -111,7 +115,6 @@ class SimulatedRobot(Protocol):
     legs: tuple[int, ...]
     period: float
     time: float
-    dissipation: float
     verdict: str | None
     joint_names: tuple[str, ...]
 
@@ -130,6 +133,14 @@ class SimulatedRobot(Protocol):
     @property
     def feet(self) -> list[FootState]:
         """State of each foot, in the order of ``legs``; the objects stay the same."""
+
+    @property
+    def dissipation(self) -> float:
+        """Work lost in feet that slip or turn, J."""
+
+    @property
+    def contacts(self) -> Array:
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
 
     @property
     def body(self) -> Vector:

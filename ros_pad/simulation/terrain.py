@@ -310,3 +310,33 @@ class Floor:
         row = np.floor_divide(np.asarray(y) - self.origin[1], self.cell).astype(int) % rows
         column = np.floor_divide(np.asarray(x) - self.origin[0], self.cell).astype(int) % columns
         return self.wet_map[row, column]
+
+
+class Spot:
+    """A place that moves over a floor: it looks only when it comes into another cell.
+
+    Parameters
+    ----------
+    floor : Floor
+        The floor.
+    """
+
+    __slots__ = ('_floor', '_left', '_low', '_right', '_top', '_wet')
+
+    def __init__(self, floor: Floor) -> None:
+        self._floor = floor
+        self._wet = False
+        self._left = self._right = self._low = self._top = 0.0
+
+    def wet(self, x: float, y: float) -> bool:
+        """Return :meth:`Floor.wet` at a position."""
+        if not (self._left < x < self._right and self._low < y < self._top):
+            floor, (start_x, start_y) = self._floor, self._floor.origin
+            self._wet = floor.wet(x, y)
+            # Less than the cell: at its very edge it looks each time.
+            edge = 1e-6 * floor.cell
+            cell = floor.cell - 2.0 * edge
+            self._left = start_x + (x - start_x) // floor.cell * floor.cell + edge
+            self._low = start_y + (y - start_y) // floor.cell * floor.cell + edge
+            self._right, self._top = self._left + cell, self._low + cell
+        return self._wet

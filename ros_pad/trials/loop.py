@@ -121,9 +121,9 @@ class BodySensing:
         for index, force in enumerate(reading.rows['force']):
             self.stage.force(index, stamp_ns, force)
         # A silent sensor reads nothing.
-        if math.isfinite(reading.imu[0][0]):
+        if math.isfinite(reading.imu[0, 0]):
             self.stage.imu(stamp_ns, *reading.imu)
-        if math.isfinite(reading.joints[0][0]):
+        if math.isfinite(reading.joints[0, 0]):
             self.stage.joints(stamp_ns, *reading.joints)
         return self._rows
 

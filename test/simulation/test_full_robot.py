@@ -264,8 +264,8 @@ def test_moments_of_the_feet_hold_a_robot_that_is_turned():
     moments = []
     for _ in range(200):  # the robot sways on its servos
         mujoco.mj_step(robot.model, robot.data, 20)
-        robot.read_contacts()
-        robot.update_feet(FLAT)
+        robot.soles.read()
+        robot.soles.update()
         moments.append([foot.moment for foot in robot.feet])
     shares = np.mean(moments, axis=0) / -torque
     assert shares.sum() == pytest.approx(1.0, abs=0.05)
@@ -331,8 +331,8 @@ def test_work_lost_in_turning_is_moment_times_angle():
     before, lost = robot.body[2], robot.dissipation
     for _ in range(200):
         mujoco.mj_step(robot.model, robot.data, 2)  # as ``step``, but friction is not updated
-        robot.read_contacts()
-        robot.update_feet(FLAT)
+        robot.soles.read()
+        robot.soles.update()
     turned = robot.body[2] - before
     assert turned > 0.1
     assert robot.dissipation - lost == pytest.approx(limit * turned, rel=0.05)
@@ -395,9 +395,10 @@ def test_film_is_whole_again_after_each_swing():
     """The film drains while a foot stands, and is thick again at the next touch-down."""
     robot = FullRobot(scene_of(), WET, 0.004)
     advance(robot, 0.5 + GAIT.cycle, pressures=[70e3] * 6)
-    ratios, foot = [], robot.feet[0]
+    ratios = []
 
     def note():
+        foot = robot.feet[0]
         if foot.standing:
             ratios.append(foot.grip / foot.force[2])
 

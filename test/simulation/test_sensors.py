@@ -4,15 +4,18 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ros_pad.records import SAMPLE
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import Proprioception
+from ros_pad.simulation.robot import contacts_of
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.scene import SensorNoise
 from ros_pad.simulation.sensors import BodySensors
 from ros_pad.simulation.sensors import Sensors
 
 NOISE = SensorNoise(rate=250.0, force=0.03, position=1.5e-4)
+WITH_MOMENTS = dataclasses.replace(NOISE, moment=5e-4)
 
 
 class Statue:
@@ -23,10 +26,19 @@ class Statue:
         self.feet[0].force = (1.0, -2.0, 7.0)
         self.feet[1].position = (0.1, 0.2, 0.3)
 
+    @property
+    def contacts(self):
+        return contacts_of(self.feet)
+
+
+def both(rows):
+    """Return force and position: (..., foot, what, axis)."""
+    return np.stack([rows['force'], rows['position']], axis=-2)
+
 
 def read(noise=NOISE, seed=0, count=5000):
     sensors, statue = Sensors(noise, 2, seed), Statue()
-    return np.array([sensors.read(statue) for _ in range(count)])  # (sample, foot, what, axis)
+    return both(np.array([sensors.sample(statue) for _ in range(count)]))
 
 
 def test_noise_is_white_and_as_wide_as_asked_for():
@@ -56,31 +68,44 @@ def test_without_noise_the_truth():
     assert (samples[:, 1, 1] == [0.1, 0.2, 0.3]).all()
 
 
-def test_readings_are_plain_floats():
-    force, position = Sensors(NOISE, 2, 0).read(Statue())[0]
-    assert all(type(value) is float for value in (*force, *position))
+def test_a_sample_has_no_velocity_and_keeps_its_values():
+    sensors = Sensors(NOISE, 2, 0)
+    rows = [sensors.sample(Statue()) for _ in range(1001)]
+    copies = [each.copy() for each in rows]
+    sensors.sample(Statue())
+    assert rows[0].dtype == SAMPLE.dtype and rows[0].shape == (2,)
+    assert np.isnan(rows[0]['velocity']).all() and np.isnan(rows[0]['variance']).all()
+    assert [each.tobytes() for each in rows] == [each.tobytes() for each in copies]
 
 
 def test_moments_are_read_where_they_are_measured():
     statue = Statue()
     statue.feet[0].moment, statue.feet[1].moment = 0.03, -0.01
-    assert Sensors(NOISE, 2, 0).read_moments(statue) == [None, None]
-    noise = SensorNoise(rate=250.0, force=0.03, position=1.5e-4, moment=5e-4)
-    sensors = Sensors(noise, 2, 0)
-    moments = np.array([sensors.read_moments(statue) for _ in range(5000)])
+    assert np.isnan(Sensors(NOISE, 2, 0).sample(statue)['moment']).all()
+    sensors = Sensors(WITH_MOMENTS, 2, 0)
+    moments = np.array([sensors.sample(statue)['moment'] for _ in range(5000)])
     assert moments.mean(axis=0) == pytest.approx([0.03, -0.01], abs=5 * 5e-4 / 5000**0.5)
     assert moments.std(axis=0) == pytest.approx([5e-4, 5e-4], rel=0.05)
 
 
 def test_a_moment_leaves_the_other_readings_as_they_are():
     """Reading moments must not change the noise of other readings."""
-    noise = SensorNoise(rate=250.0, force=0.03, position=1.5e-4, moment=5e-4)
-    sensors, statue = Sensors(noise, 2, 0), Statue()
-    readings = []
-    for _ in range(50):
-        readings.append(sensors.read(statue))
-        sensors.read_moments(statue)
-    assert np.array_equal(np.array(readings), read(count=50))
+    assert np.array_equal(read(WITH_MOMENTS, count=50), read(count=50))
+
+
+@pytest.mark.parametrize('kind', ['force_dead', 'force_frozen'])
+def test_a_dead_or_frozen_sensor_has_no_moment_of_its_own(kind):
+    for noise, measured in ((WITH_MOMENTS, True), (NOISE, False)):
+        sensors, statue = Sensors(noise, 2, 0, [(Fault(kind, 0.5),), ()]), Statue()
+        moments = []
+        for statue.time in (0.0, 0.5, 1.0):
+            moments.append(sensors.sample(statue)['moment'].tolist())
+        first, other = zip(*moments, strict=True)
+        if measured:
+            assert first[1] == first[2] == (0.0 if kind == 'force_dead' else first[0])
+            assert len(set(other)) == 3
+        else:
+            assert np.isnan(moments).all()
 
 
 FAULTS = {
@@ -107,7 +132,7 @@ def test_faults_are_in_what_is_read_and_end(kind):
                 held = (1.1, *expected[1:])
         else:
             held = statue.feet[0].force
-        before = sensors.read(statue)
+        before = both(sensors.sample(statue))
         assert before[0][0] == pytest.approx(held, abs=1e-8)
         assert before[0][1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
         assert before[1][0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-8)
@@ -120,11 +145,11 @@ def test_a_frozen_marker_leaves_the_force():
     for number in range(250):
         statue.time = number / 250.0
         statue.feet[1].position = (0.01 * number, 0.0, 0.0)
-        read.append(sensors.read(statue))
-    positions = [place for _, (_, place) in read]
-    assert len(set(positions)) == 125
-    assert len({force for _, (force, _) in read}) == 250
-    assert len({place for (_, place), _ in read}) == 250
+        read.append(both(sensors.sample(statue)))
+    different = [
+        [len(np.unique(each, axis=0)) for each in foot] for foot in np.moveaxis(read, 0, 2)
+    ]
+    assert different == [[250, 250], [250, 125]]
 
 
 # --- IMU and joints ---------------------------------------------------------------------------
@@ -154,7 +179,7 @@ def test_imu_and_joints_have_the_noise_and_bias_that_are_asked_for():
     readings = body_readings()
     imu = np.array([each.imu for each in readings])
     joints = np.array([each.joints for each in readings])
-    forces = np.array([each.forces for each in readings])
+    forces = np.array([each.rows['force'] for each in readings])
     assert imu.std(axis=0) == pytest.approx(np.array([[0.004] * 3, [0.06] * 3]), rel=0.07)
     biases = imu.mean(axis=0) - [TRUTH.gyro, TRUTH.accelerometer]
     # Means are within 5 standard errors of 0.004 and 0.06.
@@ -167,8 +192,12 @@ def test_imu_and_joints_have_the_noise_and_bias_that_are_asked_for():
     assert forces.mean(axis=0) == pytest.approx(np.array(TRUTH.forces), abs=5 * 0.03 / 3000**0.5)
 
 
+def bits(readings):
+    return [tuple(part.tobytes() for part in each) for each in readings]
+
+
 def test_body_sensors_repeat_with_their_seed():
-    one, same, other = body_readings(3, 20), body_readings(3, 20), body_readings(4, 20)
+    one, same, other = (bits(body_readings(seed, 20)) for seed in (3, 3, 4))
     assert one == same
     assert one != other
     biases = [
@@ -180,8 +209,8 @@ def test_body_sensors_repeat_with_their_seed():
 
 def test_noise_of_imu_and_joints_leaves_that_of_forces_alone():
     quiet = dataclasses.replace(LOUD, gyro=1e-6, encoder=1e-6)
-    assert [each.forces for each in body_readings(count=50)] == [
-        each.forces for each in body_readings(count=50, noise=quiet)
+    assert [rows for *_, rows in bits(body_readings(count=50))] == [
+        rows for *_, rows in bits(body_readings(count=50, noise=quiet))
     ]
 
 
@@ -195,12 +224,13 @@ def test_silent_imu_and_joints_and_dead_forces():
     readings = body_readings(count=30, faults=faults)
     for index, reading in enumerate(readings):
         time = 0.004 * index
-        assert (reading.imu is None) == (0.02 <= time < 0.06)
-        assert (reading.joints is None) == (0.04 <= time < 0.08)
-        assert (reading.forces[1] == (0.0, 0.0, 0.0)) == (time >= 0.02)
+        assert (np.isnan(reading.imu) == (0.02 <= time < 0.06)).all()
+        assert (np.isnan(reading.joints) == (0.04 <= time < 0.08)).all()
+        force = reading.rows['force']
+        assert force[1].any() != (time >= 0.02)
         if time >= 0.02:
-            assert reading.forces[2] == readings[4].forces[2]
+            assert force[2].tolist() == readings[4].rows['force'][2].tolist()
     # A gap changes nothing of what comes later.
-    assert [each.imu for each in readings[20:]] == [
-        each.imu for each in body_readings(count=30)[20:]
+    assert [imu for imu, *_ in bits(readings[20:])] == [
+        imu for imu, *_ in bits(body_readings(count=30)[20:])
     ]

@@ -50,6 +50,7 @@ from ros_pad.estimation.scales import SPREADS
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.reports.files import save
 from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.soles import Sole
 from ros_pad.simulation.terrain import CELL
 from ros_pad.simulation.terrain import LENGTH
 from ros_pad.simulation.terrain import WIDTH
@@ -158,21 +159,20 @@ def on_ground(condition: Condition, seed: int) -> Callable[[ClosedLoop], None]:
 
     def prepare(loop: ClosedLoop) -> None:
         robot: Any = loop.robot
-        write = robot._write_friction
+        soles, press = robot.soles, robot.soles.press
 
-        def changed(index: int, load: float, drained: float) -> None:
-            write(index, load, drained)
-            flat = condition.wet if robot.feet[index].wet else condition.dry
-            domed = min(1.0, robot._limits[index] / load)
-            x, y, _ = robot._places[index]
+        def changed(sole: Sole, load: float, drained: float) -> None:
+            press(sole, load, drained)
+            flat = condition.wet if sole.wet else condition.dry
+            domed = min(1.0, sole.limit / load)
+            x, y, _ = soles._places[soles._soles.index(sole)]
             place = places[int((y + 4.0) // CELL) % shape[0], int((x + 1.0) // CELL) % shape[1]]
             factor = float(place) * (domed * condition.dome + (1.0 - domed) * flat)
-            robot._ratios[index] *= factor
-            row = robot._frictions[index]
+            sole.ratio *= factor
             for axis in range(3):
-                row[axis] *= factor
+                sole.friction[axis] *= factor
 
-        robot._write_friction = changed
+        soles.press = changed
 
     return prepare
 

@@ -145,7 +145,7 @@ def _full(
 
     def make(case: Walk) -> FullRobot:
         robot = FullRobot(case.scene, case.scene.floor.build(case.seed), SAMPLE, settings)
-        robot._lever *= turning
+        robot.soles.lever *= turning
         return robot
 
     return _sampled(family, settings.timestep, make, ours)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Servos of a robot in MuJoCo: their set-points along the gait."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import sub
+
+import numpy as np
+
+from ros_pad.contact.meniscus import GRAVITY
+from ros_pad.records import Array
+from ros_pad.robots.inverse import FeetSolver
+from ros_pad.simulation.gait import FootPath
+from ros_pad.simulation.gait import WalkingGait
+from ros_pad.simulation.scene import LeggedBody
+from ros_pad.simulation.scene import Scene
+
+LOST = 0.3
+"""Angle between a joint and its set-point, rad, at which the walk ends with a verdict."""
+
+
+class Servos:
+    """Set-points of all servos.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a legged robot that has servos.
+    solver : FeetSolver
+        Solver of its legs.
+    period : float
+        Time for which a set-point stays, s.
+    setpoints : array (joints,)
+        Where MuJoCo expects them.
+
+    Attributes
+    ----------
+    path : FootPath
+        Where the gait brings the feet.
+    targets : list of float
+        Joint positions for these places, rad.
+    """
+
+    def __init__(self, scene: Scene, solver: FeetSolver, period: float, setpoints: Array) -> None:
+        body = scene.body
+        assert isinstance(body, LeggedBody) and isinstance(scene.gait, WalkingGait)
+        assert body.robot.servo is not None
+        self._robot, self._servo = body.robot, body.robot.servo
+        self._solver = solver
+        self._period = period
+        self._settle = scene.settle
+        self._gain = scene.heading_gain
+        self._weight = body.mass * GRAVITY
+        self.path = FootPath(scene.gait, [(x, y, body.ground) for x, y in body.homes])
+        self.targets = solver.angles([(x, y, body.ground) for x, y, _ in self.path.feet])
+        self._setpoints = setpoints
+        setpoints[:] = self.targets
+
+    def walk(self, time: float, heading: float) -> None:
+        """Move the feet to a time, s, with a heading of the body, rad."""
+        # The clock of the gait starts when the robot has settled.
+        turn = -self._gain * heading * self._period
+        self.path.move(max(0.0, time - self._settle), turn)
+
+    def aim(self) -> None:
+        """Set all set-points for the places of the feet.
+
+        Raises
+        ------
+        InvalidInput
+            When a foot is out of reach; the set-points stay unchanged.
+        """
+        before, self.targets = self.targets, self._solver.angles(self.path.feet)
+        self._setpoints[:] = self._led(before) if self._servo.feedforward else self.targets
+
+    def _led(self, before: Sequence[float]) -> Array:
+        """Return set-points that lead by what carries the robot and overcomes the damping."""
+        servo, stands = self._servo, [not swings for swings in self.path.swings]
+        aim = np.array(self.targets)
+        share = np.array(stands) * self._weight / max(sum(stands), 1)
+        torque = -share[:, None] * self._robot.foot_jacobians(aim)[:, 2]
+        speed = (aim - before) / self._period
+        return np.asarray(aim + (torque.ravel() + servo.damping * speed) / servo.stiffness)
+
+    def lost(self, joints: Sequence[float]) -> str:
+        """Return which of the joints, rad, is far from its set-point, or an empty text."""
+        worst = max(map(abs, map(sub, self.targets, joints)))
+        if worst <= LOST:
+            return ''
+        lost = [abs(a - b) == worst for a, b in zip(self.targets, joints, strict=True)]
+        name = self._robot.joint_names[lost.index(True)]
+        return f'servo {name} is {worst:.2f} rad off its set-point'

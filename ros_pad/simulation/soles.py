@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Soles of a robot in MuJoCo: contact, film, friction and slip of each foot.
+
+Before every step of MuJoCo the friction of each foot is set from the same film and the same law of
+resistance as on the other fidelity levels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ros_pad.contact.film import Film
+from ros_pad.records import Array
+from ros_pad.simulation.mujoco_model import POINT
+from ros_pad.simulation.robot import FootState
+from ros_pad.simulation.robot import check_pressures
+from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import Tow
+from ros_pad.simulation.terrain import Floor
+from ros_pad.simulation.terrain import Spot
+
+LIGHT = 0.05
+"""Load, N, below which the friction coefficient no longer changes with the load."""
+
+SLIP_LOAD = 1.0
+"""Load, N, up to which a foot does not count as slipping."""
+
+SLIP_SPEED = 1e-3
+"""Speed, m/s, below which a contact counts as sticking."""
+
+CLEAR = 2e-3
+"""Height above the ground, m, above which a foot has left it; the film below the foot then has its
+initial thickness.
+"""
+
+_SHALLOW = 5e-3  # m above the ground: below it the block under a foot no longer moves
+
+
+class Sole(FootState):
+    """Sole of a foot, and what it stands on.
+
+    Attributes
+    ----------
+    film : Film
+        Liquid below it.
+    friction : memoryview
+        MuJoCo's coefficients of its contact.
+    block : memoryview or None
+        Place of the ground below it, m, that moves up and down; None on even ground.
+    ratio : float
+        Present coefficient of friction.
+    pressure, limit : float
+        Gauge pressure in the pads, Pa, and force limit of the domes at that pressure, N.
+    cleared : bool
+        Whether it left the ground in its present or last swing.
+    ahead : tuple or None
+        For what film and friction were set while it had no load, see :meth:`Soles.update`.
+    """
+
+    __slots__ = (
+        'ahead',
+        'block',
+        'cleared',
+        'film',
+        'friction',
+        'limit',
+        'pressure',
+        'ratio',
+        'spot',
+    )
+
+    def __init__(self, film: Film, friction: Any, block: Any, spot: Spot) -> None:
+        super().__init__()
+        self.film, self.friction, self.block, self.spot = film, friction, block, spot
+        self.ratio = self.pressure = self.limit = 0.0
+        self.cleared = True
+        self.ahead: tuple[float, bool, bool] | None = None
+
+
+class Soles:
+    """Soles of all feet.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with foot, floor and legs.
+    floor : Floor
+        The ground.
+    period, dt : float
+        Length of a step of the robot and of MuJoCo, s.
+    model, data : mujoco.MjModel, mujoco.MjData
+        The simulation.
+
+    Attributes
+    ----------
+    foot : Foot
+        The foot on this floor.
+    lever : float
+        Lever of friction against turning about the vertical, m.
+    dissipation : float
+        Work lost in feet that slip or turn, J.
+    """
+
+    def __init__(
+        self, scene: Scene, floor: Floor, period: float, dt: float, model: Any, data: Any
+    ) -> None:
+        count = len(scene.legs)
+        self.foot = foot = scene.foot.on_rough(scene.floor.roughness)
+        self.lever = foot.turning_radius
+        self.dissipation = 0.0
+        self._floor = floor
+        self._period, self._dt = period, dt
+        self._pressures: list[float] = []
+        self._soles = [
+            Sole(
+                Film(foot, scene.floor.viscosity),
+                # Scalars go through a memoryview faster than through an array.
+                memoryview(model.pair(f'foot_{leg}').friction),
+                None if floor.heights is None else memoryview(data.mocap_pos[index]),
+                Spot(floor),
+            )
+            for index, leg in enumerate(scene.legs)
+        ]
+        # Views of MuJoCo's arrays, because it would take time to make them in every step.
+        feet = slice(model.geom('foot_1').id, model.geom('foot_1').id + count)
+        self._places = data.geom_xpos[feet]
+        self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
+        self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
+        self._felt = data.sensordata  # force and moment of each foot's contact
+        # The axes of a contact with level ground are z, y, -x.
+        self._order = (6 * np.arange(count) + np.array([[2], [1], [0], [3]])).ravel()
+        self._rows = np.zeros((7, count))  # of `contacts`, whose rows are columns here
+        self._zeros, self._gives = np.zeros(count), np.full((2, count), 1.0 / foot.shear_stiffness)
+        self._shear = np.full((3, count), POINT)
+        self._views = (
+            self._rows[:4], self._rows[:4].reshape(-1), self._rows[0], self._rows[:2],
+            self._shear[:2], self._places.T, self._rows[4:],
+        )  # fmt: skip
+        self._loads = [0.0] * count
+
+    @property
+    def contacts(self) -> Array:
+        """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
+        return self._rows.T
+
+    @property
+    def feet(self) -> list[Sole]:
+        """State of each foot, updated on access; the objects stay the same."""
+        for sole, row in zip(self._soles, self.contacts.tolist(), strict=True):
+            *force, sole.moment = row[:4]
+            sole.force, sole.position = tuple(force), tuple(row[4:])
+            sole.standing = force[2] > 0.0
+            if force[2] > LIGHT:
+                sole.grip = sole.ratio * force[2]
+        return self._soles
+
+    def fill(self, pressures: Sequence[float]) -> None:
+        """Set the gauge pressures of the pads, Pa."""
+        if pressures != self._pressures:  # they change more rarely than the robot steps
+            check_pressures(pressures, len(self._soles))
+            self._pressures = list(pressures)
+            for sole, pressure in zip(self._soles, pressures, strict=True):
+                sole.pressure, sole.limit = pressure, self.foot.dome_load(math.inf, pressure)
+
+    def place(self, places: Sequence[Sequence[float]]) -> float:
+        """Place the soles, flat and without load; return the height of the highest ground, m."""
+        grounds = []
+        for sole, (x, y, _) in zip(self._soles, places, strict=True):
+            grounds.append(self._floor.height(x, y))
+            if sole.block is not None:
+                sole.block[2] = grounds[-1]
+            sole.film.touch_down(self._floor.depth(x, y))
+            sole.wet = self._floor.wet(x, y)
+        return max(grounds)
+
+    def swing(self, before: Sequence[bool], now: Sequence[bool]) -> list[int]:
+        """Take note of which feet swing; return which end a swing in which they never cleared."""
+        low = []
+        for index, sole in enumerate(self._soles):
+            if now[index] and not before[index]:
+                sole.cleared = False
+            elif before[index] and not now[index] and not sole.cleared:
+                low.append(index)
+        return low
+
+    def rub(self) -> None:
+        """Set the friction of each standing foot for the next step, from its load in the last."""
+        for sole, load in zip(self._soles, self._loads, strict=True):
+            if load > LIGHT:
+                sole.ahead = None
+                self.press(sole, load, self._dt)
+
+    def press(self, sole: Sole, load: float, drained: float) -> None:
+        """Set the friction of a foot with a load, N, whose film has drained for a time, s."""
+        pressure, limit = sole.pressure, sole.limit
+        dome_load = load if load < limit else limit
+        sole_load = load - dome_load
+        under_domes = under_sole = 0.0
+        if sole.wet:
+            under_domes, under_sole = sole.film.drain(dome_load, sole_load, pressure, drained)
+        grip = self.foot.resistance_of(dome_load, sole_load, pressure, under_domes, under_sole)
+        sole.ratio = ratio = grip / load
+        row = sole.friction
+        # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
+        row[0] = row[1] = ratio
+        row[2] = self.lever * ratio
+
+    def read(self) -> None:
+        """Read the loads of the feet in the last step of MuJoCo."""
+        self._loads = self._felt[::6].tolist()
+
+    def update(self) -> None:
+        """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
+        pushes_x, pushes_y, loads, moments = self._measure()
+        places, axes = self._places.tolist(), self._axes.tolist()
+        last_places, last_axes = self._last
+        self._last = places, axes
+        dt = self._period
+        for index, sole in enumerate(self._soles):
+            (x, y, z), load = places[index], loads[index]
+            sole.slip_speed = 0.0
+            sole.wet = sole.spot.wet(x, y)
+            if load <= LIGHT:
+                sole.grip = sole.ratio * load
+                self._approach(sole, x, y, z - POINT)
+            elif load > SLIP_LOAD:
+                step_x, step_y = x - last_places[index][0], y - last_places[index][1]
+                distance = math.hypot(step_x, step_y)
+                if distance > SLIP_SPEED * dt:
+                    sole.slip_speed = distance / dt
+                    sole.slip_path += distance
+                turn = _turn(last_axes[index], axes[index])
+                # As on L1, sliding and turning share a foot's grip.
+                if math.hypot(distance, self.lever * turn) > SLIP_SPEED * dt:
+                    lost = pushes_x[index] * step_x + pushes_y[index] * step_y
+                    self.dissipation -= lost + moments[index] * turn
+            if sole.pressure > 0.0 and sole.limit < load:
+                sole.overload_time += dt
+
+    def _measure(self) -> list[list[float]]:
+        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
+        wrenches, flat, push_x, pushes, shears, places, markers = self._views
+        self._felt.take(self._order, None, flat, 'clip')
+        np.subtract(self._zeros, push_x, push_x)  # not -0.0 in the air
+        np.multiply(pushes, self._gives, shears)
+        np.subtract(places, self._shear, markers)
+        return wrenches.tolist()
+
+    def _approach(self, sole: Sole, x: float, y: float, z: float) -> None:
+        """Prepare film, block and friction below a foot without load."""
+        ground, clear = 0.0, CLEAR
+        if sole.block is not None:
+            clear = _SHALLOW
+            ground = sole.block[2]
+            if z > ground + _SHALLOW:
+                sole.block[2] = self._floor.height(x, y)
+        if z > ground + clear:
+            sole.cleared = True
+        left = z > ground + CLEAR
+        ahead = (sole.pressure, sole.wet, left)
+        if ahead != sole.ahead:  # else film and friction are as they were set last
+            sole.ahead = ahead
+            if left:
+                sole.film.touch_down(self._floor.depth(x, y))
+            self.press(sole, LIGHT, 0.0)
+
+
+class Sled:
+    """A towed load on the floor.
+
+    Attributes
+    ----------
+    distance : float
+        Its distance behind the body at the start, m.
+    """
+
+    def __init__(self, tow: Tow, floor: Floor, model: Any, data: Any) -> None:
+        self.distance = tow.distance
+        self._frictions = (tow.friction_dry, tow.friction_wet)
+        self._spot = Spot(floor)
+        self._place: Any = memoryview(data.geom('sled').xpos)
+        self._friction: Any = memoryview(model.pair('sled').friction)
+
+    def rub(self) -> None:
+        """Set its friction for the next step of MuJoCo."""
+        x, y, _ = self._place
+        row = self._friction
+        row[0] = row[1] = self._frictions[self._spot.wet(x, y)]
+
+
+def _turn(before: Sequence[float], now: Sequence[float]) -> float:
+    """Return a body's small turn about the vertical, rad, from the x and y rows of its rotation.
+
+    The rows are those of the rotation matrix.
+    """
+    a, b, c, d, e, f = before
+    u, v, w, x, y, z = now
+    return 0.5 * (x * a + y * b + z * c - u * d - v * e - w * f)
