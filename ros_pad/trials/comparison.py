@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +86,15 @@ class Stream(NamedTuple):
             if leg in self.legs:
                 rows[:, row] = self.block.rows[:, self.legs.index(leg)]
         return self._replace(legs=legs, block=Block(self.block.stamps, rows))
+
+    def in_order(self) -> Stream:
+        """Return the records in the order of their log times."""
+        return self.where(np.argsort(self.times, kind='stable'))
+
+    def where(self, kept: npt.NDArray[Any]) -> Stream:
+        """Return some of the records."""
+        stamps, rows = self.block
+        return self._replace(times=self.times[kept], block=Block(stamps[kept], rows[kept]))
 
     def track(self, leg: int, field: Field) -> Track:
         """Return the values of a field of a leg."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,10 +66,8 @@ class Player:
             ),
             DecisionStage(settings.controller(legs), legs, self._reject),
         )
-        self._setpoints: dict[int, np.ndarray] = {}  # recorded ones, by stamp
-        if recorded := inputs.streams.get(COMMAND.name):
-            stamps, rows = recorded.of_legs(legs).block
-            self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))
+        stamps, rows = inputs.streams[COMMAND.name].block
+        self._setpoints = dict(zip(stamps.tolist(), rows['setpoint'], strict=True))  # recorded
         # Whether the set-point of each leg differs from the recorded one.
         self._apart = np.full(len(legs), not self._setpoints)
         self._pace = Pace(TICK_PERIOD_NS)
@@ -171,8 +170,7 @@ def _blocks(samples: np.ndarray, pressures: np.ndarray) -> Iterator[tuple[int, i
     before = np.searchsorted(pressures, samples, side='left')
     ticks = (samples - samples[np.searchsorted(before, before)]) // TICK_PERIOD_NS
     cuts = np.flatnonzero(np.diff(before) | np.diff(ticks)) + 1
-    bounds = [0, *cuts.tolist(), len(samples)]
-    for start, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, end in pairwise([0, *cuts.tolist(), len(samples)]):
         yield start, end, int(before[start])
 
 
