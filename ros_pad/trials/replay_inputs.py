@@ -14,6 +14,8 @@ from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
 from ros_pad.joining import Joiner
 from ros_pad.pace import Progress
+from ros_pad.records import COMMAND
+from ros_pad.records import ESTIMATE
 from ros_pad.records import KINDS
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE
@@ -113,6 +115,12 @@ def read(
             gaps += _gaps(kind.name, stream.times, stream.block.stamps)
         else:
             gaps += _gaps_of_legs(streams[kind.name], fields)
+    command, estimate = streams[COMMAND.name], streams[ESTIMATE.name]
+    if not np.array_equal(command.times, command.block.stamps):
+        # In real time, commands without an estimate have stamps that no replay has.
+        kept = np.isin(command.block.stamps, estimate.block.stamps)
+        kept |= np.isfinite(command.block.rows['setpoint']).any(axis=1)
+        streams[COMMAND.name] = command.where(kept)
     if SAMPLE.name not in topics:
         streams[SAMPLE.name] = _joined(streams[SAMPLE.name], needed)
     return Inputs(order, sorted({*known, *settings.legs} - legs), streams, topics, gaps)
