@@ -25,8 +25,8 @@ from ros_pad.estimation.watch import Moment
 from ros_pad.estimation.watch import Watch
 
 Sample = Sequence[float]
-"""Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m, velocity,
-m/s, and its variances, m²/s²."""
+"""Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m,
+velocity, m/s, and its variances, m²/s²."""
 
 Samples = Sequence[Any]
 """Samples, None where there is none."""
@@ -60,9 +60,7 @@ class Setup(NamedTuple):
         """Return what is the same for all feet of a kind."""
         joints, shear = tuning.source == 'joints', 1.0 / foot.shear_stiffness
         softness = shear if tuning.pads_shear or not joints else 0.0
-        return cls(
-            tuning, joints, tuning.moment_noise > 0.0, shear, softness, foot.turning_radius
-        )
+        return cls(tuning, joints, tuning.moment_noise > 0.0, shear, softness, foot.turning_radius)
 
 
 class Standing(NamedTuple):
@@ -97,6 +95,9 @@ class Standing(NamedTuple):
         if not self.slip_speed or not pull:
             return 0.0, 0.0
         return -self.slip_speed * self.pull_x / pull, -self.slip_speed * self.pull_y / pull
+
+
+NOT_STANDING = Standing()
 
 
 class Track:
@@ -154,6 +155,11 @@ class Track:
         self.last: Standing | None = Standing()
         self._set_noise()
         slip.sd = slip.noise
+
+    @property
+    def standing(self) -> Standing:
+        """Last sample of the present stance; nothing else does not slip."""
+        return self.last if self.last and self.gate.stands else NOT_STANDING
 
     @property
     def margin(self) -> float:
@@ -230,7 +236,8 @@ class Track:
             return True
         self.fresh |= stood or not self.sound
         self.sound, self.watch.looks, self.time = True, False, time
-        self.slip.sd = math.hypot(math.sqrt(variance) if variance < math.inf else 0.0, self.slip.noise)
+        known = math.sqrt(variance) if variance < math.inf else 0.0
+        self.slip.sd = math.hypot(known, self.slip.noise)
         return False
 
     def _end_block(self, time: float, sample: Sample, speed_sd: float | None) -> None:
@@ -278,9 +285,7 @@ class Track:
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
         return False
 
-    def _ordinary(
-        self, times: Sequence[float], samples: Samples, first: int, end: int
-    ) -> int:
+    def _ordinary(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
         """Return up to where, after a first sample, nothing but landing and lifting can happen."""
         before, block_end, joints = times[first], self.watch.end, self._setup.joints
         a, b, c, _, d, e, f, *_ = samples[first]
