@@ -341,7 +341,7 @@ class Track:
         )  # fmt: skip
         count, loads, pulls, turnings, speeds, noises = window.sums
         smoothing, own, peak, due = tuning.smoothing, slip.noise, window.peak, tuning.filter_period
-        noise, turning, before, tests, row = own, 0.0, self.time, [], first
+        noise, turning, known, before, tests, row = own, 0.0, False, self.time, [], first
         due += window.start - 1e-9
         last = self._ordinary(times, samples, first, end)
         while row < last:
@@ -366,7 +366,8 @@ class Track:
             # A foot gives way against its tangential force; the rest of its speed is only noise.
             speed = -(vx * fx + vy * fy) / pull if pull > 0.0 else 0.0
             if moments:
-                turning = abs(moment - offset.moment) / lever if moment == moment else 0.0
+                known = moment == moment
+                turning = abs(moment - offset.moment) / lever if known else 0.0
                 turnings += turning
             tests.append((speed, noise, dt))
             count, loads, pulls, speeds = count + 1.0, loads + fz, pulls + pull, speeds + speed
@@ -375,16 +376,16 @@ class Track:
                 peak = fz
             if fz >= gate.least:
                 gate.height = z
-            before, row = time, row + 1
+            before, standing, row = time, (speed, fx, fy, fz, turning), row + 1
             if time >= due:
                 break
         slip.x, slip.y, slip.sd = sx, sy, noise
         window.sums, window.peak = (count, loads, pulls, turnings, speeds, noises), peak
-        self.last = Standing(speed, fx, fy, fz, turning, slip.alarm.update(tests))
+        self.last = Standing(*standing, slip.alarm.update(tests))
         self._note(times, samples, first + 1, row)
         self._skip(times, samples, first + 1, row)
         if before >= due:
-            self._end_window(before, (place_x, place_y), pressure, moments and moment == moment)
+            self._end_window(before, (place_x, place_y), pressure, known)
         return row
 
     def _note(self, times: Sequence[float], samples: Samples, first: int, end: int) -> None:
