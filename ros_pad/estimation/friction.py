@@ -142,45 +142,48 @@ class GroundModel:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
-        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
         error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         blur = (blur / blur.sum(axis=0)).T
         # From a posterior to sums of the blurred one up to each edge, and to its moments.
-        self.sums = np.concatenate((np.zeros_like(_ONES)[:, None], blur.cumsum(axis=1)), axis=1)
-        self.moments = np.stack((blur.dot(GRID), blur.dot(GRID * GRID)), axis=1)
+        self.summary = np.column_stack((
+            np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
+        ))  # fmt: skip
 
     def likelihoods(self, samples: Sequence[Evidence]) -> np.ndarray:
         """Return the likelihood of each sample, shape (samples, 2, grid)."""
         friction = np.array([each.scales for each in samples])[:, :, None] * GRID
-        ratios, noises, rests = np.array(
-            [(each.ratio, each.ratio_noise, each.rest) for each in samples]
-        ).T[:, :, None, None]
+        table = np.array([(each.ratio, 1.0 / each.ratio_noise, each.rest) for each in samples])
+        ratios, precisions, rests = table.T[:, :, None, None]
         # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
         # and T/N is μ less the part used by turning.
-        found: np.ndarray = special.ndtr((friction - ratios) / noises)
+        found: np.ndarray = special.ndtr((friction - ratios) * precisions)
         found *= rests
-        for each, mine, likelihood in zip(samples, friction, found, strict=True):
-            if each.speed > 0.0:
-                likelihood += self._slip(each, mine)
+        slips = [place for place, each in enumerate(samples) if each.speed > 0.0]
+        if slips:
+            some = friction[slips]
+            # The exponential is the share of demands that friction does not meet.
+            likely = np.exp(some / -DEMAND)
+            likely *= np.array([samples[each].slip for each in slips])[:, None, None]
+            likely *= precisions[slips] / _ROOT_2_PI
+            likely *= self._shown([samples[each] for each in slips], some)
+            found[slips] += likely
         return found
 
-    def _slip(self, sample: Evidence, friction: np.ndarray) -> np.ndarray:
-        """Return the likelihood that a foot slips so, by its friction on dry and wet ground."""
-        shown, noise = friction, sample.ratio_noise
-        if not sample.turning_known:
-            left = sample.speed / np.hypot(sample.speed, self._rim_speeds)
-            shown = left * friction[:, None]
-        away = (shown - sample.ratio) / noise
+    def _shown(self, samples: Sequence[Evidence], friction: np.ndarray) -> np.ndarray:
+        """Return the likelihood of T/N in a slip, mean over rim speeds, up to a factor."""
+        turns = np.array([0.0 if each.turning_known else self.rim_speed for each in samples])
+        speeds, rims = np.array([each.speed for each in samples]), _HALF_NORMAL[:, None] * turns
+        precisions = np.array([math.sqrt(0.5) / each.ratio_noise for each in samples])
+        left = (speeds / np.hypot(speeds, rims) * precisions)[:, :, None, None]
+        ratios = np.array([each.ratio for each in samples]) * precisions
+        away = left * friction
+        away -= ratios[:, None, None]
         away *= away
-        away *= -0.5
-        likely = np.exp(away, out=away)
-        if not sample.turning_known:
-            likely = _SHARES @ likely
-        # The exponential is the share of demands that friction does not meet.
-        likely *= np.exp(friction / -DEMAND)
-        likely *= sample.slip / (_ROOT_2_PI * noise)
-        return likely
+        np.negative(away, out=away)
+        np.exp(away, out=away)
+        found: np.ndarray = _SHARES.dot(away.reshape(len(_SHARES), -1)).reshape(friction.shape)
+        return found
 
 
 class GroundFilter:
@@ -224,7 +227,7 @@ class GroundFilter:
     """
 
     __slots__ = (
-        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_travelled',
+        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_summed', '_travelled',
         '_wet_before', 'expected', 'log_odds', 'scales', 'shared', 'wet_probability',
     )  # fmt: skip
 
@@ -312,14 +315,15 @@ class GroundFilter:
         """Process one sample of T/N and of slip speed."""
         update([self], [sample])
 
-    def _learn(self, sample: Evidence, after: np.ndarray, evidence: np.ndarray) -> None:
-        """Use the posterior after a sample, and the logarithm of what it shows of friction."""
+    def _learn(
+        self, sample: Evidence, after: np.ndarray, evidence: np.ndarray, grounds: list[float]
+    ) -> None:
+        """Use the posterior after a sample, what it shows of friction, and the odds."""
         self.scales = sample.scales
         self._felt = evidence if self._felt is None else self._felt + evidence
-        before = self.wet_probability
-        self._posterior = after
-        dry, wet = after.dot(_ONES).tolist()
+        (dry, wet), before = grounds, self.wet_probability
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
+        self._posterior = after
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)
         if self._dome:
@@ -344,7 +348,8 @@ class GroundFilter:
             self._posterior = (stay * before + (1.0 - stay) * grounds) * friction
         else:
             new = ((1.0 - stay) * grounds) * self.expected.flat
-            self._posterior = stay * self._posterior + new
+            new += stay * self._posterior
+            self._posterior = new
 
     def _wet_or_dry(self) -> np.ndarray:
         return self._posterior.dot(_ONES)[:, None]
@@ -353,15 +358,20 @@ class GroundFilter:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
         dry, wet = posterior.dot(_ONES).tolist()
-        self._posterior = posterior / (dry + wet)
+        self._posterior, self._summed = posterior / (dry + wet), None
         self.wet_probability = wet / (dry + wet)
+
+    @property
+    def _summary(self) -> np.ndarray:
+        """Sums of the probabilities of friction on dry and on wet ground, and two moments."""
+        if self._summed is None:
+            self._summed = self._posterior.dot(self._model.summary)
+        return self._summed
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
-        (on_dry, dry_square), (on_wet, wet_square) = self._posterior.dot(
-            self._model.moments
-        ).tolist()
+        (on_dry, dry_square), (on_wet, wet_square) = self._summary[:, -2:].tolist()
         dry, wet = self.scales
         mean = dry * on_dry + wet * on_wet
         square = dry * dry * dry_square + wet * wet * wet_square
@@ -378,7 +388,7 @@ class GroundFilter:
         """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
-        on_dry, on_wet = self._posterior.dot(self._model.sums)
+        on_dry, on_wet = self._summary[:, :-2]
         if dry != wet:
             on_wet = np.interp(edges, wet * EDGES, on_wet)
         found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
@@ -405,6 +415,6 @@ def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None
         after *= rest[:, :, None]
         rest[domes] = 1.0
         evidence += np.log(rest)[:, :, None]
-    after /= grounds.sum(axis=1)[:, None, None]
-    for each, sample, mine, felt in zip(filters, samples, after, evidence, strict=True):
-        each._learn(sample, mine, felt)
+    after /= grounds.dot(_ONES[:2])[:, None, None]
+    for each, *shown in zip(filters, samples, after, evidence, grounds.tolist(), strict=True):
+        each._learn(*shown)
