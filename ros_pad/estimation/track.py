@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
@@ -17,7 +18,6 @@ from ros_pad.estimation.parts import Gate
 from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Slip
 from ros_pad.estimation.parts import Window
-from ros_pad.estimation.sensing import LEAP_DISTANCE
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
@@ -179,13 +179,18 @@ class Track:
         samples: Samples,
         pressure: float,
         ages: Sequence[float] | None,
+        quiet: Sequence[bool] | None,
     ) -> None:
-        """Process samples at some times, s, with a pressure, Pa, and ages of positions, s."""
+        """Process samples at some times, s, with a pressure, Pa, and ages of positions, s.
+
+        In quiet samples nothing but landing and lifting can happen, while the sensors are sound.
+        """
         row, count = 0, len(times)
         while row < count:
-            # What is ordinary is done for several samples at once; old positions are not.
-            end = row if ages else self._ordinary(times, samples, row)
-            done = row
+            done = end = row
+            if quiet and quiet[row] and self.sound and self.sensing.calm:
+                end = quiet.index(False, row) if False in quiet[row:] else count
+                end = bisect_left(times, self.watch.end, row, end)
             if end > row and self.gate.stands:
                 done = self._stand(times, samples, row, end, pressure)
             elif end > row:
@@ -295,26 +300,6 @@ class Track:
         self.fresh |= changed or self.sound
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
         return False
-
-    def _ordinary(self, times: Sequence[float], samples: Samples, first: int) -> int:
-        """Return up to where nothing but landing and lifting can happen in samples."""
-        if not (self.sound and self.sensing.calm):
-            return first
-        before, block_end, joints = self.time, self.watch.end, self._setup.joints
-        a, b, c, d, e, f = self.sensing.last
-        for row in range(first, len(times)):
-            sample, time = samples[row], times[row]
-            if sample is None or not (before < time < block_end and time - before <= LONGEST_GAP):
-                return row
-            fx, fy, fz, _, x, y, z, _, _, *variances = sample
-            if fx == a or fy == b or fz == c or x == d or y == e or z == f:
-                return row
-            if (x - d) ** 2 + (y - e) ** 2 + (z - f) ** 2 > LEAP_DISTANCE**2:
-                return row
-            if joints and max(variances) == math.inf:
-                return row
-            before, a, b, c, d, e, f = time, fx, fy, fz, x, y, z
-        return len(times)
 
     def _fly(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
         """Process ordinary samples of a foot in the air; return the next one."""
