@@ -46,6 +46,7 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+_HALF_NORMAL = _HALF_NORMAL.tolist()
 
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
@@ -97,34 +98,26 @@ class Evidence(NamedTuple):
     turning_known: bool = False
     scales: tuple[float, float] = (1.0, 1.0)
 
-    @property
-    def stick(self) -> float:
-        """Density of this speed while the foot sticks, s/m."""
-        away = self.speed / self.speed_noise
-        return math.exp(-0.5 * away * away) / (_ROOT_2_PI * self.speed_noise)
+    def factors(self, rim_speed: float) -> tuple[float, float, float]:
+        """Return how likely stick and slip are at this speed, and what of it shows friction.
 
-    @property
-    def slip(self) -> float:
-        """Density of this speed while it slips, s/m."""
-        swift = max(self.speed, 0.0) / SLIP_SPEED
-        return swift * math.exp(-swift) / SLIP_SPEED
-
-    @property
-    def rest(self) -> float:
-        """Density of this speed, T/N being the demand, while it sticks or creeps, s/m."""
-        density = self.stick
-        if self.speed > 0.0:
-            creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
-            density += CREEP * math.exp(-self.speed / creep) / creep
-        return density * math.exp(-self.ratio / DEMAND) / DEMAND
-
-    def shown(self, rim_speed: float) -> float:
-        """Return the share of the evidence that shows friction, not only wet or dry."""
-        if not self.speed > 0.0 or self.turning_known or not rim_speed > 0.0:
-            return 1.0
-        slid = self.slip / (self.slip + self.stick)
-        square = self.speed * self.speed
-        return 1.0 - slid * (1.0 - max(SLOWEST, square / (square + rim_speed**2)))
+        The first is the density of the speed, and of T/N as a demand, where the foot sticks or
+        creeps; the second that of the speed where it slips, both in s/m. The last is the share of
+        the evidence that shows friction, the rest shows only wet or dry.
+        """
+        speed, noise = self.speed, self.speed_noise
+        stick = math.exp(-0.5 * (speed / noise) ** 2) / (_ROOT_2_PI * noise)
+        demand = math.exp(-self.ratio / DEMAND) / DEMAND
+        if not speed > 0.0:
+            return stick * demand, 0.0, 1.0
+        creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
+        rest = stick + CREEP * math.exp(-speed / creep) / creep
+        slip = speed / SLIP_SPEED * math.exp(-speed / SLIP_SPEED) / SLIP_SPEED
+        shown = 1.0
+        if rim_speed > 0.0 and not self.turning_known:
+            share = speed * speed / (speed * speed + rim_speed**2)
+            shown -= slip / (slip + stick) * (1.0 - max(SLOWEST, share))
+        return rest * demand, slip, shown
 
 
 class GroundModel:
@@ -150,35 +143,47 @@ class GroundModel:
             np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
         ))  # fmt: skip
 
-    def likelihoods(self, samples: Sequence[Evidence]) -> np.ndarray:
-        """Return the likelihood of each sample, shape (samples, 2, grid)."""
-        friction = np.array([each.scales for each in samples])[:, :, None] * GRID
-        table = np.array([(each.ratio, 1.0 / each.ratio_noise, each.rest) for each in samples])
-        ratios, precisions, rests = table.T[:, :, None, None]
+    def likelihoods(
+        self, samples: Sequence[Evidence], factors: Sequence[tuple[float, float, float]]
+    ) -> np.ndarray:
+        """Return the likelihood of each sample, shape (samples, 2, grid), from its factors."""
+        table = np.array([
+            (*each.scales, each.ratio, 1.0 / each.ratio_noise, rest, slip / each.ratio_noise)
+            for each, (rest, slip, _) in zip(samples, factors, strict=True)
+        ])  # fmt: skip
+        ratios, precisions, rests, slips = table.T[2:, :, None, None]
+        friction = table[:, :2, None] * GRID
         # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
         # and T/N is μ less the part used by turning.
-        found: np.ndarray = special.ndtr((friction - ratios) * precisions)
+        found = friction - ratios
+        found *= precisions
+        special.ndtr(found, out=found)
         found *= rests
-        slips = [place for place, each in enumerate(samples) if each.speed > 0.0]
-        if slips:
-            some = friction[slips]
+        if slips.any():
+            shown = self._shown(samples, friction)
             # The exponential is the share of demands that friction does not meet.
-            likely = np.exp(some / -DEMAND)
-            likely *= np.array([samples[each].slip for each in slips])[:, None, None]
-            likely *= precisions[slips] / _ROOT_2_PI
-            likely *= self._shown([samples[each] for each in slips], some)
-            found[slips] += likely
+            friction *= -1.0 / DEMAND
+            np.exp(friction, out=friction)
+            friction *= shown
+            friction *= slips / _ROOT_2_PI
+            found += friction
         return found
 
     def _shown(self, samples: Sequence[Evidence], friction: np.ndarray) -> np.ndarray:
         """Return the likelihood of T/N in a slip, mean over rim speeds, up to a factor."""
-        turns = np.array([0.0 if each.turning_known else self.rim_speed for each in samples])
-        speeds, rims = np.array([each.speed for each in samples]), _HALF_NORMAL[:, None] * turns
-        precisions = np.array([math.sqrt(0.5) / each.ratio_noise for each in samples])
-        left = (speeds / np.hypot(speeds, rims) * precisions)[:, :, None, None]
-        ratios = np.array([each.ratio for each in samples]) * precisions
-        away = left * friction
-        away -= ratios[:, None, None]
+        left, ratios = [], []
+        for each in samples:
+            precision, rim = math.sqrt(0.5) / each.ratio_noise, self.rim_speed
+            if each.turning_known or not each.speed > 0.0:
+                left.append([precision] * len(_SHARES))
+            else:
+                speed = each.speed
+                left.append([
+                    precision * speed / math.hypot(speed, rim * part) for part in _HALF_NORMAL
+                ])  # fmt: skip
+            ratios.append(each.ratio * precision)
+        away = np.array(left).T[:, :, None, None] * friction
+        away -= np.array(ratios)[:, None, None]
         away *= away
         np.negative(away, out=away)
         np.exp(away, out=away)
@@ -398,19 +403,22 @@ class GroundFilter:
 def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
     """Process one sample of each of several feet, which have one model, together."""
     model = filters[0]._model
+    factors = [each.factors(model.rim_speed) for each in samples]
+    evidence = model.likelihoods(samples, factors)
+    evidence += 1e-6
+    np.log(evidence, out=evidence)
+    evidence *= np.array([[[each.weight * model.temper]] for each in samples])
     posterior = np.array([each._posterior for each in filters])
-    evidence = np.log(model.likelihoods(samples) + 1e-6)
-    evidence *= np.array([each.weight * model.temper for each in samples])[:, None, None]
-    # The share that does not show friction shows only whether the ground is wet, or nothing
-    # under a dome.
-    domes = np.array([each._dome for each in filters])
-    shown = np.array([each.shown(model.rim_speed) for each in samples])
     after = posterior * np.exp(evidence)
     grounds = after.dot(_ONES)
-    if domes.any() or (shown < 1.0).any():
-        grounds[domes] = posterior.dot(_ONES)[domes]
-        evidence *= shown[:, None, None]
-        after = posterior * np.exp(evidence)
+    domes = [each._dome for each in filters]
+    shown = [share for _, _, share in factors]
+    # The share that does not show friction shows only whether the ground is wet, or nothing
+    # under a dome.
+    if any(domes) or min(shown) < 1.0:
+        grounds[domes] = posterior[domes].dot(_ONES)
+        evidence *= np.array(shown)[:, None, None]
+        np.multiply(posterior, np.exp(evidence), out=after)
         rest = grounds / after.dot(_ONES)
         after *= rest[:, :, None]
         rest[domes] = 1.0
