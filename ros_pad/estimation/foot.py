@@ -13,6 +13,8 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.feet import FeetEstimator
 from ros_pad.estimation.feet import late
+from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.tuning import Tuning
 
 
@@ -220,6 +222,16 @@ class FootEstimator:
         self.feet.update((time,), ((sample,),), (pressure,), ((age,),) if age else None)
         self.estimate = self._estimate()
         return self.estimate
+
+    @property
+    def ground(self) -> GroundFilter:
+        """Posterior of wet ground and friction."""
+        return self.feet.grounds.filters[0]
+
+    @property
+    def noise(self) -> SensorNoise:
+        """Configured and measured noise of the sensors."""
+        return self.feet.tracks[0].watch.noise
 
     def _estimate(self) -> Estimate:
         track, grounds = self.feet.tracks[0], self.feet.grounds
