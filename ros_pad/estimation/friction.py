@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 from typing import TypeAlias
 
 import numpy as np
@@ -22,11 +23,9 @@ from scipy import special
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import GRID
 from ros_pad.estimation.scales import Felt
-from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
-_SQUARES = GRID * GRID
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
 _ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
@@ -47,6 +46,7 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+_HALF_NORMAL = _HALF_NORMAL.tolist()
 
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
@@ -66,6 +66,129 @@ MODEL_SQUARE = 0.08
 """Error of friction measured in slip, mean over a walk: the first, and the second times the square
 of friction. A window may contain some stick, and feet turn more or less than assumed; the more
 they hold, the slower they slip, and the more turning hides."""
+
+
+class Evidence(NamedTuple):
+    """Means of the samples of a foot over a time.
+
+    Attributes
+    ----------
+    ratio, ratio_noise : float
+        T/N and its standard deviation, > 0.
+    speed, speed_noise : float
+        Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
+    dt : float
+        Duration that the sample represents, s.
+    weight : float
+        Share of the sample that is new evidence, 0 to 1.
+    turning_known : bool
+        Whether T/N includes the friction used by turning; if not, that part is estimated from
+        the rim speed.
+    scales : tuple of float
+        Friction at the load of the sample over that at the load of the prior, on dry and on wet
+        ground.
+    """
+
+    ratio: float
+    ratio_noise: float
+    speed: float
+    speed_noise: float
+    dt: float
+    weight: float = 1.0
+    turning_known: bool = False
+    scales: tuple[float, float] = (1.0, 1.0)
+
+    def factors(self, rim_speed: float) -> tuple[float, float, float]:
+        """Return how likely stick and slip are at this speed, and what of it shows friction.
+
+        The first is the density of the speed, and of T/N as a demand, where the foot sticks or
+        creeps; the second that of the speed where it slips, both in s/m. The last is the share of
+        the evidence that shows friction, the rest shows only wet or dry.
+        """
+        speed, noise = self.speed, self.speed_noise
+        stick = math.exp(-0.5 * (speed / noise) ** 2) / (_ROOT_2_PI * noise)
+        demand = math.exp(-self.ratio / DEMAND) / DEMAND
+        if not speed > 0.0:
+            return stick * demand, 0.0, 1.0
+        creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
+        rest = stick + CREEP * math.exp(-speed / creep) / creep
+        slip = speed / SLIP_SPEED * math.exp(-speed / SLIP_SPEED) / SLIP_SPEED
+        shown = 1.0
+        if rim_speed > 0.0 and not self.turning_known:
+            share = speed * speed / (speed * speed + rim_speed**2)
+            shown -= slip / (slip + stick) * (1.0 - max(SLOWEST, share))
+        return rest * demand, slip, shown
+
+
+class GroundModel:
+    """What is assumed of the ground below all feet; parameters as for :class:`GroundFilter`."""
+
+    def __init__(
+        self,
+        shared: FrictionScales,
+        wet_prior: float,
+        patch_length: float,
+        temper: float,
+        rim_speed: float,
+        model_error: float,
+    ) -> None:
+        self.shared = shared
+        self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
+        self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
+        error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
+        blur = (blur / blur.sum(axis=0)).T
+        # From a posterior to sums of the blurred one up to each edge, and to its moments.
+        self.summary = np.column_stack((
+            np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
+        ))  # fmt: skip
+
+    def likelihoods(
+        self, samples: Sequence[Evidence], factors: Sequence[tuple[float, float, float]]
+    ) -> np.ndarray:
+        """Return the likelihood of each sample, shape (samples, 2, grid), from its factors."""
+        table = np.array([
+            (*each.scales, each.ratio, 1.0 / each.ratio_noise, rest, slip / each.ratio_noise)
+            for each, (rest, slip, _) in zip(samples, factors, strict=True)
+        ])  # fmt: skip
+        ratios, precisions, rests, slips = table.T[2:, :, None, None]
+        friction = table[:, :2, None] * GRID
+        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
+        # and T/N is μ less the part used by turning.
+        found = friction - ratios
+        found *= precisions
+        special.ndtr(found, out=found)
+        found *= rests
+        if slips.any():
+            shown = self._shown(samples, friction)
+            # The exponential is the share of demands that friction does not meet.
+            friction *= -1.0 / DEMAND
+            np.exp(friction, out=friction)
+            friction *= shown
+            friction *= slips / _ROOT_2_PI
+            found += friction
+        return found
+
+    def _shown(self, samples: Sequence[Evidence], friction: np.ndarray) -> np.ndarray:
+        """Return the likelihood of T/N in a slip, mean over rim speeds, up to a factor."""
+        left, ratios = [], []
+        for each in samples:
+            precision, rim = math.sqrt(0.5) / each.ratio_noise, self.rim_speed
+            if each.turning_known or not each.speed > 0.0:
+                left.append([precision] * len(_SHARES))
+            else:
+                speed = each.speed
+                left.append([
+                    precision * speed / math.hypot(speed, rim * part) for part in _HALF_NORMAL
+                ])  # fmt: skip
+            ratios.append(each.ratio * precision)
+        away = np.array(left).T[:, :, None, None] * friction
+        away -= np.array(ratios)[:, None, None]
+        away *= away
+        np.negative(away, out=away)
+        np.exp(away, out=away)
+        found: np.ndarray = _SHARES.dot(away.reshape(len(_SHARES), -1)).reshape(friction.shape)
+        return found
 
 
 class GroundFilter:
@@ -90,15 +213,15 @@ class GroundFilter:
         Standard deviation of T/N as a measure of friction, > 0, in addition to
         :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
         reduce it.
+    model : GroundModel or None
+        All of these but the first, as several feet share them.
 
     Attributes
     ----------
     shared : FrictionScales
         As given.
-    prior : FrictionPrior
-        Friction by the contact model.
-    expected : FrictionPrior
-        Friction of new ground, median, by what the feet have learnt up to this stance.
+    expected : Expected
+        Friction of new ground by what the feet have learnt up to this stance.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -108,6 +231,11 @@ class GroundFilter:
         Change of the log odds of wet ground by this stance: about zero if it gave no evidence.
     """
 
+    __slots__ = (
+        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_summed', '_travelled',
+        '_wet_before', 'expected', 'log_odds', 'scales', 'shared', 'wet_probability',
+    )  # fmt: skip
+
     def __init__(
         self,
         shared: FrictionScales,
@@ -116,67 +244,53 @@ class GroundFilter:
         temper: float = 0.5,
         rim_speed: float = 0.0,
         model_error: float = MODEL_ERROR,
+        model: GroundModel | None = None,
     ) -> None:
-        self.prior = shared.prior
+        self._model = model or GroundModel(
+            shared, wet_prior, patch_length, temper, rim_speed, model_error
+        )
         self.shared, self._foot = shared, shared.join()
-        self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
-        self._patch_length = patch_length
-        self._temper = temper
-        self._rim_speed = rim_speed
-        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(model_error, MODEL_SQUARE * _SQUARES)
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
-        self._blur = blur / blur.sum(axis=0)
-        self._cumulated = np.zeros((2, len(EDGES)))
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self._travelled = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
-        self._expect(0.0)
-        self._posterior: np.ndarray = self._flat_prior
-        self.wet_probability = wet_prior
-        self._normalise(self._flat_prior)
+        self.expected = shared.expected(0.0)
+        self._normalise(self._model.grounds * self.expected.flat)
         self._begin()
-
-    def _expect(self, time: float) -> None:
-        """Expect what the feet have learnt up to a time, s."""
-        expected = self.shared.expected(time)
-        self._flat_prior = self._grounds * expected[:2]
-        self._priors = {False: expected[:2], True: expected[2:4]}
-        medians = [float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in expected[:3]]
-        self.expected = FrictionPrior(*medians)
-        self._undrained = expected[4]
 
     def _begin(self) -> None:
         """Begin to collect evidence of a stance."""
-        self._felt = np.zeros_like(self._posterior)
-        self._has_felt = False
+        self._felt: np.ndarray | None = None
         self._wet_before = self.wet_probability
 
     def touch_down(self, distance: float, dome: bool, time: float = 0.0) -> None:
         """Begin a stance at a distance, m, from the last one, as a dome or flat, at a time, s."""
-        if self._has_felt:
+        if self._felt is not None:
             # Stances on the same patch are no new evidence of what all patches have in common.
             since = self._travelled - self._counted[self._dome]
             self._counted[self._dome] = self._travelled
-            weight = -math.expm1(-since / self._patch_length)
+            weight = -math.expm1(-since / self._model.patch_length)
             self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
-        self._expect(time)
+        self.expected = self.shared.expected(time)
         if dome != self._dome:
             # The friction of one morphology gives no evidence of the friction of the other: keep
             # only the probability of wet ground.
             self._dome = dome
-            self._posterior = self._wet_or_dry() * self._priors[dome]
+            self._posterior = self._wet_or_dry() * self._priors
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
         if dome:
-            self._posterior[1] = self._undrained * self.wet_probability
+            self._posterior[1] = self.expected.undrained * self.wet_probability
             self._normalise(self._posterior)
         self._begin()
+
+    @property
+    def _priors(self) -> np.ndarray:
+        return self.expected.dome if self._dome else self.expected.flat
 
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
@@ -186,9 +300,9 @@ class GroundFilter:
     def forget(self, time: float) -> None:
         """Return to the prior, and take back what the foot has shown to others, at a time, s."""
         self.shared.forget(self._foot)
-        self._expect(time)
+        self.expected = self.shared.expected(time)
         self._counted = {False: -math.inf, True: -math.inf}
-        self._normalise(self._grounds * self._priors[self._dome])
+        self._normalise(self._model.grounds * self._priors)
         self._begin()
 
     @property
@@ -202,130 +316,70 @@ class GroundFilter:
         self._normalise(grid)
         self._begin()
 
-    def update(
-        self,
-        ratio: float,
-        ratio_noise: float,
-        speed: float,
-        speed_noise: float,
-        dt: float,
-        weight: float = 1.0,
-        turning_known: bool = False,
-        scales: tuple[float, float] = (1.0, 1.0),
-    ) -> None:
-        """Process one sample of T/N and of slip speed.
+    def update(self, sample: Evidence) -> None:
+        """Process one sample of T/N and of slip speed."""
+        update([self], [sample])
 
-        Parameters
-        ----------
-        ratio, ratio_noise : float
-            T/N and its standard deviation, > 0.
-        speed, speed_noise : float
-            Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
-        dt : float
-            Duration that the sample represents, s.
-        weight : float
-            Share of the sample that is new evidence, 0 to 1.
-        turning_known : bool
-            Whether T/N includes the friction used by turning; if not, that part is estimated from
-            `rim_speed`.
-        scales : tuple of float
-            New value of the attribute.
-        """
-        self.scales = scales
-        friction = np.multiply.outer(scales, GRID)
-        away = (friction - ratio) / ratio_noise
-        stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
-        swift = max(speed, 0.0) / SLIP_SPEED
-        slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
-        # and T/N is μ less the part used by turning.
-        rest = stick
-        if speed > 0.0:
-            creep = CREEP_SPEED * (ratio + LEAST_PULL)
-            rest += CREEP * math.exp(-speed / creep) / creep
-        likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
-        if slip > 0.0:
-            if not turning_known:
-                left = speed / np.hypot(speed, self._rim_speeds)
-                away = (left * friction[:, None] - ratio) / ratio_noise
-            likely = np.exp(-0.5 * away * away)
-            if not turning_known:
-                likely = _SHARES @ likely
-            unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
-            likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
-        before = self.wet_probability
-        shown = 1.0
-        if slip > 0.0 and not turning_known and self._rim_speed > 0.0:
-            slid = slip / (slip + stick)
-            share = speed * speed / (speed * speed + self._rim_speed**2)
-            shown -= slid * (1.0 - max(SLOWEST, share))
-        self._multiply(np.log(likelihood + 1e-6) * (weight * self._temper), shown)
-        self._posterior /= self._posterior.sum()
-        dry, wet = self._posterior.dot(_ONES).tolist()
+    def _learn(
+        self, sample: Evidence, after: np.ndarray, evidence: np.ndarray, grounds: list[float]
+    ) -> None:
+        """Use the posterior after a sample, what it shows of friction, and the odds."""
+        self.scales = sample.scales
+        self._felt = evidence if self._felt is None else self._felt + evidence
+        (dry, wet), before = grounds, self.wet_probability
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
-        if speed > 0.0:
-            self._move(speed * dt)
+        self._posterior = after
+        if sample.speed > 0.0:
+            self._move(sample.speed * sample.dt)
         if self._dome:
             # The film under domes drains during a stance, so friction rises on the same ground.
-            keep = math.exp(-dt / DRAINING_TIME)
+            keep = math.exp(-sample.dt / DRAINING_TIME)
             wet = self._posterior[1].dot(_ONES)
             self._posterior[1] *= keep
-            self._posterior[1] += (1.0 - keep) * wet * self._priors[True][1]
+            self._posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
             self._felt[1] *= keep
         self._normalise(self._posterior)
-
-    def _multiply(self, evidence: np.ndarray, shown: float) -> None:
-        """Multiply by a likelihood, given as logarithm; a share of it shows friction.
-
-        The rest shows only whether the ground is wet, or nothing under a dome.
-        """
-        if self._dome:
-            grounds = self._posterior.dot(_ONES)
-        elif shown < 1.0:
-            grounds = (self._posterior * np.exp(evidence)).dot(_ONES)
-        evidence *= shown
-        after = self._posterior * np.exp(evidence)
-        if self._dome or shown < 1.0:
-            rest = (grounds / after.dot(_ONES))[:, None]
-            after *= rest
-            if not self._dome:
-                evidence += np.log(rest)
-        self._felt += evidence
-        self._has_felt = True
-        self._posterior = after
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         self._travelled += distance
-        stay = math.exp(-distance / self._patch_length)
+        stay, grounds = math.exp(-distance / self._model.patch_length), self._model.grounds
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet
             # ground must not change.
             before = self._wet_or_dry()
-            grounds = stay * before + (1.0 - stay) * self._grounds
             friction = self._posterior / before
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * self._priors[True])
+            friction = stay * friction + (1.0 - stay) * self.expected.dome
+            self._posterior = (stay * before + (1.0 - stay) * grounds) * friction
         else:
-            self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
+            new = ((1.0 - stay) * grounds) * self.expected.flat
+            new += stay * self._posterior
+            self._posterior = new
 
     def _wet_or_dry(self) -> np.ndarray:
-        return self._posterior.sum(axis=1, keepdims=True)
+        return self._posterior.dot(_ONES)[:, None]
 
     def _normalise(self, posterior: np.ndarray) -> None:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
-        self._posterior = posterior = posterior / posterior.sum()
         dry, wet = posterior.dot(_ONES).tolist()
+        self._posterior, self._summed = posterior / (dry + wet), None
         self.wet_probability = wet / (dry + wet)
-        self._blurred = posterior.dot(self._blur.T)
-        self._blurred /= dry + wet
+
+    @property
+    def _summary(self) -> np.ndarray:
+        """Sums of the probabilities of friction on dry and on wet ground, and two moments."""
+        if self._summed is None:
+            self._summed = self._posterior.dot(self._model.summary)
+        return self._summed
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
-        scales = np.array(self.scales)
-        mean = float(scales.dot(self._blurred.dot(GRID)))
-        square = float((scales * scales).dot(self._blurred.dot(_SQUARES)))
+        (on_dry, dry_square), (on_wet, wet_square) = self._summary[:, -2:].tolist()
+        dry, wet = self.scales
+        mean = dry * on_dry + wet * on_wet
+        square = dry * dry * dry_square + wet * wet * wet_square
         return mean, math.sqrt(max(square - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
@@ -339,8 +393,36 @@ class GroundFilter:
         """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
-        on_dry, on_wet = self._cumulated
-        np.add.accumulate(self._blurred, axis=1, out=self._cumulated[:, 1:])
-        below = on_dry + np.interp(edges, wet * EDGES, on_wet)
-        found: np.ndarray = np.interp(np.asarray(shares), below, edges)
+        on_dry, on_wet = self._summary[:, :-2]
+        if dry != wet:
+            on_wet = np.interp(edges, wet * EDGES, on_wet)
+        found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
         return found
+
+
+def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
+    """Process one sample of each of several feet, which have one model, together."""
+    model = filters[0]._model
+    factors = [each.factors(model.rim_speed) for each in samples]
+    evidence = model.likelihoods(samples, factors)
+    evidence += 1e-6
+    np.log(evidence, out=evidence)
+    evidence *= np.array([[[each.weight * model.temper]] for each in samples])
+    posterior = np.array([each._posterior for each in filters])
+    after = posterior * np.exp(evidence)
+    grounds = after.dot(_ONES)
+    domes = [each._dome for each in filters]
+    shown = [share for _, _, share in factors]
+    # The share that does not show friction shows only whether the ground is wet, or nothing
+    # under a dome.
+    if any(domes) or min(shown) < 1.0:
+        grounds[domes] = posterior[domes].dot(_ONES)
+        evidence *= np.array(shown)[:, None, None]
+        np.multiply(posterior, np.exp(evidence), out=after)
+        rest = grounds / after.dot(_ONES)
+        after *= rest[:, :, None]
+        rest[domes] = 1.0
+        evidence += np.log(rest)[:, :, None]
+    after /= grounds.dot(_ONES[:2])[:, None, None]
+    for each, *shown in zip(filters, samples, after, evidence, grounds.tolist(), strict=True):
+        each._learn(*shown)

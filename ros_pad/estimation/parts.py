@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of the estimator of one foot, each with its own state."""
+"""Parts of the estimator of a foot, each with its own state."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 
+from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import Posterior
 
 TARE_TIME = 0.5
@@ -25,6 +26,9 @@ FADING_STEP = 0.02
 """Least distance by which the posterior fades without measurements, m: more than the jitter of a
 marker.
 """
+
+AIRBORNE = 0.01
+"""Rise above the height of its last stance, m, from which on a foot certainly touches nothing."""
 
 
 class Offset:
@@ -68,99 +72,136 @@ class Offset:
         self.sd *= 1.0 - share
 
 
-class Motion:
-    """Velocity of the contact over the floor, from its smoothed position.
+class Gate:
+    """Whether a foot stands, by its load and height.
 
     Parameters
     ----------
-    smoothing : float
-        Time constant of the smoothing, s, above 0.
+    lift_off : float
+        Load below which a foot does not stand, N.
+    least : float
+        Load below which a foot that is higher than in its last stance is in the air, N.
 
     Attributes
     ----------
-    x, y : float
-        Smoothed position of the contact, m.
+    stands : bool
+        Whether it stands.
+    height : float
+        Height of the marker in the last stance, m; infinite if unknown.
+    top : float
+        Height that it cannot reach while it stands, m.
+    least : float
+        As given.
+    firm : float
+        Load with which it is sure to stand below the top, N.
     """
 
-    __slots__ = ('_smoothing', 'x', 'y')
+    __slots__ = ('_base', '_lift_off', 'firm', 'height', 'least', 'stands', 'top')
 
-    def __init__(self, smoothing: float) -> None:
-        self._smoothing = smoothing
-        self.x = self.y = 0.0
+    def __init__(self, lift_off: float, least: float) -> None:
+        self._lift_off, self.least, self.firm = lift_off, least, max(lift_off, least)
+        self.height = self._base = self.top = math.inf
+        self.stands = False
+
+    @property
+    def air(self) -> float:
+        """Height above which a foot with little load touches nothing, m."""
+        return self.height + AIRBORNE
+
+    def aloft(self, load: float, height: float) -> bool:
+        """Return whether a foot with a load, N, at a height, m, is in the air."""
+        if self.stands and height > self.top:
+            self.height = self._base  # the ground cannot rise with the foot
+            return True
+        return load < self.least and height > self.air
+
+    def update(self, load: float) -> bool:
+        """Return whether a foot stands with a load, N."""
+        self.stands = load >= self._lift_off
+        return self.stands
+
+    def touch_down(self, height: float) -> None:
+        """Begin a stance at a height, m."""
+        self._base, self.top = height, height + AIRBORNE
+
+
+class Slip:
+    """Slip of a foot.
+
+    Parameters
+    ----------
+    alarm : SlipAlarm
+        Slip alarm.
+
+    Attributes
+    ----------
+    alarm : SlipAlarm
+        As given.
+    x, y : float
+        Smoothed position of the contact, m; with joints the smoothed shear of the pads.
+    noise : float
+        Standard deviation of the slip speed without that of the body, m/s.
+    contact_noise : float
+        That of a coordinate of the contact, m.
+    sd : float
+        Standard deviation of the last slip speed, m/s; infinite while it is not known.
+    """
+
+    __slots__ = ('alarm', 'contact_noise', 'noise', 'sd', 'x', 'y')
+
+    def __init__(self, alarm: SlipAlarm) -> None:
+        self.alarm = alarm
+        self.x = self.y = self.noise = self.contact_noise = self.sd = 0.0
 
     def begin(self, x: float, y: float) -> None:
         """Begin a stance at a position, m."""
         self.x, self.y = x, y
-
-    def update(self, x: float, y: float, dt: float) -> tuple[float, float]:
-        """Process a position, m, dt seconds after the last one; return the velocity, m/s."""
-        smoothing = self._smoothing
-        share = dt / (smoothing + dt)
-        self.x += share * (x - self.x)
-        self.y += share * (y - self.y)
-        return (x - self.x) / smoothing, (y - self.y) / smoothing
+        self.alarm.reset()
 
 
 class Window:
-    """Sums of the samples since the last update of the filter."""
-
-    __slots__ = ('count', 'first', 'load', 'noise', 'pull', 'speed', 'start', 'turning')
-
-    def __init__(self) -> None:
-        self.start = 0.0
-        self.first = True  # whether this is the first window of its stance
-        self.clear()
-
-    def clear(self) -> None:
-        """Discard all samples."""
-        self.count = 0
-        self.load = self.pull = self.speed = self.turning = self.noise = 0.0
-
-    def begin(self, time: float, first: bool) -> None:
-        """Begin a window at a time, s; ``first`` says whether it is the first of its stance."""
-        self.start, self.first = time, first
-        self.clear()
-
-    def add(
-        self, load: float, pull: float, turning: float, speed: float, noise: float = 0.0
-    ) -> None:
-        """Add normal force, tangential force, friction used by turning, N, and slip speed, m/s.
-
-        ``noise`` is the standard deviation of a measured slip speed, m/s.
-        """
-        self.count += 1
-        self.load += load
-        self.pull += pull
-        self.turning += turning
-        self.speed += speed
-        self.noise += noise
-
-
-class Stance:
-    """State of one stance.
+    """Sums of the samples of a stance since the last update of the filter.
 
     Attributes
     ----------
-    height : float
-        Height of the marker at touch-down, m; infinite before the first touch-down.
-    dome_share : float
-        Share of the expected load that domes carry, 0 to 1.
-    peak_load, peak_ratio, peak_turning : float
-        Largest normal force, N; largest T/N of the pull, and of the friction used by turning, each
-        as the mean of a window.
+    start : float
+        Its beginning, s.
+    first : bool
+        Whether it is the first one of its stance.
+    sums : tuple of float
+        Number of samples, and sums of normal force, tangential force, friction used by turning, N,
+        slip speed, and standard deviation of that, m/s.
+    peak : float
+        Largest normal force of the stance, N.
     """
 
-    __slots__ = ('_counted', 'dome_share', 'height', 'peak_load', 'peak_ratio', 'peak_turning')
+    __slots__ = ('first', 'peak', 'start', 'sums')
 
-    def __init__(self, height: float = math.inf, dome_share: float = 0.0) -> None:
-        self.height = height
+    def __init__(self, start: float, first: bool = True, peak: float = 0.0) -> None:
+        self.start, self.first, self.peak = start, first, peak
+        self.sums = (0.0,) * 6
+
+
+class Stance:
+    """Evidence of one stance.
+
+    Attributes
+    ----------
+    dome_share : float
+        Share of the expected load that domes carry, 0 to 1.
+    peak_ratio, peak_turning : float
+        Largest T/N of the pull, and of the friction used by turning, each
+        as the mean of a window.
+    counted : tuple of float or None
+        T/N and place, m, of what earlier windows have shown; None to give the next full weight.
+    """
+
+    __slots__ = ('counted', 'dome_share', 'peak_ratio', 'peak_turning')
+
+    def __init__(self, dome_share: float = 0.0) -> None:
         self.dome_share = dome_share
-        self.peak_load = self.peak_ratio = self.peak_turning = 0.0
-        self._counted: tuple[float, float, float] | None = None
-
-    def forget_counted(self) -> None:
-        """Give the next window full weight."""
-        self._counted = None
+        self.peak_ratio = self.peak_turning = 0.0
+        self.counted: tuple[float, float, float] | None = None
 
     def weight(self, ratio: float, noise: float, x: float, y: float) -> float:
         """Return the share of a window that is new evidence, 0 to 1.
@@ -168,14 +209,14 @@ class Stance:
         A foot at the same place under the same pull repeats its measurement. So the weight grows
         with the change of T/N (relative to its noise) and of the place, m, since earlier windows.
         """
-        if self._counted is None:
-            self._counted = ratio, x, y
+        if self.counted is None:
+            self.counted = ratio, x, y
             return 1.0
-        old_ratio, old_x, old_y = self._counted
+        old_ratio, old_x, old_y = self.counted
         pull, dx, dy = ratio - old_ratio, x - old_x, y - old_y
         change = (pull / noise) ** 2 + (dx * dx + dy * dy) / NEW_PLACE**2
         weight = -math.expm1(-0.5 * change)
-        self._counted = old_ratio + weight * pull, old_x + weight * dx, old_y + weight * dy
+        self.counted = old_ratio + weight * pull, old_x + weight * dx, old_y + weight * dy
         return weight
 
 

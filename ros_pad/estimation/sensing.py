@@ -13,6 +13,9 @@ import math
 from collections.abc import Sequence
 from operator import eq
 
+from ros_pad.estimation import doubt
+from ros_pad.estimation.doubt import Doubt
+
 PATIENCE = 0.1
 """Time for which a value may stay the same to the last bit, s: markers are sampled more slowly
 than forces, and converters have steps."""
@@ -31,14 +34,6 @@ sensor whose resolution is coarser than twice its noise may repeat any reading f
 DEAD_ON_GROUND = 0.4
 """Time for which a force sensor may read exactly zero at the height of the last stance, s."""
 
-SENSOR_FAULTS = (
-    'force stands still', 'force out of range',
-    'marker lost', 'marker stands still', 'marker leapt',
-    'axes', 'no wrench', 'no position', 'sample refused', 'no contact velocity',
-)  # fmt: skip
-"""Kinds of doubt about sensors, not about the ground. The last four come from
-:class:`ros_pad.estimation.stage.EstimationStage`."""
-
 LEAST = 1e-12
 """Least measured noise of a sensor, N and m: at 0 repeated readings would be no fault."""
 
@@ -48,28 +43,8 @@ LEAP = 5.0
 LEAP_DISTANCE = 0.02
 """Distance above which a jump at such a speed cannot come from clock jitter, m."""
 
-
-def sensor_fault(doubt: str) -> str:
-    """Return the kind of a doubt if it is a fault of sensors.
-
-    Parameters
-    ----------
-    doubt : str
-        A doubt as in :attr:`Estimate.doubt`: kind, colon, details.
-
-    Returns
-    -------
-    str
-        The kind; empty if the doubt is none, or one of the ground.
-
-    Examples
-    --------
-    >>> from ros_pad.estimation import sensor_fault
-    >>> sensor_fault('marker lost: for 0.2 s'), sensor_fault('')
-    ('marker lost', '')
-    """
-    kind = doubt.partition(':')[0]
-    return kind if kind in SENSOR_FAULTS else ''
+READINGS = [0, 1, 2, 4, 5, 6]
+"""Places of force and position in the numbers of a sample."""
 
 
 class Repeats:
@@ -79,14 +54,22 @@ class Repeats:
     ----------
     noises : sequence of float
         Standard deviation of each value; values without noise never count as stopped.
+
+    Attributes
+    ----------
+    last : sequence of float
+        Last values.
+    fine : bool
+        Whether each value has changed by twice its noise or less: then none of them stops while
+        all of them change.
     """
 
-    __slots__ = ('_changed', '_counts', '_fine', '_noises', '_since', '_steps', 'last')
+    __slots__ = ('_changed', '_counts', '_noises', '_since', '_steps', 'fine', 'last')
 
     def __init__(self, noises: Sequence[float]) -> None:
         self._noises = noises
         self._steps = [math.inf] * len(noises)  # smallest change so far
-        self._fine = False  # whether each value has changed by twice its noise or less
+        self.fine = False
         self.last: Sequence[float] = (math.nan,) * len(noises)
         self._changed: float | None = 0.0  # time at which all changed last; None if not all did
         self._since: list[float] = []
@@ -100,10 +83,14 @@ class Repeats:
         """Return the time since which the value with an index has not changed, s."""
         return self._since[place]
 
+    def skip(self, time: float, values: Sequence[float]) -> None:
+        """Take note of values of a time, s, after which all have changed."""
+        self.last, self._changed = values, time
+
     def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
         last, self.last = self.last, values
-        if self._fine and not any(map(eq, values, last)):
+        if self.fine and not any(map(eq, values, last)):
             self._changed = time
             return ()
         return self._compare(time, last, values)
@@ -128,7 +115,7 @@ class Repeats:
                 coarse = 2.0 * noise < self._steps[place] < math.inf
                 if not coarse or time - since[place] > DEAD:
                     stopped.append(place)
-        self._fine = all(
+        self.fine = all(
             step <= 2.0 * noise or not noise
             for step, noise in zip(self._steps, self._noises, strict=True)
         )
@@ -162,10 +149,26 @@ class Sensing:
         """Discard all readings, because the clock has been set back."""
         self._repeats = Repeats(self._noises)
         self._seen = -math.inf  # time of the last position, s
+        self._skipped = False  # whether the last samples were
         self._grounded = math.inf
         self._dead = False
         self.marker_valid = True
         self.since = math.inf
+
+    @property
+    def last(self) -> Sequence[float]:
+        """Last force, N, and position, m."""
+        return self._repeats.last
+
+    @property
+    def calm(self) -> bool:
+        """Whether a sample can be skipped: if all readings change, and none of them leaps."""
+        return self._repeats.fine and self._range == math.inf
+
+    def skip(self, time: float, readings: Sequence[float]) -> None:
+        """Take note of the last one of such samples, with force, N, and position, m."""
+        self._repeats.skip(time, readings)
+        self._seen, self._dead, self.marker_valid, self._skipped = time, False, True, True
 
     def set_noise(self, force_noise: float, position_noise: float) -> None:
         """Change the standard deviations, N and m; a sensor without noise stays so.
@@ -179,35 +182,32 @@ class Sensing:
         self._repeats.set_noises(self._noises)
 
     def update(
-        self,
-        time: float,
-        force: Sequence[float],
-        position: Sequence[float],
-        age: float,
-        standing: bool,
-        aloft: bool,
-    ) -> str:
-        """Process a sample; return why it cannot be used, or '' if it can.
+        self, time: float, readings: Sequence[float], age: float, standing: bool, air: float
+    ) -> Doubt | None:
+        """Process a sample; return why it cannot be used, or None if it can.
 
         Parameters
         ----------
         time : float
             Time of the sample, s.
-        force, position : sequence of 3 floats
+        readings : sequence of 6 floats
             Force, N, and position, m.
         age : float
             Age of the position, s.
         standing : bool
             Whether the foot stood at the sample before: then its position cannot jump.
-        aloft : bool
-            Whether the foot is above the height at which it stood last, or has not stood yet.
+        air : float
+            Height above which the foot touches nothing, m; infinite if it has not stood yet.
         """
-        if aloft:
+        last, position = self._repeats.last, readings[3:]
+        if self._skipped:
+            self._grounded = -math.inf if last[5] <= air < math.inf else math.inf
+            self._skipped = False
+        if not position[2] <= air < math.inf:
             self._grounded = math.inf
         elif self._grounded == math.inf:
             self._grounded = time
-        last = self._repeats.last
-        stopped = self._repeats.update(time, (*force, *position))
+        stopped = self._repeats.update(time, readings)
         # Markers may be sampled more slowly than forces, so speeds need the positions' own times.
         since, self._seen = self._seen, time - age
         leap = 0.0
@@ -217,47 +217,49 @@ class Sensing:
             stopped or leap > LEAP_DISTANCE or age > OLDEST_POSITION or self._range < math.inf
         ):
             self._dead, self.marker_valid = False, True
-            return ''
+            return None
         forces = [place for place in stopped if place < 3]
         marker = self._marker_fault(time, age, stopped[len(forces) :], leap, self._seen - since)
         self.marker_valid = not marker
-        return self._force_fault(time, force, forces) or marker
+        return self._force_fault(time, readings[:3], forces) or marker
 
-    def _force_fault(self, time: float, force: Sequence[float], stopped: Sequence[int]) -> str:
+    def _force_fault(
+        self, time: float, force: Sequence[float], stopped: Sequence[int]
+    ) -> Doubt | None:
         if not stopped and self._range == math.inf:
             self._dead = False
-            return ''
+            return None
         if len(stopped) == 3:
             self.since = max(map(self._repeats.since, stopped))
             if any(force):
-                return f'force stands still: {force[2]:.3g} N to the last digit'
+                return Doubt(doubt.STILL, force[2])
             grounded = time - max(self._grounded, self.since)
             # A sensor once found dead also counts as dead in the air, until it reads a force.
             self._dead |= time - self.since > DEAD or grounded > DEAD_ON_GROUND
             if self._dead:
-                return 'force stands still: reads exactly nothing'
-            return ''
+                return Doubt(doubt.DEAD)
+            return None
         self._dead = False
-        for place, axis in enumerate('xyz'):
+        for place in range(3):
             if abs(force[place]) >= self._range:
                 self.since = time
-                return f'force out of range: {axis} = {force[place]:.3g} N'
+                return Doubt(doubt.RANGE, place, force[place])
             # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
                 self.since = self._repeats.since(place)
-                return f'force out of range: {axis} stays at {force[place]:.3g} N'
-        return ''
+                return Doubt(doubt.STUCK, place, force[place])
+        return None
 
     def _marker_fault(
         self, time: float, age: float, stopped: Sequence[int], leap: float, duration: float
-    ) -> str:
+    ) -> Doubt | None:
         if age > OLDEST_POSITION:
             self.since = time - age
-            return f'marker lost: last seen {age:.2g} s ago'
+            return Doubt(doubt.LOST, age)
         if len(stopped) == 3:
             self.since = max(map(self._repeats.since, stopped))
-            return 'marker stands still: to the last digit'
+            return Doubt(doubt.MARKER_STILL)
         if leap > LEAP_DISTANCE and leap > LEAP * duration:
             self.since = time
-            return f'marker leapt: {1e3 * leap:.0f} mm'
-        return ''
+            return Doubt(doubt.LEAPT, 1e3 * leap)
+        return None

@@ -94,7 +94,7 @@ class EstimatorNode(Node):
             round(1e9 / values['publish_rate']),
             self._warn,
         )
-        self._kept = learnt.settings_of(self.stage.estimator.shared)
+        self._kept = learnt.settings_of(self.stage.estimator.grounds.shared)
         self._send = messages.record_output(topics.ESTIMATE, self._legs)
         self._diagnostics = messages.output(topics.DIAGNOSTICS)
         self._diagnostics_pace = Pace(1_000_000_000)
@@ -104,7 +104,7 @@ class EstimatorNode(Node):
         self._health_pace = Pace(TICK_PERIOD_NS)
         messages.receive_record(topics.SAMPLE, self._legs, self._on_samples)
         messages.receive_record(topics.PRESSURE, self._legs, self._on_pressure)
-        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._idle)
 
     def _on_samples(self, block: Block) -> None:
         if self.messages.simulated:
@@ -138,7 +138,7 @@ class EstimatorNode(Node):
         """Write what feet have learnt of friction, if it is new and there is a file for it."""
         if (
             not self._learnt
-            or (settings := learnt.settings_of(self.stage.estimator.shared)) == self._kept
+            or (settings := learnt.settings_of(self.stage.estimator.grounds.shared)) == self._kept
         ):
             return
         try:
@@ -152,6 +152,13 @@ class EstimatorNode(Node):
         self.keep_learnt()
         super().destroy_node()
 
+    def _idle(self, now_ns: int) -> None:
+        """Tick without samples: the controller has to know of a foot whose sensors are silent."""
+        before = self._reported
+        self._tick(now_ns)
+        if self._reported != before:
+            self._send(self.stage.estimate(now_ns))
+
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):
             return
@@ -159,7 +166,7 @@ class EstimatorNode(Node):
         if self._keep_pace.due(now_ns):
             self.keep_learnt()
         rows = self.stage.estimate(now_ns).rows[0]
-        sound = [not doubts.of_sensors(code) for code in rows['doubt'].tolist()]
+        sound = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=self._statuses(rows, sound))
@@ -174,13 +181,13 @@ class EstimatorNode(Node):
         """Return the health of the sensors of each leg, and its estimate, for ``/diagnostics``."""
         found = []
         for index, (leg, row) in enumerate(zip(self._legs, rows, strict=True)):
-            noise = self.stage.estimator.noise_texts(index)
+            noise = self.stage.estimator.tracks[index].watch.noise
             values = {
                 'P(wet)': f'{row["wetness"]:.3f}',
                 'friction': f'{row["friction"]:.3f}',
                 'friction sd': f'{row["friction_sd"]:.3f}',
-                'position noise': noise[0],
-                'force noise': noise[1],
+                'position noise': noise.position.text('m'),
+                'force noise': noise.force.text('N'),
                 'samples': str(self.stage.used[index]),
             }
             found.append(
@@ -198,7 +205,7 @@ class EstimatorNode(Node):
     def _learnt_status(self) -> DiagnosticStatus:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
         values = []
-        for name, scale in self.stage.estimator.shared.scales.items():
+        for name, scale in self.stage.estimator.grounds.shared.scales.items():
             low, high = scale.interval
             text = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
             values.append(KeyValue(key=name, value=text))

@@ -182,7 +182,8 @@ class SimulatedRegulator:
         """
         setpoint = permitted(gauge_pa, self._ceiling)
         rest = self._advance()
-        self._check_answer(self._now)
+        if self._faults:
+            self._check_answer(self._now)
         if setpoint != self._channel.setpoint:
             self._channel.step(self._channel.setpoint, rest)
             self._channel.step(setpoint, 0.0)
@@ -192,9 +193,9 @@ class SimulatedRegulator:
     def read(self) -> Reading:
         """Return pad pressure and set-point at the present time of the clock."""
         channel = self._present()
-        self._check_answer(self._now)
         pressure = channel.pad_pressure
         if self._faults:
+            self._check_answer(self._now)
             pressure += self._drift()
         if self._noise:
             if self._now != self._disturbance_time:
@@ -258,7 +259,9 @@ class SimulatedRegulator:
         while self._steps < steps:
             count = 1
             if channel.settled:
-                count = max(1, int(min(steps - self._steps, channel.quiet_time / STEP)))
+                count = steps - self._steps
+                if self._faults:
+                    count = max(1, int(min(count, channel.quiet_time / STEP)))
             channel.step(channel.setpoint, count * STEP)
             self._steps += count
         rest = elapsed - steps * STEP

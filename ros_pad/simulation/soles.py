@@ -130,32 +130,24 @@ class Soles:
         self._places = data.geom_xpos[feet]
         self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
         self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
-        self._felt = data.sensordata  # force and moment of each foot's contact
-        # The axes of a contact with level ground are z, y, -x.
-        self._order = (6 * np.arange(count) + np.array([[2], [1], [0], [3]])).ravel()
-        self._rows = np.zeros((7, count))  # of `contacts`, whose rows are columns here
-        self._zeros, self._gives = np.zeros(count), np.full((2, count), 1.0 / foot.shear_stiffness)
-        self._shear = np.full((3, count), POINT)
-        self._views = (
-            self._rows[:4], self._rows[:4].reshape(-1), self._rows[0], self._rows[:2],
-            self._shear[:2], self._places.T, self._rows[4:],
-        )  # fmt: skip
-        self._loads = [0.0] * count
+        self._loads = data.sensordata[::6]
+        self._touch = _Touch(data.sensordata, self._places, 1.0 / foot.shear_stiffness)
 
     @property
     def contacts(self) -> Array:
         """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return self._rows.T
+        return self._touch.contacts
 
     @property
     def feet(self) -> list[Sole]:
         """State of each foot, updated on access; the objects stay the same."""
         for sole, row in zip(self._soles, self.contacts.tolist(), strict=True):
-            *force, sole.moment = row[:4]
-            sole.force, sole.position = tuple(force), tuple(row[4:])
-            sole.standing = force[2] > 0.0
-            if force[2] > LIGHT:
-                sole.grip = sole.ratio * force[2]
+            push_x, push_y, load, sole.moment, *place = row
+            sole.force = (push_x + 0.0, push_y, load)  # not -0.0 in the air
+            sole.position = tuple(place)
+            sole.standing = load > 0.0
+            if load > LIGHT:
+                sole.grip = sole.ratio * load
         return self._soles
 
     def fill(self, pressures: Sequence[float]) -> None:
@@ -189,7 +181,7 @@ class Soles:
 
     def rub(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last."""
-        for sole, load in zip(self._soles, self._loads, strict=True):
+        for sole, load in zip(self._soles, self._loads.tolist(), strict=True):
             if load > LIGHT:
                 sole.ahead = None
                 self.press(sole, load, self._dt)
@@ -209,13 +201,9 @@ class Soles:
         row[0] = row[1] = ratio
         row[2] = self.lever * ratio
 
-    def read(self) -> None:
-        """Read the loads of the feet in the last step of MuJoCo."""
-        self._loads = self._felt[::6].tolist()
-
     def update(self) -> None:
         """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
-        pushes_x, pushes_y, loads, moments = self._measure()
+        pushes_x, pushes_y, loads, moments = self._touch.measure()
         places, axes = self._places.tolist(), self._axes.tolist()
         last_places, last_axes = self._last
         self._last = places, axes
@@ -241,15 +229,6 @@ class Soles:
             if sole.pressure > 0.0 and sole.limit < load:
                 sole.overload_time += dt
 
-    def _measure(self) -> list[list[float]]:
-        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
-        wrenches, flat, push_x, pushes, shears, places, markers = self._views
-        self._felt.take(self._order, None, flat, 'clip')
-        np.subtract(self._zeros, push_x, push_x)  # not -0.0 in the air
-        np.multiply(pushes, self._gives, shears)
-        np.subtract(places, self._shear, markers)
-        return wrenches.tolist()
-
     def _approach(self, sole: Sole, x: float, y: float, z: float) -> None:
         """Prepare film, block and friction below a foot without load."""
         ground, clear = 0.0, CLEAR
@@ -267,6 +246,32 @@ class Soles:
             if left:
                 sole.film.touch_down(self._floor.depth(x, y))
             self.press(sole, LIGHT, 0.0)
+
+
+class _Touch:
+    """Forces, moments and markers of all feet, from MuJoCo's arrays at once.
+
+    Rows of its table are force x, y and z, moment, and what is between place and marker.
+    """
+
+    def __init__(self, felt: Array, places: Array, give: float) -> None:
+        count = len(places)
+        # The axes of a contact with level ground are z, y, -x.
+        order = 6 * np.arange(count) + np.array([[2], [1], [0], [3], [2], [1]])
+        self._felt, self._order = felt, order.ravel()
+        self._factors = np.repeat((-1.0, 1.0, 1.0, 1.0, -give, give, POINT), count)
+        self._raw, self._table = np.ones((2, 7 * count))
+        rows = self._table.reshape(7, count)
+        self.contacts = rows.T
+        self._views = self._raw[: 6 * count], rows[:4], rows[4:], places.T
+
+    def measure(self) -> list[list[float]]:
+        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
+        felt, wrenches, markers, places = self._views
+        self._felt.take(self._order, None, felt, 'clip')
+        np.multiply(self._raw, self._factors, self._table)
+        np.subtract(places, markers, markers)
+        return wrenches.tolist()
 
 
 class Sled:

@@ -16,7 +16,6 @@ from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.series import Records
 from ros_pad.trials.series import held
-from ros_pad.trials.series import joined
 
 
 class NoLog(TrialLog):
@@ -67,7 +66,7 @@ def estimated(stage: EstimationStage, records: Records) -> Block:
             estimates += stage.process(Block(sample.stamps[first:end], sample.rows[first:end]))
         if rows is not None:
             stage.pressure(rows)
-    return joined(ESTIMATE, sample.rows.shape[1], estimates)
+    return Block.joined(ESTIMATE, estimates, sample.rows.shape[1])
 
 
 def pressures(records: Records, stamps: np.ndarray) -> np.ndarray:
