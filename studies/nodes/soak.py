@@ -4,15 +4,15 @@
 The regulator node runs in this process with simulated regulators, and receives commands for six
 feet at 100 Hz of simulated time. Devices become silent, stick, leak, drift and lose their supply;
 commands stop, of one foot or of all, have wrong stamps, are above the ceiling, negative or not
-finite; ``~/vent`` is called; and every five minutes the node is cleaned up and configured again. All events follow from
-a seed.
+finite; ``~/vent`` is called; and every five minutes the node is cleaned up and configured again.
+All events follow from a seed.
 
 Devices record the commands that they receive. A pad whose commands have stopped, or whose pressure
-is above the ceiling, must receive a vent within ``command_timeout`` and one tick. The node ticks at
-each record and, 0.1 s after the last one, at each time on /clock. A device that did not answer must
-receive another vent at each tick. After its pressure was above the ceiling, a
-pad must receive no pressure until the node is activated again. The exit status is 1 if any of
-these rules was broken.
+is above the ceiling, must receive a vent within ``command_timeout`` and one tick. The node ticks
+with each record and, 0.1 s after the last one, with each time on /clock. A device that did not
+answer must receive another vent at each tick. After its pressure was above the ceiling, a pad must
+receive no pressure until the node is activated again. The exit status is 1 if any of these rules
+was broken.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from ros_pad import regulators
-from ros_pad.commands.progress import bar
 from ros_pad.bags.wire import Wire
+from ros_pad.commands.progress import bar
 from ros_pad.commands.run import alone
 from ros_pad.nodes import topics
 from ros_pad.nodes.messages import Messages
@@ -166,7 +166,7 @@ class Trouble:
         self.kind = ''
 
     def at(self, now: float) -> str:
-        """Return the present one at a time, s, no earlier than the last; empty if there is none."""
+        """Return the present one at a time, s, which never goes back; empty if there is none."""
         if now >= self._until:
             self.kind = '' if self.kind else self._chance.choice(self._kinds)
             mean = 1.0 if self.kind else TROUBLE_EVERY
@@ -335,8 +335,10 @@ class Soak:
         ticks = not self._active or abs(now_ns - self._record_ns) > TICK_PERIOD_NS
         self._ticked = ticks
         self._spin(
-            lambda: self.node.messages.now_ns() == now_ns
-            and (not ticks or self.node.tick_ns == now_ns),
+            lambda: (
+                self.node.messages.now_ns() == now_ns
+                and (not ticks or self.node.tick_ns == now_ns)
+            ),
             f'the time of the node, {now_ns} ns',
         )
 
