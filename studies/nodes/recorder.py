@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure the message rate that the recorder node can record, and its processor time.
 
-This process sends records of all kinds in turn, of six legs, at each rate to two receivers one after
+This process sends records of all kinds in turn, at each rate to two receivers one after
 the other, each in a process of its own:
 
 - bare: rclpy's EventsExecutor with raw, reliable subscriptions and callbacks that only count;
