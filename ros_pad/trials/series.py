@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
 
@@ -13,7 +12,6 @@ import numpy as np
 
 from ros_pad.estimation import doubt as doubts
 from ros_pad.records import Block
-from ros_pad.records import Kind
 
 
 class Records(NamedTuple):
@@ -28,13 +26,6 @@ class Records(NamedTuple):
     estimate: Block
     command: Block
     pressure: Block
-
-
-def joined(kind: Kind, legs: int, blocks: Sequence[Block]) -> Block:
-    """Return the records of several blocks as one block, for so many legs if there are none."""
-    if not blocks:
-        return Block(np.empty(0, np.int64), kind.rows(0, legs))
-    return Block(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
 
 
 def by_row(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
