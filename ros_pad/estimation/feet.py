@@ -171,13 +171,12 @@ class FeetEstimator:
                 end += 1
             whole = end - first == count
             for place, track in enumerate(self.tracks):
-                mine = samples[place], ages and ages[place], quiet and quiet[place]
-                if whole:
-                    track.update(times, mine[0], pressures[place], *mine[1:])
-                else:
-                    part = slice(first, end)
-                    mine = tuple(each and each[part] for each in mine)
-                    track.update(times[part], mine[0], pressures[place], *mine[1:])
+                mine, part = samples[place], slice(first, end)
+                old = ages[place][part] if ages else None
+                calm = quiet[place][part] if quiet else None
+                track.update(
+                    times[part], mine if whole else mine[part], pressures[place], old, calm
+                )
             self.grounds.flush()
             first = end
 

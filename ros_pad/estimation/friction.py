@@ -218,8 +218,8 @@ class GroundFilter:
 
     Attributes
     ----------
-    shared : FrictionScales
-        As given.
+    shared, model
+        As given, or made of the other parameters.
     expected : Expected
         Friction of new ground by what the feet have learnt up to this stance.
     wet_probability : float
@@ -232,8 +232,8 @@ class GroundFilter:
     """
 
     __slots__ = (
-        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_summed', '_travelled',
-        '_wet_before', 'expected', 'log_odds', 'scales', 'shared', 'wet_probability',
+        '_counted', '_dome', '_felt', '_foot', '_posterior', '_summed', '_travelled',
+        '_wet_before', 'expected', 'log_odds', 'model', 'scales', 'shared', 'wet_probability',
     )  # fmt: skip
 
     def __init__(
@@ -246,7 +246,7 @@ class GroundFilter:
         model_error: float = MODEL_ERROR,
         model: GroundModel | None = None,
     ) -> None:
-        self._model = model or GroundModel(
+        self.model = model or GroundModel(
             shared, wet_prior, patch_length, temper, rim_speed, model_error
         )
         self.shared, self._foot = shared, shared.join()
@@ -256,7 +256,8 @@ class GroundFilter:
         self._travelled = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
         self.expected = shared.expected(0.0)
-        self._normalise(self._model.grounds * self.expected.flat)
+        self.wet_probability = wet_prior
+        self._normalise(self.model.grounds * self.expected.flat)
         self._begin()
 
     def _begin(self) -> None:
@@ -270,7 +271,7 @@ class GroundFilter:
             # Stances on the same patch are no new evidence of what all patches have in common.
             since = self._travelled - self._counted[self._dome]
             self._counted[self._dome] = self._travelled
-            weight = -math.expm1(-since / self._model.patch_length)
+            weight = -math.expm1(-since / self.model.patch_length)
             self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
@@ -302,7 +303,7 @@ class GroundFilter:
         self.shared.forget(self._foot)
         self.expected = self.shared.expected(time)
         self._counted = {False: -math.inf, True: -math.inf}
-        self._normalise(self._model.grounds * self._priors)
+        self._normalise(self.model.grounds * self._priors)
         self._begin()
 
     @property
@@ -343,7 +344,7 @@ class GroundFilter:
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         self._travelled += distance
-        stay, grounds = math.exp(-distance / self._model.patch_length), self._model.grounds
+        stay, grounds = math.exp(-distance / self.model.patch_length), self.model.grounds
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet
             # ground must not change.
@@ -363,14 +364,15 @@ class GroundFilter:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
         dry, wet = posterior.dot(_ONES).tolist()
-        self._posterior, self._summed = posterior / (dry + wet), None
+        self._posterior = posterior / (dry + wet)
+        self._summed: np.ndarray | None = None
         self.wet_probability = wet / (dry + wet)
 
     @property
     def _summary(self) -> np.ndarray:
         """Sums of the probabilities of friction on dry and on wet ground, and two moments."""
         if self._summed is None:
-            self._summed = self._posterior.dot(self._model.summary)
+            self._summed = self._posterior.dot(self.model.summary)
         return self._summed
 
     @property
@@ -402,7 +404,7 @@ class GroundFilter:
 
 def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
     """Process one sample of each of several feet, which have one model, together."""
-    model = filters[0]._model
+    model = filters[0].model
     factors = [each.factors(model.rim_speed) for each in samples]
     evidence = model.likelihoods(samples, factors)
     evidence += 1e-6
@@ -424,5 +426,5 @@ def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None
         rest[domes] = 1.0
         evidence += np.log(rest)[:, :, None]
     after /= grounds.dot(_ONES[:2])[:, None, None]
-    for each, *shown in zip(filters, samples, after, evidence, grounds.tolist(), strict=True):
-        each._learn(*shown)
+    for place, each in enumerate(filters):
+        each._learn(samples[place], after[place], evidence[place], grounds[place].tolist())
