@@ -36,10 +36,6 @@ from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.policies import IsWet
 from ros_pad.control.policies import Policy
-<<<<<<< HEAD
-=======
-from ros_pad.estimation import FeetEstimator
->>>>>>> main
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
@@ -174,11 +170,6 @@ def walk(job: Job) -> tuple[float, int, str | None]:
 def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: int) -> ClosedLoop:
     """Return a loop that has walked; ``first`` names the policy by which feet begin."""
     loop = ClosedLoop(scene, first, seed, LEVEL)
-<<<<<<< HEAD
-=======
-    load, foot = scene.expected_load, known or scene.foot
-    feet = FeetEstimator(len(scene.legs), foot, load, tuning_for(scene))
->>>>>>> main
     controller = MorphologyController(
         known or scene.foot,
         scene.legs,
@@ -187,11 +178,7 @@ def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: in
         start=first_morphologies(first, scene.legs),
         fixed_pressure=scene.dome_pressure,
     )
-<<<<<<< HEAD
     loop.connect(controller, known)
-=======
-    loop.connect(feet, controller)
->>>>>>> main
     loops.walk(loop, scene)
     return loop
 

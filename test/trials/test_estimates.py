@@ -7,9 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from ros_pad.estimation import doubt
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
+from studies.closed_loop import loops
 from studies.work_precision.estimator.priors import Condition
 from studies.work_precision.estimator.priors import updates
 from studies.work_precision.estimator.priors import walked as walked_on
