@@ -2,8 +2,7 @@
 """Estimator of all feet of a robot: slip, wetness, friction, and friction margin.
 
 Each foot follows a whole block of samples before the next one does: as long as it stands, or
-swings, and its readings are ordinary, little is to be done for a sample. Then the filters of all
-feet are updated together.
+swings, and its readings are ordinary, little is to be done for a sample.
 """
 
 from __future__ import annotations
@@ -177,7 +176,6 @@ class FeetEstimator:
                 track.update(
                     times[part], mine if whole else mine[part], pressures[place], old, calm
                 )
-            self.grounds.flush()
             first = end
 
 
