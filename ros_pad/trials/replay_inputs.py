@@ -130,8 +130,9 @@ def _leave_out(streams: dict[str, Stream]) -> str:
         there |= np.isin(stamps, samples.block.stamps)
         streams[each.kind.name] = each.where(there)
     # An estimator makes its first estimate of its first sample.
-    loaded = np.isfinite(estimates.block.rows['load']).any(axis=1)
-    kept = samples.block.stamps >= estimates.block.stamps[loaded].min(initial=_NEVER)
+    stamps, rows = estimates.block
+    begun = np.isin(stamps, samples.block.stamps) | np.isfinite(rows['load']).any(axis=1)
+    kept = samples.block.stamps >= stamps[begun].min(initial=_NEVER)
     if kept.all() or not kept.any():  # none, where there are no estimates
         return ''
     streams[SAMPLE.name] = samples.where(kept)
