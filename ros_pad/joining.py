@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from collections.abc import Sequence
-from typing import Any
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ class _Record(NamedTuple):
 
 
 class Joiner:
-    """Join pieces of records: fields of one leg, with a stamp.
+    """Join pieces of records: some fields of one leg, with a stamp.
 
     A record begins with the first of the needed fields of any leg. It is given out when all needed
     fields of all legs have come, when a later record is complete, or when it has waited too long;
@@ -58,17 +58,18 @@ class Joiner:
     ) -> None:
         self._kind, self._wait_ns = kind, wait_ns
         self._row = {leg: row for row, leg in enumerate(legs)}
+        self._columns = [(each, field.name) for field in kind.fields for each in field.columns]
         self._needed = tuple(needed)
         self._complete = {(row, name) for row in self._row.values() for name in needed}
         self._begin()
 
     def _begin(self) -> None:
         self._waiting: dict[int, _Record] = {}
-        self._loose: dict[int, Any] = {}  # position that belongs to no record, by row
+        self._loose: dict[int, np.ndarray] = {}  # position that belongs to no record, by row
         self._newest = self._given = -math.inf  # stamps of records, begun and given out
 
-    def add(self, leg: int, stamp_ns: int, **fields: Any) -> list[Block]:
-        """Add fields of a leg; return the records, of one moment each, that go out with it.
+    def add(self, leg: int, stamp_ns: int, values: Mapping[str, float]) -> list[Block]:
+        """Add numbers of a leg; return the records, of one moment each, that go out with them.
 
         Parameters
         ----------
@@ -76,14 +77,14 @@ class Joiner:
             Number of the leg.
         stamp_ns : int
             Time stamp, ns; one that is more than 0.1 s before the last ones begins anew.
-        **fields : float or sequence of float
-            Values, by name.
+        values : mapping
+            Numbers of whole fields, by column: ``{'force_x': 0.0, 'force_y': ...}``.
         """
         row, given = self._row[leg], []
+        fields = {field for column, field in self._columns if column in values}
         if not self._needed:
             rows = self._kind.rows(len(self._row))
-            for name, value in fields.items():
-                rows[name][row] = value
+            self._put(rows, row, values)
             return [Block.of(stamp_ns, rows)]
         drives = self._needed[0] in fields
         if drives and stamp_ns < self._newest - SET_BACK_NS:
@@ -91,7 +92,9 @@ class Joiner:
             self._begin()
         if stamp_ns <= self._given:
             if LOOSE in fields and not drives:
-                self._loose[row] = fields[LOOSE]
+                rows = self._kind.rows(len(self._row))
+                self._put(rows, row, values)
+                self._loose[row] = rows[LOOSE][row]
             return given
         if drives:
             self._newest = max(self._newest, stamp_ns)
@@ -101,12 +104,17 @@ class Joiner:
             record = self._waiting[stamp_ns] = _Record(rows, self._newest, set())
             if len(self._waiting) > _MOST:  # no record begins
                 self._loosen(self._waiting.pop(next(iter(self._waiting))))
-        for name, value in fields.items():
-            record.rows[name][row] = value
-            record.there.add((row, name))
+        self._put(record.rows, row, values)
+        record.there.update((row, field) for field in fields)
         if self._complete <= record.there:
             given += self._give(stamp_ns)
         return given + self.expire(self._newest)
+
+    def _put(self, rows: np.ndarray, row: int, values: Mapping[str, float]) -> None:
+        numbers = rows.view('f8').reshape(len(rows), -1)[row]
+        for place, (column, _) in enumerate(self._columns):
+            if column in values:
+                numbers[place] = values[column]
 
     def expire(self, now_ns: float) -> list[Block]:
         """Return the records that have waited too long at a time on the clock of stamps, ns."""

@@ -13,6 +13,8 @@ missing values concerns its own leg only.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +48,8 @@ class Field(NamedTuple):
         return tuple(f'{self.name}_{axis}' for axis in self.axes) or (self.name,)
 
 
-class Kind(NamedTuple):
+@dataclass(frozen=True)
+class Kind:
     """A kind of record.
 
     Attributes
@@ -63,12 +66,12 @@ class Kind(NamedTuple):
     meaning: str
     fields: tuple[Field, ...]
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of all numbers in a row."""
         return tuple(column for field in self.fields for column in field.columns)
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[np.void]:
         """Structured type of a row."""
         return np.dtype(

@@ -14,8 +14,20 @@ MS = 1_000_000
 NAN = (math.nan,) * 3
 
 
+class Fields(Joiner):
+    """A joiner that takes fields by name."""
+
+    def add(self, leg, stamp_ns, **fields):
+        values = {}
+        for name, value in fields.items():
+            axes = ('_x', '_y', '_z') if np.ndim(value) else ('',)
+            numbers = zip(axes, np.atleast_1d(value), strict=False)
+            values |= {name + axis: each for axis, each in numbers}
+        return super().add(leg, stamp_ns, values)
+
+
 def joiner(legs=(1, 2), needed=('force', 'position')):
-    return Joiner(SAMPLE, legs, needed)
+    return Fields(SAMPLE, legs, needed)
 
 
 def force(load):
@@ -153,7 +165,7 @@ def test_nothing_waits_without_end():
 
 
 def test_pressures_do_not_wait():
-    join = Joiner(PRESSURE, (1, 2))
+    join = Fields(PRESSURE, (1, 2))
     (block,) = join.add(2, 20 * MS, pressure=3e4)
     assert block.last_ns == 20 * MS
     pressures = block.rows[0]['pressure'].tolist()

@@ -28,7 +28,6 @@ from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.node_settings import Value
 
-UNITS = {'slip': ' m/s', 'pressure_setpoint': ' Pa'}  # all other kinds have no unit
 WORDS = {
     'equal': 'equal to the bit',
     'rounding': 'equal except for rounding: recorded on another kind of processor',
@@ -177,9 +176,9 @@ def _show(replay: Replay) -> None:
         print(f'note: {note}')
     if replay.comparisons:
         print()
-        rows = [_row(each) for each in _gathered(replay.comparisons)]
+        rows = [_row(*each) for each in _gathered(replay.comparisons)]
         print_table(
-            ['topic', 'compared', 'equal', 'largest difference', 'first at', 'not replayed',
+            ['quantity', 'compared', 'equal', 'largest difference', 'first at', 'not replayed',
              'not recorded'],
             rows,
         )  # fmt: skip
@@ -198,34 +197,29 @@ def _show(replay: Replay) -> None:
 
 
 def _gathered(comparisons: list[Comparison]) -> list[tuple[str, list[Comparison]]]:
-    """Return the rows of the table; a kind of topic that is equal on several legs shares a row."""
+    """Return the rows of the table; a quantity that is equal on several legs shares a row."""
     found: dict[str, list[Comparison]] = {}
     for each in comparisons:
-        name = each.topic
-        if each.compared and each.verdict in ('equal', 'rounding'):
-            name = each.topic.replace(str(each.leg), '*', 1)
+        leg = '*' if each.compared and each.verdict in ('equal', 'rounding') else each.leg
+        topic = each.topic.rpartition('/')[2]
+        name = f'{topic} of leg {leg}: {each.quantity}' if each.leg >= 0 else topic
         found.setdefault(name, []).append(each)
-    return sorted(found.items())
+    return list(found.items())
 
 
-def _row(gathered: tuple[str, list[Comparison]]) -> list[str]:
-    name, topics = gathered
-    apart = [each.first_difference_s for each in topics if each.first_difference_s is not None]
-    largest = [each.largest_difference for each in topics if each.largest_difference is not None]
-    after = ' (after a gap)' if any(each.verdict == 'gap' for each in topics) else ''
+def _row(name: str, found: list[Comparison]) -> list[str]:
+    apart = [each.first_difference_s for each in found if each.first_difference_s is not None]
+    largest = max(each.largest_difference for each in found)
+    after = ' (after a gap)' if any(each.verdict == 'gap' for each in found) else ''
     return [
         name,
-        str(sum(each.compared for each in topics)),
-        str(sum(each.equal for each in topics)),
-        _largest(max(largest), topics[0].kind) if largest else 'text',
+        str(sum(each.compared for each in found)),
+        str(sum(each.equal for each in found)),
+        'number or none' if largest == math.inf else f'{largest:.3g} {found[0].unit}'.rstrip(),
         f'{min(apart):.3f} s{after}' if apart else '-',
-        str(sum(each.missing for each in topics)),
-        str(sum(each.not_recorded for each in topics)),
+        str(sum(each.missing for each in found)),
+        str(sum(each.not_recorded for each in found)),
     ]
-
-
-def _largest(value: float, kind: str) -> str:
-    return 'number or none' if value == math.inf else f'{value:.3g}{UNITS.get(kind, "")}'
 
 
 def _pair(pair: tuple[int | None, int]) -> str:

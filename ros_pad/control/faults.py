@@ -9,17 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from ros_pad.estimation import DOUBTS
-from ros_pad.estimation import sensor_fault
-
-
-def sensor_fault_text(doubt: float) -> str:
-    """Return the kind of a doubt of the estimator, given its code; empty if no sensor is faulty.
-
-    NaN, a doubt that is not known, is no fault.
-    """
-    known = 0 <= doubt < len(DOUBTS)
-    return sensor_fault(DOUBTS[int(doubt)]) if known else ''
+from ros_pad.estimation import doubt as doubts
 
 
 class Kind(Enum):
@@ -79,7 +69,7 @@ KINDS: dict[float, Kind] = {kind.code: kind for kind in Kind}
 
 
 class Fault(NamedTuple):
-    """A fault; false if it is none. Its text is ``str(fault)``.
+    """A fault, whose text is ``str(fault)``. Where there is none, there is None instead.
 
     Attributes
     ----------
@@ -93,9 +83,6 @@ class Fault(NamedTuple):
     a: float
     b: float
 
-    def __bool__(self) -> bool:
-        return self.kind is not Kind.NONE
-
     def __str__(self) -> str:
         p, q = (f'{1e-3 * each:.1f} kPa' for each in self[1:])
         return self.kind.template.format(a=self.a, b=self.b, p=p, q=q) or self.label
@@ -103,11 +90,7 @@ class Fault(NamedTuple):
     @property
     def label(self) -> str:
         """The kind in a few words."""
-        return sensor_fault_text(self.a) if self.kind is Kind.DOUBT else self.kind.label
-
-
-NONE = Kind.NONE()
-"""No fault."""
+        return doubts.kind(self.a) if self.kind is Kind.DOUBT else self.kind.label
 
 
 def text(code: float, a: float, b: float) -> str:

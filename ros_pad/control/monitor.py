@@ -13,7 +13,7 @@ import statistics
 from collections import deque
 
 from ros_pad.configuration import number
-from ros_pad.control.faults import NONE
+from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 
@@ -58,8 +58,6 @@ class RunningMedian:
         The median.
     """
 
-    __slots__ = ('_last', 'value')
-
     def __init__(self, start: float) -> None:
         self._last: deque[float] = deque(maxlen=5)
         self.value = start
@@ -73,8 +71,6 @@ class RunningMedian:
 
 class _Changes:
     """Times that fills and vents take, from the command to the set-point."""
-
-    __slots__ = ('_distance', '_filling', 'commanded', 'fill', 'vent')
 
     def __init__(self) -> None:
         self.commanded = 0.0  # time of the last change of the set-point
@@ -115,8 +111,6 @@ class _Changes:
 class _Motion:
     """Whether a pad that is not at its set-point still moves towards it."""
 
-    __slots__ = ('_recent', '_since', '_stopped', 'stalled')
-
     def __init__(self) -> None:
         self._recent: deque[tuple[float, float]] = deque()  # times and falling |e| of the window
         self.restart(0.0)
@@ -154,8 +148,6 @@ class _Motion:
 
 class _Repair:
     """Whether a faulty pad has done what it failed to do."""
-
-    __slots__ = ('_highest', '_lowest', '_right', 'side')
 
     def __init__(self) -> None:
         self.side = 0  # kind of the fault: -1 pressure too low, 1 too high, 0 sensor faulty
@@ -197,11 +189,11 @@ class PadMonitor:
     ----------
     pressure : float
         Last reading, gauge Pa; NaN before the first one.
-    fault : Fault
-        The fault, or ``NONE``. A fault ends when the pad has done what it failed to do: a pad that
+    fault : Fault or None
+        The fault. A fault ends when the pad has done what it failed to do: a pad that
         did not fill must fill, and a pad that did not vent must vent.
-    silence : Fault
-        The fault while readings are missing; ``NONE`` otherwise, and before the first reading.
+    silence : Fault or None
+        The fault while readings are missing; None also before the first reading.
     tolerance : float
         Largest allowed difference between reading and set-point, Pa.
 
@@ -217,7 +209,7 @@ class PadMonitor:
     has been constant for 0.4 s. So the slowest fill that counts as moving is an exponential one
     with a time constant of 1.8 s (4 s to 90 %), or one at a constant rate of 6.7 kPa/s.
 
-    An update takes about 1 µs, and a third of it while the pad is at its set-point.
+    An update takes 1.2 µs, and 0.4 µs while the pad is at its set-point.
 
     Examples
     --------
@@ -231,17 +223,13 @@ class PadMonitor:
     'does not fill: 0.0 kPa 0.5 s after the command'
     """
 
-    __slots__ = (
-        '_arrived', '_ceiling', '_changes', '_motion', '_read', '_repair', '_rests', '_setpoint',
-        '_time', 'fault', 'pressure', 'silence', 'tolerance',
-    )  # fmt: skip
-
     def __init__(self, ceiling: float) -> None:
         self._ceiling = number('ceiling', ceiling, 'Pa', above=True)
         self.tolerance = TOLERANCE * ceiling
         self.pressure = math.nan
-        self.fault = self.silence = NONE
-        self._setpoint: float | None = None
+        self.fault: Fault | None = None
+        self.silence: Fault | None = None
+        self._setpoint = math.nan  # NaN: none
         self._time = self._read = -math.inf
         self._arrived = False  # whether the pad has reached the present set-point
         self._rests = False  # whether it is sound and there, and was so at the last reading
@@ -281,46 +269,41 @@ class PadMonitor:
         pressure : float or None
             Reading, gauge Pa; None or not finite if there was no reading.
         """
+        aim = math.nan if setpoint is None else setpoint
+        reading = math.nan if pressure is None else pressure
         before, self._time = self._time, time
         steady = 0.0 <= time - before <= SILENT
         if self._rests:
-            if (
-                steady
-                and pressure is not None
-                and setpoint is not None
-                and setpoint == self._setpoint
-                and self._is_right(setpoint, pressure)
-            ):
-                self._read, self.pressure = time, pressure
+            if steady and aim == self._setpoint and self._is_right(aim, reading):
+                self._read, self.pressure = time, reading
                 return
             self._rests = False
             self._motion.restart(self._read)
         if not steady:
             before = self._read = time
             self._wait(time)
+        last, self._setpoint = self._setpoint, aim
         if setpoint is None:
             self._wait(time)
-        elif self._setpoint is None:
-            self._set_out(before, setpoint, self.pressure)
-        elif abs(setpoint - self._setpoint) > self.tolerance:
-            left = abs(self._setpoint - self.pressure)
-            self._changes.cut_short(before, left, self.tolerance)
-            self._set_out(before, setpoint, self.pressure)
-        self._setpoint = setpoint
-        if pressure is None or not math.isfinite(pressure):
+        elif math.isnan(last):
+            self._set_out(before, aim, self.pressure)
+        elif abs(aim - last) > self.tolerance:
+            self._changes.cut_short(before, abs(last - self.pressure), self.tolerance)
+            self._set_out(before, aim, self.pressure)
+        if not math.isfinite(reading):
             silent = time - self._read
             if silent > SILENT and not math.isnan(self.pressure) and not self.silence:
                 self.silence = Kind.SILENCE(silent, self.pressure)
             return
         first, last_read, self._read = math.isnan(self.pressure), self._read, time
-        self.pressure = pressure
+        self.pressure = reading
         if self.silence:
-            self.silence = NONE
+            self.silence = None
             self._wait(time)
         if setpoint is not None:
             if first:
-                self._set_out(time, setpoint, pressure)
-            self._judge(time, setpoint, last_read)
+                self._set_out(time, aim, reading)
+            self._judge(time, aim, last_read)
 
     def _is_right(self, aim: float, pressure: float) -> bool:
         over = pressure > self._ceiling + self.tolerance
@@ -346,7 +329,7 @@ class PadMonitor:
             self._motion.restart(time)
             self._arrived = True
             if self.fault and self._repair.done(time, aim, pressure, tolerance):
-                self.fault = NONE
+                self.fault = None
             self._rests = not self.fault
             return
         self._repair.restart()
@@ -373,8 +356,9 @@ class PadMonitor:
             self.fault = Kind.STUCK(pressure)
         elif self._arrived:
             self.fault = (Kind.RISES if side > 0 else Kind.SAGS)(pressure, aim)
-        elif side > 0 or pressure < self.tolerance:
-            kind = Kind.NO_VENT if side > 0 else Kind.NO_FILL
-            self.fault = kind(pressure, time - self._changes.commanded)
+        elif side > 0:
+            self.fault = Kind.NO_VENT(pressure, time - self._changes.commanded)
+        elif pressure < self.tolerance:
+            self.fault = Kind.NO_FILL(pressure, time - self._changes.commanded)
         else:
             self.fault = Kind.LEAK(pressure, aim - pressure)

@@ -21,7 +21,6 @@ from ros_pad.configuration import instance
 from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
-from ros_pad.control.faults import NONE
 from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
@@ -54,10 +53,8 @@ MARGIN = Setting(
 )  # fmt: skip
 
 LIFT_OFF = Setting(
-    'lift_off_share', LIFT_OFF_SHARE,
-    'Share of the expected load below which a foot has lifted off; it stands again at this share'
-    ' plus 0.3.',
-    '', 0.01, 0.6,
+    'lift_off_share', LIFT_OFF_SHARE, 'Share of the expected load below which a foot has lifted'
+    ' off; it stands again at this share plus 0.3.', '', 0.01, 0.6,
 )  # fmt: skip
 
 FIRST_WAIT = 5
@@ -68,10 +65,6 @@ LONGEST_WAIT = 40
 
 FURTHEST_LEAD = 3
 """Largest lead of a leg with a slow hose, steps."""
-
-
-SOUND = (NONE,) * 5
-"""Faults of a leg that has none, see `_LegState.present`."""
 
 
 @dataclass
@@ -154,16 +147,6 @@ class _Air:
 
 
 @dataclass(slots=True)
-class _Faults:
-    """Faults of a leg except those of its air, and its faults in the list that still last."""
-
-    timeout: Fault = NONE
-    no_step: Fault = NONE
-    sensors: Fault = NONE
-    open: dict[int, FootFault] = field(default_factory=dict)  # by place in `_LegState.present`
-
-
-@dataclass(slots=True)
 class _Timing:
     """Times of events of a leg, and durations, s."""
 
@@ -178,10 +161,14 @@ class _Timing:
 class _LegState:
     """Memory of the controller about one leg."""
 
+    leg: int
     ground: _Ground
     air: _Air
     morphology: str
-    faults: _Faults = field(default_factory=_Faults)
+    timeout: Fault | None = None
+    no_step: Fault | None = None
+    sensors: Fault | None = None
+    lasting: dict[int, FootFault] = field(default_factory=dict)  # by place in `present`
     timing: _Timing = field(default_factory=_Timing)
     steps: float = math.inf  # steps since the morphology changed last
     probing: bool = False
@@ -189,10 +176,10 @@ class _LegState:
     setpoint: float = 0.0
 
     @property
-    def present(self) -> tuple[Fault, ...]:
-        """Its faults of all sorts, each at its place; ``NONE`` for those that it does not have."""
-        faults, monitor = self.faults, self.air.monitor
-        return faults.timeout, faults.no_step, faults.sensors, monitor.silence, monitor.fault
+    def present(self) -> tuple[Fault | None, ...]:
+        """Its faults of all sorts, each at its place; None for those that it does not have."""
+        monitor = self.air.monitor
+        return self.timeout, self.no_step, self.sensors, monitor.silence, monitor.fault
 
     @property
     def lead(self) -> int:
@@ -316,6 +303,7 @@ class MorphologyController:
         self._decisions = 0
         self._legs = {
             leg: _LegState(
+                leg,
                 _Ground(LoadGate(expected_load, lift_off_share, TOUCH_DOWN), 1.5 * expected_load),
                 _Air(PadMonitor(foot.ceiling)),
                 first[leg],
@@ -326,8 +314,8 @@ class MorphologyController:
         self.refusals: dict[int, str] = {}
         self.switches = dict.fromkeys(legs, 0)
         self.underpressure = dict.fromkeys(legs, 0)
-        for leg in legs:
-            self._apply(leg, Choice(first[leg]))
+        for leg, state in self._legs.items():
+            self._apply(state, Choice(first[leg]))
 
     def _state(self, leg: int) -> _LegState:
         state = self._legs.get(leg)
@@ -485,8 +473,8 @@ class MorphologyController:
             reading.
         doubt : float
             Code (no unit) of the doubt of the estimator if sensors of the foot cannot be used; 0
-            if they can. A foot with such a fault adds no footprints and does not probe; it uses the
-            footprints of the other feet.
+            if they can. A foot with such a fault adds no footprints and does not probe; it uses
+            the footprints of the other feet.
 
         Raises
         ------
@@ -494,9 +482,9 @@ class MorphologyController:
             For a leg that is not controlled.
         """
         state = self._state(leg)
-        timing, air, faults = state.timing, state.air, state.faults
-        if doubt != faults.sensors.a:
-            faults.sensors = Kind.DOUBT(doubt) if doubt else NONE
+        timing, air = state.timing, state.air
+        if doubt or state.sensors:
+            state.sensors = Kind.DOUBT(doubt) if doubt else None
         if not 0.0 <= time - timing.now <= self.command_timeout:
             # the first time, or after a pause
             timing.updated = time
@@ -509,18 +497,20 @@ class MorphologyController:
             self._follow_fault(air, before)
         age = time - timing.updated
         if age <= self.command_timeout:
-            faults.timeout = NONE
-        elif not faults.timeout:
-            faults.timeout = Kind.TIMEOUT(age)
-            self._time_out(leg, state)
+            state.timeout = None
+        elif not state.timeout:
+            state.timeout = Kind.TIMEOUT(age)
+            self._time_out(state)
         missed = self._decisions - state.decided
         if missed <= 2 * len(self._legs):
-            faults.no_step = NONE
-        elif not faults.no_step:
-            faults.no_step = Kind.NO_STEP(missed)
-        self._list_faults(leg, state)
+            state.no_step = None
+        elif not state.no_step:
+            state.no_step = Kind.NO_STEP(missed)
+        own = state.timeout or state.no_step or state.sensors
+        if own or monitor.fault or monitor.silence or state.lasting:
+            self._list_faults(state)
 
-    def _follow_fault(self, air: _Air, before: Fault) -> None:
+    def _follow_fault(self, air: _Air, before: Fault | None) -> None:
         """Wait with the next dome when a fault of the air begins; try all legs when one ends."""
         if not air.monitor.fault:
             # If the supply is back, the pads of the other legs can be filled again, too.
@@ -530,25 +520,22 @@ class MorphologyController:
         elif not before:
             air.wait = air.patience
 
-    def _time_out(self, leg: int, state: _LegState) -> None:
+    def _time_out(self, state: _LegState) -> None:
         """Make a leg flat that has had no estimate for the command timeout."""
         if state.morphology == DOME:
-            self.switches[leg] += 1
-        self._apply(leg, Choice(FLAT))
+            self.switches[state.leg] += 1
+        self._apply(state, Choice(FLAT))
         state.steps = math.inf
         state.air.sent = None  # the regulator vents after its own timeout
 
-    def _list_faults(self, leg: int, state: _LegState) -> None:
+    def _list_faults(self, state: _LegState) -> None:
         """Update the list of faults: one entry from the start of a fault to its end."""
-        faults, now = state.present, state.timing.now
-        lasting = state.faults.open
-        if faults == SOUND and not lasting:
-            return
+        faults, lasting, now = state.present, state.lasting, state.timing.now
         for place, fault in enumerate(faults):
             entry = lasting.get(place)
             if entry is None:
                 if fault:
-                    lasting[place] = FootFault(leg, now, None, fault)
+                    lasting[place] = FootFault(state.leg, now, None, fault)
                     self.faults.append(lasting[place])
             elif not fault:
                 lasting.pop(place).end = now
@@ -601,16 +588,16 @@ class MorphologyController:
         ground, gate = state.ground, state.ground.gate
         stood = gate.standing
         if gate.update(load) and not stood:
-            self._touch_down(leg, state)
+            self._touch_down(state)
         if load >= gate.lift_off:
             ground.largest = max(ground.largest, load)
             ground.stood = (position[0], position[1])
         elif stood:
-            self._lift_off(leg, state, wet_probability, position, friction)
+            self._lift_off(state, wet_probability, position, friction)
         state.air.sent = state.setpoint
         return state.setpoint
 
-    def _touch_down(self, leg: int, state: _LegState) -> None:
+    def _touch_down(self, state: _LegState) -> None:
         """Compare the pressure of a dome with what its load needs."""
         timing, air = state.timing, state.air
         air.shortfall = ''
@@ -620,18 +607,18 @@ class MorphologyController:
             timing.swing.add(timing.now - timing.lifted)
         pressure = air.monitor.pressure
         if state.morphology == DOME and pressure < air.needed:
-            self.underpressure[leg] += 1
+            self.underpressure[state.leg] += 1
             air.shortfall = (
                 f'{1e-3 * pressure:.1f} kPa at touch-down, {1e-3 * air.needed:.1f} kPa needed'
             )
 
-    def _permitted(self, leg: int, state: _LegState, choice: Choice) -> Choice:
+    def _permitted(self, state: _LegState, choice: Choice) -> Choice:
         """Return the choice, changed where faults of sensors or air do not permit it.
 
         After a fault of its air a leg is flat, except when a dome is tried.
         """
         air, monitor = state.air, state.air.monitor
-        if state.faults.sensors and choice.probe and choice.morphology == FLAT:
+        if state.sensors and choice.probe and choice.morphology == FLAT:
             choice = Choice(state.morphology)  # a probe without sensors would measure nothing
         if not monitor.fault:
             air.trying = False
@@ -647,7 +634,7 @@ class MorphologyController:
             air.patience = min(2 * air.patience, LONGEST_WAIT)
             air.wait = air.patience
         air.wait -= 1
-        others = (other.air for name, other in self._legs.items() if name != leg)
+        others = (other.air for other in self._legs.values() if other is not state)
         # At 0 a leg waits once more while another leg tries. Below 0 it has done so, or another
         # pad has recovered (see `observe`).
         if air.wait > 0 or (air.wait == 0 and any(other.trying for other in others)):
@@ -656,12 +643,7 @@ class MorphologyController:
         return choice
 
     def _lift_off(
-        self,
-        leg: int,
-        state: _LegState,
-        wet_probability: float,
-        position: Sequence[float],
-        friction: float,
+        self, state: _LegState, wet: float, position: Sequence[float], friction: float
     ) -> None:
         """Evaluate the step that ends, and choose the morphology of the next one."""
         ground, timing = state.ground, state.timing
@@ -670,48 +652,44 @@ class MorphologyController:
         if timing.now > timing.lifted:
             timing.stride.add(timing.now - timing.lifted)
         timing.lifted = timing.now
-        if not (state.air.monitor.silence or state.faults.sensors):
+        if not (state.air.monitor.silence or state.sensors):
             # A pad under pressure is not flat, even if its set-point is zero.
             flat = state.morphology == FLAT and not state.air.holds
             if flat:
-                self.footprints.add(*ground.stood, wet_probability)
+                self.footprints.add(*ground.stood, wet)
             if flat or state.air.holds:
-                self.friction.add(flat, wet_probability, friction)
+                self.friction.add(flat, wet, friction)
         ahead = ground.next_position(position)
         self._decisions += 1
         state.decided = self._decisions
         step = LiftOff(
-            leg=leg,
-            morphology=self.morphology(leg),
+            leg=state.leg,
+            morphology=self.morphology(state.leg),
             steps=state.steps,
             probing=state.probing,
             wet_ahead=self.footprints.wet_probability(*ahead),
             next_position=ahead,
-            others_probing=self._others_probing(leg),
+            others_probing=self._others_probing(state),
             flat_pays=self.friction.flat_pays,
         )
         before = state.morphology
-        self._apply(leg, self._permitted(leg, state, self.policy(step)))
+        self._apply(state, self._permitted(state, self.policy(step)))
         if state.morphology != before:
-            self.switches[leg] += 1
+            self.switches[state.leg] += 1
             state.steps = 0
 
-    def _others_probing(self, leg: int) -> bool:
+    def _others_probing(self, state: _LegState) -> bool:
         # A probing leg that has stopped stepping must not delay the probes of the others.
         recent = self._decisions - 2 * len(self._legs)
-        return any(
-            other.probing and other.decided > recent
-            for name, other in self._legs.items()
-            if name != leg
-        )
+        others = (other for other in self._legs.values() if other is not state)
+        return any(other.probing and other.decided > recent for other in others)
 
-    def _apply(self, leg: int, choice: Choice) -> None:
+    def _apply(self, state: _LegState, choice: Choice) -> None:
         """Apply a choice; make the leg flat if no pressure up to the ceiling carries the load."""
-        state = self._legs[leg]
         air, peak = state.air, state.ground.peak
         morphology = choice.morphology
         setpoint = 0.0
-        self.refusals.pop(leg, None)
+        self.refusals.pop(state.leg, None)
         if morphology == DOME:
             try:
                 if self._fixed_pressure:
@@ -722,7 +700,7 @@ class MorphologyController:
                     air.needed = dome_pressure(self._foot, peak, 1.0)
             except LimitError as error:
                 # Overloaded domes have less capacity than a flat sole.
-                self.refusals[leg] = str(error)
+                self.refusals[state.leg] = str(error)
                 morphology = FLAT
         state.morphology = morphology
         state.probing = choice.probe

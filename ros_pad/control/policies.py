@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from collections.abc import Mapping
@@ -77,26 +76,17 @@ IsWet = Callable[[float, float], bool]
 """Function that returns whether the ground is wet at x and y, m."""
 
 SETTINGS = (
-    Setting(
-        'policy.wet_above', 0.65,
-        'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome.',
-        '', 0.0, 1.0,
-    ),
-    Setting(
-        'policy.dry_below', 0.35,
-        'Adaptive policy: probability of wet ground ahead below which a foot becomes flat; at most'
-        ' policy.wet_above.',
-        '', 0.0, 1.0,
-    ),
-    Setting(
-        'policy.probe_below', 0.8,
-        'Adaptive policy: probability of wet ground ahead below which a domed foot probes.',
-        '', 0.0, 1.0,
-    ),
-    Setting(
-        'policy.dwell', 2, 'Adaptive policy: steps for which a morphology is kept at least.',
-        'steps', 1, 1000,
-    ),
+    Setting('policy.wet_above', 0.65,
+            'Adaptive policy: probability of wet ground ahead above which a foot becomes a dome.',
+            '', 0.0, 1.0),
+    Setting('policy.dry_below', 0.35,
+            'Adaptive policy: probability of wet ground ahead below which a foot becomes flat; at'
+            ' most policy.wet_above.', '', 0.0, 1.0),
+    Setting('policy.probe_below', 0.8,
+            'Adaptive policy: probability of wet ground ahead below which a domed foot probes.',
+            '', 0.0, 1.0),
+    Setting('policy.dwell', 2, 'Adaptive policy: steps for which a morphology is kept at least.',
+            'steps', 1, 1000),
 )  # fmt: skip
 """The settings of :func:`adaptive`, each named ``policy.`` and its argument."""
 
@@ -298,13 +288,7 @@ def policy_named(
             ' only the adaptive policy has parameters'
         )
     for parameter in parameters or ():
-        if parameter not in POLICY_PARAMETERS:
-            near = difflib.get_close_matches(parameter, POLICY_PARAMETERS, n=1)
-            hint = f' Did you mean {near[0]!r}?' if near else ''
-            raise InvalidInput(
-                f'the adaptive policy has no parameter {parameter!r}.{hint}'
-                f' Allowed: {", ".join(POLICY_PARAMETERS)}'
-            )
+        choice('parameter of the adaptive policy', parameter, POLICY_PARAMETERS)
     if name == 'oracle':
         if is_wet is None:
             raise InvalidInput("policy = 'oracle' needs the map of the floor (is_wet)")

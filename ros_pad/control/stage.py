@@ -10,13 +10,14 @@ import math
 from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ros_pad.control.faults import sensor_fault_text
 from ros_pad.control.morphology import MorphologyController
 from ros_pad.control.policies import DOME
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import doubt as doubts
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.records import COMMAND
 from ros_pad.records import Block
@@ -87,14 +88,14 @@ class DecisionStage:
         or not allowed. A channel that receives no set-points vents its pad after the command
         timeout.
         """
-        now, row = record.last_ns * 1e-9, record.rows[-1]
+        now_ns, row = record.last_ns, record.rows[-1]
         names = ('wetness', 'load', 'position', 'friction', 'doubt')
         estimates = zip(*(row[name].tolist() for name in names), strict=True)
         setpoints = [
-            self._decide(leg, now, *estimate)
+            self._decide(leg, now_ns * 1e-9, estimate)
             for leg, estimate in zip(self._legs, estimates, strict=True)
         ]
-        return self._command(record.last_ns, setpoints)
+        return self._command(now_ns, setpoints)
 
     def tick(self, now_ns: int) -> Block | None:
         """Observe the legs that have no estimates; call it every ``pace.TICK_PERIOD_NS``.
@@ -114,25 +115,16 @@ class DecisionStage:
         record = self._command(now_ns, [math.nan] * len(self._legs))
         return record if self._domes != before else None
 
-    def _decide(
-        self,
-        leg: int,
-        now: float,
-        wetness: float,
-        load: float,
-        position: Sequence[float],
-        friction: float,
-        doubt: float,
-    ) -> float:
+    def _decide(self, leg: int, now: float, estimate: tuple[Any, ...]) -> float:
         """Return the set-point of a leg, gauge Pa; NaN if there is none."""
+        wetness, load, (x, y), friction, doubt = estimate
         inputs = self._legs[leg]
         if inputs.largest < load < math.inf:
             inputs.largest = load
-        x, y = position
         if not math.isnan(x + y):
             inputs.position, inputs.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
-            inputs.doubt = doubt if sensor_fault_text(doubt) else 0.0
+            inputs.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
         self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
         old = now - inputs.positioned > OLD
         if old or not math.isfinite(load + wetness + sum(inputs.position)):

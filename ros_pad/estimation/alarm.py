@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ros_pad.configuration import number
+from ros_pad.records import Array
 
 SLOW_SLIP = 0.01
 """Slip speed for which the test for slow slip is designed, m/s."""
@@ -20,28 +23,29 @@ THRESHOLD = 4.0
 
 
 class SlipAlarm:
-    """Raise an alarm when there is enough evidence for slip at a given speed.
+    """Raise an alarm when there is enough evidence for slip at one of several speeds.
 
     The statistic g ← max(0, g + v1/σ² (v - v1/2)) is the log-likelihood ratio of slip at v1 to
     stick, summed since the time when stick was last more likely than slip.
 
     Parameters
     ----------
-    noise : float
-        Standard deviation of the speed while the foot sticks, m/s, above 0.
     correlation_time : float
         Correlation time of the noise of the speed, s, from 0: samples closer together have less
         weight.
-    speed : float
-        Slip speed v1 for which the test is designed, m/s, above 0.
+    speeds : sequence of float
+        Slip speeds v1 for which there is a test, m/s, above 0.
     threshold : float
-        Threshold of the statistic, nats, above 0. With independent noise of any level, at least
-        e^threshold samples lie between false alarms on average (Lorden 1971), mostly far more.
+        Threshold of the statistics, nats, above 0. With independent noise of any level, at least
+        e^threshold samples lie between false alarms of a test on average (Lorden 1971), mostly
+        far more.
+    feet : int
+        Number of feet.
 
     Attributes
     ----------
-    statistic : float
-        The statistic g, nats, from 0 to 1.25 times the threshold.
+    state : array (speeds, feet)
+        The statistics g, nats, from 0 to 1.25 times the threshold.
 
     Raises
     ------
@@ -49,94 +53,33 @@ class SlipAlarm:
         When a value is outside its range; the message names it.
     """
 
-    __slots__ = (
-        '_correlation_time', '_half', '_highest', '_speed', '_threshold', '_variance', 'statistic',
-    )  # fmt: skip
+    __slots__ = ('_correlation_time', '_speeds', '_threshold', 'state')
 
     def __init__(
         self,
-        noise: float,
-        correlation_time: float,
-        speed: float = SLOW_SLIP,
-        threshold: float = THRESHOLD,
-    ) -> None:
-        self._variance = number('noise', noise, 'm/s', above=True) ** 2
-        self._correlation_time = number('correlation_time', correlation_time, 's')
-        self._speed = number('speed', speed, 'm/s', above=True)
-        self._threshold = number('threshold', threshold, '(nats)', above=True)
-        self._half = 0.5 * self._speed
-        self._highest = 1.25 * self._threshold  # so that the alarm ends soon after the slip
-        self.statistic = 0.0
-
-    def set_noise(self, noise: float) -> None:
-        """Change the standard deviation of the speed, m/s, above 0, for the next samples."""
-        self._variance = noise * noise
-
-    def reset(self) -> None:
-        """Discard all evidence; call it at touch-down."""
-        self.statistic = 0.0
-
-    def update(self, speed: float, dt: float) -> bool:
-        """Process a slip speed, m/s, measured dt seconds after the previous one.
-
-        Return whether the alarm is on.
-        """
-        stretch = self._correlation_time / dt
-        variance = self._variance * stretch if stretch > 1.0 else self._variance
-        statistic = self.statistic + self._speed / variance * (speed - self._half)
-        if not statistic > 0.0:
-            self.statistic = 0.0
-            return False
-        self.statistic = statistic if statistic < self._highest else self._highest
-        return statistic > self._threshold
-
-
-class SlipAlarms:
-    """Run several :class:`SlipAlarm` on one slip speed; the alarm is on when any of them is on.
-
-    Parameters
-    ----------
-    noise, correlation_time : float
-        As for :class:`SlipAlarm`, the same for all.
-    speeds : sequence of float
-        Slip speed for which each alarm is designed, m/s.
-    threshold : float
-        Threshold of each alarm, nats.
-
-    Raises
-    ------
-    InvalidInput
-        When a value is outside its range; the message names it.
-    """
-
-    __slots__ = ('_alarms',)
-
-    def __init__(
-        self,
-        noise: float,
         correlation_time: float,
         speeds: Sequence[float] = (SLOW_SLIP, FAST_SLIP),
         threshold: float = THRESHOLD,
+        feet: int = 1,
     ) -> None:
-        self._alarms = [SlipAlarm(noise, correlation_time, speed, threshold) for speed in speeds]
+        self._correlation_time = number('correlation_time', correlation_time, 's')
+        self._threshold = number('threshold', threshold, '(nats)', above=True)
+        speeds = [number('speed', speed, 'm/s', above=True) for speed in speeds]
+        self._speeds = np.array(speeds)[:, None]
+        self.state = np.zeros((len(speeds), feet))
 
-    def reset(self) -> None:
-        """Discard all evidence; call it at touch-down."""
-        for alarm in self._alarms:
-            alarm.reset()
+    def update(self, speeds: Array, noises: Array, dt: Array) -> Array:
+        """Process slip speeds, m/s, with standard deviations, m/s, dt seconds after the last ones.
 
-    def set_noise(self, noise: float) -> None:
-        """Change the standard deviation of the speed, m/s, above 0, for the next samples."""
-        for alarm in self._alarms:
-            alarm.set_noise(noise)
-
-    def update(self, speed: float, dt: float) -> bool:
-        """Process a slip speed, m/s, measured dt seconds after the previous one.
-
-        Return whether the alarm is on.
+        All have rows of samples and columns of feet, or one for all. Return for each foot whether
+        the alarm is on after the last sample.
         """
-        raised = False
-        for alarm in self._alarms:
-            if alarm.update(speed, dt):
-                raised = True
+        weights = noises * noises * np.maximum(self._correlation_time / dt, 1.0)
+        gains = self._speeds / weights[:, None] * (speeds[:, None] - 0.5 * self._speeds)
+        statistic = self.state
+        for gain in gains:
+            gain += statistic
+            statistic = np.minimum(np.maximum(gain, 0.0), 1.25 * self._threshold)
+        self.state[:] = statistic  # capped, so that the alarm ends soon after the slip
+        raised: Array = (gains[-1] > self._threshold).any(axis=0)
         return raised

@@ -14,6 +14,8 @@ from collections import deque
 from collections.abc import Sequence
 from operator import add
 
+from ros_pad.estimation import doubt
+from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import SLIP_SPEED
 from ros_pad.estimation.scales import DELAY
 
@@ -60,17 +62,11 @@ SEVERAL = 2.0 * MOST
 
 Matrix = tuple[float, float, float, float]
 
-TURNS: tuple[tuple[str, Matrix], ...] = (
-    ('the ordinary ones', (1.0, 0.0, 0.0, 1.0)),
-    ('force axes turned by about 90° about z', (0.0, -1.0, 1.0, 0.0)),
-    ('force axes turned by about -90° about z', (0.0, 1.0, -1.0, 0.0)),
-    ('force axes, or those of the position, turned by about 180° about z', (-1.0, 0.0, 0.0, -1.0)),
-    ('left-handed, x of force or position has the wrong sign', (-1.0, 0.0, 0.0, 1.0)),
-    ('left-handed, y of force or position has the wrong sign', (1.0, 0.0, 0.0, -1.0)),
-    ('left-handed, x and y of the force are exchanged', (0.0, 1.0, 1.0, 0.0)),
-    ('left-handed, x and y of the force are exchanged with wrong signs', (0.0, -1.0, -1.0, 0.0)),
-)
-"""For each turn, the matrix (by rows) from the true horizontal force to the measured one."""
+TURNS: tuple[Matrix, ...] = (
+    (1.0, 0.0, 0.0, 1.0), (0.0, -1.0, 1.0, 0.0), (0.0, 1.0, -1.0, 0.0), (-1.0, 0.0, 0.0, -1.0),
+    (-1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, -1.0), (0.0, 1.0, 1.0, 0.0), (0.0, -1.0, -1.0, 0.0),
+)  # fmt: skip
+"""For each turn of :data:`ros_pad.estimation.doubt.TURNS`, the matrix (by rows) from the true horizontal force to the measured one."""
 
 Vector = tuple[float, float, float]
 
@@ -99,13 +95,61 @@ class SharedAxes:
         sure, raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
         for number, sums in enumerate(self._sums):
             old = [each for each in sums if each[0] <= time - DELAY]
-            if number == foot or not old:
-                continue
-            _, more, plain = old[-1]
-            for turn in range(len(TURNS)):
-                sure[turn] += min(MOST, more[turn])
-                raw[turn] += plain[turn]
+            if number != foot and old:
+                _, more, plain = old[-1]
+                sure = [a + b if b < MOST else a + MOST for a, b in zip(sure, more, strict=True)]
+                raw = [*map(add, raw, plain)]
         return [min(SEVERAL, each) for each in sure], raw
+
+
+class Stance:
+    """Sums over a stance, or a second of one."""
+
+    __slots__ = ('duration', 'force', 'heights', 'last', 'likely')
+
+    def __init__(self) -> None:
+        self.force, self.heights, self.duration = (0.0, 0.0, 0.0), 0.0, 0.0
+        self.likely = [0.0] * len(TURNS)  # log likelihoods of the motions
+        self.last: tuple[float, ...] | None = None  # block
+
+    def add(self, duration: float, height: float, force: Vector) -> None:
+        """Add a height, m, and a force, N, that have lasted for a time, s."""
+        (a, b, c), (x, y, z) = self.force, force
+        self.force = a + x * duration, b + y * duration, c + z * duration
+        self.heights += height * duration
+        self.duration += duration
+
+
+class Heights:
+    """Whether a foot swings below the heights at which it stands."""
+
+    __slots__ = ('below', 'highest', 'last', 'lowest')
+
+    def __init__(self) -> None:
+        self.below = 0  # swings in a row
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the height of the last stance."""
+        self.last = math.nan  # mean of the last stance, m
+        self.lowest, self.highest = math.inf, -math.inf  # since then, m
+
+    def swing(self, height: float) -> None:
+        """Process a height in the air, m."""
+        if height < self.lowest:
+            self.lowest = height
+        if height > self.highest:
+            self.highest = height
+
+    def stand(self, height: float) -> None:
+        """Process the mean height of a stance, m."""
+        last = height if math.isnan(self.last) else self.last
+        lowest, highest = min(height, last), max(height, last)
+        if self.lowest < lowest - BELOW and self.highest < lowest + BELOW:
+            self.below = min(STANCES, self.below + 1)
+        elif self.highest > highest + BELOW:
+            self.below = 0
+        self.last, self.lowest, self.highest = height, math.inf, -math.inf
 
 
 class Axes:
@@ -124,14 +168,13 @@ class Axes:
 
     Attributes
     ----------
-    doubt : str
-        Why the axes cannot be right, with the likely turn; empty if they can.
+    doubt : Doubt
+        Why the axes cannot be right, with the likely turn; none if they can.
     """
 
     __slots__ = (
-        '_below', '_duration', '_foot', '_force', '_height', '_heights', '_highest', '_last',
-        '_likely', '_loaded', '_lowest', '_pull', '_raw', '_shared', '_softness', '_steep',
-        '_sure', '_touch', '_unload', '_weight', 'doubt',
+        '_expected_load', '_foot', '_heights', '_loaded', '_raw', '_shared', '_softness',
+        '_stance', '_steep', '_sure', '_weight', 'doubt',
     )  # fmt: skip
 
     def __init__(
@@ -141,27 +184,20 @@ class Axes:
         memory: float = BLOCK,
         shared: SharedAxes | None = None,
     ) -> None:
-        self._touch, self._unload = LOADED * expected_load, UNLOADED * expected_load
-        self._pull, self._softness = PULL * expected_load, softness
+        self._expected_load, self._softness = expected_load, softness
         self._weight = 0.5 * BLOCK / memory  # blocks that follow each other agree
         self._shared = shared or SharedAxes()
         self._foot = self._shared.join()
-        self._steep = self._below = 0
+        self._steep, self._heights = 0, Heights()
         self._sure, self._raw = [0.0] * len(TURNS), [0.0] * len(TURNS)
-        self.doubt = ''
+        self.doubt = Doubt()
         self.restart()
 
     def restart(self) -> None:
         """Forget the present stance and the height of the last one."""
-        self._height = math.nan  # mean of the last stance, m
-        self._lowest, self._highest = math.inf, -math.inf  # since then, m
+        self._heights.restart()
         self._loaded = False
-        self._begin_stance()
-
-    def _begin_stance(self) -> None:
-        self._force, self._heights, self._duration = (0.0, 0.0, 0.0), 0.0, 0.0
-        self._likely = [0.0] * len(TURNS)  # log likelihoods of the motions in this stance
-        self._last: tuple[float, ...] | None = None
+        self._stance = Stance()
 
     def update(self, time: float, duration: float, height: float, force: Vector) -> bool:
         """Process a position's height, m, and a force without offset, N, about every `BLOCK`.
@@ -172,22 +208,16 @@ class Axes:
         x, y, z = force
         size = math.sqrt(x * x + y * y + z * z)
         if not self._loaded:
-            if height < self._lowest:
-                self._lowest = height
-            if height > self._highest:
-                self._highest = height
-            if size > self._touch:
+            self._heights.swing(height)
+            if size > LOADED * self._expected_load:
                 self._loaded = True
-                self._begin_stance()
+                self._stance = Stance()
                 self._judge(time)
             return False
-        if size < self._unload or self._duration > LONGEST:
+        if size < UNLOADED * self._expected_load or self._stance.duration > LONGEST:
             self._end_stance(time)
             return False
-        a, b, c = self._force
-        self._force = a + x * duration, b + y * duration, c + z * duration
-        self._heights += height * duration
-        self._duration += duration
+        self._stance.add(duration, height, force)
         return True
 
     def compare(
@@ -198,7 +228,8 @@ class Axes:
         ``sd`` is the standard deviation of a change of the position between blocks, m; it is
         infinite if the direction of the force or the motion is not known.
         """
-        last, self._last = self._last, (time, x, y, fx, fy)
+        stance = self._stance
+        last, stance.last = stance.last, (time, x, y, fx, fy)
         if not last or time - last[0] > 1.5 * duration:
             return
         _, a, b, c, d = last
@@ -207,28 +238,21 @@ class Axes:
         if max(math.hypot(*move), math.hypot(*change)) < 2.0 * sd:
             return
         force = 0.5 * (fx + c), 0.5 * (fy + d)
-        pulled = math.hypot(*force) > self._pull
+        pulled = math.hypot(*force) > PULL * self._expected_load
         found = likelihoods(move, change, force, sd, duration, pulled)
-        self._likely = [*map(add, self._likely, found)]
+        stance.likely = [*map(add, stance.likely, found)]
 
     def _end_stance(self, time: float) -> None:
         """Add the evidence of a stance, or of a second of one."""
-        self._loaded = False
-        if self._duration < SHORTEST:
+        self._loaded, stance = False, self._stance
+        if stance.duration < SHORTEST:
             return
-        mean = [each / self._duration for each in self._force]
+        mean = [each / stance.duration for each in stance.force]
         steep = mean[2] < STEEPEST * math.hypot(*mean)
         self._steep = min(STANCES, self._steep + 1) if steep else 0
-        height = self._heights / self._duration
-        last = height if math.isnan(self._height) else self._height
-        lowest, highest = min(height, last), max(height, last)
-        if self._lowest < lowest - BELOW and self._highest < lowest + BELOW:
-            self._below = min(STANCES, self._below + 1)
-        elif self._highest > highest + BELOW:
-            self._below = 0
-        self._height, self._lowest, self._highest = height, math.inf, -math.inf
-        for turn, likely in enumerate(self._likely):
-            more = self._weight * (likely - self._likely[0])
+        self._heights.stand(stance.heights / stance.duration)
+        for turn, likely in enumerate(stance.likely):
+            more = self._weight * (likely - stance.likely[0])
             self._raw[turn] = max(-3.0 * SURE, self._raw[turn] + more)
             sure = self._sure[turn] + min(MOST, max(LEAST, more))
             self._sure[turn] = min(3.0 * SURE, max(-SURE, sure))
@@ -239,28 +263,18 @@ class Axes:
         """Set the doubt at a time, s; after a stance with its mean force, N."""
         if self._steep >= STANCES:
             if mean:
-                self.doubt = _wrong_normal(mean)
+                axis = max(range(3), key=lambda each: abs(mean[each]))
+                code = doubt.UPSIDE_DOWN if axis == 2 else doubt.NORMAL
+                self.doubt = Doubt(code, axis, mean[axis])
             return
-        if self._below >= STANCES:
-            self.doubt = 'axes: z of the position is turned, the foot swings below its stances'
+        if self._heights.below >= STANCES:
+            self.doubt = Doubt(doubt.BELOW)
             return
         sure, raw = self._shared.others(time, self._foot)
-        turns = range(len(TURNS))
-        turn = max(turns, key=lambda each: self._raw[each] + raw[each])
-        most = max(self._sure[each] + sure[each] for each in turns)
-        if not turn or most < (0.5 * SURE if self.doubt else SURE):
-            self.doubt = ''
-        else:
-            self.doubt = f'axes: {TURNS[turn][0]}'
-
-
-def _wrong_normal(mean: Sequence[float]) -> str:
-    """Return the doubt of a mean force, N, that is not along z."""
-    axis = max(range(3), key=lambda each: abs(mean[each]))
-    if axis == 2:
-        return 'axes: the sign of the force is turned, it pulls the foot down'
-    sign = '-' if mean[axis] < 0.0 else ''
-    return f'axes: the normal force is along {sign}{"xyz"[axis]} of the sensor, not z'
+        raw, sure = [*map(add, raw, self._raw)], [*map(add, sure, self._sure)]
+        turn = raw.index(max(raw))
+        doubted = turn and max(sure) >= (0.5 * SURE if self.doubt.code else SURE)
+        self.doubt = Doubt(doubt.TURNED, turn) if doubted else Doubt()
 
 
 def likelihoods(
@@ -293,7 +307,7 @@ def likelihoods(
     wide = (3.0 * length) ** 2
     sticks, slips = 0.5 / variance, 0.5 * math.sqrt(2.0 * math.pi) / length**2
     found = []
-    for _, (a, b, c, d) in TURNS:
+    for a, b, c, d in TURNS:
         x, y = move_x + a * bend_x + c * bend_y, move_y + b * bend_x + d * bend_y
         half = 0.5 * (x * x + y * y)
         total = (STRAY * math.exp(-half / wide) + 1e-9) / wide

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reason why the ground is unobservable in a stance, as text: a kind, a colon, and details."""
+"""Doubts of the estimator: codes with two numbers, and their texts for people.
+
+The kind of a doubt is the part of its text before the colon.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +30,115 @@ the true friction of wet ground may be 1.5 times the expected one."""
 LIGHT = 0.3
 """Share of the expected load below which sensor noise hides the friction."""
 
-MOTION = 'motion unknown'
-"""Kind of doubt of a foot whose body estimate is in doubt; the doubt of the body follows."""
 
-OF_THE_GROUND = (
-    'not yet', 'domed', 'half inflated', 'light', 'turning', 'not pulled', 'undecided',
+TURNS = (
+    'the ordinary ones',
+    'force axes turned by about 90° about z',
+    'force axes turned by about -90° about z',
+    'force axes, or those of the position, turned by about 180° about z',
+    'left-handed, x of force or position has the wrong sign',
+    'left-handed, y of force or position has the wrong sign',
+    'left-handed, x and y of the force are exchanged',
+    'left-handed, x and y of the force are exchanged with wrong signs',
+)
+"""Turned or mirrored axes; their matrices are in :mod:`ros_pad.estimation.axes`."""
+
+
+class Doubt(NamedTuple):
+    """A reason why the ground is unobservable; a code and two numbers, whose meaning depends on it.
+
+    Attributes
+    ----------
+    code : int
+        Place in :data:`TABLE`; 0: no doubt.
+    a, b : float
+        Details.
+    """
+
+    code: int = 0
+    a: float = 0.0
+    b: float = 0.0
+
+
+class Row(NamedTuple):
+    """What a code means: its kind, the template of its details, and whether sensors are faulty."""
+
+    kind: str
+    details: str = ''
+    fault: bool = False
+
+
+TABLE = (
+    Row(''),
+    Row('not yet', 'has not stood'),
+    Row('not yet', 'has not stood since its sensors were in doubt'),
+    Row('domed', 'wet and dry ground feel alike'),
+    Row('half inflated', 'domes carry {a:.0f} % of the load'),
+    Row('light', '{a:.2g} N of {b:.2g} N'),
+    Row('turning', 'it takes up {a:.2f} of friction, pull {b:.2f}'),
+    Row('not pulled', 'T/N up to {a:.2f}, and wet ground holds {b:.2f}'),
+    Row('undecided', 'friction {a:.2f} ± {b:.2f} fits wet ground and dry'),
+    Row('motion unknown', 'the body is in doubt'),
+    Row('force stands still', '{a:.3g} N to the last digit', True),
+    Row('force stands still', 'reads exactly nothing', True),
+    Row('force out of range', '{axis} = {b:.3g} N', True),
+    Row('force out of range', '{axis} stays at {b:.3g} N', True),
+    Row('marker lost', 'last seen {a:.2g} s ago', True),
+    Row('marker stands still', 'to the last digit', True),
+    Row('marker leapt', '{a:.0f} mm', True),
+    Row('axes', '{turn}', True),
+    Row('axes', 'the normal force is along {sign}{axis} of the sensor, not z', True),
+    Row('axes', 'the sign of the force is turned, it pulls the foot down', True),
+    Row('axes', 'z of the position is turned, the foot swings below its stances', True),
+    Row('no wrench', 'for {a:.1f} s', True),
+    Row('no position', 'for {a:.1f} s', True),
+    Row('sample refused', 'for {a:.1f} s', True),
+    Row('no contact velocity', 'for {a:.1f} s', True),
 )  # fmt: skip
-"""Kinds of doubt about the ground; kinds of doubt about sensors are in
-:data:`ros_pad.estimation.sensing.SENSOR_FAULTS`."""
+"""What the codes mean; the last four come from :class:`ros_pad.estimation.stage.EstimationStage`.
+"""
+
+(
+    NONE, NOT_YET, NOT_AGAIN, ALL_DOME, HALF, FAINT, TURNING, NOT_PULLED, UNDECIDED, MOTION,
+    STILL, DEAD, RANGE, STUCK, LOST, MARKER_STILL, LEAPT,
+    TURNED, NORMAL, UPSIDE_DOWN, BELOW,
+    NO_WRENCH, NO_POSITION, REFUSED, NO_VELOCITY,
+) = range(len(TABLE))  # fmt: skip
+
+KINDS = tuple(dict.fromkeys(each.kind for each in TABLE))
+"""Kinds of doubt; the first one, empty, is no doubt."""
+
+FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
+"""Kinds of doubt about sensors, not about the ground."""
+
+
+def kind(code: float) -> str:
+    """Return the kind of a code."""
+    return TABLE[int(code)].kind
+
+
+def is_fault(code: float) -> bool:
+    """Return whether a code is a fault of the sensors."""
+    return TABLE[int(code)].fault
+
+
+def text(code: float, a: float = 0.0, b: float = 0.0) -> str:
+    """Return a doubt for people: its kind, a colon, and details; '' without one.
+
+    Examples
+    --------
+    >>> from ros_pad.estimation import doubt
+    >>> doubt.text(doubt.LOST, 0.2)
+    'marker lost: last seen 0.2 s ago'
+    """
+    row = TABLE[int(code)]
+    if not row.kind:
+        return ''
+    place = int(a) if 0.0 <= a < len(TURNS) else 0
+    details = row.details.format(
+        a=a, b=b, axis='xyz'[place % 3], sign='-' if b < 0.0 else '', turn=TURNS[place]
+    )
+    return f'{row.kind}: {details}'
 
 
 class StanceEvidence(NamedTuple):
@@ -67,49 +171,23 @@ class StanceEvidence(NamedTuple):
     friction_sd: float
 
 
-def doubt(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) -> str:
-    """Return why the ground is unobservable in a stance; '' if it is observable.
+def of_ground(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) -> Doubt:
+    """Return why the ground is unobservable in a stance; no doubt if it is observable.
 
     The expected load is in N; the friction is what feet expect of new ground.
     """
     if stance.dome_share > ALL_DOMED:
-        return 'domed: wet and dry ground feel alike'
+        return Doubt(ALL_DOME)
     if stance.dome_share > DOMED:
-        return f'half inflated: domes carry {100 * stance.dome_share:.0f} % of the load'
+        return Doubt(HALF, 100.0 * stance.dome_share)
     if abs(stance.log_odds) >= CONCLUSIVE:
-        return ''
+        return Doubt()
     if stance.peak_load < LIGHT * expected_load:
-        return f'light: {stance.peak_load:.2g} N of {expected_load:.2g} N'
+        return Doubt(FAINT, stance.peak_load, expected_load)
     if stance.turning_ratio > stance.peak_ratio:
-        return (
-            f'turning: it takes up {stance.turning_ratio:.2f} of friction, pull'
-            f' {stance.peak_ratio:.2f}'
-        )
+        return Doubt(TURNING, stance.turning_ratio, stance.peak_ratio)
     if stance.peak_ratio < PULLED * prior.flat_wet:
-        return (
-            f'not pulled: T/N up to {stance.peak_ratio:.2f}, and wet ground holds'
-            f' {prior.flat_wet:.2f}'
-        )
+        return Doubt(NOT_PULLED, stance.peak_ratio, prior.flat_wet)
     if not 1.0 - SURE < stance.wet_probability < SURE:
-        return ''
-    return (
-        f'undecided: friction {stance.friction_mean:.2f} ± {stance.friction_sd:.2f} fits wet'
-        f' ground ({prior.flat_wet:.2f}) and dry ({prior.flat_dry:.2f})'
-    )
-
-
-def text(code, a, b):
-    from ros_pad.estimation import DOUBTS
-
-    return DOUBTS[int(code)]
-
-
-def of_sensors(code):
-    from ros_pad.estimation import DOUBTS
-    from ros_pad.estimation import sensor_fault
-
-    return bool(sensor_fault(DOUBTS[int(code)]))
-
-
-def place(code):
-    return -1 if code != code else int(code)
+        return Doubt()
+    return Doubt(UNDECIDED, stance.friction_mean, stance.friction_sd)

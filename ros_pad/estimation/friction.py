@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 from typing import TypeAlias
 
 import numpy as np
@@ -22,11 +23,9 @@ from scipy import special
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import GRID
 from ros_pad.estimation.scales import Felt
-from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
-_SQUARES = GRID * GRID
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.
 _ONES = np.ones_like(GRID)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
@@ -68,6 +67,122 @@ of friction. A window may contain some stick, and feet turn more or less than as
 they hold, the slower they slip, and the more turning hides."""
 
 
+class Evidence(NamedTuple):
+    """Means of the samples of a foot over a time.
+
+    Attributes
+    ----------
+    ratio, ratio_noise : float
+        T/N and its standard deviation, > 0.
+    speed, speed_noise : float
+        Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
+    dt : float
+        Duration that the sample represents, s.
+    weight : float
+        Share of the sample that is new evidence, 0 to 1.
+    turning_known : bool
+        Whether T/N includes the friction used by turning; if not, that part is estimated from
+        the rim speed.
+    scales : tuple of float
+        Friction at the load of the sample over that at the load of the prior, on dry and on wet
+        ground.
+    """
+
+    ratio: float
+    ratio_noise: float
+    speed: float
+    speed_noise: float
+    dt: float
+    weight: float = 1.0
+    turning_known: bool = False
+    scales: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def stick(self) -> float:
+        """Density of this speed while the foot sticks, s/m."""
+        away = self.speed / self.speed_noise
+        return math.exp(-0.5 * away * away) / (_ROOT_2_PI * self.speed_noise)
+
+    @property
+    def slip(self) -> float:
+        """Density of this speed while it slips, s/m."""
+        swift = max(self.speed, 0.0) / SLIP_SPEED
+        return swift * math.exp(-swift) / SLIP_SPEED
+
+    @property
+    def rest(self) -> float:
+        """Density of this speed, T/N being the demand, while it sticks or creeps, s/m."""
+        density = self.stick
+        if self.speed > 0.0:
+            creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
+            density += CREEP * math.exp(-self.speed / creep) / creep
+        return density * math.exp(-self.ratio / DEMAND) / DEMAND
+
+    def shown(self, rim_speed: float) -> float:
+        """Return the share of the evidence that shows friction, not only wet or dry."""
+        if not self.speed > 0.0 or self.turning_known or not rim_speed > 0.0:
+            return 1.0
+        slid = self.slip / (self.slip + self.stick)
+        square = self.speed * self.speed
+        return 1.0 - slid * (1.0 - max(SLOWEST, square / (square + rim_speed**2)))
+
+
+class GroundModel:
+    """What is assumed of the ground below all feet; parameters as for :class:`GroundFilter`."""
+
+    def __init__(
+        self,
+        shared: FrictionScales,
+        wet_prior: float,
+        patch_length: float,
+        temper: float,
+        rim_speed: float,
+        model_error: float,
+    ) -> None:
+        self.shared = shared
+        self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
+        self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
+        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
+        error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
+        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
+        blur = (blur / blur.sum(axis=0)).T
+        # From a posterior to sums of the blurred one up to each edge, and to its moments.
+        self.sums = np.concatenate((np.zeros_like(_ONES)[:, None], blur.cumsum(axis=1)), axis=1)
+        self.moments = np.stack((blur.dot(GRID), blur.dot(GRID * GRID)), axis=1)
+
+    def likelihoods(self, samples: Sequence[Evidence]) -> np.ndarray:
+        """Return the likelihood of each sample, shape (samples, 2, grid)."""
+        friction = np.array([each.scales for each in samples])[:, :, None] * GRID
+        ratios, noises, rests = np.array(
+            [(each.ratio, each.ratio_noise, each.rest) for each in samples]
+        ).T[:, :, None, None]
+        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
+        # and T/N is μ less the part used by turning.
+        found: np.ndarray = special.ndtr((friction - ratios) / noises)
+        found *= rests
+        for each, mine, likelihood in zip(samples, friction, found, strict=True):
+            if each.speed > 0.0:
+                likelihood += self._slip(each, mine)
+        return found
+
+    def _slip(self, sample: Evidence, friction: np.ndarray) -> np.ndarray:
+        """Return the likelihood that a foot slips so, by its friction on dry and wet ground."""
+        shown, noise = friction, sample.ratio_noise
+        if not sample.turning_known:
+            left = sample.speed / np.hypot(sample.speed, self._rim_speeds)
+            shown = left * friction[:, None]
+        away = (shown - sample.ratio) / noise
+        away *= away
+        away *= -0.5
+        likely = np.exp(away, out=away)
+        if not sample.turning_known:
+            likely = _SHARES @ likely
+        # The exponential is the share of demands that friction does not meet.
+        likely *= np.exp(friction / -DEMAND)
+        likely *= sample.slip / (_ROOT_2_PI * noise)
+        return likely
+
+
 class GroundFilter:
     """Posterior of wet ground and friction for one foot.
 
@@ -90,15 +205,15 @@ class GroundFilter:
         Standard deviation of T/N as a measure of friction, > 0, in addition to
         :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
         reduce it.
+    model : GroundModel or None
+        All of these but the first, as several feet share them.
 
     Attributes
     ----------
     shared : FrictionScales
         As given.
-    prior : FrictionPrior
-        Friction by the contact model.
-    expected : FrictionPrior
-        Friction of new ground, median, by what the feet have learnt up to this stance.
+    expected : Expected
+        Friction of new ground by what the feet have learnt up to this stance.
     wet_probability : float
         Probability of wet ground, 0 to 1.
     scales : tuple of float
@@ -108,6 +223,11 @@ class GroundFilter:
         Change of the log odds of wet ground by this stance: about zero if it gave no evidence.
     """
 
+    __slots__ = (
+        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_travelled',
+        '_wet_before', 'expected', 'log_odds', 'scales', 'shared', 'wet_probability',
+    )  # fmt: skip
+
     def __init__(
         self,
         shared: FrictionScales,
@@ -116,67 +236,53 @@ class GroundFilter:
         temper: float = 0.5,
         rim_speed: float = 0.0,
         model_error: float = MODEL_ERROR,
+        model: GroundModel | None = None,
     ) -> None:
-        self.prior = shared.prior
+        self._model = model or GroundModel(
+            shared, wet_prior, patch_length, temper, rim_speed, model_error
+        )
         self.shared, self._foot = shared, shared.join()
-        self._grounds = np.array([[1.0 - wet_prior], [wet_prior]])
-        self._patch_length = patch_length
-        self._temper = temper
-        self._rim_speed = rim_speed
-        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
-        error = np.hypot(model_error, MODEL_SQUARE * _SQUARES)
-        blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
-        self._blur = blur / blur.sum(axis=0)
-        self._cumulated = np.zeros((2, len(EDGES)))
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self._travelled = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
-        self._expect(0.0)
-        self._posterior: np.ndarray = self._flat_prior
-        self.wet_probability = wet_prior
-        self._normalise(self._flat_prior)
+        self.expected = shared.expected(0.0)
+        self._normalise(self._model.grounds * self.expected.flat)
         self._begin()
-
-    def _expect(self, time: float) -> None:
-        """Expect what the feet have learnt up to a time, s."""
-        expected = self.shared.expected(time)
-        self._flat_prior = self._grounds * expected[:2]
-        self._priors = {False: expected[:2], True: expected[2:4]}
-        medians = [float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in expected[:3]]
-        self.expected = FrictionPrior(*medians)
-        self._undrained = expected[4]
 
     def _begin(self) -> None:
         """Begin to collect evidence of a stance."""
-        self._felt = np.zeros_like(self._posterior)
-        self._has_felt = False
+        self._felt: np.ndarray | None = None
         self._wet_before = self.wet_probability
 
     def touch_down(self, distance: float, dome: bool, time: float = 0.0) -> None:
         """Begin a stance at a distance, m, from the last one, as a dome or flat, at a time, s."""
-        if self._has_felt:
+        if self._felt is not None:
             # Stances on the same patch are no new evidence of what all patches have in common.
             since = self._travelled - self._counted[self._dome]
             self._counted[self._dome] = self._travelled
-            weight = -math.expm1(-since / self._patch_length)
+            weight = -math.expm1(-since / self._model.patch_length)
             self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
-        self._expect(time)
+        self.expected = self.shared.expected(time)
         if dome != self._dome:
             # The friction of one morphology gives no evidence of the friction of the other: keep
             # only the probability of wet ground.
             self._dome = dome
-            self._posterior = self._wet_or_dry() * self._priors[dome]
+            self._posterior = self._wet_or_dry() * self._priors
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self.fade(distance)
         if dome:
-            self._posterior[1] = self._undrained * self.wet_probability
+            self._posterior[1] = self.expected.undrained * self.wet_probability
             self._normalise(self._posterior)
         self._begin()
+
+    @property
+    def _priors(self) -> np.ndarray:
+        return self.expected.dome if self._dome else self.expected.flat
 
     def fade(self, distance: float) -> None:
         """Fade towards the prior over a distance, m, without measurements."""
@@ -186,9 +292,9 @@ class GroundFilter:
     def forget(self, time: float) -> None:
         """Return to the prior, and take back what the foot has shown to others, at a time, s."""
         self.shared.forget(self._foot)
-        self._expect(time)
+        self.expected = self.shared.expected(time)
         self._counted = {False: -math.inf, True: -math.inf}
-        self._normalise(self._grounds * self._priors[self._dome])
+        self._normalise(self._model.grounds * self._priors)
         self._begin()
 
     @property
@@ -202,130 +308,63 @@ class GroundFilter:
         self._normalise(grid)
         self._begin()
 
-    def update(
-        self,
-        ratio: float,
-        ratio_noise: float,
-        speed: float,
-        speed_noise: float,
-        dt: float,
-        weight: float = 1.0,
-        turning_known: bool = False,
-        scales: tuple[float, float] = (1.0, 1.0),
-    ) -> None:
-        """Process one sample of T/N and of slip speed.
+    def update(self, sample: Evidence) -> None:
+        """Process one sample of T/N and of slip speed."""
+        update([self], [sample])
 
-        Parameters
-        ----------
-        ratio, ratio_noise : float
-            T/N and its standard deviation, > 0.
-        speed, speed_noise : float
-            Slip speed, m/s, positive where the foot gives way, and its standard deviation, > 0.
-        dt : float
-            Duration that the sample represents, s.
-        weight : float
-            Share of the sample that is new evidence, 0 to 1.
-        turning_known : bool
-            Whether T/N includes the friction used by turning; if not, that part is estimated from
-            `rim_speed`.
-        scales : tuple of float
-            New value of the attribute.
-        """
-        self.scales = scales
-        friction = np.multiply.outer(scales, GRID)
-        away = (friction - ratio) / ratio_noise
-        stick = math.exp(-0.5 * (speed / speed_noise) ** 2) / (_ROOT_2_PI * speed_noise)
-        swift = max(speed, 0.0) / SLIP_SPEED
-        slip = swift * math.exp(-swift) / SLIP_SPEED
-        # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
-        # and T/N is μ less the part used by turning.
-        rest = stick
-        if speed > 0.0:
-            creep = CREEP_SPEED * (ratio + LEAST_PULL)
-            rest += CREEP * math.exp(-speed / creep) / creep
-        likelihood = (rest * math.exp(-ratio / DEMAND) / DEMAND) * special.ndtr(away)
-        if slip > 0.0:
-            if not turning_known:
-                left = speed / np.hypot(speed, self._rim_speeds)
-                away = (left * friction[:, None] - ratio) / ratio_noise
-            likely = np.exp(-0.5 * away * away)
-            if not turning_known:
-                likely = _SHARES @ likely
-            unmet = np.exp(friction / -DEMAND)  # share of demands that friction does not meet
-            likelihood += slip / (_ROOT_2_PI * ratio_noise) * unmet * likely
+    def _learn(self, sample: Evidence, after: np.ndarray, evidence: np.ndarray) -> None:
+        """Use the posterior after a sample, and the logarithm of what it shows of friction."""
+        self.scales = sample.scales
+        self._felt = evidence if self._felt is None else self._felt + evidence
         before = self.wet_probability
-        shown = 1.0
-        if slip > 0.0 and not turning_known and self._rim_speed > 0.0:
-            slid = slip / (slip + stick)
-            share = speed * speed / (speed * speed + self._rim_speed**2)
-            shown -= slid * (1.0 - max(SLOWEST, share))
-        self._multiply(np.log(likelihood + 1e-6) * (weight * self._temper), shown)
-        self._posterior /= self._posterior.sum()
-        dry, wet = self._posterior.dot(_ONES).tolist()
+        self._posterior = after
+        dry, wet = after.dot(_ONES).tolist()
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
-        if speed > 0.0:
-            self._move(speed * dt)
+        if sample.speed > 0.0:
+            self._move(sample.speed * sample.dt)
         if self._dome:
             # The film under domes drains during a stance, so friction rises on the same ground.
-            keep = math.exp(-dt / DRAINING_TIME)
+            keep = math.exp(-sample.dt / DRAINING_TIME)
             wet = self._posterior[1].dot(_ONES)
             self._posterior[1] *= keep
-            self._posterior[1] += (1.0 - keep) * wet * self._priors[True][1]
+            self._posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
             self._felt[1] *= keep
         self._normalise(self._posterior)
-
-    def _multiply(self, evidence: np.ndarray, shown: float) -> None:
-        """Multiply by a likelihood, given as logarithm; a share of it shows friction.
-
-        The rest shows only whether the ground is wet, or nothing under a dome.
-        """
-        if self._dome:
-            grounds = self._posterior.dot(_ONES)
-        elif shown < 1.0:
-            grounds = (self._posterior * np.exp(evidence)).dot(_ONES)
-        evidence *= shown
-        after = self._posterior * np.exp(evidence)
-        if self._dome or shown < 1.0:
-            rest = (grounds / after.dot(_ONES))[:, None]
-            after *= rest
-            if not self._dome:
-                evidence += np.log(rest)
-        self._felt += evidence
-        self._has_felt = True
-        self._posterior = after
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         self._travelled += distance
-        stay = math.exp(-distance / self._patch_length)
+        stay, grounds = math.exp(-distance / self._model.patch_length), self._model.grounds
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet
             # ground must not change.
             before = self._wet_or_dry()
-            grounds = stay * before + (1.0 - stay) * self._grounds
             friction = self._posterior / before
-            self._posterior = grounds * (stay * friction + (1.0 - stay) * self._priors[True])
+            friction = stay * friction + (1.0 - stay) * self.expected.dome
+            self._posterior = (stay * before + (1.0 - stay) * grounds) * friction
         else:
-            self._posterior = stay * self._posterior + (1.0 - stay) * self._flat_prior
+            new = ((1.0 - stay) * grounds) * self.expected.flat
+            self._posterior = stay * self._posterior + new
 
     def _wet_or_dry(self) -> np.ndarray:
-        return self._posterior.sum(axis=1, keepdims=True)
+        return self._posterior.dot(_ONES)[:, None]
 
     def _normalise(self, posterior: np.ndarray) -> None:
         # Without normalisation rounding errors would grow: after a hundred touch-downs the sum
         # would be zero.
-        self._posterior = posterior = posterior / posterior.sum()
         dry, wet = posterior.dot(_ONES).tolist()
+        self._posterior = posterior / (dry + wet)
         self.wet_probability = wet / (dry + wet)
-        self._blurred = posterior.dot(self._blur.T)
-        self._blurred /= dry + wet
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
-        scales = np.array(self.scales)
-        mean = float(scales.dot(self._blurred.dot(GRID)))
-        square = float((scales * scales).dot(self._blurred.dot(_SQUARES)))
+        (on_dry, dry_square), (on_wet, wet_square) = self._posterior.dot(
+            self._model.moments
+        ).tolist()
+        dry, wet = self.scales
+        mean = dry * on_dry + wet * on_wet
+        square = dry * dry * dry_square + wet * wet * wet_square
         return mean, math.sqrt(max(square - mean * mean, 0.0))
 
     def quantile(self, share: float) -> float:
@@ -339,8 +378,33 @@ class GroundFilter:
         """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
-        on_dry, on_wet = self._cumulated
-        np.add.accumulate(self._blurred, axis=1, out=self._cumulated[:, 1:])
-        below = on_dry + np.interp(edges, wet * EDGES, on_wet)
-        found: np.ndarray = np.interp(np.asarray(shares), below, edges)
+        on_dry, on_wet = self._posterior.dot(self._model.sums)
+        if dry != wet:
+            on_wet = np.interp(edges, wet * EDGES, on_wet)
+        found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
         return found
+
+
+def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
+    """Process one sample of each of several feet, which have one model, together."""
+    model = filters[0]._model
+    posterior = np.array([each._posterior for each in filters])
+    evidence = np.log(model.likelihoods(samples) + 1e-6)
+    evidence *= np.array([each.weight * model.temper for each in samples])[:, None, None]
+    # The share that does not show friction shows only whether the ground is wet, or nothing
+    # under a dome.
+    domes = np.array([each._dome for each in filters])
+    shown = np.array([each.shown(model.rim_speed) for each in samples])
+    after = posterior * np.exp(evidence)
+    grounds = after.dot(_ONES)
+    if domes.any() or (shown < 1.0).any():
+        grounds[domes] = posterior.dot(_ONES)[domes]
+        evidence *= shown[:, None, None]
+        after = posterior * np.exp(evidence)
+        rest = grounds / after.dot(_ONES)
+        after *= rest[:, :, None]
+        rest[domes] = 1.0
+        evidence += np.log(rest)[:, :, None]
+    after /= grounds.sum(axis=1)[:, None, None]
+    for each, sample, mine, felt in zip(filters, samples, after, evidence, strict=True):
+        each._learn(sample, mine, felt)

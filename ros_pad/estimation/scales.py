@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -137,6 +138,29 @@ class Felt(NamedTuple):
     weight: float
 
 
+class Expected:
+    """Friction that feet expect of new ground, from its probabilities, shape (5, grid).
+
+    Attributes
+    ----------
+    flat, dome : array (2, grid)
+        Probabilities on dry and on wet ground, of a dome once its film has drained.
+    undrained : array (grid,)
+        Those of a dome on wet ground before.
+    """
+
+    def __init__(self, rows: np.ndarray) -> None:
+        self.rows = rows
+        self.flat, self.dome, self.undrained = rows[:2], rows[2:4], rows[4]
+
+    @cached_property
+    def medians(self) -> FrictionPrior:
+        """Median for each ground and morphology."""
+        return FrictionPrior(
+            *(float(np.interp(0.5, np.cumsum(row), EDGES[1:])) for row in self.rows[:3])
+        )
+
+
 class FrictionScales:
     """Posterior of scale and spread of each class of friction, shared by the feet of a robot.
 
@@ -218,12 +242,8 @@ class FrictionScales:
             found[name] = Scale(math.exp(mean), sd)
         return found
 
-    def expected(self, time: float) -> np.ndarray:
-        """Return the probabilities of friction in a stance that begins at a time, s.
-
-        The rows of the array (5, grid) are a flat foot on dry and on wet ground, and a dome on dry
-        ground, on wet ground once the film has drained, and before.
-        """
+    def expected(self, time: float) -> Expected:
+        """Return what feet expect of a stance that begins at a time, s."""
         period = math.floor(time / PERIOD)
         if period <= self._period - 2:  # the clock has been set back: what is later is old
             self._update(time, math.inf)
@@ -242,12 +262,12 @@ class FrictionScales:
         if self._learns:
             self._felt.append(felt)
 
-    def _expected(self) -> np.ndarray:
+    def _expected(self) -> Expected:
         dry, wet, dome = (
             weights.dot(table) for weights, table in zip(self._weights, self._tables, strict=True)
         )
         drained = (1.0 - REWETTED) * self._films.dot(dome) + REWETTED * self._undrained
-        return np.array([dry, wet, dome, drained, self._undrained])
+        return Expected(np.array([dry, wet, dome, drained, self._undrained]))
 
     def _update(self, begin: float, end: float) -> None:
         """Use the stances between two times, s, sorted: feet may be read in any order."""

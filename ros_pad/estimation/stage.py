@@ -56,7 +56,7 @@ class Emission(NamedTuple):
     position: tuple[float, float] | None
 
 
-class OneStage:
+class EstimationStage:
     """Pair the wrenches of a foot with its positions, and emit the estimates.
 
     A wrench is paired with the position of the same time stamp, whichever arrives first. If the
@@ -282,104 +282,3 @@ def _check_size(name: str, values: tuple[float, ...], largest: float, unit: str)
                 f'{name} = {value!r} {unit} is not allowed: a number from {-largest:g} to'
                 f' {largest:g} {unit} is needed'
             )
-
-
-import numpy as np
-
-from ros_pad.estimation.foot import estimators_of
-from ros_pad.records import ESTIMATE
-from ros_pad.records import Block
-
-
-class EstimationStage:
-    def __init__(
-        self, foot, expected_load, tuning, legs, period_ns=CONTROL_PERIOD_NS, reject=None
-    ):
-        feet, shared = estimators_of(len(legs), foot, expected_load, tuning)
-        self.legs = []
-        self.pace = Pace(period_ns)
-        for leg, est in zip(legs, feet):
-            self.legs.append(
-                OneStage(
-                    est,
-                    1,
-                    lambda e: None,
-                    lambda d: None,
-                    (lambda er, leg=leg: reject(leg, er)) if reject else (lambda er: None),
-                )
-            )
-
-        class E:
-            pass
-
-        self.estimator = E()
-        self.estimator.shared = shared
-        self.estimator.feet = feet
-        self.estimator.noise_texts = lambda i: (
-            feet[i].noise.position.text('m'),
-            feet[i].noise.force.text('N'),
-        )
-        self.joints = tuning.source == 'joints'
-        self.load = np.full(len(legs), -np.inf)
-        self.pos = np.full((len(legs), 2), np.nan)
-        self.samples = 0
-        self.last_ns = 0
-
-    @property
-    def used(self):
-        return np.array([l.samples for l in self.legs])
-
-    def pressure(self, rows):
-        for l, p in zip(self.legs, rows['pressure'].tolist()):
-            l.pressure(p)
-
-    def process(self, block):
-        out = []
-        for stamp, rows in zip(block.stamps.tolist(), block.rows):
-            for i, (l, r) in enumerate(zip(self.legs, rows)):
-                f = r['force'].tolist()
-                if not math.isfinite(sum(f)):
-                    continue
-                m = float(r['moment'])
-                self.load[i] = max(self.load[i], f[2])
-                p = r['position'].tolist()
-                if math.isfinite(p[0]):
-                    self.pos[i] = p[:2]
-                if self.joints:
-                    v = r['variance'].tolist()
-                    inf = math.isinf(v[0])
-                    l.contact_velocity(
-                        stamp, *r['velocity'].tolist(), *([-1.0, -1.0] if inf else v)
-                    )
-                l.sample(stamp, tuple(f), None if math.isnan(m) else m, tuple(p))
-            self.samples += 1
-            self.last_ns = stamp
-            if self.pace.due(stamp):
-                out.append(self.estimate(stamp))
-                self.load[:] = -np.inf
-                self.pos[:] = np.nan
-        return out
-
-    def estimate(self, stamp):
-        rows = ESTIMATE.rows(len(self.legs))
-        for i, l in enumerate(self.legs):
-            e = l.estimator.estimate
-            rows[i]['position'] = self.pos[i]
-            rows[i]['load'] = self.load[i] if np.isfinite(self.load[i]) else np.nan
-            rows[i]['slip'] = e.slip_velocity
-            rows[i]['slip_speed'] = e.slip_speed
-            rows[i]['slip_speed_sd'] = e.slip_speed_sd
-            rows[i]['slipping'] = e.slipping
-            rows[i]['wetness'] = e.wet_probability
-            rows[i]['friction'] = e.friction_mean
-            rows[i]['friction_sd'] = e.friction_sd
-            rows[i]['margin'] = e.margin
-            from ros_pad.estimation import DOUBTS
-
-            rows[i]['doubt'] = DOUBTS.index(e.doubt.partition(':')[0])
-            rows[i]['detail'] = 0
-        return Block.of(stamp, rows)
-
-    def tick(self, now):
-        for l in self.legs:
-            l.tick(now)

@@ -159,7 +159,7 @@ class EstimatorNode(Node):
         if self._keep_pace.due(now_ns):
             self.keep_learnt()
         rows = self.stage.estimate(now_ns).rows[0]
-        sound = [not doubts.of_sensors(code) for code in rows['doubt'].tolist()]
+        sound = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
         if self._diagnostics_pace.due(now_ns) or sound != self._reported:
             self._reported = sound
             array = DiagnosticArray(status=self._statuses(rows, sound))

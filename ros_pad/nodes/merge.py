@@ -118,16 +118,7 @@ class MergeNode(Node):
             return
         stamp_ns = seconds * 1_000_000_000 + fraction or self.messages.now_ns()
         numbers = schemas.to_record(schema, np.array(values), self._ambient)
-        found = dict(zip(schema.columns, numbers.tolist(), strict=True))
-        assert schema.record
-        fields = {
-            field.name: [found[each] for each in field.columns]
-            if field.axes
-            else found[field.name]
-            for field in schema.record.fields
-            if field.columns[0] in found
-        }
-        record.add(leg, stamp_ns, fields)
+        record.add(leg, stamp_ns, dict(zip(schema.columns, numbers.tolist(), strict=True)))
 
     def _tick(self, now_ns: int) -> None:
         for record in self._records.values():
@@ -158,9 +149,9 @@ class _Record:
         self._node, self._topic, self._joiner = node, topic, joiner
         self._publish: Callable[[Block], None] | None = None
 
-    def add(self, leg: int, stamp_ns: int, fields: dict[str, Any]) -> None:
-        """Add what a message of a leg has: values of fields of the record."""
-        self._send(self._joiner.add(leg, stamp_ns, **fields))
+    def add(self, leg: int, stamp_ns: int, values: dict[str, float]) -> None:
+        """Add what a message of a leg has: numbers of the record, by column."""
+        self._send(self._joiner.add(leg, stamp_ns, values))
 
     def expire(self, now_ns: int) -> None:
         """Publish what has waited too long."""

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from numbers import Real
+from typing import NamedTuple
 from typing import Protocol
 from typing import runtime_checkable
 
@@ -16,8 +16,7 @@ CEILING = 90e3
 """Highest set-point of a regulator unless its options give another one, gauge Pa."""
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """State of a regulator at one moment.
 
     Parameters

@@ -192,9 +192,9 @@ class SimulatedRegulator:
     def read(self) -> Reading:
         """Return pad pressure and set-point at the present time of the clock."""
         channel = self._present()
-        self._check_answer(self._now)
         pressure = channel.pad_pressure
         if self._faults:
+            self._check_answer(self._now)
             pressure += self._drift()
         if self._noise:
             if self._now != self._disturbance_time:
@@ -254,12 +254,14 @@ class SimulatedRegulator:
         self._now = now
         elapsed = now - self._epoch
         steps = int(elapsed / STEP + _ROUNDING)
-        channel = self._channel
+        channel, setpoint = self._channel, self._channel.setpoint
         while self._steps < steps:
             count = 1
             if channel.settled:
-                count = max(1, int(min(steps - self._steps, channel.quiet_time / STEP)))
-            channel.step(channel.setpoint, count * STEP)
+                count = steps - self._steps
+                if self._faults:
+                    count = max(1, int(min(count, channel.quiet_time / STEP)))
+            channel.step(setpoint, count * STEP)
             self._steps += count
         rest = elapsed - steps * STEP
         self._rest = rest if rest > _ROUNDING * STEP else 0.0

@@ -8,7 +8,6 @@ A :class:`SupervisedChannel` stands between a controller and the regulator of on
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -16,7 +15,6 @@ from typing import NamedTuple
 from typing import Protocol
 
 from ros_pad.configuration import Setting
-from ros_pad.control.faults import NONE
 from ros_pad.control.faults import Fault
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
@@ -30,15 +28,12 @@ from ros_pad.regulators.protocol import Regulator
 from ros_pad.regulators.protocol import permitted
 
 SLEW_LIMIT = Setting(
-    'slew_limit', 0.0,
-    'Largest rate of change of the set-point in force, except for vents; 0: no limit.',
-    'Pa/s', 0.0, 1e7,
+    'slew_limit', 0.0, 'Largest rate of change of the set-point in force, except for vents; 0: no'
+    ' limit.', 'Pa/s', 0.0, 1e7,
 )  # fmt: skip
 CEILING_TOLERANCE = Setting(
-    'ceiling_tolerance', 0.02,
-    'Share of the ceiling by which the pressure of a pad may exceed the ceiling; above that, the'
-    ' pad is vented and held.',
-    '', 0.005, 0.2,
+    'ceiling_tolerance', 0.02, 'Share of the ceiling by which the pressure of a pad may exceed the'
+    ' ceiling; above that, the pad is vented and held.', '', 0.005, 0.2,
 )  # fmt: skip
 ON_FAULT = Setting(
     'on_fault', 'report', 'Reaction to a faulty pad: only report it, or vent and hold it.',
@@ -278,7 +273,7 @@ class SupervisedChannel:
         self.active = False
         self.held = ''
         self.commanded_ns: int | None = None
-        self._hold = NONE
+        self._hold = Kind.NONE()
         self._log: Log = log or NoLog()
         self._device_faults: tuple[str, ...] = ()
 
@@ -291,9 +286,8 @@ class SupervisedChannel:
     def present(self) -> Fault:
         """The fault for records: of pad or device, or that for which the pad is held."""
         monitor = self.monitor
-        if self._device_faults:
-            return monitor.silence or Kind.DEVICE()
-        return monitor.silence or monitor.fault or self._hold
+        device = Kind.DEVICE() if self._device_faults else None
+        return monitor.silence or device or monitor.fault or self._hold
 
     @property
     def sags(self) -> bool:
@@ -318,7 +312,7 @@ class SupervisedChannel:
 
     def activate(self, elapsed_ns: int) -> None:
         """Accept commands from now on, at a time, ns, also of a pad that was held."""
-        self.held, self._hold = '', NONE
+        self.held, self._hold = '', Kind.NONE()
         self.monitor = PadMonitor(self.outlet.regulator.ceiling)
         # The monitor reports a silent device only after a first reading.
         self.monitor.update(elapsed_ns * 1e-9, None, self.pressure)
@@ -430,19 +424,16 @@ class SupervisedChannel:
         self._continue(elapsed_ns)
         return pressure
 
-    def row(self, elapsed_ns: int) -> tuple[float, float, float, float, tuple[float, float]]:
+    def row(self, elapsed_ns: int) -> tuple[Any, ...]:
         """Read the device at a time, ns, and return the row of a PRESSURE record."""
-        pressure, setpoint, pad, fault = (
-            self.read(elapsed_ns),
-            self.setpoint,
-            math.nan,
-            self.present,
-        )
-        if pressure is None:
-            pressure = setpoint = math.nan
-        with suppress(PadError):  # of a device that is closed
-            pad = getattr(self.outlet.regulator, 'pad_pressure', pad)
-        return pressure, setpoint, pad, fault.kind.code, fault[1:]
+        pressure = self.read(elapsed_ns)
+        fault = self.present
+        try:
+            pad = getattr(self.outlet.regulator, 'pad_pressure', math.nan)
+        except PadError:  # the device is closed
+            pad = math.nan
+        known = (math.nan, math.nan) if pressure is None else (pressure, self.setpoint)
+        return *known, pad, fault.kind.code, fault[1:]
 
     def vent(self, reason: str) -> None:
         """Vent the pad; a failure is logged, and the next tick tries again."""

@@ -40,14 +40,12 @@ def draw(path: str | os.PathLike[str], replay: Replay) -> None:
 
 
 def _figure(replay: Replay) -> Figure:
-    ambient = replay.settings.ambient_pressure
     figure = Figure(figsize=(WIDE, 0.9 + 0.95 * len(replay.legs)), layout='constrained')
     grid = figure.subplots(len(replay.legs), 2, sharex=True, sharey='col', squeeze=False)
     for (wet, pressure), leg in zip(grid, replay.legs, strict=True):
         for tracks, look in ((replay.recorded, RECORDED), (replay.replayed, REPLAYED)):
             _steps(wet, tracks[leg, 'wetness'], replay.start_ns, look)
-            setpoints = tracks[leg, 'pressure_setpoint']
-            _steps(pressure, setpoints, replay.start_ns, look, 1e-3, ambient)
+            _steps(pressure, tracks[leg, 'setpoint'], replay.start_ns, look, 1e-3)
         wet.set_ylabel(f'leg {leg}', rotation=0, ha='right', va='center')
     grid[0, 0].set_title('P(wet)')
     grid[0, 1].set_title('set-point, kPa gauge')
@@ -57,7 +55,7 @@ def _figure(replay: Replay) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel('time, s')
         axes.set_xlim(0.0, max(replay.duration_s, 1e-3))
-    anything = any(len(track) for track in replay.recorded.values())
+    anything = any(len(track.times) for track in replay.recorded.values())
     lines = [
         Line2D([], [], label='recorded' if anything else 'recorded (none)', **RECORDED),
         Line2D([], [], label='replayed', **REPLAYED),
@@ -67,14 +65,10 @@ def _figure(replay: Replay) -> Figure:
 
 
 def _steps(
-    axes: Axes,
-    track: Track,
-    start_ns: int,
-    look: dict[str, Any],
-    scale: float = 1.0,
-    zero: float = 0.0,
+    axes: Axes, track: Track, start_ns: int, look: dict[str, Any], scale: float = 1.0
 ) -> None:
-    if not len(track):
-        return
-    time = (np.array(track.times, dtype=np.int64) - start_ns) * 1e-9
-    axes.plot(time, scale * (track.values[:, 0] - zero), drawstyle='steps-post', **look)
+    # Ticks may add commands without set-points.
+    known = np.isfinite(track.values[:, 0])
+    if known.any():
+        time, values = (track.times[known] - start_ns) * 1e-9, track.values[known, 0]
+        axes.plot(time, scale * values, drawstyle='steps-post', **look)

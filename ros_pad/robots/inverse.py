@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import sub
 
 import numpy as np
 
@@ -121,7 +122,9 @@ class LegSolver:
         thigh = math.remainder(math.atan2(v, u) - end - self._start, math.tau)
         knee = math.remainder(self._sense * (fold - self._fold), math.tau)
         found = [hip, thigh, knee]
-        return self._near_home(found) if self._far else found
+        if self._far and max(map(abs, map(sub, found, self._home))) > math.pi:
+            return self._near_home(found)
+        return found
 
     @staticmethod
     def _cosine(side: float, size: float) -> float:
@@ -147,9 +150,7 @@ class LegSolver:
     def _near_home(self, angles: Sequence[float]) -> list[float]:
         """Return the same angles, rad, at most half a turn from home."""
         return [
-            angle
-            if abs(home - angle) <= math.pi
-            else angle + math.tau * round((home - angle) / math.tau)
+            angle + math.tau * round((home - angle) / math.tau)
             for angle, home in zip(angles, self._home, strict=True)
         ]
 

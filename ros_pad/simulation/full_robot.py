@@ -201,7 +201,6 @@ class FullRobot:
             if not abs(where[0]) < _FAR:
                 self._end('the solution of MuJoCo has diverged')
                 return
-            soles.read()
         soles.update()
         self._judge()
 
@@ -250,16 +249,18 @@ class _Senses:
         self._period = period
         self._moving = slice(6, 6 + len(robot.joint_names))
         self._turns = data.geom_xmat[first : first + len(scene.legs)].reshape(-1, 3, 3)
+        self._now = data.qpos, data.qvel
         self._before = data.qpos.copy(), data.qvel.copy()  # a step ago
 
     def note(self) -> None:
         """Note places and speeds at the beginning of a step."""
-        self._before[0][:], self._before[1][:] = self._data.qpos, self._data.qvel
+        for before, now in zip(self._before, self._now, strict=True):
+            np.copyto(before, now)
 
     def read(self, forces: Array) -> Proprioception:
         """Return what they measure at forces on the feet, N, (feet, 3)."""
         data, to_imu, moving = self._data, self._imu[:3, :3], self._moving
-        turn, after = self._motion(data.qpos, data.qvel)
+        turn, after = self._motion(*self._now)
         pull = (after - self._motion(*self._before)[1]) / self._period - self._gravity
         # The damping of the joints is the back-EMF of their motors.
         efforts = data.qfrc_actuator[moving] + data.qfrc_passive[moving]

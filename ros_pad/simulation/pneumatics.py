@@ -7,11 +7,12 @@ than NumPy for single values.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import field
 from itertools import pairwise
 
 from ros_pad.configuration import instance
@@ -191,6 +192,7 @@ class Hose:
     length: float
     measured_conductance: float | None = None
     measured_critical_ratio: float | None = None
+    _law: tuple[float, float, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         number('hose_diameter', self.inner_diameter, 'm', 0.5e-3, 20e-3)
@@ -199,8 +201,10 @@ class Hose:
             number('hose_conductance', self.measured_conductance, 'm³/(s Pa)', 1e-12, 1e-5)
         if self.measured_critical_ratio is not None:
             number('hose_critical_ratio', self.measured_critical_ratio, '(ratio)', 0.0, 0.9)
+        law = self.sonic_conductance, self.critical_ratio, self._laminar
+        object.__setattr__(self, '_law', law)  # every step needs it
 
-    @cached_property
+    @property
     def volume(self) -> float:
         """Volume of the bore, m³."""
         return math.pi / 4.0 * self.inner_diameter**2 * self.length
@@ -210,7 +214,7 @@ class Hose:
         """Part of the bore behind the resistance, m³."""
         return self.volume if self.measured_conductance is not None else 0.5 * self.volume
 
-    @cached_property
+    @property
     def sonic_conductance(self) -> float:
         """Sonic conductance C, m³/(s Pa)."""
         if self.measured_conductance is not None:
@@ -218,14 +222,14 @@ class Hose:
         d = self.inner_diameter
         return 0.029 * d * d / math.sqrt(self.length / d**1.25 + 510.0)
 
-    @cached_property
+    @property
     def critical_ratio(self) -> float:
         """b, the ratio of absolute pressures, downstream over upstream, where choking begins."""
         if self.measured_critical_ratio is not None:
             return self.measured_critical_ratio
         return 474.0 * self.sonic_conductance / self.inner_diameter**2
 
-    @cached_property
+    @property
     def _laminar(self) -> float:
         """Laminar mass flow over the difference of squared pressures, kg/(s Pa²)."""
         if not self.length:
@@ -246,9 +250,173 @@ class Hose:
         float
             Conductance, kg/(s Pa), finite and positive also where the pressures are equal.
         """
-        turbulent = conductance(self.sonic_conductance, self.critical_ratio, first, second)
-        laminar = self._laminar * (first + second)
+        sonic, ratio, slope = self._law
+        turbulent = conductance(sonic, ratio, first, second)
+        laminar = slope * (first + second)
         return laminar if laminar < turbulent else turbulent
+
+
+class Outlet:
+    """A regulator with what it makes of its set-points, and the pressure at its outlet.
+
+    Parameters
+    ----------
+    model : RegulatorModel
+        The regulator.
+
+    Attributes
+    ----------
+    pressure : float
+        Pressure at the outlet, gauge Pa.
+    setpoint : float
+        The last set-point commanded, gauge Pa.
+    target : float
+        The set-point that is followed, after dead band and dead time, gauge Pa.
+    pending : tuple of (float, float)
+        Targets in dead time: when they are due, s, and gauge Pa.
+    """
+
+    def __init__(self, model: RegulatorModel) -> None:
+        self.model = model
+        self.pressure = self.setpoint = self.target = 0.0
+        self.pending: tuple[tuple[float, float], ...] = ()
+        self._rate = 0.0
+        self._accepted = 0.0  # the set-point that the dead band compares with
+        self._reference = 0.0  # the target after the slew limit, Pa
+        self._transition = (0.0, model.transition(0.0))
+
+    def command(self, setpoint: float, time: float) -> bool:
+        """Round a new set-point and, outside the dead band, queue it for the dead time.
+
+        Return whether it is outside.
+        """
+        model = self.model
+        number('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
+        self.setpoint = setpoint
+        target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
+        target = min(target, model.full_scale)  # full scale need not be a multiple of the quantum
+        moved = abs(target - self._accepted)
+        follows = moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0)
+        if follows:
+            self._accepted = target
+            self.pending = (*self.pending, (time + model.dead_time, target))
+        return follows
+
+    def slope(self, h: float) -> tuple[float, float]:
+        """Return how fast the reference rises, Pa/s, and for how long at most, s, at least h."""
+        away = self.target - self._reference
+        if not away:
+            return 0.0, h
+        limit = self.model.slew_limit
+        if abs(away) <= limit * _INSTANT:
+            self._reference = self.target
+            return 0.0, h
+        return math.copysign(limit, away), min(h, abs(away) / limit)
+
+    def move(self, h: float, slope: float, hardware: Condition) -> None:
+        """Move by the exact response of the regulator over a time h, s, within its limits."""
+        model = self.model
+        if h != self._transition[0]:
+            self._transition = h, model.transition(h)
+        ff, fr, rf, rr = self._transition[1]
+        # The regulator controls the reading of its sensor, except with an open exhaust.
+        aim = self._reference - hardware.offset if self._reference else 0.0
+        # A second-order system follows a ramp with a constant lag; the rest of its motion decays.
+        lag = 2.0 * model.damping * slope / model.natural_frequency
+        error = self.pressure - aim + lag
+        rate = self._rate - slope
+        self._reference += slope * h
+        if hardware.stuck:
+            outlet, self._rate = self.pressure, 0.0
+        else:
+            outlet = aim + slope * h - lag + ff * error + fr * rate
+            self._rate = slope + rf * error + rr * rate
+        highest = model.full_scale if hardware is SOUND else min(model.full_scale, hardware.supply)
+        if not 0.0 <= outlet <= highest:
+            # Neither the exhaust nor the supply can move the outlet pressure further.
+            outlet = 0.0 if outlet < 0.0 else highest
+            self._rate = 0.0
+        self.pressure = outlet
+
+    def settle(self) -> bool:
+        """End the motion where the outlet is at the target and nothing is pending.
+
+        Return whether it has ended.
+        """
+        settled = (
+            abs(self.pressure - self.target) < _SETTLED
+            and abs(self._rate) < _SETTLED * self.model.natural_frequency
+            and self._reference == self.target
+            and not self.pending
+        )
+        if settled:
+            self.pressure, self._rate = self.target, 0.0
+        return settled
+
+
+class PadAir:
+    """Air in a pad, its chamber and the hose, over the pressure in the pad.
+
+    Parameters
+    ----------
+    pad_volume : float or callable
+        As for :class:`PneumaticChannel`.
+    hose : Hose
+        The hose behind the regulator.
+    ambient, full_scale : float
+        Ambient pressure, absolute Pa, and highest pressure, gauge Pa.
+
+    Attributes
+    ----------
+    before : float
+        Volume of the hose before its resistance, m³.
+    """
+
+    def __init__(
+        self,
+        pad_volume: float | Callable[[float], float],
+        hose: Hose,
+        ambient: float,
+        full_scale: float,
+    ) -> None:
+        if callable(pad_volume):
+            self._cell = full_scale / _CELLS
+            pressures = [i * self._cell for i in range(_CELLS + 1)]
+            volumes = [pad_volume(pressure) for pressure in pressures]
+        else:
+            self._cell = full_scale
+            pressures = [0.0, self._cell]
+            volumes = [pad_volume, pad_volume]
+        for pressure, volume in zip(pressures, volumes, strict=True):
+            number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
+        self.before = hose.volume - hose.volume_behind
+        # Content p V in Pa m³, and its slope, the capacity, in m³.
+        contents = [
+            (p + ambient) * (float(v) + hose.volume_behind)
+            for p, v in zip(pressures, volumes, strict=True)
+        ]
+        capacities = [(high - low) / self._cell for low, high in pairwise(contents)]
+        if min(capacities) <= 0.0:
+            raise InvalidInput(
+                'pad_volume falls too fast with the pressure: pressure (absolute) times volume'
+                ' must grow with the pressure'
+            )
+        cells = [
+            (content, capacity, REFERENCE_PRESSURE / (REFERENCE_DENSITY * capacity), pressure)
+            for content, capacity, pressure in zip(
+                contents[:-1], capacities, pressures[:-1], strict=True
+            )
+        ]
+        self._cells = [*cells, cells[-1]]  # the last one is also that of full scale
+
+    def stiffness(self, pressure: float) -> float:
+        """Return the rise of the pressure with the mass of air, Pa/kg, at a gauge pressure, Pa."""
+        return self._cells[int(pressure / self._cell)][2]
+
+    def content(self, pressure: float) -> float:
+        """Return pressure times volume behind the resistance, Pa m³, at a gauge pressure, Pa."""
+        content, capacity, _, start = self._cells[int(pressure / self._cell)]
+        return content + capacity * (pressure - start)
 
 
 class PneumaticChannel:
@@ -270,12 +438,8 @@ class PneumaticChannel:
 
     Attributes
     ----------
-    outlet_pressure : float
-        Pressure at the outlet of the regulator, gauge Pa, in [0, full scale], also with faults.
     pad_pressure : float
         Pressure in the pad, gauge Pa, in [0, full scale], also with faults.
-    setpoint : float
-        The last set-point commanded, gauge Pa.
     settled : bool
         Whether the pressures are constant, so that further steps with the same set-point return at
         once; False while a fault acts on the air.
@@ -324,53 +488,40 @@ class PneumaticChannel:
         instance('regulator', regulator, RegulatorModel)
         instance('hose', hose, Hose)
         number('ambient', ambient, 'Pa (absolute)', 1e3, 2e5)
-        self.regulator = regulator
         self.hose = hose
-        self.outlet_pressure = 0.0
         self.pad_pressure = 0.0
-        self.setpoint = 0.0
         self.settled = not faults  # a fault may act from the beginning
         self._ambient = ambient
         self._faults = tuple(faults)
         self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
-        self._outlet_rate = 0.0
         self._time = 0.0
         self._origin = 0.0  # time on the schedule of faults at which this channel started, s
-        self._accepted = 0.0  # the set-point that the dead band compares with
-        self._pending: tuple[tuple[float, float], ...] = ()  # (due time, target), dead time
-        self._target = 0.0
-        self._reference = 0.0  # the target after the slew limit, Pa
-        self._transition_time = 0.0
-        self._transition = regulator.transition(0.0)
-        self._tabulate(pad_volume)
-        self._content = self._contents[0] + self._before * ambient
+        self._outlet = Outlet(regulator)
+        self._air = PadAir(pad_volume, hose, ambient, regulator.full_scale)
+        self._content = self._air.content(0.0) + self._air.before * ambient
         self._drawn = 0.0
 
-    def _tabulate(self, pad_volume: float | Callable[[float], float]) -> None:
-        """Tabulate the gas content p V in Pa m³ and its slope, the capacity, in m³."""
-        if callable(pad_volume):
-            self._cell = self.regulator.full_scale / _CELLS
-            pressures = [i * self._cell for i in range(_CELLS + 1)]
-            volumes = [pad_volume(pressure) for pressure in pressures]
-        else:
-            self._cell = self.regulator.full_scale
-            pressures = [0.0, self._cell]
-            volumes = [pad_volume, pad_volume]
-        for pressure, volume in zip(pressures, volumes, strict=True):
-            number(f'pad_volume at {pressure:g} Pa', volume, 'm³', 1e-9, 1e-2)
-        hose = self.hose
-        self._before = hose.volume - hose.volume_behind
-        self._contents = [
-            (p + self._ambient) * (float(v) + hose.volume_behind)
-            for p, v in zip(pressures, volumes, strict=True)
-        ]
-        self._capacities = [(high - low) / self._cell for low, high in pairwise(self._contents)]
-        if min(self._capacities) <= 0.0:
-            raise InvalidInput(
-                'pad_volume falls too fast with the pressure: pressure (absolute) times volume'
-                ' must grow with the pressure'
-            )
-        self._last_cell = len(self._capacities) - 1
+    def __copy__(self) -> PneumaticChannel:
+        """Return a channel in the same state, which moves on its own."""
+        twin = object.__new__(PneumaticChannel)
+        twin.__dict__.update(self.__dict__)
+        twin._outlet = copy.copy(self._outlet)
+        return twin
+
+    @property
+    def regulator(self) -> RegulatorModel:
+        """The regulator."""
+        return self._outlet.model
+
+    @property
+    def outlet_pressure(self) -> float:
+        """Pressure at the outlet of the regulator, gauge Pa, in [0, full scale]."""
+        return self._outlet.pressure
+
+    @property
+    def setpoint(self) -> float:
+        """The last set-point commanded, gauge Pa."""
+        return self._outlet.setpoint
 
     @property
     def air_used(self) -> float:
@@ -417,10 +568,11 @@ class PneumaticChannel:
         """
         if not 0.0 <= dt < math.inf:
             raise InvalidInput(f'dt = {dt!r} s is not allowed: it must be finite and not negative')
-        if setpoint != self.setpoint:
-            self._command(setpoint)
+        outlet = self._outlet
+        if setpoint != outlet.setpoint and outlet.command(setpoint, self._time):
+            self.settled = False
         while dt > _INSTANT:
-            sound = self.quiet_time
+            sound = self.quiet_time if self._edges else math.inf
             if self.settled:
                 h = min(dt, sound)
                 self._time += h
@@ -429,74 +581,35 @@ class PneumaticChannel:
                 continue
             h = dt if dt <= MAX_STEP else dt / math.ceil(dt / MAX_STEP)
             h = min(h, sound)
-            if self._pending:
-                due, target = self._pending[0]
+            if outlet.pending:
+                due, target = outlet.pending[0]
                 if due - self._time <= _INSTANT:
-                    self._target = target
-                    self._pending = self._pending[1:]
+                    outlet.target, outlet.pending = target, outlet.pending[1:]
                     continue
                 h = min(h, due - self._time)
-            slope = 0.0
-            if self._reference != self._target:
-                limit = self.regulator.slew_limit
-                away = self._target - self._reference
-                if abs(away) <= limit * _INSTANT:
-                    self._reference = self._target
-                else:
-                    h = min(h, abs(away) / limit)
-                    slope = math.copysign(limit, away)
+            slope, h = outlet.slope(h)
             self._advance(h, slope)
             dt -= h
         return self.pad_pressure
 
-    def _command(self, setpoint: float) -> None:
-        """Round a new set-point and, outside the dead band, queue it for the dead time."""
-        model = self.regulator
-        number('setpoint', setpoint, 'Pa', 0.0, model.full_scale)
-        self.setpoint = setpoint
-        target = model.quantum * round(setpoint / model.quantum) if model.quantum else setpoint
-        target = min(target, model.full_scale)  # full scale need not be a multiple of the quantum
-        moved = abs(target - self._accepted)
-        if moved > model.dead_band * model.full_scale or (target == 0.0 and moved > 0.0):
-            self._accepted = target
-            self._pending = (*self._pending, (self._time + model.dead_time, target))
-            self.settled = False
-
     def _advance(self, h: float, slope: float) -> None:
         """Move regulator and pad by a time h, s, with a reference that rises at a slope, Pa/s."""
-        # Steps end where a fault starts or ends: a fault at mid-step acts during the whole step.
-        now = self.time
-        hardware = self._hardware(now + 0.5 * h, now + h) if self._faults else SOUND
-        start = self.outlet_pressure
-        self._move_outlet(h, slope, hardware)
+        outlet, hardware = self._outlet, SOUND
+        if self._faults:
+            # Steps end where a fault starts or ends: one at mid-step acts during the whole step.
+            now = self.time
+            hardware = self._hardware(now + 0.5 * h, now + h)
+        start = outlet.pressure
+        outlet.move(h, slope, hardware)
         self._move_pad(h, start, hardware.leak)
         self._time += h
-        self._settle()
-
-    def _move_outlet(self, h: float, slope: float, hardware: Condition) -> None:
-        """Move the outlet by the exact response of the regulator, within its limits."""
-        model = self.regulator
-        if h != self._transition_time:
-            self._transition_time, self._transition = h, model.transition(h)
-        ff, fr, rf, rr = self._transition
-        # The regulator controls the reading of its sensor, except with an open exhaust.
-        aim = self._reference - hardware.offset if self._reference else 0.0
-        # A second-order system follows a ramp with a constant lag; the rest of its motion decays.
-        start = self.outlet_pressure
-        lag = 2.0 * model.damping * slope / model.natural_frequency
-        error = start - aim + lag
-        rate = self._outlet_rate - slope
-        self._reference += slope * h
-        outlet = aim + slope * h - lag + ff * error + fr * rate
-        self._outlet_rate = slope + rf * error + rr * rate
-        if hardware.stuck:
-            outlet, self._outlet_rate = start, 0.0
-        highest = min(model.full_scale, hardware.supply)
-        if not 0.0 <= outlet <= highest:
-            # Neither the exhaust nor the supply can move the outlet pressure further.
-            outlet = 0.0 if outlet < 0.0 else highest
-            self._outlet_rate = 0.0
-        self.outlet_pressure = outlet
+        if (
+            abs(self.pad_pressure - outlet.target) < _SETTLED
+            and (not self._faults or self._sound_for_now())
+            and outlet.settle()
+        ):
+            self._fill(outlet.target)
+            self.settled = True
 
     def _move_pad(self, h: float, start: float, leak: float) -> None:
         """Move the pad by a time h, s, in which the outlet moved linearly from ``start``, Pa.
@@ -505,36 +618,21 @@ class PneumaticChannel:
         Together they draw it to a share of the outlet's pressure. gap = pad - share outlet obeys
         gap' = -relaxation gap - ramp.
         """
-        outlet = self.outlet_pressure
-        relaxation, share = self._relaxation(start, self.pad_pressure, leak)
-        gap = self.pad_pressure - share * start
+        outlet, before = self._outlet.pressure, self.pad_pressure
+        relaxation, share = self._relaxation(start, before, leak)
+        gap = before - share * start
         ramp = share * (outlet - start) / h
         done = -math.expm1(-0.5 * relaxation * h)
         middle = 0.5 * (start + outlet)
         pad = share * middle + gap - (gap + ramp / relaxation) * done
         relaxation, share = self._relaxation(middle, pad, leak)
-        gap = self.pad_pressure - share * start
+        gap = before - share * start
         ramp = share * (outlet - start) / h
         done = -math.expm1(-relaxation * h)
         lost = 0.0
         if leak:
             lost = self._leaking(pad, leak) * pad * h * REFERENCE_PRESSURE / REFERENCE_DENSITY
         self._fill(share * outlet + gap - (gap + ramp / relaxation) * done, lost)
-
-    def _settle(self) -> None:
-        """End the motion where pad and outlet are at the target and nothing is pending."""
-        if (
-            abs(self.pad_pressure - self._target) < _SETTLED
-            and abs(self.outlet_pressure - self._target) < _SETTLED
-            and abs(self._outlet_rate) < _SETTLED * self.regulator.natural_frequency
-            and self._reference == self._target
-            and not self._pending
-            and (not self._faults or self._sound_for_now())
-        ):
-            self.outlet_pressure = self._target
-            self._outlet_rate = 0.0
-            self._fill(self._target)
-            self.settled = True
 
     def _hardware(self, during: float, time: float) -> Condition:
         """Return the condition at a time, s, by the faults that act at the time ``during``, s."""
@@ -551,13 +649,12 @@ class PneumaticChannel:
 
         Return this share, too.
         """
-        capacity = self._capacities[min(int(pad / self._cell), self._last_cell)]
-        inflow = self.hose.conductance(outlet + self._ambient, pad + self._ambient)
-        scale = REFERENCE_PRESSURE / (REFERENCE_DENSITY * capacity)
+        air, ambient = self._air, self._ambient
+        inflow = self.hose.conductance(outlet + ambient, pad + ambient)
         if not leak:
-            return inflow * scale, 1.0
+            return inflow * air.stiffness(pad), 1.0
         total = inflow + self._leaking(pad, leak)
-        return total * scale, inflow / total
+        return total * air.stiffness(pad), inflow / total
 
     def _leaking(self, pad: float, leak: float) -> float:
         """Return the conductance of a leak at the pad, kg/(s Pa)."""
@@ -565,9 +662,8 @@ class PneumaticChannel:
 
     def _fill(self, pressure: float, lost: float = 0.0) -> None:
         """Set the pad's pressure, Pa, and add the air drawn; ``lost`` is the air leaked, Pa m³."""
-        cell = min(int(pressure / self._cell), self._last_cell)
-        content = self._contents[cell] + self._capacities[cell] * (pressure - cell * self._cell)
-        content += self._before * (self.outlet_pressure + self._ambient)
+        content = self._air.content(pressure)
+        content += self._air.before * (self._outlet.pressure + self._ambient)
         if content + lost > self._content:
             self._drawn += content + lost - self._content
         self._content = content

@@ -76,10 +76,12 @@ class Servos:
 
     def _led(self, before: Sequence[float]) -> Array:
         """Return set-points that lead by what carries the robot and overcomes the damping."""
-        servo, stands = self._servo, [not swings for swings in self.path.swings]
+        robot, servo = self._robot, self._servo
+        stands = [not swings for swings in self.path.swings]
         aim = np.array(self.targets)
         share = np.array(stands) * self._weight / max(sum(stands), 1)
-        torque = -share[:, None] * self._robot.foot_jacobians(aim)[:, 2]
+        jacobians = robot.chains.solve(aim.reshape(robot.home.shape)).jacobians
+        torque = -share[:, None] * jacobians[:, 2]
         speed = (aim - before) / self._period
         return np.asarray(aim + (torque.ravel() + servo.damping * speed) / servo.stiffness)
 

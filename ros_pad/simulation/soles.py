@@ -131,31 +131,33 @@ class Soles:
         self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
         self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
         self._felt = data.sensordata  # force and moment of each foot's contact
-        # The axes of a contact with level ground are z, y, -x.
-        self._order = (6 * np.arange(count) + np.array([[2], [1], [0], [3]])).ravel()
-        self._rows = np.zeros((7, count))  # of `contacts`, whose rows are columns here
-        self._zeros, self._gives = np.zeros(count), np.full((2, count), 1.0 / foot.shear_stiffness)
-        self._shear = np.full((3, count), POINT)
-        self._views = (
-            self._rows[:4], self._rows[:4].reshape(-1), self._rows[0], self._rows[:2],
-            self._shear[:2], self._places.T, self._rows[4:],
-        )  # fmt: skip
-        self._loads = [0.0] * count
+        self._loads = self._felt[::6]
+        # The axes of a contact with level ground are z, y, -x. Rows of this table are force x, y
+        # and z, moment, and what lies between contact and marker; `contacts` has them as columns.
+        order = 6 * np.arange(count) + np.array([[2], [1], [0], [3], [2], [1]])
+        give = 1.0 / foot.shear_stiffness
+        self._order = order.ravel()
+        self._factors = np.repeat((-1.0, 1.0, 1.0, 1.0, -give, give, POINT), count)
+        self._raw = np.ones(7 * count)
+        self._table = np.zeros(7 * count)
+        self._contacts = self._table.reshape(7, count)
+        self._views = self._raw[: 6 * count], self._contacts[4:], self._contacts[:4]
 
     @property
     def contacts(self) -> Array:
         """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return self._rows.T
+        return self._contacts.T
 
     @property
     def feet(self) -> list[Sole]:
         """State of each foot, updated on access; the objects stay the same."""
         for sole, row in zip(self._soles, self.contacts.tolist(), strict=True):
-            *force, sole.moment = row[:4]
-            sole.force, sole.position = tuple(force), tuple(row[4:])
-            sole.standing = force[2] > 0.0
-            if force[2] > LIGHT:
-                sole.grip = sole.ratio * force[2]
+            push_x, push_y, load, sole.moment, *place = row
+            sole.force = (push_x + 0.0, push_y, load)  # not -0.0 in the air
+            sole.position = tuple(place)
+            sole.standing = load > 0.0
+            if load > LIGHT:
+                sole.grip = sole.ratio * load
         return self._soles
 
     def fill(self, pressures: Sequence[float]) -> None:
@@ -189,7 +191,7 @@ class Soles:
 
     def rub(self) -> None:
         """Set the friction of each standing foot for the next step, from its load in the last."""
-        for sole, load in zip(self._soles, self._loads, strict=True):
+        for sole, load in zip(self._soles, self._loads.tolist(), strict=True):
             if load > LIGHT:
                 sole.ahead = None
                 self.press(sole, load, self._dt)
@@ -208,10 +210,6 @@ class Soles:
         # The yaw moment of an evenly pressed round sole has a lever arm of 2/3 of its radius.
         row[0] = row[1] = ratio
         row[2] = self.lever * ratio
-
-    def read(self) -> None:
-        """Read the loads of the feet in the last step of MuJoCo."""
-        self._loads = self._felt[::6].tolist()
 
     def update(self) -> None:
         """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
@@ -243,11 +241,10 @@ class Soles:
 
     def _measure(self) -> list[list[float]]:
         """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
-        wrenches, flat, push_x, pushes, shears, places, markers = self._views
-        self._felt.take(self._order, None, flat, 'clip')
-        np.subtract(self._zeros, push_x, push_x)  # not -0.0 in the air
-        np.multiply(pushes, self._gives, shears)
-        np.subtract(places, self._shear, markers)
+        felt, markers, wrenches = self._views
+        self._felt.take(self._order, None, felt, 'clip')
+        np.multiply(self._raw, self._factors, self._table)
+        np.subtract(self._places.T, markers, markers)
         return wrenches.tolist()
 
     def _approach(self, sole: Sole, x: float, y: float, z: float) -> None:

@@ -3,14 +3,10 @@
 
 from ros_pad.trials.loop import run
 from ros_pad.trials.node_settings import NodeSettings
-
-try:
-    from ros_pad.trials.replay import Outcome
-    from ros_pad.trials.replay import Replay
-    from ros_pad.trials.replay import open_bag
-    from ros_pad.trials.replay import replay
-except ImportError:
-    pass
+from ros_pad.trials.replay import Outcome
+from ros_pad.trials.replay import Replay
+from ros_pad.trials.replay import open_bag
+from ros_pad.trials.replay import replay
 from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the recorded messages of a topic, one by one, with those of its replay."""
+"""Compare recorded records, one by one, with those of a replay: by leg and quantity."""
 
 from __future__ import annotations
 
-import bisect
 import math
-from array import array
-from collections.abc import Callable
 from dataclasses import dataclass
-from dataclasses import field
+from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+
+from ros_pad.records import Block
+from ros_pad.records import Field
+from ros_pad.records import Kind
 
 ROUNDING = 1e-12
 """Largest difference that counts as rounding, relative to the recorded number (below 1: to 1).
@@ -18,108 +21,133 @@ ROUNDING = 1e-12
 NumPy's exponential differs between processors in the last bit."""
 
 
-@dataclass
-class Track:
-    """The messages on one topic.
+class Track(NamedTuple):
+    """Values of one quantity of a leg.
 
     Attributes
     ----------
-    width : int
-        Number of values in a message; 0 for a text.
-    times : array of int
-        Log time of each message, ns; in a replay, the log time of the last input before it.
-    keys : array of int
-        Time by which each message is matched, ns: its stamp, or ``times`` where it has none.
-    numbers : array of float
-        Values of all messages, one message after the other; empty for texts.
-    texts : list of str
-        Texts of all messages; empty for numbers.
+    times : array of int64 (n,)
+        Log time of each record, ns; in a replay, that of the last sample before it.
+    stamps : array of int64 (n,)
+        Time stamps, ns.
+    values : array (n, components)
+        Values, in SI units.
     """
 
-    width: int
-    times: array[int] = field(default_factory=lambda: array('q'))
-    keys: array[int] = field(default_factory=lambda: array('q'))
-    numbers: array[float] = field(default_factory=lambda: array('d'))
-    texts: list[str] = field(default_factory=list)
+    times: npt.NDArray[np.int64]
+    stamps: npt.NDArray[np.int64]
+    values: npt.NDArray[np.float64]
 
-    def add(self, time_ns: int, numbers: tuple[float, ...], key_ns: int | None = None) -> None:
-        """Append a message of numbers: its log time and, if it has one, its stamp, ns."""
-        self.times.append(time_ns)
-        self.keys.append(time_ns if key_ns is None else key_ns)
-        self.numbers.extend(numbers)
+    def at(self, stamp_ns: int) -> float:
+        """Return the first value of the last record up to a stamp, ns; NaN before the first."""
+        place = int(np.searchsorted(self.stamps, stamp_ns, side='right'))
+        return float(self.values[place - 1, 0]) if place else math.nan
 
-    def add_text(self, time_ns: int, text: str) -> None:
-        """Append a message of text with its log time, ns."""
-        self.times.append(time_ns)
-        self.keys.append(time_ns)
-        self.texts.append(text)
 
-    def __len__(self) -> int:
-        return len(self.times)
+class Stream(NamedTuple):
+    """All records of a kind in a bag or of a replay.
 
-    def since(self, time_ns: int) -> Track:
-        """Return a track of the texts from a log time, ns, on."""
-        made = Track(self.width)
-        for at_ns, text in zip(self.times, self.texts, strict=True):
-            if at_ns >= time_ns:
-                made.add_text(at_ns, text)
-        return made
+    Attributes
+    ----------
+    kind : Kind
+    legs : tuple of int
+        Numbers of the legs, in the order of the rows.
+    times : array of int64 (n,)
+        Log times, ns.
+    block : Block
+    """
 
-    @property
-    def values(self) -> np.ndarray:
-        """Values of the messages, shape (messages, width)."""
-        return np.array(self.numbers).reshape(len(self), self.width)
+    kind: Kind
+    legs: tuple[int, ...]
+    times: npt.NDArray[np.int64]
+    block: Block
 
-    def at(self, time_ns: int) -> float | None:
-        """Return the first value of the last message up to a log time, ns, or None."""
-        place = bisect.bisect_right(self.times, time_ns)
-        return self.numbers[(place - 1) * self.width] if place else None
+    @classmethod
+    def of(
+        cls, kind: Kind, legs: tuple[int, ...], records: list[tuple[int, Block]] | None = None
+    ) -> Stream:
+        """Return the stream of blocks of one record each, with their log times, ns."""
+        times = [time_ns for time_ns, _ in records or ()]
+        stamps = [block.last_ns for _, block in records or ()]
+        rows = [kind.rows(0, len(legs)), *(block.rows for _, block in records or ())]
+        return cls(
+            kind,
+            legs,
+            np.array(times, np.int64),
+            Block(np.array(stamps, np.int64), np.concatenate(rows)),
+        )
+
+    def of_legs(self, legs: tuple[int, ...]) -> Stream:
+        """Return the records of some legs; rows of a leg that has none are NaN."""
+        if legs == self.legs:
+            return self
+        rows = self.kind.rows(len(self.times), len(legs))
+        for row, leg in enumerate(legs):
+            if leg in self.legs:
+                rows[:, row] = self.block.rows[:, self.legs.index(leg)]
+        return self._replace(legs=legs, block=Block(self.block.stamps, rows))
+
+    def in_order(self) -> Stream:
+        """Return the records in the order of their log times."""
+        return self.where(np.argsort(self.times, kind='stable'))
+
+    def where(self, kept: npt.NDArray[Any]) -> Stream:
+        """Return some of the records."""
+        stamps, rows = self.block
+        return self._replace(times=self.times[kept], block=Block(stamps[kept], rows[kept]))
+
+    def track(self, leg: int, field: Field) -> Track:
+        """Return the values of a field of a leg."""
+        values = self.block.rows[field.name][:, self.legs.index(leg)]
+        return Track(self.times, self.block.stamps, values.reshape(len(values), -1))
+
+
+def quantity(field: Field) -> str:
+    """Return the name of what a field is, for people: that of the field, or ``morphology``."""
+    return 'morphology' if field.name == 'dome' else field.name
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of comparing a recorded topic with its replay.
+    """Result of comparing a recorded quantity of a leg with its replay.
 
     Attributes
     ----------
     topic : str
-        Name in the bag.
+        Topic of the records in the bag.
     leg : int
-    kind : str
-        Kind of the topic, such as ``wetness``.
+        Number of the leg; -1 for the body.
+    quantity, unit : str
+        What is compared, such as ``wetness``, and its unit.
     recorded, replayed : int
-        Numbers of messages.
+        Numbers of records.
     compared, equal : int
-        Number of messages that are in the bag and in the replay, and how many of these are equal
-        to the bit.
-    missing : int
-        Number of recorded messages that the replay does not have.
-    not_recorded : int
-        Number of messages of the replay that were not recorded. Texts among them count as
-        differences, because a text is published only when it changes; numbers count as lost by
-        the recorder.
-    largest_difference : float or None
-        Largest difference of two numbers, in the unit of the message, inf if only one of them is
-        NaN; None for text.
+        Number of records that are in the bag and in the replay, by their stamps, and how many of
+        these are equal to the bit.
+    missing, not_recorded : int
+        Number of records in the bag that the replay does not have, and the other way round.
+    largest_difference : float
+        Largest difference of two numbers, in that unit; inf if only one of them is NaN.
     first_difference_s : float or None
-        Time of the first message that differs or is missing, s after the beginning of the bag.
+        Time of the first record that differs or is missing, s after the beginning of the bag.
     rounded : bool
-        Whether no message is missing, and no difference is larger than :data:`ROUNDING`.
+        Whether no record is missing, and no difference is larger than :data:`ROUNDING`.
     excused : bool
-        Whether all larger differences and missing messages come after a gap in the recorded
+        Whether all larger differences and missing records come after a gap in the recorded
         inputs: lost inputs cannot be replayed, and may be the cause.
     """
 
     topic: str
     leg: int
-    kind: str
+    quantity: str
+    unit: str
     recorded: int
     replayed: int
     compared: int
     equal: int
     missing: int
     not_recorded: int
-    largest_difference: float | None
+    largest_difference: float
     first_difference_s: float | None
     rounded: bool
     excused: bool
@@ -137,123 +165,66 @@ class Comparison:
 def compare(
     topic: str,
     leg: int,
-    kind: str,
+    field: Field,
     recorded: Track,
     replayed: Track,
     start_ns: int = 0,
-    period_ns: int = 20_000_000,
-    gap_ns: int | None = None,
-    look_ns: int = 0,
+    gap_ns: float = math.inf,
 ) -> Comparison:
-    """Compare a topic with its replay, message by message.
-
-    Two messages match when the key of the recorded one is at most 0.9 periods after that of the
-    replayed one, and at most 0.1 periods before it: topics may be recorded in another order than
-    they were published.
+    """Compare a quantity of a leg with its replay; records match by their stamps.
 
     Parameters
     ----------
-    topic, leg, kind
+    topic, leg
         See :class:`Comparison`.
+    field : Field
+        What is compared.
     recorded, replayed : Track
-        Messages on the topic, recorded and replayed.
+        Its values, recorded and replayed.
     start_ns : int
         Beginning of the bag, ns.
-    period_ns : int
-        Period of the messages, ns.
-    gap_ns : int or None
-        Time of the first gap in the recorded inputs, ns, after which differences are excused; -1
-        if an input is missing altogether, None if nothing is missing.
-    look_ns : int
-        Largest time between matching texts, ns, for a bag without ``/clock``, which does not show
-        when the nodes published them; the duration of a silence, which depends on that time, is
-        then not compared. 0 matches texts like numbers.
+    gap_ns : float
+        Log time of the first gap in the recorded inputs, ns, from which on differences are
+        excused.
     """
-    content = _without_length if look_ns else str
-    early_ns, late_ns = period_ns // 10, 9 * period_ns // 10
-    if look_ns and not recorded.width:
-        early_ns = late_ns = look_ns
-    pairs = _pairs(recorded, replayed, early_ns, late_ns, content)
-    own = np.zeros(len(recorded), dtype=bool)
-    own[[i for i, _ in pairs]] = True
-    theirs = np.array([j for _, j in sorted(pairs)], dtype=int)
-    times = np.array(recorded.times, dtype=np.int64)
-    lost = np.empty(0, dtype=np.int64)
-    largest: float | None = None
-    if recorded.width:
-        same, far, largest = _differences(recorded.values[own], replayed.values[theirs])
-    else:
-        same = np.array(
-            [content(recorded.texts[i]) == content(replayed.texts[j]) for i, j in sorted(pairs)],
-            dtype=bool,
-        )
-        far = ~same
-        # A text is published only when it changes, so an additional one is a difference.
-        lost = np.delete(np.array(replayed.times, dtype=np.int64), theirs)
-    parting = np.concatenate([times[own][~same], times[~own], lost])
-    grave = np.concatenate([times[own][far], times[~own], lost])
-    return Comparison(
-        topic=topic,
-        leg=leg,
-        kind=kind,
-        recorded=len(recorded),
-        replayed=len(replayed),
-        compared=int(own.sum()),
-        equal=int(same.sum()),
-        missing=int((~own).sum()),
-        not_recorded=len(replayed) - int(own.sum()),
-        largest_difference=largest,
-        first_difference_s=(int(parting.min()) - start_ns) * 1e-9 if len(parting) else None,
-        rounded=not len(grave),
-        excused=gap_ns is not None and len(grave) > 0 and int(grave.min()) >= gap_ns,
-    )
-
-
-def _differences(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return which messages are equal, which differ by more than rounding, and by how much."""
+    _, own, theirs = np.intersect1d(recorded.stamps, replayed.stamps, return_indices=True)
+    before, after, times = recorded.values[own], replayed.values[theirs], recorded.times
     same = (before == after) | (np.isnan(before) & np.isnan(after))
     with np.errstate(invalid='ignore'):
         apart = np.nan_to_num(np.abs(before - after), nan=math.inf, posinf=math.inf)
     apart[same] = 0.0
     far = apart > ROUNDING * np.maximum(1.0, np.abs(np.nan_to_num(before)))
-    return same.all(axis=1), far.any(axis=1), float(apart.max(initial=0.0))
+    lost = np.delete(times, own)
+    parting = np.concatenate([times[own][~same.all(axis=1)], lost])
+    grave = np.concatenate([times[own][far.any(axis=1)], lost])
+    return Comparison(
+        topic=topic,
+        leg=leg,
+        quantity=quantity(field),
+        unit=field.unit,
+        recorded=len(times),
+        replayed=len(replayed.times),
+        compared=len(own),
+        equal=int(same.all(axis=1).sum()),
+        missing=len(lost),
+        not_recorded=len(replayed.times) - len(own),
+        largest_difference=float(apart.max(initial=0.0)),
+        first_difference_s=(int(parting.min()) - start_ns) * 1e-9 if len(parting) else None,
+        rounded=not len(grave),
+        excused=len(grave) > 0 and int(grave.min()) >= gap_ns,
+    )
 
 
-def _pairs(
-    recorded: Track, replayed: Track, early_ns: int, late_ns: int, content: Callable[[str], str]
-) -> list[tuple[int, int]]:
-    """Return the indices of matched messages, in order; each message is used once.
-
-    Of several numbers that match, the nearest is taken; of several texts, the first that is equal
-    or, if none is equal, the first.
-    """
-    rows = sorted(range(len(recorded)), key=recorded.keys.__getitem__)
-    theirs = sorted(range(len(replayed)), key=replayed.keys.__getitem__)
-    found, at = [], 0
-
-    def fits(place: int, key: int) -> bool:
-        return place < len(theirs) and replayed.keys[theirs[place]] <= key + early_ns
-
-    for row in rows:
-        key = recorded.keys[row]
-        while at < len(theirs) and replayed.keys[theirs[at]] <= key - late_ns:
-            at += 1
-        best = at
-        if recorded.width:
-            while fits(best + 1, key) and abs(replayed.keys[theirs[best + 1]] - key) < abs(
-                replayed.keys[theirs[best]] - key
-            ):
-                best += 1
-        else:
-            text = content(recorded.texts[row])
-            while fits(best, key) and content(replayed.texts[theirs[best]]) != text:
-                best += 1
-            best = best if fits(best, key) else at
-        if fits(best, key):
-            found.append((row, theirs[best]))
-            at = best + 1
-    return found
-
-
-def _without_length(text: str) -> str:
-    return text.partition(':')[0] if text.startswith(('no wrench', 'no position')) else text
+def compare_streams(
+    topic: str, recorded: Stream, replayed: Stream, start_ns: int, gap_ns: float
+) -> list[Comparison]:
+    """Compare all quantities of all legs that were recorded and replayed; see :func:`compare`."""
+    return [
+        compare(
+            topic, leg, field, recorded.track(leg, field), replayed.track(leg, field), start_ns,
+            gap_ns,
+        )
+        for leg in recorded.legs
+        if leg in replayed.legs
+        for field in recorded.kind.fields
+    ]  # fmt: skip

@@ -401,7 +401,7 @@ def _of_nodes(
         dome_pressure=float(controller['dome_pressure']),
         policy_parameters=of_policy,
         **own,
-        ambient_pressure=float(controller['ambient_pressure']),
+        ambient_pressure=float(controller.get('ambient_pressure', settings.ambient_pressure)),
         publish_rate=float(estimator['publish_rate']),
         floor=floor,
         seed=seed,

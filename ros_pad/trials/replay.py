@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replay: run the recorded inputs of feet through estimators and controller again.
 
-The stages of the nodes receive the wrenches, positions and pressures of a bag in the order of
-recording, and their output is compared with the recorded one. For a trial in simulated time, the
-two are equal to the bit. The body estimator of a trial without markers is replayed beside them,
-from IMU, joints and forces. With other parameters, a replay shows how estimates and decisions
-would have changed; the motion of the robot stays as recorded.
+The stages of the nodes receive the samples and pressures of a bag in the order of recording, and
+their estimates and commands are compared with the recorded ones. For a trial in simulated time,
+the two are equal to the bit. The body estimator of a trial without markers is replayed beside
+them, from IMU, joints and forces. With other parameters, a replay shows how estimates and
+decisions would have changed; the motion of the robot stays as recorded.
 """
 
 from __future__ import annotations
@@ -14,9 +14,7 @@ import math
 import os
 import pathlib
 from collections.abc import Callable
-from collections.abc import Iterator
 from collections.abc import Mapping
-from collections.abc import Sequence
 from dataclasses import asdict
 from dataclasses import dataclass
 from typing import Any
@@ -25,27 +23,30 @@ import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
+from ros_pad.estimation.load_gate import CONTACT_SHARE
+from ros_pad.pace import Progress
+from ros_pad.pace import part
 from ros_pad.trials.comparison import Comparison
+from ros_pad.trials.comparison import Stream
 from ros_pad.trials.comparison import Track
+from ros_pad.trials.comparison import compare_streams
+from ros_pad.trials.comparison import quantity
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
 from ros_pad.trials.replay_body import compare_body
-from ros_pad.trials.replay_comparison import compare_topics
+from ros_pad.trials.replay_inputs import Inputs
+from ros_pad.trials.replay_inputs import read
+from ros_pad.trials.replay_notes import missing_inputs
 from ros_pad.trials.replay_notes import notes_on
-from ros_pad.trials.replay_player import DECISIONS
-from ros_pad.trials.replay_player import ESTIMATES
-from ros_pad.trials.replay_player import OF_MOTION
 from ros_pad.trials.replay_player import Player
-from ros_pad.trials.replay_player import Progress
-from ros_pad.trials.replay_player import Tracks
-from ros_pad.trials.replay_player import inputs_of
-from ros_pad.trials.replay_player import play
 from ros_pad.trials.trial import BOUNCE
+
+Tracks = dict[tuple[int, str], Track]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Counts of a leg. Pairs are recorded (None if the topic was not recorded) and replayed.
+    """Counts of a leg. Pairs are recorded (None if nothing was recorded) and replayed.
 
     Attributes
     ----------
@@ -89,11 +90,15 @@ class Replay:
     refused : dict
         Number of rejected samples, and the reason of the last one, by leg.
     recorded : dict
-        A :class:`Track` by leg and kind, as recorded.
+        A :class:`Track` by leg and quantity, such as ``wetness`` or ``setpoint``, as recorded; the
+        quantities are the fields of :data:`ros_pad.records.ESTIMATE` and, of the command,
+        ``setpoint`` and ``morphology`` (1 dome, 0 flat).
     replayed : dict
-        A :class:`Track` by leg and kind, as replayed.
+        The same, as replayed.
+    streams : dict of Stream
+        Replayed records by name of their kind, ``estimate`` and ``command``.
     comparisons : list of Comparison
-        One for each recorded topic of estimates and decisions.
+        One for each leg and quantity of recorded estimates and commands.
     outcomes : list of Outcome
         One for each leg.
     notes : list of str
@@ -109,6 +114,7 @@ class Replay:
     refused: dict[int, tuple[int, str]]
     recorded: Tracks
     replayed: Tracks
+    streams: dict[str, Stream]
     comparisons: list[Comparison]
     outcomes: list[Outcome]
     notes: list[str]
@@ -146,7 +152,7 @@ class Replay:
             },
             'samples': self.samples,
             'refused': {leg: count for leg, (count, _) in self.refused.items()},
-            'topics': [
+            'comparisons': [
                 _plain(asdict(each) | {'verdict': each.verdict}) for each in self.comparisons
             ],
             'outcomes': [asdict(each) for each in self.outcomes],
@@ -227,120 +233,107 @@ def replay(
         When a remap is not allowed, see :func:`ros_pad.trials.recorded.wanted_topics`.
     """
     settings = settings or NodeSettings.of(bag)
-    kinds = (*inputs_of(settings), *ESTIMATES, *DECISIONS)
-    if settings.tuning.source == 'joints':
-        kinds += OF_MOTION
-    wanted = {
-        topic: key
-        for topic, key in wanted_topics(bag, namespace, remaps).items()
-        if key[1] in kinds
-    }
-    there = {key: topic for topic, key in wanted.items()}
-    legs = tuple(sorted(leg for leg, kind in there if kind == 'wrench'))
-    if not legs:
-        raise BagError(
-            f'{bag.path}: no wrench of a leg was recorded; the topics are'
-            f' {", ".join(sorted(bag.topics))}. If one has wrenches, name it with a remap'
-        )
-    # Keep the order of the legs in the controller of the bag, around the body.
-    legs = tuple(leg for leg in settings.legs if leg in legs) + tuple(
-        leg for leg in legs if leg not in settings.legs
-    )
-    found = _once(bag, settings, wanted, legs, {}, progress)
-    late = {leg: stamp_ns for leg in legs if (stamp_ns := _beginning(found, leg)) is not None}
-    if late and found.verdict in ('different', 'gap'):
-        # The first estimates are not in the bag, because the recorder lost them or because the
-        # estimator started later than the recorder. Replay both ways, and take the better match.
-        other = _once(bag, settings, wanted, legs, late, progress)
-        if _agreeing(other) > _agreeing(found):
-            other.notes.append(
-                f'leg {", ".join(map(str, late))}: the estimator started later than the recorder,'
-                ' so the replay leaves out the samples before its first recorded estimate'
-            )
-            found = other
+    wanted = wanted_topics(bag, namespace, remaps)
+    inputs, late = _begun(read(bag, wanted, settings, part(progress, 0.0, 0.2)))
+    player = Player(settings, inputs)
+    made = player.play(part(progress, 0.2, 0.9))
+    # What was lost may have changed all legs: they share what feet learn, and one controller.
+    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
+    if missing_inputs(inputs, settings):
+        gap_ns = -math.inf
+    there = {kind: inputs.streams[kind] for kind in made}
+    comparisons = [
+        found
+        for kind, each in there.items()
+        if kind in inputs.topics
+        for found in compare_streams(inputs.topics[kind], each, made[kind], bag.start, gap_ns)
+    ]
     # The body estimator is replayed beside the feet, which take what it published.
-    comparisons, note = compare_body(bag, wanted)
-    found.comparisons += comparisons
-    found.notes += [note] if note else []
-    return found
-
-
-def _beginning(found: Replay, leg: int) -> int | None:
-    """Return the stamp of the first recorded estimate, ns, if the replay has earlier ones."""
-    one, other = found.recorded[leg, 'slip'].keys, found.replayed[leg, 'slip'].keys
-    return min(one) if len(one) and len(other) and min(one) > min(other) else None
-
-
-def _agreeing(found: Replay) -> int:
-    return sum(each.equal for each in found.comparisons)
-
-
-def _once(
-    bag: BagReader,
-    settings: NodeSettings,
-    wanted: Mapping[str, tuple[int, str]],
-    legs: Sequence[int],
-    beginnings: Mapping[int, int],
-    progress: Progress | None,
-) -> Replay:
-    """Replay a bag once; ``beginnings``: stamp of the first sample to use, ns, of some legs."""
-    there = {key: topic for topic, key in wanted.items()}
-    player = play(bag, settings, wanted, legs, beginnings, progress)
-    comparisons = compare_topics(bag, player, there, settings)
+    of_body, note = compare_body(bag, wanted)
+    recorded, replayed = _tracks(there), _tracks(made)
+    refused = {leg: (count, player.rejection[leg]) for leg, count in player.rejected.items()}
+    if progress:
+        progress(1.0)
     return Replay(
         bag=str(bag.path),
         settings=settings,
-        legs=tuple(legs),
+        legs=inputs.legs,
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
-        samples={leg: each.estimation.samples for leg, each in player.legs.items()},
-        refused={
-            leg: (each.rejected, each.rejection)
-            for leg, each in player.legs.items()
-            if each.rejected
-        },
-        recorded=player.recorded,
-        replayed=player.replayed,
-        comparisons=comparisons,
-        outcomes=[_outcome(player, leg, settings) for leg in player.legs],
-        notes=notes_on(bag, player, there, settings, comparisons),
+        samples=dict(zip(inputs.legs, player.stages.estimation.used.tolist(), strict=True)),
+        refused=refused,
+        recorded=recorded,
+        replayed=replayed,
+        streams=made,
+        comparisons=comparisons + of_body,
+        outcomes=[_outcome(inputs, settings, leg, recorded, replayed) for leg in inputs.legs],
+        notes=[
+            *notes_on(bag, inputs, settings, refused, comparisons),
+            *filter(None, (late, note)),
+        ],
     )
 
 
-def _outcome(player: Player, leg: int, settings: NodeSettings) -> Outcome:
-    replayed = player.legs[leg]
-    ends = [
-        end
-        for end, landing in _with_next(replayed.lift_offs, replayed.landings)
-        if landing is None or landing - end >= BOUNCE * 1e9
-    ]
-    # After this delay the estimate of the stance is published; it is constant in the air.
+def _begun(inputs: Inputs) -> tuple[Inputs, str]:
+    """Leave out the samples before the first recorded estimate; return a note if there are any.
+
+    An estimator makes its first estimate of its first sample: it started later than the recorder.
+    """
+    samples = inputs.streams['sample']
+    stamps, first = samples.block.stamps, inputs.streams['estimate'].block.stamps[:1]
+    kept = stamps >= first if len(first) else stamps >= 0
+    if kept.all() or not kept.any():
+        return inputs, ''
+    streams = inputs.streams | {'sample': samples.where(kept)}
+    return inputs._replace(streams=streams), (
+        'the estimator started later than the recorder, so the replay leaves out the'
+        f' {int(np.sum(~kept))} samples before its first recorded estimate'
+    )
+
+
+def _tracks(streams: Mapping[str, Stream]) -> Tracks:
+    return {
+        (leg, quantity(field)): each.track(leg, field)
+        for each in streams.values()
+        for leg in each.legs
+        for field in each.kind.fields
+    }
+
+
+def _outcome(
+    inputs: Inputs, settings: NodeSettings, leg: int, recorded: Tracks, replayed: Tracks
+) -> Outcome:
+    ends = _stance_ends(inputs, leg, CONTACT_SHARE * settings.expected_load)
+    # After this delay the estimate of the stance is there; it is constant in the air.
     delay_ns = round(2e9 / settings.publish_rate)
 
-    def pair(kind: str, count: Callable[[Track], int]) -> tuple[int | None, int]:
-        track = player.recorded[leg, kind]
-        return count(track) if len(track) else None, count(player.replayed[leg, kind])
+    def pair(name: str, count: Callable[[Track], int]) -> tuple[int | None, int]:
+        track = recorded[leg, name]
+        return count(track) if len(track.times) else None, count(replayed[leg, name])
 
     return Outcome(
         leg=leg,
         stance_ends=len(ends),
         wet_ends=pair(
-            'wetness', lambda track: sum((track.at(end + delay_ns) or 0.0) > 0.5 for end in ends)
+            'wetness', lambda track: sum(track.at(end + delay_ns) > 0.5 for end in ends.tolist())
         ),
         slips=pair(
-            'slipping', lambda track: int(np.sum(np.diff(track.values[:, 0], prepend=0) > 0))
+            'slipping',
+            lambda track: int(np.sum(np.diff(track.values[:, 0] == 1.0, prepend=0) > 0)),
         ),
-        switches=pair('morphology', lambda track: max(0, len(track) - 1)),
+        switches=pair('morphology', lambda track: int(np.sum(np.diff(track.values[:, 0]) != 0.0))),
     )
 
 
-def _with_next(
-    lift_offs: Sequence[int], landings: Sequence[int]
-) -> Iterator[tuple[int, int | None]]:
-    """Yield each lift-off with the landing after it, or None after the last landing."""
-    for end in lift_offs:
-        place = int(np.searchsorted(landings, end))
-        yield end, landings[place] if place < len(landings) else None
+def _stance_ends(inputs: Inputs, leg: int, load: float) -> np.ndarray:
+    """Return the stamps at which a leg lifts off, ns; a bounce is no lift-off."""
+    stamps, rows = inputs.streams['sample'].block
+    force = rows['force'][:, inputs.legs.index(leg), 2]
+    stamps, force = stamps[np.isfinite(force)], force[np.isfinite(force)]
+    step = np.diff((force >= load).astype(int))
+    ends, landings = stamps[1:][step < 0], stamps[1:][step > 0]
+    last = np.append(landings, np.iinfo(np.int64).max)
+    return ends[last[np.searchsorted(landings, ends)] - ends >= BOUNCE * 1e9]
 
 
 __all__ = ['Outcome', 'Replay', 'open_bag', 'replay']

@@ -3,41 +3,54 @@
 
 from __future__ import annotations
 
+import heapq
 import json
+import math
+from collections.abc import Iterator
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ros_pad.bags import BagReader
-from ros_pad.bags.topics import CONTACT_VELOCITY
-from ros_pad.bags.topics import FOOT_WRENCH
+from ros_pad.bags.topics import FORCE
 from ros_pad.bags.topics import IMU
 from ros_pad.bags.topics import JOINT_STATES
 from ros_pad.bags.topics import ODOM
+from ros_pad.bags.topics import SAMPLE
 from ros_pad.bags.topics import STAMP
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import PadError
 from ros_pad.errors import reason
+from ros_pad.records import SAMPLE as SAMPLES
+from ros_pad.records import Block
+from ros_pad.records import Field
 from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimate
+from ros_pad.sensing import BodyEstimator
 from ros_pad.sensing import SensingStage
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import foot_readings
+from ros_pad.sensing.stage import sample_of
 from ros_pad.trials.comparison import Comparison
+from ros_pad.trials.comparison import Stream
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
+from ros_pad.trials.comparison import compare_streams
 from ros_pad.trials.label import PARAMETERS
-from ros_pad.trials.recorded import OF_ROBOT
+from ros_pad.trials.recorded import Wanted
+
+OF_BODY = -1
+"""In place of the number of a leg, for the pose of the body."""
 
 _NAMES = {each.name for each in SETTINGS}
+_POSE = Field('odom', '', 'position, m, and orientation of the body')
 
 
-def compare_body(
-    bag: BagReader, wanted: Mapping[str, tuple[int, str]]
-) -> tuple[list[Comparison], str]:
+def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Comparison], str]:
     """Replay the body estimator with its recorded parameters, and compare what it published.
 
     Parameters
@@ -45,14 +58,14 @@ def compare_body(
     bag : BagReader
         What was recorded.
     wanted : mapping
-        Leg and kind of each topic, as :func:`ros_pad.trials.recorded.wanted_topics` returns them.
+        What each topic is, as :func:`ros_pad.trials.recorded.wanted_topics` returns it.
 
     Returns
     -------
     comparisons : list of Comparison
-        Those of ``odom`` and of the velocity of each contact. Empty unless the bag has the
-        parameters of one body estimator and all of its inputs. Without ``/clock`` the order in
-        which its inputs arrived is not in the bag, so that differences are excused.
+        Those of ``odom`` and of the samples of the feet. Empty unless the bag has the parameters
+        of one body estimator and all of its inputs. Without ``/clock`` the order in which its
+        inputs arrived is not in the bag, so that differences are excused.
     note : str
         Why the body estimator cannot be replayed although the bag has all of this: the file of
         the robot is not in the bag, and may be gone or changed. Else empty.
@@ -64,103 +77,105 @@ def compare_body(
     """
     nodes = json.loads(bag.custom_data.get(PARAMETERS, '{}')).values()
     found = [each for each in nodes if each.keys() >= _NAMES]
-    feet = {leg: topic for topic, (leg, kind) in wanted.items() if kind == CONTACT_VELOCITY.kind}
-    if len(found) != 1 or not feet:
+    sample = next((name for name, each in wanted.items() if each.topic is SAMPLE), '')
+    prefix = sample.removesuffix(SAMPLE.name())
+    needed = [prefix + each.name() for each in (FORCE, IMU, JOINT_STATES, ODOM)]
+    if len(found) != 1 or not sample or not all(bag.counts.get(name) for name in needed):
         return [], ''
-    (values,) = found
-    legs = values['legs']
-    if set(legs) != set(feet):
-        return [], ''
-    prefix = feet[legs[0]].removesuffix(CONTACT_VELOCITY.name(legs[0]))
     try:
-        player = _Player(bag, prefix, values)
-        if not player.complete:
-            return [], ''
-        player.play()
+        player = _Player(bag, found[0])
+        player.play(needed)
     except (ConfigError, InvalidInput) as error:
         return [], f'the body estimator is not replayed: {error}'
-    period_ns = round(1e9 / values['rate'])
-    gap_ns = None if bag.counts.get('/clock') else -1
-    comparisons = [
-        compare(topic, leg, kind, player.recorded[topic], player.replayed[topic], bag.start,
-                period_ns, gap_ns)
-        for topic, leg, kind in player.outputs
-    ]  # fmt: skip
-    return comparisons, ''
+    gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
+    recorded = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
+    # At moments without an estimate, the node sends records without values.
+    felt = recorded.where(np.isfinite(recorded.block.rows['force']).any(axis=(1, 2)))
+    feet = Stream.of(SAMPLES, tuple(found[0]['legs']), player.feet)
+    poses = compare(
+        needed[-1], OF_BODY, _POSE, _track(player.recorded), _track(player.poses), bag.start,
+        gap_ns,
+    )  # fmt: skip
+    return [poses, *compare_streams(sample, felt, feet, bag.start, gap_ns)], ''
+
+
+def _stage_of(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
+    """Return the robot and the estimator that recorded parameters describe."""
+    try:
+        robot = Robot.load(
+            values['robot'],
+            [each.strip() for each in values['feet'].split(',') if each.strip()],
+            values['imu_link'],
+            values['foot_radius'] if values['foot_radius'] >= 0.0 else None,
+        )
+    except KeyError as error:
+        raise _not_valid(bag, error) from error
+    try:
+        return robot, estimator_of(robot, values)
+    except (KeyError, PadError) as error:
+        raise _not_valid(bag, error) from error
+
+
+def _not_valid(bag: BagReader, error: Exception) -> BagError:
+    return BagError(
+        f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the body estimator is'
+        f' missing or not valid: {reason(error)}'
+    )
+
+
+def _track(poses: list[tuple[int, int, list[float]]]) -> Track:
+    times, stamps, values = zip(*poses, strict=True)
+    return Track(np.array(times), np.array(stamps), np.array(values))
 
 
 class _Player:
     """Pass the recorded inputs of a body estimator to a sensing stage."""
 
-    def __init__(self, bag: BagReader, prefix: str, values: Mapping[str, Any]) -> None:
-        self._bag, legs = bag, values['legs']
-        self._imu, self._joints = prefix + IMU.name(), prefix + JOINT_STATES.name()
-        self._forces = {prefix + FOOT_WRENCH.name(leg): i for i, leg in enumerate(legs)}
-        self._odom = prefix + ODOM.name()
-        self._velocities = [prefix + CONTACT_VELOCITY.name(leg) for leg in legs]
-        self.outputs = [(self._odom, OF_ROBOT, ODOM.kind)]
-        self.outputs += [
-            (topic, leg, CONTACT_VELOCITY.kind)
-            for topic, leg in zip(self._velocities, legs, strict=True)
-        ]
-        topics = (self._imu, self._joints, *self._forces, self._odom)
-        self.complete = all(bag.counts.get(topic) for topic in topics)
-        self.recorded = {topic: Track(self._width(kind)) for topic, _, kind in self.outputs}
-        self.replayed = {topic: Track(self._width(kind)) for topic, _, kind in self.outputs}
-        self._log_ns = 0
-        try:
-            robot = Robot.load(
-                values['robot'],
-                [each.strip() for each in values['feet'].split(',') if each.strip()],
-                values['imu_link'],
-                values['foot_radius'] if values['foot_radius'] >= 0.0 else None,
-            )
-        except KeyError as error:
-            raise self._not_valid(error) from error
-        try:
-            estimator = estimator_of(robot, values)
-        except (KeyError, PadError) as error:
-            raise self._not_valid(error) from error
+    def __init__(self, bag: BagReader, values: Mapping[str, Any]) -> None:
+        self._bag = bag
+        robot, estimator = _stage_of(bag, values)
         self._order, self._wrong = JointOrder(robot), InvalidInput('no reading can be used')
         self._stage = SensingStage(
-            robot, estimator, self._take, lambda _: None, _ignore, values['forces']
+            robot, estimator, self._take, lambda doubt: None, lambda error: None, values['forces']
         )
+        self._log_ns = 0
+        self.feet: list[tuple[int, Block]] = []
+        self.poses: list[tuple[int, int, list[float]]] = []  # log time, stamp, values
+        self.recorded: list[tuple[int, int, list[float]]] = []
 
-    def _not_valid(self, error: Exception) -> BagError:
-        return BagError(
-            f'{self._bag.path}: in the custom data {PARAMETERS!r} a parameter of the body'
-            f' estimator is missing or not valid: {reason(error)}'
-        )
-
-    @staticmethod
-    def _width(kind: str) -> int:
-        return len(ODOM.values) if kind == ODOM.kind else len(CONTACT_VELOCITY.values)
-
-    def _paths(self) -> dict[str, tuple[str, ...]]:
-        """Return the fields to read of each topic."""
-        return {
-            self._imu: (*STAMP, *IMU.values),
-            self._joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
-            self._odom: (*STAMP, *ODOM.values),
-            **dict.fromkeys(self._forces, (*STAMP, *FOOT_WRENCH.values)),
-            **dict.fromkeys(self._velocities, (*STAMP, *CONTACT_VELOCITY.values)),
+    def play(self, topics: list[str]) -> None:
+        """Play the bag once: topics of forces, IMU, joints and odom."""
+        force, imu, joints, odom = topics
+        paths = {
+            imu: (*STAMP, *IMU.values),
+            joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
+            odom: (*STAMP, *ODOM.values),
         }
-
-    def play(self) -> None:
-        """Play the bag once."""
-        for topic, (seconds, fraction, *numbers), log_ns in self._bag.values(self._paths()):
-            self._log_ns = log_ns
-            stamp_ns = seconds * 1_000_000_000 + fraction
-            if topic in self._forces:
-                self._stage.force(self._forces[topic], stamp_ns, numbers)
-            elif topic == self._imu:
-                self._stage.imu(stamp_ns, numbers[:3], numbers[3:])
-            elif topic == self._joints:
-                self._take_joints(stamp_ns, *numbers)
-            else:
-                self.recorded[topic].add(log_ns, tuple(numbers), stamp_ns)
+        messages = (
+            (log_ns, topic, seconds * 1_000_000_000 + fraction, values)
+            for topic, (seconds, fraction, *values), log_ns in self._bag.values(paths)
+        )
+        # Forces come first: readings of the joints wait for those of the same moment.
+        both = heapq.merge(self._forces(force), messages, key=lambda each: each[0])
+        for self._log_ns, topic, stamp_ns, values in both:
+            if topic == force:
+                for index, each in enumerate(values):
+                    if math.isfinite(each.sum()):
+                        self._stage.force(index, stamp_ns, each)
+            elif topic == odom:
+                self.recorded.append((self._log_ns, stamp_ns, values))
+            elif topic == joints:
+                self._take_joints(stamp_ns, *values)
+            elif math.isfinite(sum(values)):
+                self._stage.imu(stamp_ns, values[:3], values[3:])
         if not self._stage.samples:
             raise self._wrong
+
+    def _forces(self, topic: str) -> Iterator[tuple[int, str, int, Any]]:
+        _, times, block = self._bag.records({topic: SAMPLES})[topic]
+        columns = times.tolist(), block.stamps.tolist(), block.rows['force']
+        for time_ns, stamp_ns, forces in zip(*columns, strict=True):
+            yield time_ns, topic, stamp_ns, forces
 
     def _take_joints(self, stamp_ns: int, *values: Any) -> None:
         try:
@@ -169,18 +184,13 @@ class _Player:
             self._wrong = error
             self._stage.reject(error)
             return
-        self._stage.joints(stamp_ns, *ordered)
+        if math.isfinite(ordered[0].sum()):
+            self._stage.joints(stamp_ns, *ordered)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
-        pose = (*estimate.position.tolist(), *estimate.orientation.tolist())
-        self.replayed[self._odom].add(self._log_ns, pose, stamp_ns)
-        for topic, foot in zip(self._velocities, foot_readings(estimate), strict=True):
-            values = (*foot.velocity, foot.variance, foot.variance)
-            self.replayed[topic].add(self._log_ns, values, stamp_ns)
-
-
-def _ignore(error: InvalidInput) -> None:
-    """Ignore a rejected reading, as the node did."""
+        pose = [*estimate.position.tolist(), *estimate.orientation.tolist()]
+        self.poses.append((self._log_ns, stamp_ns, pose))
+        self.feet.append((self._log_ns, Block.of(stamp_ns, sample_of(estimate))))
 
 
 __all__ = ['compare_body']

@@ -1,26 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the messages of a replay into a new bag, to be shown beside the recorded one.
+"""Write the records of a replay into a new bag, to be shown beside the recorded one.
 
-This needs no ROS except for the definitions of the message types.
+This needs no ROS except for the definition of the message type.
 """
 
 from __future__ import annotations
 
-import heapq
 import json
 import os
-from collections.abc import Iterator
+
+import numpy as np
 
 from ros_pad.bags import BagWriter
-from ros_pad.bags import codec
-from ros_pad.bags.definitions import message_definition
-from ros_pad.bags.fields import FieldWriter
-from ros_pad.bags.topics import FRAME
-from ros_pad.bags.topics import STAMP
-from ros_pad.bags.topics import TRIAL
-from ros_pad.bags.topics import Topic
+from ros_pad.bags.wire import TYPE
+from ros_pad.bags.wire import Wire
 from ros_pad.pace import Progress
-from ros_pad.trials.comparison import Track
+from ros_pad.records import Block
 from ros_pad.trials.label import KEY
 from ros_pad.trials.replay import Replay
 
@@ -33,7 +28,7 @@ def write(
     namespace: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write the replayed topics of every leg into a new bag.
+    """Write the estimates and commands of a replay into a new bag.
 
     Parameters
     ----------
@@ -49,7 +44,7 @@ def write(
     Raises
     ------
     BagError
-        When the folder exists or cannot be written, or the message types are not installed.
+        When the folder exists or cannot be written, or the message type is not installed.
     """
     settings = replay.settings
     about = {
@@ -65,38 +60,21 @@ def write(
         },
     }
     prefix = f'/{(namespace or "").strip("/")}/'.replace('//', '/')
+    streams = list(replay.streams.values())
     with BagWriter(folder, {KEY: json.dumps(about)}) as bag:
-        streams = []
-        for (leg, kind), track in replay.replayed.items():
-            topic = TRIAL[kind]
-            name = prefix + topic.name(leg)
-            bag.add_topic(name, topic.type_name)
-            streams.append(_messages(name, leg, topic, track))
-        total = sum(map(len, replay.replayed.values()))
-        merged = heapq.merge(*streams, key=lambda each: each[0])
-        for done, (time_ns, name, data) in enumerate(merged, 1):
-            bag.write(name, data, time_ns)
-            if progress and (done % _REPORT_EVERY == 0 or done == total):
-                progress(done / total)
-
-
-def _messages(name: str, leg: int, topic: Topic, track: Track) -> Iterator[tuple[int, str, bytes]]:
-    """Yield time, ns, name of the topic and bytes of each message of a track."""
-    message_type = codec.message_type(topic.type_name, message_definition(topic.type_name))
-    if topic.text:
-        (path,) = topic.values
-        for time_ns, text in zip(track.times, track.texts, strict=True):
-            yield time_ns, name, FieldWriter(message_type, (), {path: text})()
-        return
-    if not topic.frame:
-        write = FieldWriter(message_type, topic.values)
-        for time_ns, values in zip(track.times, track.values.tolist(), strict=True):
-            yield time_ns, name, write(*values)
-        return
-    write = FieldWriter(message_type, STAMP + topic.values, {FRAME: topic.frame.format(leg=leg)})
-    columns = track.times, track.keys, track.values.tolist()
-    for time_ns, key_ns, values in zip(*columns, strict=True):
-        yield time_ns, name, write(*divmod(key_ns, 1_000_000_000), *values)
+        for each in streams:
+            bag.add_topic(f'{prefix}feet/{each.kind.name}', TYPE)
+        wires = [Wire(each.kind, each.legs) for each in streams]
+        sources = np.repeat(np.arange(len(streams)), [len(each.times) for each in streams])
+        rows = np.concatenate([np.arange(len(each.times)) for each in streams])
+        order = np.argsort(np.concatenate([each.times for each in streams]), kind='stable')
+        for done, place in enumerate(order, 1):
+            stream, row = streams[sources[place]], rows[place]
+            record = Block(*(each[row : row + 1] for each in stream.block))
+            data = wires[sources[place]].encode(record)
+            bag.write(f'{prefix}feet/{stream.kind.name}', data, int(stream.times[row]))
+            if progress and (done % _REPORT_EVERY == 0 or done == len(order)):
+                progress(done / len(order))
 
 
 __all__ = ['write']

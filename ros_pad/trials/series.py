@@ -12,10 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.estimation import doubt as doubts
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
 from ros_pad.records import Block
 from ros_pad.records import Kind
 
@@ -102,10 +98,10 @@ def series(records: Records) -> dict[str, Any]:
         'slip_speed': by_row(math.hypot, of(estimate, 'slip')),
         'slipping': of(estimate, 'slipping') == 1.0,
         'dome': of(command, 'dome') == 1.0,
-        'doubt': np.vectorize(doubts.place, otypes=[int])(code),
+        'doubt': np.vectorize(_kind_of, otypes=[int])(code),
     }
 
 
-def empty(legs: int) -> Records:
-    """Return no records of so many legs."""
-    return Records(*(joined(kind, legs, ()) for kind in (SAMPLE, ESTIMATE, COMMAND, PRESSURE)))
+def _kind_of(code: float) -> int:
+    """Return the place of a doubt in the list of kinds; -1 if it is not known."""
+    return -1 if math.isnan(code) else doubts.KINDS.index(doubts.kind(code))

@@ -2,7 +2,6 @@
 import math
 
 from ros_pad.control.faults import KINDS
-from ros_pad.control.faults import NONE
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 from ros_pad.control.faults import text
@@ -19,15 +18,13 @@ def test_codes_are_the_places_in_the_table():
 
 def test_a_fault_is_text_for_people_and_three_numbers_for_records():
     fault = Kind.LEAK(45e3, 25e3)
-    assert fault
     assert str(fault) == 'leaks or lacks air: 45.0 kPa, 25.0 kPa below the set-point'
     assert text(fault.kind.code, fault.a, fault.b) == str(fault)
     assert str(Kind.SILENCE(0.52, 70e3)) == 'no reading for 0.5 s, the last was 70.0 kPa'
 
 
-def test_no_fault_is_false_and_has_no_text():
-    assert not NONE
-    assert str(NONE) == text(0.0, math.nan, math.nan) == joined(NONE, '', None) == ''
+def test_no_fault_has_no_text():
+    assert text(0.0, math.nan, math.nan) == joined(None, '') == ''
     assert text(math.nan, 0.0, 0.0) == text(99.0, 0.0, 0.0) == text(0.5, 1.0, 1.0) == ''
 
 

@@ -264,7 +264,6 @@ def test_moments_of_the_feet_hold_a_robot_that_is_turned():
     moments = []
     for _ in range(200):  # the robot sways on its servos
         mujoco.mj_step(robot.model, robot.data, 20)
-        robot.soles.read()
         robot.soles.update()
         moments.append([foot.moment for foot in robot.feet])
     shares = np.mean(moments, axis=0) / -torque
@@ -331,7 +330,6 @@ def test_work_lost_in_turning_is_moment_times_angle():
     before, lost = robot.body[2], robot.dissipation
     for _ in range(200):
         mujoco.mj_step(robot.model, robot.data, 2)  # as ``step``, but friction is not updated
-        robot.soles.read()
         robot.soles.update()
     turned = robot.body[2] - before
     assert turned > 0.1

@@ -150,7 +150,7 @@ def test_policies_take_their_parameters():
 @pytest.mark.parametrize(
     ('policy', 'parameters', 'message'),
     [
-        ('adaptive', {'wet_abov': 0.5}, "no parameter 'wet_abov'. Did you mean 'wet_above'"),
+        ('adaptive', {'wet_abov': 0.5}, "'wet_abov' is not allowed: .* Did you mean 'wet_above'"),
         ('adaptive', {'wet_above': 1.5}, 'wet_above = 1.5 .* to 1'),
         ('flat', {'wet_above': 0.5}, "policy = 'flat' has no parameters, but wet_above"),
     ],

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Watch over the sensors of a foot: measure noise, and look for turned axes, now and then."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ros_pad.estimation.axes import BLOCK
+from ros_pad.estimation.axes import LONGEST
+from ros_pad.estimation.axes import Axes
+from ros_pad.estimation.axes import Vector
+from ros_pad.estimation.noise import SensorNoise
+
+LONGEST_GAP = 0.15
+"""Longest gap between samples of one stance, s: in a longer gap the foot may have stepped."""
+
+EAGER, PAUSE = 10, 8
+"""Stances in which noise is measured and axes are checked at first, and of how many one is later.
+Stances are counted anew each second."""
+
+
+class Moment(NamedTuple):
+    """A foot at the end of a block.
+
+    Attributes
+    ----------
+    time : float
+        Time, s.
+    height : float
+        Height of its position, m.
+    force : tuple of float
+        Force without offset, N.
+    offset : tuple of float or None
+        Offset of the horizontal force, N; None if it is not known.
+    stands : bool
+        Whether it stood until now.
+    speed_sd : float or None
+        With joints, standard deviation of the velocity, m/s; infinite if it must not be used.
+    """
+
+    time: float
+    height: float
+    force: Vector
+    offset: tuple[float, float] | None
+    stands: bool
+    speed_sd: float | None
+
+
+class Watch:
+    """Watch over the sensors of one foot, in blocks of samples.
+
+    Parameters
+    ----------
+    noise : SensorNoise
+        Noise of the sensors.
+    axes : Axes
+        Doubt of their axes.
+
+    Attributes
+    ----------
+    noise, axes
+        As given.
+    end : float
+        Time at which the present block ends, s.
+    looks : bool
+        Whether noise is measured, and motions are compared, in this stance.
+    """
+
+    __slots__ = ('_block', '_earlier', '_look_end', '_looked', 'axes', 'end', 'looks', 'noise')
+
+    def __init__(self, noise: SensorNoise, axes: Axes) -> None:
+        self.noise, self.axes = noise, axes
+        self._looked, self.looks, self._look_end = 0, False, math.inf
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the last readings, and the height of the last stance."""
+        self.axes.restart()
+        self.end = -math.inf
+        self._block: list[list[float]] = []  # readings since the last block, and two before them
+        self._earlier = 0  # how many are before them
+
+    def look(self, time: float) -> None:
+        """Decide whether to look at the readings of a stance, or of a second of a long one.
+
+        Noise and axes hardly ever change during a walk.
+        """
+        self._looked += 1
+        self.looks = self._looked <= EAGER or self._looked % PAUSE == 0
+        self._look_end = time + LONGEST
+        self._block, self._earlier = [], 0
+        self.noise.begin()
+
+    def note(self, readings: list[list[float]]) -> None:
+        """Take note of readings: time, s, position x and y, m, and force, N."""
+        self._block += readings
+
+    def end_block(self, now: Moment) -> bool:
+        """Look at the readings of a block that ends now; return whether noise was measured."""
+        block, earlier = self._block, self._earlier
+        duration = now.time - self.end + BLOCK
+        self._block, self._earlier = block[-2:], min(2, len(block))
+        self.end = now.time + BLOCK - 1e-9
+        if duration > BLOCK + LONGEST_GAP or now.speed_sd == math.inf:
+            self.axes.restart()
+            return False
+        loaded = self.axes.update(now.time, duration, now.height, now.force)
+        measured = False
+        if self.looks and len(block) > earlier:
+            measured = self._look_at(block, earlier, duration, now, loaded)
+        if now.stands and now.time > self._look_end:
+            self.look(now.time)
+        return measured
+
+    def _look_at(
+        self, block: list[list[float]], earlier: int, duration: float, now: Moment, loaded: bool
+    ) -> bool:
+        """Measure noise and compare motions in a block, which follows on ``earlier`` readings."""
+        columns = [*zip(*block, strict=True)]
+        count = len(block) - earlier
+        means = [sum(each[earlier:]) / count for each in columns[1:]]
+        measured = now.stands and self.noise.add(columns, means, count)
+        if loaded and now.offset:
+            x, y, fx, fy, _ = means
+            sd = self.noise.position.noise * math.sqrt(2.0 / count)
+            if now.speed_sd is not None:
+                sd = now.speed_sd * BLOCK
+            dx, dy = now.offset
+            self.axes.compare(columns[0][-1], duration, x, y, fx - dx, fy - dy, sd)
+        return measured
