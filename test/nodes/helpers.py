@@ -137,6 +137,8 @@ class Bench:
         monkeypatch.setattr(Publisher, 'publish', lambda *given: self._keep(*given))
 
     def _keep(self, publisher: Publisher, message: Any) -> None:
+        if publisher.topic_name == '/parameter_events':  # with the time of day
+            return
         data = message if isinstance(message, bytes) else serialize_message(message)
         self.sent[publisher.topic_name].append(data)
 
