@@ -201,8 +201,8 @@ def _gathered(comparisons: list[Comparison]) -> list[tuple[str, list[Comparison]
     found: dict[str, list[Comparison]] = {}
     for each in comparisons:
         leg = '*' if each.compared and each.verdict in ('equal', 'rounding') else each.leg
-        topic = each.topic.rpartition('/')[2]
-        name = f'{topic} of leg {leg}: {each.quantity}' if each.leg >= 0 else topic
+        name = f'leg_{leg}/{each.quantity}' if each.leg >= 0 else each.quantity
+        name = f'{each.topic}: {name}'
         found.setdefault(name, []).append(each)
     return list(found.items())
 

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Sequence
 
-import numpy as np
-
 from ros_pad.configuration import number
-from ros_pad.records import Array
 
 SLOW_SLIP = 0.01
 """Slip speed for which the test for slow slip is designed, m/s."""
@@ -39,12 +37,10 @@ class SlipAlarm:
         Threshold of the statistics, nats, above 0. With independent noise of any level, at least
         e^threshold samples lie between false alarms of a test on average (Lorden 1971), mostly
         far more.
-    feet : int
-        Number of feet.
 
     Attributes
     ----------
-    state : array (speeds, feet)
+    statistics : list of float
         The statistics g, nats, from 0 to 1.25 times the threshold.
 
     Raises
@@ -53,33 +49,43 @@ class SlipAlarm:
         When a value is outside its range; the message names it.
     """
 
-    __slots__ = ('_correlation_time', '_speeds', '_threshold', 'state')
+    __slots__ = ('_correlation_time', '_highest', '_speeds', '_threshold', 'statistics')
 
     def __init__(
         self,
         correlation_time: float,
         speeds: Sequence[float] = (SLOW_SLIP, FAST_SLIP),
         threshold: float = THRESHOLD,
-        feet: int = 1,
     ) -> None:
         self._correlation_time = number('correlation_time', correlation_time, 's')
         self._threshold = number('threshold', threshold, '(nats)', above=True)
-        speeds = [number('speed', speed, 'm/s', above=True) for speed in speeds]
-        self._speeds = np.array(speeds)[:, None]
-        self.state = np.zeros((len(speeds), feet))
+        self._highest = 1.25 * self._threshold  # so that the alarm ends soon after the slip
+        self._speeds = [number('speed', speed, 'm/s', above=True) for speed in speeds]
+        self.reset()
 
-    def update(self, speeds: Array, noises: Array, dt: Array) -> Array:
-        """Process slip speeds, m/s, with standard deviations, m/s, dt seconds after the last ones.
+    def reset(self) -> None:
+        """Discard all evidence; call it at touch-down."""
+        self.statistics = [0.0] * len(self._speeds)
 
-        All have rows of samples and columns of feet, or one for all. Return for each foot whether
-        the alarm is on after the last sample.
+    def update(self, samples: Iterable[tuple[float, float, float]]) -> bool:
+        """Process slip speeds, m/s, with their deviations, m/s, dt seconds after the last ones.
+
+        Return whether the alarm is on after the last one.
         """
-        weights = noises * noises * np.maximum(self._correlation_time / dt, 1.0)
-        gains = self._speeds / weights[:, None] * (speeds[:, None] - 0.5 * self._speeds)
-        statistic = self.state
-        for gain in gains:
-            gain += statistic
-            statistic = np.minimum(np.maximum(gain, 0.0), 1.25 * self._threshold)
-        self.state[:] = statistic  # capped, so that the alarm ends soon after the slip
-        raised: Array = (gains[-1] > self._threshold).any(axis=0)
+        weighed = []
+        for speed, noise, dt in samples:
+            stretch = self._correlation_time / dt
+            weighed.append((speed, noise * noise * (stretch if stretch > 1.0 else 1.0)))
+        threshold, highest, raised = self._threshold, self._highest, False
+        for test, designed in enumerate(self._speeds):
+            statistic, half, on = self.statistics[test], 0.5 * designed, False
+            for speed, variance in weighed:
+                statistic += designed / variance * (speed - half)
+                on = statistic > threshold
+                if not statistic > 0.0:
+                    statistic = 0.0
+                elif statistic > highest:
+                    statistic = highest
+            self.statistics[test] = statistic
+            raised = raised or on
         return raised

@@ -7,17 +7,13 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from ros_pad.configuration import shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
-from ros_pad.estimation.feet import SPEED_SD
-from ros_pad.estimation.feet import TIME
 from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.feet import Samples
 from ros_pad.estimation.feet import late
+from ros_pad.estimation.track import Standing
 from ros_pad.estimation.tuning import Tuning
 
 
@@ -160,7 +156,7 @@ class FootEstimator:
 
     def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
         self.feet = FeetEstimator(1, foot, expected_load, tuning)
-        self.estimate = self._estimate(fresh=True)
+        self.estimate = self._estimate()
 
     def update(
         self,
@@ -205,7 +201,7 @@ class FootEstimator:
             When a value is not a finite number, force or position are not three numbers, time
             does not advance, or the motion is missing or has a deviation below 0.
         """
-        tuning = self.feet.tuning
+        tuning, track = self.feet.tuning, self.feet.tracks[0]
         motion = motion if tuning.source == 'joints' else None
         moment = moment if tuning.moment_noise > 0.0 else None
         if tuning.source == 'joints' and motion is None:
@@ -214,27 +210,25 @@ class FootEstimator:
                 ' velocity of the contact is needed'
             )
         _check(time, force, position, pressure, moment, position_time, motion)
-        late(time, float(self.feet.last[TIME, 0]))
+        late(time, track.time)
         yaw = math.nan if moment is None else moment
-        speeds = [*motion.velocity, *(2 * [motion.sd**2])] if motion else 4 * [0.0]
-        if motion and motion.doubt:
-            speeds[2:] = math.inf, math.inf
-        values = np.array([*force, yaw, *position, *speeds])[None, :, None]
+        variance = 0.0
+        if motion:
+            variance = math.inf if motion.doubt else motion.sd**2
+        velocity = motion.velocity if motion else (0.0, 0.0)
         age = 0.0 if position_time is None else abs(time - position_time)
-        ages = np.array([[age]]) if age else None
-        self.feet.update(Samples([time], values, [pressure], ages))
-        self.estimate = self._estimate(bool(self.feet.fresh[0]))
+        sample = *force, yaw, *position, *velocity, variance, variance
+        self.feet.update((time,), ((sample,),), (pressure,), ((age,),) if age else None)
+        self.estimate = self._estimate()
         return self.estimate
 
-    def _estimate(self, fresh: bool) -> Estimate:
-        feet = self.feet
-        velocity, speed, slipping = feet.slips
-        why, sound = feet.doubts[0], bool(feet.sound[0])
+    def _estimate(self) -> Estimate:
+        track, grounds = self.feet.tracks[0], self.feet.grounds
+        now = track.last if track.last and track.gate.stands else Standing()
         return Estimate(
-            float(feet.last[TIME, 0]), bool(feet.stances.stands[0]), bool(slipping[0]),
-            (float(velocity[0, 0]), float(velocity[1, 0])), float(speed[0]),
-            float(feet.last[SPEED_SD, 0]), *feet.grounds.beliefs[0],
-            float(feet.margins[0]), fresh, doubt.text(*why), sound,
+            track.time, track.gate.stands, now.slipping, now.slip_velocity, now.slip_speed,
+            track.slip.sd, *grounds.beliefs[0], track.margin, track.fresh,
+            doubt.text(*grounds.doubts[0]), track.sound,
         )  # fmt: skip
 
 

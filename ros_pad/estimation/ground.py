@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the feet feel of the ground: their samples in windows, and the filters that these update."""
+"""What each foot knows of the ground, from the windows of its samples."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-
-import numpy as np
 
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
@@ -20,49 +17,18 @@ from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.parts import History
 from ros_pad.estimation.parts import Path
 from ros_pad.estimation.parts import Stance
+from ros_pad.estimation.parts import Window
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.records import Array
 
 HINDSIGHT = DEAD + LONGEST_GAP
 """Time for which earlier posteriors are kept, s: no sensor fault stays undetected for longer."""
 
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
-
-SUMS = 6
-"""Sums over a window: samples, normal force, tangential force, friction used by turning, slip
-speed, and its standard deviation."""
-
-
-class Window:
-    """A window of the samples of a foot, as the filter needs it.
-
-    Attributes
-    ----------
-    foot : int
-        Place of the foot.
-    row : int
-        Its last sample.
-    time, start : float
-        Its end and beginning, s.
-    first : bool
-        Whether it is the first one of its stance.
-    sums : list of float
-        See :data:`SUMS`.
-    """
-
-    __slots__ = ('first', 'foot', 'row', 'start', 'sums', 'time')
-
-    def __init__(
-        self, foot: int, row: int, time: float, start: float, first: bool, sums: list[float]
-    ) -> None:
-        self.foot, self.row, self.time, self.start = foot, row, time, start
-        self.first, self.sums = first, sums
-
 
 class Grounds:
     """What each foot knows of the ground.
@@ -88,11 +54,10 @@ class Grounds:
         Posterior of each foot.
     beliefs : list of tuple
         Probability of wet ground, and mean and standard deviation of friction, of each foot.
+    doubts : list of Doubt
+        Why the ground below each foot is unobservable.
     quantiles : list of float
         Friction of each foot that is exceeded with a probability of 1 - :data:`MARGIN_SHARE`.
-    state : array (9, feet)
-        Sums over the present window, its start, whether it is the first of its stance, and the
-        largest normal force of the stance, N.
     """
 
     def __init__(
@@ -108,11 +73,13 @@ class Grounds:
         self.histories = [History(HINDSIGHT) for _ in range(feet)]
         self._stances = [Stance() for _ in range(feet)]
         self.beliefs = [(tuning.wet_prior, *each.friction) for each in self.filters]
-        self.quantiles = np.array([each.quantile(MARGIN_SHARE) for each in self.filters])
-        self.state = np.zeros((SUMS + 3, feet))
+        self.quantiles = [each.quantile(MARGIN_SHARE) for each in self.filters]
+        self.doubts = [Doubt(doubt.NOT_YET)] * feet
+        self._due: dict[int, tuple[float, float, Evidence]] = {}  # time, peak load, and evidence
 
     def touch_down(self, foot: int, time: float, x: float, y: float, pressure: float) -> None:
         """Begin a stance of a foot at a time, s, and place, m, with a pressure, Pa."""
+        self.flush()
         ground, stance = self.filters[foot], Stance(self._share_on_domes(pressure))
         self._stances[foot] = stance
         ground.touch_down(
@@ -120,20 +87,16 @@ class Grounds:
         )
         self.histories[foot].add(time, ground.posterior)
         self.quantiles[foot] = ground.quantile(MARGIN_SHARE)
-        self.begin(foot, time)
-        self.state[SUMS + 2, foot] = 0.0
 
-    def begin(self, foot: int, time: float) -> None:
-        """Begin a window of a foot at a time, s, as in the beginning of a stance."""
-        self.state[:SUMS, foot] = 0.0
-        self.state[SUMS : SUMS + 2, foot] = time, 1.0
-
-    def lose(self, foot: int, dt: float, place: tuple[float, float] | None, since: float) -> bool:
+    def lose(
+        self, foot: int, dt: float, place: tuple[float, float] | None, since: float, why: Doubt
+    ) -> bool:
         """Undo what a foot has felt since a time, s, as its sensors are in doubt, and fade.
 
         The sample is dt seconds after the last one, at a place, m, None if that is unknown.
         Return whether the posterior has changed.
         """
+        self.flush()
         ground, path = self.filters[foot], self.paths[foot]
         posterior = self.histories[foot].undo(since)
         if posterior is not None:
@@ -143,111 +106,112 @@ class Grounds:
             ground.fade(distance)
         changed = posterior is not None or distance > 0.0
         friction = ground.friction if changed else self.beliefs[foot][1:]
-        self.beliefs[foot] = ground.wet_probability, *friction
+        self.beliefs[foot], self.doubts[foot] = (ground.wet_probability, *friction), why
         return changed
+
+    def doubt(self, foot: int) -> bool:
+        """Take the motion of a foot for unknown; return whether it was known."""
+        self.flush()
+        known = self.doubts[foot].code != doubt.MOTION
+        self.doubts[foot] = Doubt(doubt.MOTION)
+        return known
+
+    def set_back(self, foot: int) -> None:
+        """Forget the times of a foot, because the clock has been set back."""
+        self.flush()
+        self.paths[foot].restart()
+        self.histories[foot].clear()
 
     def forget(self, foot: int, time: float) -> None:
         """Forget what a foot has learnt in wrong axes until a time, s."""
+        self.flush()
         self.histories[foot].clear()
         self.filters[foot].forget(time)
         self.beliefs[foot] = self.beliefs[foot][0], *self.filters[foot].friction
 
-    def add(
+    def end_window(
         self,
-        times: Sequence[float],
-        values: Array,
-        stands: Array,
-        places: Array,
-        pressures: Sequence[float],
-        noises: Array,
-        known: Array | None,
-    ) -> dict[int, Doubt]:
-        """Process samples; return the doubts of the feet whose filters have been updated.
+        foot: int,
+        time: float,
+        window: Window,
+        place: tuple[float, float],
+        pressure: float,
+        noises: tuple[float, float, float],
+        turning_known: bool,
+    ) -> None:
+        """Use a window of a foot that ends at a time, s, with the next :meth:`flush`.
 
         Parameters
         ----------
-        times : sequence of float
-            Times, s.
-        values : array (samples, SUMS, feet)
-            What is summed up in windows.
-        stands : array of bool (feet,)
-            Which feet stand; the others do not count.
-        places : array (samples, 2, feet)
-            Places of the contacts, m.
-        pressures : sequence of float
-            Gauge pressures in the pads, Pa.
-        noises : array (3, feet)
+        foot : int
+            Place of the foot.
+        time : float
+            Time, s.
+        window : Window
+            The window.
+        place : tuple of float
+            Place of the contact, m.
+        pressure : float
+            Gauge pressure in the pads, Pa.
+        noises : tuple of float
             Standard deviations of a component of the force, of its offset, N, and of a coordinate
             of the contact, m.
-        known : array of bool (samples, feet) or None
-            Whether the torque about z was measured; None: never.
+        turning_known : bool
+            Whether the torque about z was measured.
         """
-        state, found = self.state, {}
-        sums = np.add.accumulate(values)
-        period = self._tuning.filter_period - 1e-9
-        while True:
-            due = np.flatnonzero(stands & (times[-1] - state[SUMS] >= period)).tolist()
-            if not due:
-                break
-            windows = [self._window(foot, times, sums, period) for foot in due]
-            for each in windows:
-                peak = values[: each.row + 1, 1, each.foot].max()
-                self._stances[each.foot].peak_load = max(state[SUMS + 2, each.foot], peak)
-                self._follow_pressure(each, pressures[each.foot])
-            samples = [
-                self._evidence(
-                    each, places[each.row, :, each.foot].tolist(),
-                    noises[:, each.foot].tolist(),
-                    known is not None and bool(known[each.row, each.foot]),
-                ) for each in windows
-            ]  # fmt: skip
-            friction.update([self.filters[foot] for foot in due], samples)
-            for each in windows:
-                found[each.foot] = self._use(each)
-        state[:SUMS] += sums[-1]
-        state[SUMS + 2] = np.maximum(state[SUMS + 2], np.maximum.reduce(values[:, 1]))
-        return found
+        if foot in self._due:
+            self.flush()
+        self._follow_pressure(foot, time, pressure)
+        evidence = self._evidence(foot, time - window.start, window, place, noises, turning_known)
+        self._due[foot] = time, window.peak, evidence
 
-    def _window(self, foot: int, times: Sequence[float], sums: Array, period: float) -> Window:
-        """Return the next window of a foot that ends in these samples, and begin another one."""
-        start, first = self.state[SUMS : SUMS + 2, foot].tolist()
-        row = next(row for row, time in enumerate(times) if time - start >= period)
-        found = self.state[:SUMS, foot] + sums[row, :, foot]
-        self.state[:SUMS, foot] = -sums[row, :, foot]
-        self.state[SUMS : SUMS + 2, foot] = times[row], 0.0
-        return Window(foot, row, times[row], start, first > 0.0, found.tolist())
+    def flush(self) -> None:
+        """Update the filters of all feet with windows that have ended, together."""
+        due, self._due = self._due, {}
+        if due:
+            friction.update([self.filters[foot] for foot in due], [each[2] for each in due.values()])
+        for foot, (time, peak, _) in due.items():
+            self._use(foot, time, peak)
 
-    def _use(self, window: Window) -> Doubt:
-        """Use the updated filter of a foot; return why its ground is unobservable."""
-        foot, ground, stance = window.foot, self.filters[window.foot], self._stances[window.foot]
-        self.histories[foot].add(window.time, ground.posterior)
+    def _use(self, foot: int, time: float, peak_load: float) -> None:
+        """Use the updated filter of a foot."""
+        ground, stance = self.filters[foot], self._stances[foot]
+        self.histories[foot].add(time, ground.posterior)
         self.quantiles[foot] = ground.quantile(MARGIN_SHARE)
         self.beliefs[foot] = wet, mean, sd = ground.wet_probability, *ground.friction
         evidence = doubt.StanceEvidence(
-            stance.dome_share, ground.log_odds, stance.peak_load, stance.peak_ratio,
+            stance.dome_share, ground.log_odds, peak_load, stance.peak_ratio,
             stance.peak_turning, wet, mean, sd,
         )  # fmt: skip
-        return doubt.of_ground(evidence, ground.expected.medians, self._expected_load)
+        self.doubts[foot] = doubt.of_ground(
+            evidence, ground.expected.medians, self._expected_load
+        )
 
     def _share_on_domes(self, pressure: float) -> float:
         return self._foot.dome_load(self._expected_load, pressure) / self._expected_load
 
-    def _follow_pressure(self, window: Window, pressure: float) -> None:
+    def _follow_pressure(self, foot: int, time: float, pressure: float) -> None:
         """Begin a new stance at the same place when a foot changes its morphology under load."""
-        stance = self._stances[window.foot]
+        stance = self._stances[foot]
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
         dome = stance.dome_share > doubt.DOMED
         if (before > doubt.DOMED) != dome:
-            self.filters[window.foot].touch_down(0.0, dome, window.time)
+            self.filters[foot].touch_down(0.0, dome, time)
             stance.counted = None
 
     def _evidence(
-        self, window: Window, place: list[float], noises: list[float], turning_known: bool
+        self,
+        foot: int,
+        duration: float,
+        window: Window,
+        place: tuple[float, float],
+        noises: tuple[float, float, float],
+        turning_known: bool,
     ) -> Evidence:
         """Return what a window shows."""
         count, load, pull, turning, speed, speed_noise = window.sums
         (force_noise, offset_sd, contact_noise), tuning = noises, self._tuning
-        stance, duration = self._stances[window.foot], window.time - window.start
+        stance = self._stances[foot]
         pull, turning, load = pull / load, turning / load, load / count
         ratio = math.hypot(pull, turning)
         if turning > 0.0:

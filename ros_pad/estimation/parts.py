@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of the estimator, each with its own state; arrays are of samples, numbers and feet."""
+"""Parts of the estimator of a foot, each with its own state."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 
-import numpy as np
-
+from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import Posterior
-from ros_pad.records import Array
 
 TARE_TIME = 0.5
 """Time over which the force of a foot in the air is averaged, s."""
@@ -33,197 +31,155 @@ AIRBORNE = 0.01
 """Rise above the height of its last stance, m, from which on a foot certainly touches nothing."""
 
 
-def followed(start: Array, targets: Array, shares: Array) -> Array:
-    """Return x after each of x ← x + share (target - x), from its start.
-
-    The start is of numbers and feet, targets have samples before, shares are of samples and feet.
-    """
-    if len(targets) == 1:
-        first: Array = start + shares * (targets - start)
-        return first
-    # What is kept of the start; more than nothing, for the division.
-    kept = np.multiply.accumulate(np.maximum(1.0 - shares, 1e-100))[:, None]
-    found: Array = kept * (start + np.add.accumulate(shares[:, None] / kept * targets))
-    return found
-
-
 class Offset:
-    """Offset of each force sensor: the mean of its readings in the air.
+    """Offset of a force sensor: the mean of its readings in the air.
 
     Parameters
     ----------
     expected_load : float
         Normal force in stance, N.
-    feet : int
-        Number of feet.
 
     Attributes
     ----------
-    state : array (6, feet)
-        Mean force, N, mean torque about z, N m, standard deviation of the offset of the force, N,
-        and time in the air, s, above 0 when the offset is known.
+    x, y, z, moment : float
+        Mean force, N, and mean torque about z, N m.
+    sd : float
+        Standard deviation of the offset of the force, N.
     """
 
-    __slots__ = ('_shares', '_times', '_values', 'state')
+    __slots__ = ('_air_time', 'moment', 'sd', 'x', 'y', 'z')
 
-    def __init__(self, expected_load: float, feet: int) -> None:
-        self.state = np.zeros((6, feet))
-        self.state[4] = OFFSET_SHARE * expected_load
-
-    def ahead(self, dt: Array, forces: Array, air: Array) -> Array:
-        """Return forces and torque after each of several samples, of which some are in the air."""
-        # This is a plain mean at first, and an exponential one after TARE_TIME.
-        dt = np.where(air, np.minimum(dt, TARE_TIME), 0.0)
-        self._times = self.state[5] + np.add.accumulate(dt)
-        self._shares = dt / np.maximum(np.minimum(TARE_TIME + dt, self._times), 1e-12)
-        self._values = followed(self.state[:4], forces, self._shares)
-        return self._values
+    def __init__(self, expected_load: float) -> None:
+        self.x = self.y = self.z = self.moment = 0.0
+        self.sd = OFFSET_SHARE * expected_load
+        self._air_time = 0.0
 
     @property
-    def first(self) -> Array:
-        """Forces and torque after the first of these samples."""
-        found: Array = self._values[0]
-        return found
+    def known(self) -> bool:
+        """Whether the foot was in the air."""
+        return self._air_time > 0.0
 
-    def use(self, count: int) -> None:
-        """Use the first of these samples."""
-        self.state[:4], self.state[5] = self._values[count - 1], self._times[count - 1]
-        self.state[4] *= np.multiply.reduce(1.0 - self._shares[:count])
-
-
-class SlipSpeed:
-    """Velocity of the contacts over the floor, from their smoothed positions.
-
-    Parameters
-    ----------
-    smoothing : float
-        Time constant of the smoothing, s, above 0.
-    feet : int
-        Number of feet.
-
-    Attributes
-    ----------
-    state : array (2, feet)
-        Smoothed position of the contact, m.
-    """
-
-    __slots__ = ('_smoothing', 'state')
-
-    def __init__(self, smoothing: float, feet: int) -> None:
-        self._smoothing = smoothing
-        self.state = np.zeros((2, feet))
-
-    def update(self, places: Array, dt: Array) -> tuple[Array, Array]:
-        """Process positions, m; return the smoothed ones, and velocities, m/s."""
-        smooth = followed(self.state, places, dt / (self._smoothing + dt))
-        self.state[:] = smooth[-1]
-        return smooth, (places - smooth) / self._smoothing
+    def update(self, dt: float, fx: float, fy: float, fz: float, moment: float) -> None:
+        """Process forces, N, and a torque, N m, read in the air dt seconds after the last ones."""
+        # This is a plain mean at first, and an exponential one after TARE_TIME.
+        dt = min(dt, TARE_TIME)
+        self._air_time += dt
+        share = dt / min(TARE_TIME + dt, self._air_time)
+        self.x += share * (fx - self.x)
+        self.y += share * (fy - self.y)
+        self.z += share * (fz - self.z)
+        self.moment += share * (moment - self.moment)
+        self.sd *= 1.0 - share
 
 
-class Ahead:
-    """Whether feet go on as they are in the samples to come, see :meth:`Stances.ahead`.
-
-    Attributes
-    ----------
-    rise : array of bool (feet,)
-        Which ones rise at the first sample.
-    change : array of bool (feet,)
-        Which ones land or lift off at the first sample.
-    count : int
-        For how many samples none of them does.
-    """
-
-    __slots__ = ('air', 'change', 'count', 'light', 'moved', 'rise')
-
-    def __init__(self, rise: Array, light: Array, air: Array, same: Array, sure: int) -> None:
-        self.rise, self.light, self.air, self.change = rise, light, air, ~same[0]
-        self.moved = bool(air.any())
-        steady = same.all(axis=1)
-        self.count = sure if steady.all() else min(sure, int(steady.argmin()))
-
-
-class Stances:
-    """Which feet stand, and at which heights.
+class Gate:
+    """Whether a foot stands, by its load and height.
 
     Parameters
     ----------
     lift_off : float
         Load below which a foot does not stand, N.
     least : float
-        Load below which a foot may be in the air, if it is higher than in its last stance, N.
-    feet : int
-        Number of feet.
+        Load below which a foot that is higher than in its last stance is in the air, N.
 
     Attributes
     ----------
-    stands : array of bool (feet,)
-        Which feet stand.
-    height : array (feet,)
+    stands : bool
+        Whether it stands.
+    height : float
         Height of the marker in the last stance, m; infinite if unknown.
-    state : array (3, feet)
-        These heights, heights at touch-down, and those that a standing foot cannot reach, m.
+    top : float
+        Height that it cannot reach while it stands, m.
+    least : float
+        As given.
+    firm : float
+        Load with which it is sure to stand below the top, N.
     """
 
-    __slots__ = ('_base', '_least', '_lift_off', '_top', 'height', 'stands', 'state')
+    __slots__ = ('_base', '_lift_off', 'firm', 'height', 'least', 'stands', 'top')
 
-    def __init__(self, lift_off: float, least: float, feet: int) -> None:
-        self._lift_off, self._least = lift_off, least
-        self.state = np.full((3, feet), math.inf)
-        self.height, self._base, self._top = self.state
-        self.stands = np.zeros(feet, bool)
+    def __init__(self, lift_off: float, least: float) -> None:
+        self._lift_off, self.least, self.firm = lift_off, least, max(lift_off, least)
+        self.height = self._base = self.top = math.inf
+        self.stands = False
 
-    def ahead(
-        self, dt: Array, forces: Array, heights: Array, offset: Offset, lifted: Array | None
-    ) -> Ahead:
-        """Find out how feet go on; offset.use is then ready for as many samples.
+    @property
+    def air(self) -> float:
+        """Height above which a foot with little load touches nothing, m."""
+        return self.height + AIRBORNE
 
-        Those that have just been lifted are in the air at the first sample.
-        """
-        load = forces[:, 2] - offset.state[2]
-        light = load < self._least
-        rise = heights > self._top
-        air = heights > self._heights(heights, light) + AIRBORNE
-        air &= light
-        air |= rise
-        sure = len(heights)
-        if lifted is not None:
-            air[0] |= lifted
-        if air.any():
-            after = offset.ahead(dt, forces, air)
-            load[1:] = forces[1:, 2] - after[:-1, 2]
-            if ((load < self._least) != light).any():  # from there on the offset may not change
-                sure = max(1, int(((load < self._least) != light).any(axis=1).argmax()))
-            load[air] = 0.0
-        same = (load >= self._lift_off) == self.stands
-        return Ahead(rise[0], light, air, same, sure)
+    def aloft(self, load: float, height: float) -> bool:
+        """Return whether a foot with a load, N, at a height, m, is in the air."""
+        if self.stands and height > self.top:
+            self.height = self._base  # the ground cannot rise with the foot
+            return True
+        return load < self.least and height > self.air
 
-    def _heights(self, heights: Array, light: Array) -> Array:
-        """Return the heights of the last stance at each sample."""
-        if len(heights) == 1 or not (light & self.stands).any():
-            return self.height
-        found = [self.height]
-        for height, unloaded in zip(heights[:-1], light[:-1], strict=True):
-            found.append(np.where(self.stands & ~unloaded, height, found[-1]))
-        return np.array(found)
+    def update(self, load: float) -> bool:
+        """Return whether a foot stands with a load, N."""
+        self.stands = load >= self._lift_off
+        return self.stands
 
-    def use(self, heights: Array, light: Array) -> None:
-        """Use samples in which no foot lands or lifts off."""
-        if not (light & self.stands).any():
-            heights, light = heights[-1:], light[-1:]
-        for height, unloaded in zip(heights, light, strict=True):
-            np.copyto(self.height, height, where=self.stands & ~unloaded)
+    def touch_down(self, height: float) -> None:
+        """Begin a stance at a height, m."""
+        self._base, self.top = height, height + AIRBORNE
 
-    def land(self, foot: int, height: float) -> None:
-        """Begin a stance of a foot at a height, m."""
-        self.stands[foot] = True
-        self._base[foot], self._top[foot] = height, height + AIRBORNE
 
-    def lift(self, foot: int, rises: bool = False) -> None:
-        """End the stance of a foot, which may have risen: the ground cannot rise with it."""
-        self.stands[foot] = False
-        self._top[foot] = math.inf
-        if rises:
-            self.height[foot] = self._base[foot]
+class Slip:
+    """Slip of a foot.
+
+    Parameters
+    ----------
+    alarm : SlipAlarm
+        Slip alarm.
+
+    Attributes
+    ----------
+    alarm : SlipAlarm
+        As given.
+    x, y : float
+        Smoothed position of the contact, m; with joints the smoothed shear of the pads.
+    noise : float
+        Standard deviation of the slip speed without that of the body, m/s.
+    contact_noise : float
+        That of a coordinate of the contact, m.
+    sd : float
+        Standard deviation of the last slip speed, m/s; infinite while it is not known.
+    """
+
+    __slots__ = ('alarm', 'contact_noise', 'noise', 'sd', 'x', 'y')
+
+    def __init__(self, alarm: SlipAlarm) -> None:
+        self.alarm = alarm
+        self.x = self.y = self.noise = self.contact_noise = self.sd = 0.0
+
+    def begin(self, x: float, y: float) -> None:
+        """Begin a stance at a position, m."""
+        self.x, self.y = x, y
+        self.alarm.reset()
+
+
+class Window:
+    """Sums of the samples of a stance since the last update of the filter.
+
+    Attributes
+    ----------
+    start : float
+        Its beginning, s.
+    first : bool
+        Whether it is the first one of its stance.
+    sums : tuple of float
+        Number of samples, and sums of normal force, tangential force, friction used by turning, N,
+        slip speed, and standard deviation of that, m/s.
+    peak : float
+        Largest normal force of the stance, N.
+    """
+
+    __slots__ = ('first', 'peak', 'start', 'sums')
+
+    def __init__(self, start: float, first: bool = True, peak: float = 0.0) -> None:
+        self.start, self.first, self.peak = start, first, peak
+        self.sums = (0.0,) * 6
 
 
 class Stance:
@@ -233,18 +189,18 @@ class Stance:
     ----------
     dome_share : float
         Share of the expected load that domes carry, 0 to 1.
-    peak_load, peak_ratio, peak_turning : float
-        Largest normal force, N; largest T/N of the pull, and of the friction used by turning, each
+    peak_ratio, peak_turning : float
+        Largest T/N of the pull, and of the friction used by turning, each
         as the mean of a window.
     counted : tuple of float or None
         T/N and place, m, of what earlier windows have shown; None to give the next full weight.
     """
 
-    __slots__ = ('counted', 'dome_share', 'peak_load', 'peak_ratio', 'peak_turning')
+    __slots__ = ('counted', 'dome_share', 'peak_ratio', 'peak_turning')
 
     def __init__(self, dome_share: float = 0.0) -> None:
         self.dome_share = dome_share
-        self.peak_load = self.peak_ratio = self.peak_turning = 0.0
+        self.peak_ratio = self.peak_turning = 0.0
         self.counted: tuple[float, float, float] | None = None
 
     def weight(self, ratio: float, noise: float, x: float, y: float) -> float:

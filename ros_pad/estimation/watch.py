@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from ros_pad.estimation.axes import BLOCK
@@ -78,7 +79,7 @@ class Watch:
         """Forget the last readings, and the height of the last stance."""
         self.axes.restart()
         self.end = -math.inf
-        self._block: list[list[float]] = []  # readings since the last block, and two before them
+        self._block: list[tuple[float, ...]] = []  # readings since the last block, and two before them
         self._earlier = 0  # how many are before them
 
     def look(self, time: float) -> None:
@@ -92,9 +93,9 @@ class Watch:
         self._block, self._earlier = [], 0
         self.noise.begin()
 
-    def note(self, readings: list[list[float]]) -> None:
+    def note(self, readings: Iterable[tuple[float, ...]]) -> None:
         """Take note of readings: time, s, position x and y, m, and force, N."""
-        self._block += readings
+        self._block.extend(readings)
 
     def end_block(self, now: Moment) -> bool:
         """Look at the readings of a block that ends now; return whether noise was measured."""
@@ -114,7 +115,7 @@ class Watch:
         return measured
 
     def _look_at(
-        self, block: list[list[float]], earlier: int, duration: float, now: Moment, loaded: bool
+        self, block: list[tuple[float, ...]], earlier: int, duration: float, now: Moment, loaded: bool
     ) -> bool:
         """Measure noise and compare motions in a block, which follows on ``earlier`` readings."""
         columns = [*zip(*block, strict=True)]

@@ -104,7 +104,7 @@ class EstimatorNode(Node):
         self._health_pace = Pace(TICK_PERIOD_NS)
         messages.receive_record(topics.SAMPLE, self._legs, self._on_samples)
         messages.receive_record(topics.PRESSURE, self._legs, self._on_pressure)
-        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
+        messages.on_tick(TICK_PERIOD_NS * 1e-9, self._idle)
 
     def _on_samples(self, block: Block) -> None:
         if self.messages.simulated:
@@ -151,6 +151,13 @@ class EstimatorNode(Node):
         """Write what was learnt, and destroy the node."""
         self.keep_learnt()
         super().destroy_node()
+
+    def _idle(self, now_ns: int) -> None:
+        """Tick without samples: the controller has to know of a foot whose sensors are silent."""
+        before = self._reported
+        self._tick(now_ns)
+        if self._reported != before:
+            self._send(self.stage.estimate(now_ns))
 
     def _tick(self, now_ns: int) -> None:
         if not self._health_pace.due(now_ns):

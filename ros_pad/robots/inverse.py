@@ -50,9 +50,12 @@ class LegSolver:
         # In the axes of the hip: normal to the leg's plane, in the plane, and its own axis.
         inside = cross(hip.axis, across) / sine
         frame = np.array((cross(inside, hip.axis), inside, hip.axis))
-        self._base: list[list[float]] = (frame @ hip.at[:3, :3].T).tolist()
+        base = frame @ hip.at[:3, :3].T
+        self._base: list[float] = base.ravel().tolist()
         self._at: list[float] = hip.at[:3, 3].tolist()
-        self._plane = [(frame @ each).tolist() for each in (thigh.at[:3, 3], ahead, up)]
+        self._plane: list[float] = np.ravel(
+            [frame @ each for each in (thigh.at[:3, 3], ahead, up)]
+        ).tolist()
         upper = thigh.at[:3, :3] @ knee.at[:3, 3]
         lower = turn @ foot[:3, 3]
         self._side = (float(across @ (thigh.at[:3, 3] + upper + lower)), lean, sine)
@@ -66,7 +69,7 @@ class LegSolver:
         bend = math.remainder(self._sense * home[2] + self._fold, math.tau)
         self._knee = 1.0 if bend >= 0.0 else -1.0
         place = Chains([joints], foot[None]).solve(np.array([home])).positions[0]
-        near, far, _ = np.array(self._base) @ (place - hip.at[:3, 3])
+        near, far, _ = base @ (place - hip.at[:3, 3])
         middle = math.atan2(far, near)
         self._hip = 1.0 if math.remainder(home[0] - middle, math.tau) >= 0.0 else -1.0
         self._home = home
@@ -93,11 +96,9 @@ class LegSolver:
         InvalidInput
             When the place is too far or too close for the leg.
         """
-        (at_x, at_y, at_z), (normal, inside, axis) = self._at, self._base
+        (at_x, at_y, at_z), (a, b, c, d, e, f, g, h, i) = self._at, self._base
         x, y, z = x - at_x, y - at_y, z - at_z
-        near = normal[0] * x + normal[1] * y + normal[2] * z
-        far = inside[0] * x + inside[1] * y + inside[2] * z
-        along = axis[0] * x + axis[1] * y + axis[2] * z
+        near, far, along = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
         # The hip turns the plane of the other two joints until the foot is in it.
         side, lean, sine = self._side
         side, size = side - lean * along, sine * math.hypot(near, far)
@@ -106,13 +107,12 @@ class LegSolver:
             share = self._cosine(side, size)
         hip = math.remainder(math.atan2(far, near) + self._hip * math.acos(share), math.tau)
         c, s = math.cos(hip), math.sin(hip)
-        # The same place in the link of the hip, which has turned by this angle.
-        origin, one, two = self._plane
-        near, far = c * near + s * far - origin[0], c * far - s * near - origin[1]
-        # This product is `along` but for its rounding, and walks hang on the last bit.
-        along = c * along + along * (1.0 - c) - origin[2]
-        u = one[0] * near + one[1] * far + one[2] * along
-        v = two[0] * near + two[1] * far + two[2] * along
+        # The same place in the link of the hip, which has turned by this angle. The last sum is
+        # `along` but for its rounding, and walks hang on the last bit.
+        near, far, along = c * near + s * far, c * far - s * near, c * along + along * (1.0 - c)
+        at_x, at_y, at_z, a, b, c, d, e, f = self._plane
+        near, far, along = near - at_x, far - at_y, along - at_z
+        u, v = a * near + b * far + c * along, d * near + e * far + f * along
         upper, lower, upper2, lower2, double = self._links
         bend = (u * u + v * v - upper2 - lower2) / double
         if not -1.0 <= bend <= 1.0:

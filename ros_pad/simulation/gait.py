@@ -163,18 +163,18 @@ class FootPath:
         strokes = [self._gait.stroke(first, time) for first in self._firsts]
         offsets, feet, swings = self._offsets, self.feet, self.swings
         self.swings = [strokes[group] is not None for group in self._groups]
-        for index, (home_x, home_y, home_z) in enumerate(self._homes):
-            x, y = offsets[index]
-            stroke = strokes[self._groups[index]]
+        places = zip(self._homes, offsets, self._groups, strict=True)
+        for index, ((home_x, home_y, height), (x, y), group) in enumerate(places):
+            stroke = strokes[group]
             if stroke is None:
                 # The foot moves in the body against the motion of the body.
-                height = 0.0
                 x, y = x - advance + turn * (home_y + y), y - turn * (home_x + x)
             else:
                 if not swings[index]:
                     self._lifted[index] = (x, y)
-                progress, height = stroke
+                progress, rise = stroke
+                height += rise
                 from_x, from_y = self._lifted[index]
                 x, y = from_x + progress * (self._reach - from_x), from_y * (1.0 - progress)
             offsets[index] = (x, y)
-            feet[index] = (home_x + x, home_y + y, home_z + height)
+            feet[index] = (home_x + x, home_y + y, height)

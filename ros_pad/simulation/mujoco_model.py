@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
+from html import escape  # xml.sax would import all of urllib
 
 import numpy as np
 
@@ -137,7 +137,7 @@ def mjcf(scene: Scene, uneven: bool, settings: SolverSettings, dt: float) -> str
             f'<pair name="foot_{leg}" geom1="block_{leg}" geom2="foot_{leg}" condim="4"/>'
         )
         sensors.append(f'<contact geom1="block_{leg}" geom2="foot_{leg}" data="force torque"/>')
-    servos = [f'<position joint={quoteattr(name)}/>' for name in robot.joint_names]
+    servos = [f'<position joint="{escape(name)}"/>' for name in robot.joint_names]
     load = line = ''
     if tow.weight:
         grounds.append('<geom name="ground" type="plane" size="0 0 1"/>')
@@ -228,8 +228,8 @@ def _leg_xml(leg: int, robot: Robot, scale: float) -> str:
         kind = 'type="slide" ' if joint.slides else ''
         link = joint.name + '_link' * (joint.name in _OWN_BODIES)
         text += (
-            f'<body name={quoteattr(link)} {at_frame(joint.at)}>'
-            f'<joint {kind}name={quoteattr(joint.name)}'
+            f'<body name="{escape(link)}" {at_frame(joint.at)}>'
+            f'<joint {kind}name="{escape(joint.name)}"'
             f' axis="{words(joint.axis)}"/>{_rod_xml(scale * joint.mass, joint.centre, end)}'
         )
         ends += '</body>'

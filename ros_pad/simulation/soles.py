@@ -130,23 +130,13 @@ class Soles:
         self._places = data.geom_xpos[feet]
         self._axes = data.geom_xmat[feet, :6]  # x and y rows of their rotation
         self._last: tuple[list[list[float]], list[list[float]]] = ([], [])
-        self._felt = data.sensordata  # force and moment of each foot's contact
-        self._loads = self._felt[::6]
-        # The axes of a contact with level ground are z, y, -x. Rows of this table are force x, y
-        # and z, moment, and what lies between contact and marker; `contacts` has them as columns.
-        order = 6 * np.arange(count) + np.array([[2], [1], [0], [3], [2], [1]])
-        give = 1.0 / foot.shear_stiffness
-        self._order = order.ravel()
-        self._factors = np.repeat((-1.0, 1.0, 1.0, 1.0, -give, give, POINT), count)
-        self._raw = np.ones(7 * count)
-        self._table = np.zeros(7 * count)
-        self._contacts = self._table.reshape(7, count)
-        self._views = self._raw[: 6 * count], self._contacts[4:], self._contacts[:4]
+        self._loads = data.sensordata[::6]
+        self._touch = _Touch(data.sensordata, self._places, 1.0 / foot.shear_stiffness)
 
     @property
     def contacts(self) -> Array:
         """Force, N, yaw moment, N m, and position, m, of each foot, (feet, 7)."""
-        return self._contacts.T
+        return self._touch.contacts
 
     @property
     def feet(self) -> list[Sole]:
@@ -213,7 +203,7 @@ class Soles:
 
     def update(self) -> None:
         """Set contacts, slip and the work lost in it, after the last step of MuJoCo."""
-        pushes_x, pushes_y, loads, moments = self._measure()
+        pushes_x, pushes_y, loads, moments = self._touch.measure()
         places, axes = self._places.tolist(), self._axes.tolist()
         last_places, last_axes = self._last
         self._last = places, axes
@@ -239,14 +229,6 @@ class Soles:
             if sole.pressure > 0.0 and sole.limit < load:
                 sole.overload_time += dt
 
-    def _measure(self) -> list[list[float]]:
-        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
-        felt, markers, wrenches = self._views
-        self._felt.take(self._order, None, felt, 'clip')
-        np.multiply(self._raw, self._factors, self._table)
-        np.subtract(self._places.T, markers, markers)
-        return wrenches.tolist()
-
     def _approach(self, sole: Sole, x: float, y: float, z: float) -> None:
         """Prepare film, block and friction below a foot without load."""
         ground, clear = 0.0, CLEAR
@@ -264,6 +246,32 @@ class Soles:
             if left:
                 sole.film.touch_down(self._floor.depth(x, y))
             self.press(sole, LIGHT, 0.0)
+
+
+class _Touch:
+    """Forces, moments and markers of all feet, from MuJoCo's arrays at once.
+
+    Rows of its table are force x, y and z, moment, and what is between place and marker.
+    """
+
+    def __init__(self, felt: Array, places: Array, give: float) -> None:
+        count = len(places)
+        # The axes of a contact with level ground are z, y, -x.
+        order = 6 * np.arange(count) + np.array([[2], [1], [0], [3], [2], [1]])
+        self._felt, self._order = felt, order.ravel()
+        self._factors = np.repeat((-1.0, 1.0, 1.0, 1.0, -give, give, POINT), count)
+        self._raw, self._table = np.ones((2, 7 * count))
+        rows = self._table.reshape(7, count)
+        self.contacts = rows.T
+        self._views = self._raw[: 6 * count], rows[:4], rows[4:], places.T
+
+    def measure(self) -> list[list[float]]:
+        """Set the contacts; return forces along x, y and z, N, and moments, N m, of all feet."""
+        felt, wrenches, markers, places = self._views
+        self._felt.take(self._order, None, felt, 'clip')
+        np.multiply(self._raw, self._factors, self._table)
+        np.subtract(places, markers, markers)
+        return wrenches.tolist()
 
 
 class Sled:

@@ -10,6 +10,7 @@ decisions would have changed; the motion of the robot stays as recorded.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import pathlib
@@ -29,15 +30,14 @@ from ros_pad.pace import part
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.comparison import Track
-from ros_pad.trials.comparison import compare_streams
-from ros_pad.trials.comparison import quantity
+from ros_pad.trials.comparison import compare
+from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
 from ros_pad.trials.replay_body import compare_body
 from ros_pad.trials.replay_inputs import Inputs
+from ros_pad.trials.replay_inputs import missing
 from ros_pad.trials.replay_inputs import read
-from ros_pad.trials.replay_notes import missing_inputs
-from ros_pad.trials.replay_notes import notes_on
 from ros_pad.trials.replay_player import Player
 from ros_pad.trials.trial import BOUNCE
 
@@ -125,7 +125,7 @@ class Replay:
 
         See :attr:`Comparison.verdict`.
         """
-        verdicts = {each.verdict for each in self.comparisons if each.recorded}
+        verdicts = {each.verdict for each in self.comparisons if each.compared + each.missing}
         for worst in ('different', 'gap', 'rounding', 'equal'):
             if worst in verdicts:
                 return worst
@@ -152,9 +152,7 @@ class Replay:
             },
             'samples': self.samples,
             'refused': {leg: count for leg, (count, _) in self.refused.items()},
-            'comparisons': [
-                _plain(asdict(each) | {'verdict': each.verdict}) for each in self.comparisons
-            ],
+            'comparisons': [_plain(asdict(each)) for each in self.comparisons],
             'outcomes': [asdict(each) for each in self.outcomes],
             'notes': self.notes,
         }
@@ -237,21 +235,34 @@ def replay(
     inputs, late = _begun(read(bag, wanted, settings, part(progress, 0.0, 0.2)))
     player = Player(settings, inputs)
     made = player.play(part(progress, 0.2, 0.9))
+    lacks = missing(inputs, settings)
     # What was lost may have changed all legs: they share what feet learn, and one controller.
-    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
-    if missing_inputs(inputs, settings):
-        gap_ns = -math.inf
-    there = {kind: inputs.streams[kind] for kind in made}
+    gap_ns = -math.inf if lacks else min((each.time_ns for each in inputs.gaps), default=math.inf)
     comparisons = [
         found
-        for kind, each in there.items()
+        for kind, each in made.items()
         if kind in inputs.topics
-        for found in compare_streams(inputs.topics[kind], each, made[kind], bag.start, gap_ns)
+        for found in compare(inputs.topics[kind], inputs.streams[kind], each, bag.start, gap_ns)
     ]
     # The body estimator is replayed beside the feet, which take what it published.
     of_body, note = compare_body(bag, wanted)
-    recorded, replayed = _tracks(there), _tracks(made)
+    recorded = {
+        key: track for kind in made for key, track in inputs.streams[kind].tracks().items()
+    }
+    replayed = {key: track for each in made.values() for key, track in each.tracks().items()}
     refused = {leg: (count, player.rejection[leg]) for leg, count in player.rejected.items()}
+    notes = [*settings.assumed, bag.problem, *_changes(bag), *lacks]
+    notes += _gaps(bag, inputs) if any(each.verdict == 'gap' for each in comparisons) else []
+    notes += [
+        f'leg {leg}: {count} samples rejected, the last one: {why}'
+        for leg, (count, why) in refused.items()
+    ]
+    different = [each for each in comparisons if each.verdict == 'different']
+    if different and not any(each.equal for each in different):
+        notes.append(
+            'the quantities that differ have no equal record: the nodes had other settings, or the'
+            ' bag begins in the middle of a walk'
+        )
     if progress:
         progress(1.0)
     return Replay(
@@ -267,11 +278,26 @@ def replay(
         streams=made,
         comparisons=comparisons + of_body,
         outcomes=[_outcome(inputs, settings, leg, recorded, replayed) for leg in inputs.legs],
-        notes=[
-            *notes_on(bag, inputs, settings, refused, comparisons),
-            *filter(None, (late, note)),
-        ],
+        notes=[text for text in (*notes, late, note) if text],
     )
+
+
+def _changes(bag: BagReader) -> list[str]:
+    """Return a note for each parameter that changed while the bag was recorded."""
+    return [
+        f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r}; the'
+        ' replay keeps the first value'
+        for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]'))
+    ]
+
+
+def _gaps(bag: BagReader, inputs: Inputs) -> list[str]:
+    return [
+        f'{each.what}: {each.places} gap{"s" if each.places > 1 else ""}, the first'
+        f' {(each.time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded'
+        ' cannot be replayed'
+        for each in sorted(inputs.gaps)
+    ]
 
 
 def _begun(inputs: Inputs) -> tuple[Inputs, str]:
@@ -289,15 +315,6 @@ def _begun(inputs: Inputs) -> tuple[Inputs, str]:
         'the estimator started later than the recorder, so the replay leaves out the'
         f' {int(np.sum(~kept))} samples before its first recorded estimate'
     )
-
-
-def _tracks(streams: Mapping[str, Stream]) -> Tracks:
-    return {
-        (leg, quantity(field)): each.track(leg, field)
-        for each in streams.values()
-        for leg in each.legs
-        for field in each.kind.fields
-    }
 
 
 def _outcome(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import heapq
 import json
 import math
+import operator
 from collections.abc import Iterator
 from collections.abc import Mapping
 from typing import Any
@@ -22,11 +23,11 @@ from ros_pad.bags.topics import STAMP
 from ros_pad.errors import BagError
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
 from ros_pad.errors import reason
 from ros_pad.records import SAMPLE as SAMPLES
 from ros_pad.records import Block
 from ros_pad.records import Field
+from ros_pad.records import Kind
 from ros_pad.robots import Robot
 from ros_pad.sensing import BodyEstimate
 from ros_pad.sensing import BodyEstimator
@@ -37,9 +38,7 @@ from ros_pad.sensing.stage import estimator_of
 from ros_pad.sensing.stage import sample_of
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Stream
-from ros_pad.trials.comparison import Track
 from ros_pad.trials.comparison import compare
-from ros_pad.trials.comparison import compare_streams
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.recorded import Wanted
 
@@ -47,7 +46,11 @@ OF_BODY = -1
 """In place of the number of a leg, for the pose of the body."""
 
 _NAMES = {each.name for each in SETTINGS}
-_POSE = Field('odom', '', 'position, m, and orientation of the body')
+_POSE = Kind(
+    'odom',
+    'Estimated pose of the body.',
+    (Field('position', 'm', 'in odom', 'xyz'), Field('orientation', '', 'quaternion', 'xyzw')),
+)
 
 
 def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Comparison], str]:
@@ -84,48 +87,35 @@ def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Com
         return [], ''
     try:
         player = _Player(bag, found[0])
-        player.play(needed)
+        player.play(*needed[:3])
     except (ConfigError, InvalidInput) as error:
         return [], f'the body estimator is not replayed: {error}'
     gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
-    recorded = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
+    samples = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
     # At moments without an estimate, the node sends records without values.
-    felt = recorded.where(np.isfinite(recorded.block.rows['force']).any(axis=(1, 2)))
-    feet = Stream.of(SAMPLES, tuple(found[0]['legs']), player.feet)
-    poses = compare(
-        needed[-1], OF_BODY, _POSE, _track(player.recorded), _track(player.poses), bag.start,
-        gap_ns,
-    )  # fmt: skip
-    return [poses, *compare_streams(sample, felt, feet, bag.start, gap_ns)], ''
+    samples = samples.where(np.isfinite(samples.block.rows['force']).any(axis=(1, 2)))
+    times, table = bag.tables({needed[-1]: (*STAMP, *ODOM.values)})[needed[-1]]
+    stamps = table[:, :2].astype(np.int64) @ np.array([1_000_000_000, 1])
+    poses = Stream(_POSE, (OF_BODY,), times, Block(stamps, table[:, 2:].copy().view(_POSE.dtype)))
+    legs = tuple(found[0]['legs'])
+    return [
+        *compare(needed[-1], poses, Stream.of(_POSE, (OF_BODY,), player.poses), bag.start, gap_ns),
+        *compare(sample, samples, Stream.of(SAMPLES, legs, player.feet), bag.start, gap_ns),
+    ], ''
 
 
-def _stage_of(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
+def _parts(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
     """Return the robot and the estimator that recorded parameters describe."""
     try:
-        robot = Robot.load(
-            values['robot'],
-            [each.strip() for each in values['feet'].split(',') if each.strip()],
-            values['imu_link'],
-            values['foot_radius'] if values['foot_radius'] >= 0.0 else None,
-        )
-    except KeyError as error:
-        raise _not_valid(bag, error) from error
-    try:
+        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
+        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
+        robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
         return robot, estimator_of(robot, values)
-    except (KeyError, PadError) as error:
-        raise _not_valid(bag, error) from error
-
-
-def _not_valid(bag: BagReader, error: Exception) -> BagError:
-    return BagError(
-        f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the body estimator is'
-        f' missing or not valid: {reason(error)}'
-    )
-
-
-def _track(poses: list[tuple[int, int, list[float]]]) -> Track:
-    times, stamps, values = zip(*poses, strict=True)
-    return Track(np.array(times), np.array(stamps), np.array(values))
+    except (KeyError, InvalidInput) as error:
+        raise BagError(
+            f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the body estimator is'
+            f' missing or not valid: {reason(error)}'
+        ) from error
 
 
 class _Player:
@@ -133,49 +123,45 @@ class _Player:
 
     def __init__(self, bag: BagReader, values: Mapping[str, Any]) -> None:
         self._bag = bag
-        robot, estimator = _stage_of(bag, values)
+        robot, estimator = _parts(bag, values)
         self._order, self._wrong = JointOrder(robot), InvalidInput('no reading can be used')
         self._stage = SensingStage(
             robot, estimator, self._take, lambda doubt: None, lambda error: None, values['forces']
         )
         self._log_ns = 0
+        # Log time, ns, and block of each estimate.
         self.feet: list[tuple[int, Block]] = []
-        self.poses: list[tuple[int, int, list[float]]] = []  # log time, stamp, values
-        self.recorded: list[tuple[int, int, list[float]]] = []
+        self.poses: list[tuple[int, Block]] = []
 
-    def play(self, topics: list[str]) -> None:
-        """Play the bag once: topics of forces, IMU, joints and odom."""
-        force, imu, joints, odom = topics
+    def play(self, force: str, imu: str, joints: str) -> None:
+        """Play the messages on these topics once."""
         paths = {
             imu: (*STAMP, *IMU.values),
             joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
-            odom: (*STAMP, *ODOM.values),
         }
-        messages = (
-            (log_ns, topic, seconds * 1_000_000_000 + fraction, values)
-            for topic, (seconds, fraction, *values), log_ns in self._bag.values(paths)
-        )
+        messages = ((log_ns, topic, values) for topic, values, log_ns in self._bag.values(paths))
         # Forces come first: readings of the joints wait for those of the same moment.
-        both = heapq.merge(self._forces(force), messages, key=lambda each: each[0])
-        for self._log_ns, topic, stamp_ns, values in both:
-            if topic == force:
+        both = heapq.merge(self._forces(force), messages, key=operator.itemgetter(0))
+        for self._log_ns, topic, (seconds, fraction, *values) in both:
+            stamp_ns = seconds * 1_000_000_000 + fraction
+            if topic == joints:
+                self._take_joints(stamp_ns, *values)
+            elif topic == imu:
+                if math.isfinite(sum(values)):
+                    self._stage.imu(stamp_ns, values[:3], values[3:])
+            else:
                 for index, each in enumerate(values):
                     if math.isfinite(each.sum()):
                         self._stage.force(index, stamp_ns, each)
-            elif topic == odom:
-                self.recorded.append((self._log_ns, stamp_ns, values))
-            elif topic == joints:
-                self._take_joints(stamp_ns, *values)
-            elif math.isfinite(sum(values)):
-                self._stage.imu(stamp_ns, values[:3], values[3:])
         if not self._stage.samples:
             raise self._wrong
 
-    def _forces(self, topic: str) -> Iterator[tuple[int, str, int, Any]]:
-        _, times, block = self._bag.records({topic: SAMPLES})[topic]
-        columns = times.tolist(), block.stamps.tolist(), block.rows['force']
-        for time_ns, stamp_ns, forces in zip(*columns, strict=True):
-            yield time_ns, topic, stamp_ns, forces
+    def _forces(self, topic: str) -> Iterator[tuple[int, str, tuple[Any, ...]]]:
+        _, times, (stamps, rows) = self._bag.records({topic: SAMPLES})[topic]
+        for time_ns, stamp_ns, forces in zip(
+            times.tolist(), stamps.tolist(), rows['force'], strict=True
+        ):
+            yield time_ns, topic, (0, stamp_ns, *forces)
 
     def _take_joints(self, stamp_ns: int, *values: Any) -> None:
         try:
@@ -188,8 +174,9 @@ class _Player:
             self._stage.joints(stamp_ns, *ordered)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
-        pose = [*estimate.position.tolist(), *estimate.orientation.tolist()]
-        self.poses.append((self._log_ns, stamp_ns, pose))
+        pose = _POSE.rows(1)
+        pose['position'], pose['orientation'] = estimate.position, estimate.orientation
+        self.poses.append((self._log_ns, Block.of(stamp_ns, pose)))
         self.feet.append((self._log_ns, Block.of(stamp_ns, sample_of(estimate))))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read the records that a replay needs from a bag, and find the gaps in them."""
+"""Read the records that a replay needs from a bag, and tell what they lack."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
 from ros_pad.joining import Joiner
 from ros_pad.pace import Progress
+from ros_pad.records import COMMAND
+from ros_pad.records import ESTIMATE
 from ros_pad.records import KINDS
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE
+from ros_pad.records import Block
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import Wanted
@@ -83,10 +86,6 @@ def read(
         When there is no wrench of any leg, or a message cannot be read.
     """
     known, records, times = read_records(bag, wanted, settings.ambient_pressure, progress)
-    streams = {
-        kind.name: Stream(kind, known, times[kind.name], block).in_order()
-        for kind, block in zip(KINDS, records, strict=True)
-    }
     topics = {
         each.topic.record.name: name
         for name, each in wanted.items()
@@ -101,7 +100,13 @@ def read(
         )
     # Keep the order of the legs in the controller of the bag, around the body.
     order = (*(leg for leg in settings.legs if leg in legs), *sorted(legs - {*settings.legs}))
-    streams = {name: each.of_legs(order) for name, each in streams.items()}
+    places = [known.index(leg) for leg in order]
+    streams = {
+        kind.name: Stream(kind, order, times[kind.name], Block(stamps, rows[:, places])).where(
+            np.argsort(times[kind.name], kind='stable')
+        )
+        for kind, (stamps, rows) in zip(KINDS, records, strict=True)
+    }
     needed = ('force', 'position', 'velocity')[: 3 if settings.tuning.source == 'joints' else 2]
     gaps: list[Gap] = []
     for kind, fields in ((SAMPLE, needed), (PRESSURE, ('pressure',))):
@@ -110,6 +115,12 @@ def read(
             gaps += _gaps(kind.name, stream.times, stream.block.stamps)
         else:
             gaps += _gaps_of_legs(streams[kind.name], fields)
+    command, estimate = streams[COMMAND.name], streams[ESTIMATE.name]
+    if not np.array_equal(command.times, command.block.stamps):
+        # In real time, commands without an estimate have stamps that no replay has.
+        kept = np.isin(command.block.stamps, estimate.block.stamps)
+        kept |= np.isfinite(command.block.rows['setpoint']).any(axis=1)
+        streams[COMMAND.name] = command.where(kept)
     if SAMPLE.name not in topics:
         streams[SAMPLE.name] = _joined(streams[SAMPLE.name], needed)
     return Inputs(order, sorted({*known, *settings.legs} - legs), streams, topics, gaps)
@@ -146,4 +157,34 @@ def _gaps(what: str, times: np.ndarray, stamps: np.ndarray) -> Iterator[Gap]:
         yield Gap(int(times[wide[0]]), what, len(wide))
 
 
-__all__ = ['Gap', 'Inputs', 'read']
+def missing(inputs: Inputs, settings: NodeSettings) -> list[str]:
+    """Return notes on legs of which something was not recorded at all, one sentence each.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What was recorded.
+    settings : NodeSettings
+        Settings of the replay.
+    """
+    needed = [
+        ('sample', 'position', 'no position was recorded, so there are no estimates'),
+        ('pressure', 'pressure', 'no pressure was recorded, so its pads are assumed to be flat'),
+    ]
+    if settings.tuning.source == 'joints':
+        text = (
+            'no velocity of the contact was recorded, which source joints needs, so there are no'
+            ' estimates'
+        )
+        needed.append(('sample', 'velocity', text))
+    text = 'no wrench was recorded, so the decisions for other legs lack its footprints'
+    found = [(inputs.absent, text)]
+    for kind, field, text in needed:
+        values = inputs.streams[kind].block.rows[field]
+        known = np.isfinite(values).reshape(*values.shape[:2], -1).any(axis=(0, 2))
+        legs = [leg for leg, there in zip(inputs.legs, known, strict=True) if not there]
+        found.append((legs, text))
+    return [f'leg {", ".join(map(str, legs))}: {text}' for legs, text in found if legs]
+
+
+__all__ = ['Gap', 'Inputs', 'missing', 'read']

@@ -21,6 +21,7 @@ from ros_pad.records import COMMAND
 from ros_pad.records import ESTIMATE
 from ros_pad.records import PRESSURE
 from ros_pad.records import Block
+from ros_pad.records import Kind
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay_inputs import Inputs
@@ -72,8 +73,7 @@ class Player:
         self._apart = np.full(len(legs), not self._setpoints)
         self._pace = Pace(TICK_PERIOD_NS)
         self._log_ns = self._sampled_ns = self._offset_ns = 0
-        self._estimates: list[tuple[int, Block]] = []
-        self._commands: list[tuple[int, Block]] = []
+        self._made: dict[Kind, list[tuple[int, Block]]] = {ESTIMATE: [], COMMAND: []}
 
     def play(self, progress: Progress | None = None) -> dict[str, Stream]:
         """Play everything; return estimates and commands by name of their kind.
@@ -94,32 +94,26 @@ class Player:
                 progress(end / len(samples.times))
         self._press(pressures, done, len(pressures.times))
         legs = self._inputs.legs
-        return {
-            ESTIMATE.name: Stream.of(ESTIMATE, legs, self._estimates),
-            COMMAND.name: Stream.of(COMMAND, legs, self._commands),
-        }
+        return {kind.name: Stream.of(kind, legs, each) for kind, each in self._made.items()}
 
     def _sample(self, times: np.ndarray, block: Block) -> None:
         """Process samples that came one after the other, with their log times, ns."""
-        if not self._log_ns:
-            self._log_ns = int(times[0])
         self._pass_time(int(times[0]))
         self._log_ns = self._sampled_ns = int(times[-1])
         self._offset_ns = block.last_ns - self._log_ns
         self._tick(self._log_ns)
         for estimate, command in self.stages.process(block):
-            self._estimates.append((self._log_ns, estimate))
-            self._commands.append((self._log_ns, command))
+            self._made[ESTIMATE].append((self._log_ns, estimate))
+            self._made[COMMAND].append((self._log_ns, command))
             self._follow(command)
 
     def _press(self, pressures: Stream, start: int, end: int) -> None:
         """Process pressure records."""
-        for row in range(start, end):
-            time_ns = int(pressures.times[row])
+        stamps, rows = pressures.block
+        for row, time_ns in enumerate(pressures.times[start:end].tolist(), start):
             self._pass_time(time_ns)
             if time_ns - self._sampled_ns > TICK_PERIOD_NS:
                 self._tick(time_ns)
-            stamps, rows = pressures.block
             self.stages.estimation.pressure(rows[row])
             own = rows[row].copy()
             own['pressure'][self._apart] = math.nan
@@ -128,14 +122,16 @@ class Player:
     def _pass_time(self, until_ns: int) -> None:
         """Tick in a silence until a log time, ns, as the timers of the nodes do."""
         first = max(self._log_ns + TICK_PERIOD_NS, until_ns - LONGEST_SILENCE_NS)
-        for time_ns in range(first, until_ns, TICK_PERIOD_NS) if self._log_ns else ():
+        for time_ns in range(first, until_ns, TICK_PERIOD_NS):
             self._tick(time_ns)
         self._log_ns = until_ns
 
     def _tick(self, log_ns: int) -> None:
         now_ns = log_ns + self._offset_ns  # on the clock of the stamps
-        if self._pace.due(now_ns) and (command := self.stages.tick(now_ns)):
-            self._commands.append((log_ns, command))
+        if not self._sampled_ns or not self._pace.due(now_ns):
+            return
+        if command := self.stages.tick(now_ns):
+            self._made[COMMAND].append((log_ns, command))
 
     def _follow(self, command: Block) -> None:
         """Let the pressure be the set-point while the set-point differs from the recorded one.

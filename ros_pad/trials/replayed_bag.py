@@ -6,16 +6,18 @@ This needs no ROS except for the definition of the message type.
 
 from __future__ import annotations
 
+import heapq
 import json
+import operator
 import os
-
-import numpy as np
+from collections.abc import Iterator
 
 from ros_pad.bags import BagWriter
 from ros_pad.bags.wire import TYPE
 from ros_pad.bags.wire import Wire
 from ros_pad.pace import Progress
 from ros_pad.records import Block
+from ros_pad.trials.comparison import Stream
 from ros_pad.trials.label import KEY
 from ros_pad.trials.replay import Replay
 
@@ -60,21 +62,24 @@ def write(
         },
     }
     prefix = f'/{(namespace or "").strip("/")}/'.replace('//', '/')
-    streams = list(replay.streams.values())
+    streams = [_messages(each, prefix) for each in replay.streams.values()]
+    total = sum(len(each.times) for each in replay.streams.values())
     with BagWriter(folder, {KEY: json.dumps(about)}) as bag:
-        for each in streams:
-            bag.add_topic(f'{prefix}feet/{each.kind.name}', TYPE)
-        wires = [Wire(each.kind, each.legs) for each in streams]
-        sources = np.repeat(np.arange(len(streams)), [len(each.times) for each in streams])
-        rows = np.concatenate([np.arange(len(each.times)) for each in streams])
-        order = np.argsort(np.concatenate([each.times for each in streams]), kind='stable')
-        for done, place in enumerate(order, 1):
-            stream, row = streams[sources[place]], rows[place]
-            record = Block(*(each[row : row + 1] for each in stream.block))
-            data = wires[sources[place]].encode(record)
-            bag.write(f'{prefix}feet/{stream.kind.name}', data, int(stream.times[row]))
-            if progress and (done % _REPORT_EVERY == 0 or done == len(order)):
-                progress(done / len(order))
+        for kind in replay.streams:
+            bag.add_topic(f'{prefix}feet/{kind}', TYPE)
+        merged = heapq.merge(*streams, key=operator.itemgetter(0))
+        for done, (time_ns, name, data) in enumerate(merged, 1):
+            bag.write(name, data, time_ns)
+            if progress and (done % _REPORT_EVERY == 0 or done == total):
+                progress(done / total)
+
+
+def _messages(stream: Stream, prefix: str) -> Iterator[tuple[int, str, bytes]]:
+    """Yield log time, ns, topic and bytes of each record."""
+    encode, name = Wire(stream.kind, stream.legs).encode, f'{prefix}feet/{stream.kind.name}'
+    for row, time_ns in enumerate(stream.times.tolist()):
+        stamps, rows = stream.block
+        yield time_ns, name, encode(Block(stamps[row : row + 1], rows[row : row + 1]))
 
 
 __all__ = ['write']

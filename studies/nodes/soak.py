@@ -328,7 +328,7 @@ class Soak:
                 self._vent_at = now + self._chance.expovariate(1.0 / VENT_EVERY)
         node, message = self.node, self._message
         vents = [each.vents for each in Device.made]
-        refusals = sum(each.refused for each in node.channels.values())
+        refusals = sum(each.answers.refused for each in node.channels.values())
         answered, sent = node.answered, 0
         for commander, publisher in zip(self._commanders, self._publishers, strict=True):
             command = commander.next(now)
@@ -348,7 +348,9 @@ class Soak:
             )
         self._show(now_ns)
         self.result.set_points += sent
-        self.result.refused += sum(each.refused for each in node.channels.values()) - refusals
+        self.result.refused += (
+            sum(each.answers.refused for each in node.channels.values()) - refusals
+        )
         for commander, device, before in zip(self._commanders, Device.made, vents, strict=True):
             self._judge(commander, device, now, device.vents > before)
 

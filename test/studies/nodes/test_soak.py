@@ -43,16 +43,11 @@ def test_a_soak_follows_from_its_seed():
     assert figures(1) == figures(1) != figures(2)
 
 
-def never_late(channel, elapsed_ns):
-    if not channel.vented and not channel.active:
-        channel.vent('tried again')
-
-
 @pytest.mark.parametrize(
     ('name', 'defect'),
     [
-        ('tick', never_late),  # no command timeout
-        ('hold', lambda channel, reason: None),  # no reaction to the ceiling
+        ('expire', lambda channel, elapsed_ns: None),  # no command timeout
+        ('hold', lambda channel, reason, fault: None),  # no reaction to the ceiling
         ('deactivate', lambda channel, reason: None),  # no reaction to ~/vent
     ],
 )
