@@ -181,7 +181,7 @@ class Bench:
     def heard(self, topic: topics.Topic, leg: int | None = None) -> list[Any]:
         """Return what was published on a topic: blocks or messages."""
         name = '/' + topic.name(leg).lstrip('/')
-        return [decoded(topic, data) for data in self.sent[name]]
+        return [decoded(topic, data) for data in self.sent.get(name, ())]
 
     def last(self, topic: topics.Topic) -> Any:
         """Return the rows of the last record of a topic."""
