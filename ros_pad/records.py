@@ -169,3 +169,12 @@ class Block(NamedTuple):
     def last_ns(self) -> int:
         """Time stamp of the last record, ns."""
         return int(self.stamps[-1])
+
+    @classmethod
+    def joined(cls, kind: Kind, blocks: Sequence[Block], feet: int) -> Block:
+        """Return the records of several blocks as one block; of so many feet if there are none."""
+        if not blocks:
+            return cls(np.empty(0, np.int64), kind.rows(0, feet))
+        # NumPy joins plain numbers ten times as fast as structured rows.
+        numbers = np.concatenate([rows.view('f8') for _, rows in blocks])
+        return cls(np.concatenate([stamps for stamps, _ in blocks]), numbers.view(kind.dtype))

@@ -19,6 +19,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
 from scipy.optimize import brentq
 
 from ros_pad.contact import LARGE_PAD
@@ -233,13 +235,16 @@ def test_replay_a_bag(run: Run):
     assert out in PAGE.read_text(encoding='utf-8')
     first, *legs = out.splitlines()
     assert first.endswith('different')
-    switches = {}
     with AnyReader([BAG]) as reader:  # another reader
-        for leg in range(1, 7):
-            topic = f'/leg_{leg}/morphology'
-            messages = reader.messages([c for c in reader.connections if c.topic == topic])
-            texts = [reader.deserialize(raw, c.msgtype).data for c, _, raw in messages]
-            switches[leg] = sum(a != b for a, b in itertools.pairwise(texts))
+        messages = reader.messages([c for c in reader.connections if c.topic == '/feet/command'])
+        commands = [reader.deserialize(raw, c.msgtype) for c, _, raw in messages]
+    domes = [dict(zip(each.name, each.position, strict=True)) for each in commands]
+    switches = {
+        leg: sum(
+            a[f'leg_{leg}/dome'] != b[f'leg_{leg}/dome'] for a, b in itertools.pairwise(domes)
+        )
+        for leg in range(1, 7)
+    }
     for line in legs:
         leg, was_wet, wet, was, _ = numbers(line)
         assert was == switches[leg]
@@ -247,15 +252,28 @@ def test_replay_a_bag(run: Run):
 
 
 def test_replay_of_one_leg(run: Run, tmp_path: pathlib.Path):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    wrench = store.types['geometry_msgs/msg/WrenchStamped']
+    point = store.types['geometry_msgs/msg/PointStamped']
+    header, vector = store.types['std_msgs/msg/Header'], store.types['geometry_msgs/msg/Vector3']
+    time = store.types['builtin_interfaces/msg/Time']
+    wrench_of = store.types['geometry_msgs/msg/Wrench']
     copy = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
-    with AnyReader([BAG]) as reader, copy as writer:
-        for name in ('/leg_6/wrench', '/leg_6/position'):
-            (found,) = (each for each in reader.connections if each.topic == name)
-            topic = writer.add_connection(
-                name, found.msgtype, msgdef=found.msgdef.data, rihs01=found.digest
-            )
-            for _, stamp, data in itertools.islice(reader.messages([found]), 100):
-                writer.write(topic, stamp, data)
+    with copy as writer:
+        topics = {
+            kind: writer.add_connection(f'/leg_6/{kind}', of_type.__msgtype__, typestore=store)
+            for kind, of_type in (('wrench', wrench), ('position', point))
+        }
+        for stamp in range(4_000_000, 400_000_001, 4_000_000):
+            head = header(time(0, stamp), 'world')
+            felt = wrench_of(vector(0.0, 0.0, 6.8), vector(0.0, 0.0, 0.0))
+            place = store.types['geometry_msgs/msg/Point'](0.1, 0.0, 0.0)
+            for kind, message in (
+                ('wrench', wrench(head, felt)),
+                ('position', point(head, place)),
+            ):
+                data = store.serialize_cdr(message, message.__msgtype__)
+                writer.write(topics[kind], stamp, data)
     first, leg = run('replay_a_bag', "'bag'").splitlines()
     assert first.endswith('compared: nothing')
     assert leg.startswith('leg 6: wet stances None -> 0')

@@ -202,7 +202,8 @@ def _gathered(comparisons: list[Comparison]) -> list[tuple[str, list[Comparison]
     for each in comparisons:
         leg = '*' if each.compared and each.verdict in ('equal', 'rounding') else each.leg
         name = f'leg_{leg}/{each.quantity}' if each.leg >= 0 else each.quantity
-        name = f'{each.topic}: {name}'
+        if not each.topic.endswith(('/estimate', '/command')):  # of the body estimator
+            name = f'{each.topic}: {name}'
         found.setdefault(name, []).append(each)
     return list(found.items())
 

@@ -66,7 +66,8 @@ TURNS: tuple[Matrix, ...] = (
     (1.0, 0.0, 0.0, 1.0), (0.0, -1.0, 1.0, 0.0), (0.0, 1.0, -1.0, 0.0), (-1.0, 0.0, 0.0, -1.0),
     (-1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, -1.0), (0.0, 1.0, 1.0, 0.0), (0.0, -1.0, -1.0, 0.0),
 )  # fmt: skip
-"""For each turn of :data:`ros_pad.estimation.doubt.TURNS`, the matrix (by rows) from the true horizontal force to the measured one."""
+"""For each turn of :data:`ros_pad.estimation.doubt.TURNS`, the matrix (by rows) from the true
+horizontal force to the measured one."""
 
 Vector = tuple[float, float, float]
 

@@ -45,7 +45,7 @@ TURNS = (
 
 
 class Doubt(NamedTuple):
-    """A reason why the ground is unobservable; a code and two numbers, whose meaning depends on it.
+    """A reason why the ground is unobservable: a code and two numbers.
 
     Attributes
     ----------

@@ -13,7 +13,6 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.feet import FeetEstimator
 from ros_pad.estimation.feet import late
-from ros_pad.estimation.track import Standing
 from ros_pad.estimation.tuning import Tuning
 
 
@@ -224,7 +223,7 @@ class FootEstimator:
 
     def _estimate(self) -> Estimate:
         track, grounds = self.feet.tracks[0], self.feet.grounds
-        now = track.last if track.last and track.gate.stands else Standing()
+        now = track.standing
         return Estimate(
             track.time, track.gate.stands, now.slipping, now.slip_velocity, now.slip_speed,
             track.slip.sd, *grounds.beliefs[0], track.margin, track.fresh,

@@ -30,6 +30,7 @@ HINDSIGHT = DEAD + LONGEST_GAP
 MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
 
+
 class Grounds:
     """What each foot knows of the ground.
 
@@ -169,7 +170,8 @@ class Grounds:
         """Update the filters of all feet with windows that have ended, together."""
         due, self._due = self._due, {}
         if due:
-            friction.update([self.filters[foot] for foot in due], [each[2] for each in due.values()])
+            filters = [self.filters[foot] for foot in due]
+            friction.update(filters, [evidence for _, _, evidence in due.values()])
         for foot, (time, peak, _) in due.items():
             self._use(foot, time, peak)
 
@@ -183,9 +185,7 @@ class Grounds:
             stance.dome_share, ground.log_odds, peak_load, stance.peak_ratio,
             stance.peak_turning, wet, mean, sd,
         )  # fmt: skip
-        self.doubts[foot] = doubt.of_ground(
-            evidence, ground.expected.medians, self._expected_load
-        )
+        self.doubts[foot] = doubt.of_ground(evidence, ground.expected.medians, self._expected_load)
 
     def _share_on_domes(self, pressure: float) -> float:
         return self._foot.dome_load(self._expected_load, pressure) / self._expected_load

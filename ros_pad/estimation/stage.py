@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimation stage of one foot: pair its samples, and emit estimates at a given rate.
+"""Estimation stage of all feet: check their samples, and make estimates of them at a given rate.
 
 The estimator node, the loop without ROS and replay use the same class.
 """
@@ -8,15 +8,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
 
 from ros_pad.configuration import Setting
+from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.foot import ContactMotion
-from ros_pad.estimation.foot import Estimate
-from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation import doubt
+from ros_pad.estimation.doubt import Doubt
+from ros_pad.estimation.feet import FeetEstimator
+from ros_pad.estimation.feet import late
+from ros_pad.estimation.track import Sample
+from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import Pace
+from ros_pad.records import ESTIMATE
+from ros_pad.records import Array
+from ros_pad.records import Block
 
 PUBLISH_RATE = Setting(
     'publish_rate', 1e9 / CONTROL_PERIOD_NS, 'Estimates a second.', 'Hz', 5.0, 1000.0
@@ -32,253 +42,286 @@ LARGEST_MOMENT = 1e5
 """Largest sizes of sensor values: force, N, position, m, gauge pressure, Pa, and moment, N m. A
 larger value, though finite, would spoil sums and means for ever."""
 
-Vector = tuple[float, float, float]
 
-
-class Emission(NamedTuple):
-    """An estimate, with what a decision needs of the samples since the last one.
-
-    Attributes
-    ----------
-    stamp_ns : int
-        Time stamp of the wrench, ns.
-    estimate : Estimate
-        The estimate.
-    load : float
-        Largest normal force since the last emission, N, also of rejected samples.
-    position : tuple of float or None
-        Last position x and y of the foot, m; None if none has arrived since the last emission.
-    """
-
-    stamp_ns: int
-    estimate: Estimate
-    load: float
-    position: tuple[float, float] | None
-
-
-class EstimationStage:
-    """Pair the wrenches of a foot with its positions, and emit the estimates.
-
-    A wrench is paired with the position of the same time stamp, whichever arrives first. If the
-    next wrench arrives before such a position, the last position is used instead. With the setting
-    ``source: joints`` wrench, position and velocity of the contact come from one body estimator:
-    all three must have the same time stamp, and a sample that lacks one is left out.
+class Input:
+    """What has come from the sensors of a foot.
 
     Parameters
     ----------
-    estimator : FootEstimator
-        Estimator of the foot.
-    period_ns : int
-        Period of the emitted estimates, ns.
-    emit : callable
-        Called once a period with an :class:`Emission`.
-    emit_doubt : callable
-        Called with the doubt of the foot when the kind of the doubt has changed, before the
-        estimate of the same sample.
-    reject : callable
-        Called with the error when a sample is rejected; the sample is not used.
+    tuning : Tuning
+        Settings for sensors and ground.
 
     Attributes
     ----------
-    estimator : FootEstimator
-        Estimator of the foot, as given.
+    position : tuple of float or None
+        Last position, m.
+    first_ns : int
+        Stamp of the sample with which that was first used, ns.
+    place : tuple of float
+        Last position x and y since the last estimate, m; NaN if none has come.
+    load : float
+        Largest normal force since the last estimate, N, also of refused samples; NaN if there is
+        none.
+    silent_ns : int or None
+        Time since which no sample has been used, ns, as far as it was noticed.
+    missing : int
+        Code of the doubt that follows from a longer silence.
+    """
+
+    __slots__ = (
+        '_joints', '_moments', 'first_ns', 'load', 'missing', 'place', 'position', 'silent_ns',
+    )  # fmt: skip
+
+    def __init__(self, tuning: Tuning) -> None:
+        self._joints, self._moments = tuning.source == 'joints', tuning.moment_noise > 0.0
+        self.position: tuple[float, ...] | None = None
+        self.first_ns = 0
+        self.silent_ns: int | None = None
+        self.missing = doubt.NO_WRENCH
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew after an estimate."""
+        self.place: tuple[float, ...] = (math.nan, math.nan)
+        self.load = math.nan
+
+    def note(self, stamp_ns: int, position: Sequence[float], load: float) -> None:
+        """Take note of samples that may all be used: the last position, and the largest load."""
+        self.position, self.first_ns, self.place = tuple(position), stamp_ns, tuple(position[:2])
+        if not load <= self.load:
+            self.load = load
+        self.used()
+
+    def used(self) -> None:
+        """Take note that a sample has been used."""
+        self.silent_ns, self.missing = None, doubt.NO_WRENCH
+
+    def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
+        """Return the sample to use of the numbers of a row; None if something is missing.
+
+        Raises
+        ------
+        InvalidInput
+            When a number is too large or infinite.
+        """
+        fx, fy, fz, moment, *position, vx, vy, variance_x, variance_y = sample
+        new = all(map(math.isfinite, position))
+        if new and max(map(abs, position)) <= LARGEST_POSITION:
+            self.place = position[0], position[1]
+        if fz <= LARGEST_FORCE and not fz <= self.load and fz > -math.inf:
+            self.load = fz
+        if math.isnan(fx + fy + fz) and math.inf not in map(abs, (fx, fy, fz)):
+            return None
+        if self._joints:
+            self._miss(doubt.NO_VELOCITY)
+            if not new or math.isnan(variance_x + variance_y):
+                return None
+            if math.inf in (variance_x, variance_y):
+                vx = vy = 0.0
+                variance_x = variance_y = math.inf
+            elif math.isnan(vx + vy):
+                return None
+            _check_velocity(vx, vy, variance_x, variance_y)
+        elif not new and self.position is None:
+            self._miss(doubt.NO_POSITION)
+            return None
+        if not new:
+            assert self.position
+            position = [*self.position]
+        moment = moment if self._moments else math.nan
+        _check_size('force', (fx, fy, fz), LARGEST_FORCE, 'N')
+        _check_size('position', position, LARGEST_POSITION, 'm')
+        _check_size('moment', () if math.isnan(moment) else (moment,), LARGEST_MOMENT, 'N m')
+        if new:
+            self.position, self.first_ns = tuple(position), stamp_ns
+        return fx, fy, fz, moment, *position, vx, vy, variance_x, variance_y
+
+    def _miss(self, code: int) -> None:
+        if self.missing != doubt.REFUSED:
+            self.missing = code
+
+
+class EstimationStage:
+    """Check the samples of all feet, and make estimates of them.
+
+    A foot whose force is NaN has no sample at this moment; the others go on. Where a position is
+    NaN, the last one is used again, as old as it is. With the setting ``source: joints`` force,
+    position and velocity come from one body estimator: a sample that lacks one is left out. One
+    with an infinite variance teaches nothing.
+
+    Parameters
+    ----------
+    foot : Foot
+        All feet are of this kind.
+    expected_load : float
+        Normal force on a foot in stance, N, above 0.
+    tuning : Tuning
+        Settings for sensors and ground.
+    legs : sequence of int
+        Numbers of the legs, in the order of the rows.
+    period_ns : int
+        Period of the estimates, ns.
+    reject : callable or None
+        Called with the number of a leg, and the error, when its sample is refused; it is not used.
+
+    Attributes
+    ----------
+    estimator : FeetEstimator
+        Estimator of the feet.
     samples : int
-        Number of samples used so far.
+        Number of moments used so far, in which at least one foot had a sample that could be used.
+    used : array of int (feet,)
+        Number of samples used so far, by foot.
     last_ns : int
-        Time stamp of the last sample used, ns; 0 before the first one.
-    doubt : str or None
-        Doubt emitted last, with the present details after the colon; None before the first sample.
-    sound : bool
-        Whether the sensors can be used.
+        Time stamp of the last moment used, ns; 0 before the first one.
     """
 
     def __init__(
         self,
-        estimator: FootEstimator,
-        period_ns: int,
-        emit: Callable[[Emission], None],
-        emit_doubt: Callable[[str], None],
-        reject: Callable[[InvalidInput], None],
+        foot: Foot,
+        expected_load: float,
+        tuning: Tuning,
+        legs: Sequence[int],
+        period_ns: int = CONTROL_PERIOD_NS,
+        reject: Callable[[int, InvalidInput], None] | None = None,
     ) -> None:
-        self.estimator = estimator
-        self._pace = Pace(period_ns)
-        self._moments = estimator.tuning.moment_noise > 0.0
-        self._joints = estimator.tuning.source == 'joints'
-        self._motion: tuple[int, ContactMotion] | None = None
-        self._body_doubt = ''
-        self._emit, self._emit_doubt, self._reject = emit, emit_doubt, reject
-        self._pressure = 0.0
-        self._wrench: tuple[int, Vector, float | None] | None = None
-        self._position: tuple[int, Vector] | None = None
-        self._used: tuple[int, Vector] | None = None  # position of the last sample
-        self._load = -math.inf  # largest since the last emission
-        self._place: tuple[float, float] | None = None  # last position since the last emission
-        self._used_ns = 0  # stamp of the wrench with which that position was first used
-        self._silent_since_ns: int | None = None
-        self._rejection = ''
+        self.estimator = FeetEstimator(len(legs), foot, expected_load, tuning)
+        self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
+        self._inputs = [Input(tuning) for _ in legs]
+        self._pressures = [0.0] * len(legs)
+        self._silences: dict[int, Doubt] = {}  # doubts of feet that are silent
+        self.used: npt.NDArray[np.int64] = np.zeros(len(legs), np.int64)
         self.samples = self.last_ns = 0
-        self.doubt: str | None = None
-        self.sound = True
+        largest = [LARGEST_FORCE] * 3 + [LARGEST_MOMENT] + [LARGEST_POSITION] * 3
+        # Numbers that are not used are not checked.
+        self._checked = [*range(3), *([3] if tuning.moment_noise > 0.0 else []), *range(4, 7)]
+        self._largest = np.array(largest)[self._checked]
+        if tuning.source == 'joints':
+            self._checked += range(7, 11)
+            self._largest = np.append(self._largest, 4 * [1e300])
 
-    def pressure(self, gauge: float) -> None:
-        """Store a gauge pressure of the pads, Pa; ignore NaN and values beyond 1e7 Pa."""
-        if abs(gauge) <= LARGEST_PRESSURE:
-            self._pressure = gauge
+    def pressure(self, rows: np.ndarray) -> None:
+        """Store gauge pressures of the pads, rows of PRESSURE; not NaN and beyond 1e7 Pa."""
+        for place, gauge in enumerate(rows['pressure'].tolist()):
+            if abs(gauge) <= LARGEST_PRESSURE:
+                self._pressures[place] = gauge
 
-    def wrench(self, stamp_ns: int, force: Vector, moment: float | None) -> None:
-        """Process a wrench: time stamp, ns, force, N, and torque z, N m, None if not measured."""
-        if self._wrench is not None and self._position is not None and not self._joints:
-            # No position came for the last wrench: the marker is hidden or sampled more slowly.
-            self._update(self._wrench, self._position)
-        self._hold(force[2])
-        self._wrench = stamp_ns, force, moment if self._moments else None
-        self._match(stamp_ns)
+    def process(self, block: Block) -> list[Block]:
+        """Process samples; return the estimates that are due in them."""
+        values = np.ascontiguousarray(block.rows).view(float).reshape(*block.rows.shape, -1)
+        stamps = block.stamps.tolist()
+        ordinary, found, first = self._ordinary(stamps, values), [], 0
+        for row, stamp_ns in enumerate(stamps):
+            if ordinary:
+                if not self._pace.due(stamp_ns):
+                    continue
+                self._use(stamps[first : row + 1], values[first : row + 1])
+                first = row + 1
+            elif not self._use_some(stamp_ns, values[row]) or not self._pace.due(stamp_ns):
+                continue
+            found.append(self.estimate(stamp_ns))
+            for each in self._inputs:
+                each.clear()
+        if ordinary and first < len(stamps):
+            self._use(stamps[first:], values[first:])
+        return found
 
-    def position(self, stamp_ns: int, point: Vector) -> None:
-        """Process a position of the marker: its time stamp, ns, and coordinates, m."""
-        self._place = point[0], point[1]
-        # Some motion capture systems send NaN for a hidden marker: keep the last position.
-        if math.isfinite(point[0] + point[1] + point[2]):
-            self._position = stamp_ns, point
-        wrench, position = self._wrench, self._position
-        if self._joints:
-            self._match(stamp_ns)
-        elif wrench is not None and position is not None and wrench[0] == stamp_ns:
-            self._update(wrench, position)
+    def _ordinary(self, stamps: list[int], values: Array) -> bool:
+        """Return whether all samples can be used."""
+        last = max(each.time for each in self.estimator.tracks)
+        if not stamps or stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
+            return False
+        checked = values[:, :, self._checked]
+        if not (np.abs(checked) <= self._largest).all():
+            return False
+        return self.estimator.tuning.source != 'joints' or bool((checked[:, :, -2:] >= 0.0).all())
 
-    def body_doubt(self, doubt: str) -> None:
-        """Store why the body estimator is in doubt; empty if it is not."""
-        self._body_doubt = doubt
+    def _use(self, stamps: list[int], values: Array) -> None:
+        """Use samples of all feet."""
+        samples = values.transpose(1, 0, 2).tolist()
+        self.estimator.update([each * 1e-9 for each in stamps], samples, self._pressures)
+        loads = values[:, :, 2].max(axis=0).tolist()
+        for each, mine, load in zip(self._inputs, samples, loads, strict=True):
+            each.note(stamps[-1], mine[-1][4:7], load)
+        self._silences.clear()
+        self._count(stamps[-1], len(stamps), np.ones(len(self._legs), np.int64))
 
-    def contact_velocity(
-        self, stamp_ns: int, x: float, y: float, variance_x: float, variance_y: float
-    ) -> None:
-        """Process a velocity of the contact point; used with the setting ``source: joints`` only.
+    def _use_some(self, stamp_ns: int, values: Array) -> bool:
+        """Use those samples of a moment that can be used; return whether there are any."""
+        time, samples = stamp_ns * 1e-9, []
+        for place, sample in enumerate(values.tolist()):
+            found = None
+            try:
+                found = self._inputs[place].take(stamp_ns, sample)
+                if found:
+                    late(time, self.estimator.tracks[place].time)
+            except InvalidInput as error:
+                found, self._inputs[place].missing = None, doubt.REFUSED
+                if self._reject:
+                    self._reject(self._legs[place], error)
+            if found:
+                self._inputs[place].used()
+                self._silences.pop(place, None)
+            samples.append((found,))
+        used = np.array([bool(each) for (each,) in samples], np.int64)
+        if not used.any():
+            return False
+        ages = [(abs(time - each.first_ns * 1e-9),) for each in self._inputs]
+        self.estimator.update(
+            (time,), samples, self._pressures, ages if any(age for (age,) in ages) else None
+        )
+        self._count(stamp_ns, 1, used)
+        return True
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Time stamp, ns.
-        x, y : float
-            Velocity over the floor, m/s.
-        variance_x, variance_y : float
-            Variances of the components, m²/s², of which the larger one counts; one below 0 means
-            that the velocity must not be used.
-        """
-        doubt, variance = '', max(variance_x, variance_y)
-        if variance_x < 0.0 or variance_y < 0.0:
-            doubt, x, y, variance = self._body_doubt or 'no reason was received', 0.0, 0.0, 0.0
-        self._motion = stamp_ns, ContactMotion((x, y), math.sqrt(variance), doubt)
-        self._match(stamp_ns)
-
-    def _match(self, stamp_ns: int) -> None:
-        """Use the sample of a time stamp, ns, if all of it is there."""
-        wrench, position, motion = self._wrench, self._position, self._motion
-        if wrench is None or position is None or not wrench[0] == position[0] == stamp_ns:
-            return
-        if not self._joints or (motion and motion[0] == stamp_ns):
-            self._update(wrench, position)
-
-    def sample(self, stamp_ns: int, force: Vector, moment: float | None, point: Vector) -> None:
-        """Process a wrench and a position of the same time stamp, see :meth:`wrench`."""
-        if (
-            self._wrench is None
-            and not self._joints
-            and math.isfinite(point[0] + point[1] + point[2])
-        ):
-            self._hold(force[2])
-            self._place = point[0], point[1]
-            self._position = position = stamp_ns, point
-            self._update((stamp_ns, force, moment if self._moments else None), position)
-        else:
-            self.wrench(stamp_ns, force, moment)
-            self.position(stamp_ns, point)
-
-    def _hold(self, load: float) -> None:
-        if self._load < load <= LARGEST_FORCE:
-            self._load = load
-
-    def _update(
-        self, wrench: tuple[int, Vector, float | None], position: tuple[int, Vector]
-    ) -> None:
-        """Process a sample."""
-        self._wrench = None
-        stamp_ns, force, moment = wrench
-        if position is not self._used:
-            # The position's own stamp may come from another clock.
-            self._used, self._used_ns = position, stamp_ns
-        (fx, fy, fz), (x, y, z) = force, position[1]
-        try:
-            # Only an unusual sample is looked at more closely; squares take less time than abs().
-            if fx * fx + fy * fy + fz * fz + x * x + y * y + z * z > LARGEST_FORCE**2 or moment:
-                _check_sizes(force, position[1], moment)
-            estimate = self.estimator.update(
-                stamp_ns * 1e-9,
-                force,
-                position[1],
-                self._pressure,
-                moment,
-                self._used_ns * 1e-9,
-                *([self._motion[1]] if self._joints and self._motion else []),
-            )
-        except InvalidInput as error:
-            self.reject(error)
-            return
-        self.samples += 1
+    def _count(self, stamp_ns: int, moments: int, used: npt.NDArray[np.int64]) -> None:
+        self.samples += moments
+        self.used += moments * used
         self.last_ns = stamp_ns
-        self._silent_since_ns, self._rejection = None, ''
-        if estimate.doubt != self.doubt or estimate.sound != self.sound:
-            self._update_doubt(estimate.doubt, estimate.sound)
-        if self._pace.due(stamp_ns):
-            emission = Emission(stamp_ns, estimate, self._load, self._place)
-            self._load, self._place = -math.inf, None
-            self._emit(emission)
-
-    def reject(self, error: InvalidInput) -> None:
-        """Report a rejected sample; its error becomes the doubt if no sample follows for long."""
-        self._rejection = str(error)
-        self._reject(error)
-
-    def _update_doubt(self, doubt: str, sound: bool) -> None:
-        before = self.doubt
-        self.doubt, self.sound = doubt, sound
-        # Details, after the colon, may change with every sample.
-        if doubt != before and (
-            before is None or doubt.partition(':')[0] != before.partition(':')[0]
-        ):
-            self._emit_doubt(doubt)
 
     def tick(self, now_ns: int) -> None:
         """Check at a time, ns, whether samples are missing; call it every `TICK_PERIOD_NS`."""
-        if self._silent_since_ns is None:
-            self._silent_since_ns = now_ns
-        silence = (now_ns - self._silent_since_ns) * 1e-9
-        if silence > SILENCE:
-            self._update_doubt(self._missing(silence), False)
+        for place, each in enumerate(self._inputs):
+            if each.silent_ns is None:
+                each.silent_ns = now_ns
+            silence = (now_ns - each.silent_ns) * 1e-9
+            if silence > SILENCE:
+                self._silences[place] = Doubt(each.missing, silence)
 
-    def _missing(self, silence: float) -> str:
-        if self._rejection:
-            return f'sample refused: {self._rejection}'
-        if self._position is None and self._wrench is not None:
-            return f'no position: for {silence:.1f} s'
-        if self._joints and self._wrench is not None:
-            return f'no contact velocity: for {silence:.1f} s'
-        return f'no wrench: for {silence:.1f} s'
+    @property
+    def doubts(self) -> list[Doubt]:
+        """Why the ground below each foot is unobservable."""
+        known = self.estimator.grounds.doubts
+        return [self._silences.get(place, each) for place, each in enumerate(known)]
+
+    def estimate(self, stamp_ns: int) -> Block:
+        """Return the present estimates as a record of a time, ns."""
+        table, estimator = [], self.estimator
+        for each, track, belief, why in zip(
+            self._inputs, estimator.tracks, estimator.grounds.beliefs, self.doubts, strict=True
+        ):
+            now = track.standing
+            table.append((
+                *each.place, each.load, *now.slip_velocity, now.slip_speed, track.slip.sd,
+                now.slipping, *belief, track.margin, *why,
+            ))  # fmt: skip
+        rows = np.array(table, float).view(ESTIMATE.dtype)[:, 0]
+        return Block.of(stamp_ns, rows)
 
 
-def _check_sizes(force: Vector, point: Vector, moment: float | None) -> None:
-    """Refuse numbers that are too large; the estimator refuses numbers that are not finite."""
-    _check_size('force', force, LARGEST_FORCE, 'N')
-    _check_size('position', point, LARGEST_POSITION, 'm')
-    if moment is not None:
-        _check_size('moment', (moment,), LARGEST_MOMENT, 'N m')
-
-
-def _check_size(name: str, values: tuple[float, ...], largest: float, unit: str) -> None:
-    """Refuse finite numbers that are larger than ``largest`` in size."""
+def _check_size(name: str, values: Sequence[float], largest: float, unit: str) -> None:
+    """Refuse numbers that are larger than ``largest`` in size, or no numbers."""
     for value in values:
-        if largest < abs(value) < math.inf:
+        if not abs(value) <= largest:
             raise InvalidInput(
                 f'{name} = {value!r} {unit} is not allowed: a number from {-largest:g} to'
                 f' {largest:g} {unit} is needed'
             )
+
+
+def _check_velocity(x: float, y: float, variance_x: float, variance_y: float) -> None:
+    """Refuse a velocity of the contact that is infinite, or has a variance below 0."""
+    if not (math.isfinite(x + y) and variance_x >= 0.0 and variance_y >= 0.0):
+        raise InvalidInput(
+            f'velocity = ({x!r}, {y!r}) m/s with variances of {variance_x!r} and {variance_y!r}'
+            ' m²/s² is not allowed: finite numbers are needed, and variances from 0'
+        )

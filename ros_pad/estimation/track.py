@@ -25,8 +25,8 @@ from ros_pad.estimation.watch import Moment
 from ros_pad.estimation.watch import Watch
 
 Sample = Sequence[float]
-"""Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m, velocity,
-m/s, and its variances, m²/s²."""
+"""Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m,
+velocity, m/s, and its variances, m²/s²."""
 
 Samples = Sequence[Any]
 """Samples, None where there is none."""
@@ -60,9 +60,7 @@ class Setup(NamedTuple):
         """Return what is the same for all feet of a kind."""
         joints, shear = tuning.source == 'joints', 1.0 / foot.shear_stiffness
         softness = shear if tuning.pads_shear or not joints else 0.0
-        return cls(
-            tuning, joints, tuning.moment_noise > 0.0, shear, softness, foot.turning_radius
-        )
+        return cls(tuning, joints, tuning.moment_noise > 0.0, shear, softness, foot.turning_radius)
 
 
 class Standing(NamedTuple):
@@ -97,6 +95,9 @@ class Standing(NamedTuple):
         if not self.slip_speed or not pull:
             return 0.0, 0.0
         return -self.slip_speed * self.pull_x / pull, -self.slip_speed * self.pull_y / pull
+
+
+NOT_STANDING = Standing()
 
 
 class Track:
@@ -154,6 +155,11 @@ class Track:
         self.last: Standing | None = Standing()
         self._set_noise()
         slip.sd = slip.noise
+
+    @property
+    def standing(self) -> Standing:
+        """Last sample of the present stance; nothing else does not slip."""
+        return self.last if self.last and self.gate.stands else NOT_STANDING
 
     @property
     def margin(self) -> float:
@@ -230,7 +236,8 @@ class Track:
             return True
         self.fresh |= stood or not self.sound
         self.sound, self.watch.looks, self.time = True, False, time
-        self.slip.sd = math.hypot(math.sqrt(variance) if variance < math.inf else 0.0, self.slip.noise)
+        known = math.sqrt(variance) if variance < math.inf else 0.0
+        self.slip.sd = math.hypot(known, self.slip.noise)
         return False
 
     def _end_block(self, time: float, sample: Sample, speed_sd: float | None) -> None:
@@ -278,9 +285,7 @@ class Track:
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
         return False
 
-    def _ordinary(
-        self, times: Sequence[float], samples: Samples, first: int, end: int
-    ) -> int:
+    def _ordinary(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
         """Return up to where, after a first sample, nothing but landing and lifting can happen."""
         before, block_end, joints = times[first], self.watch.end, self._setup.joints
         a, b, c, _, d, e, f, *_ = samples[first]
@@ -336,7 +341,7 @@ class Track:
         )  # fmt: skip
         count, loads, pulls, turnings, speeds, noises = window.sums
         smoothing, own, peak, due = tuning.smoothing, slip.noise, window.peak, tuning.filter_period
-        noise, turning, before, tests, row = own, 0.0, self.time, [], first
+        noise, turning, known, before, tests, row = own, 0.0, False, self.time, [], first
         due += window.start - 1e-9
         last = self._ordinary(times, samples, first, end)
         while row < last:
@@ -361,7 +366,8 @@ class Track:
             # A foot gives way against its tangential force; the rest of its speed is only noise.
             speed = -(vx * fx + vy * fy) / pull if pull > 0.0 else 0.0
             if moments:
-                turning = abs(moment - offset.moment) / lever if moment == moment else 0.0
+                known = moment == moment
+                turning = abs(moment - offset.moment) / lever if known else 0.0
                 turnings += turning
             tests.append((speed, noise, dt))
             count, loads, pulls, speeds = count + 1.0, loads + fz, pulls + pull, speeds + speed
@@ -370,16 +376,16 @@ class Track:
                 peak = fz
             if fz >= gate.least:
                 gate.height = z
-            before, row = time, row + 1
+            before, standing, row = time, (speed, fx, fy, fz, turning), row + 1
             if time >= due:
                 break
         slip.x, slip.y, slip.sd = sx, sy, noise
         window.sums, window.peak = (count, loads, pulls, turnings, speeds, noises), peak
-        self.last = Standing(speed, fx, fy, fz, turning, slip.alarm.update(tests))
+        self.last = Standing(*standing, slip.alarm.update(tests))
         self._note(times, samples, first + 1, row)
         self._skip(times, samples, first + 1, row)
         if before >= due:
-            self._end_window(before, (place_x, place_y), pressure, moments and moment == moment)
+            self._end_window(before, (place_x, place_y), pressure, known)
         return row
 
     def _note(self, times: Sequence[float], samples: Samples, first: int, end: int) -> None:

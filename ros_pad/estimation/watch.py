@@ -79,7 +79,9 @@ class Watch:
         """Forget the last readings, and the height of the last stance."""
         self.axes.restart()
         self.end = -math.inf
-        self._block: list[tuple[float, ...]] = []  # readings since the last block, and two before them
+        self._block: list[
+            tuple[float, ...]
+        ] = []  # readings since the last block, and two before them
         self._earlier = 0  # how many are before them
 
     def look(self, time: float) -> None:
@@ -115,7 +117,12 @@ class Watch:
         return measured
 
     def _look_at(
-        self, block: list[tuple[float, ...]], earlier: int, duration: float, now: Moment, loaded: bool
+        self,
+        block: list[tuple[float, ...]],
+        earlier: int,
+        duration: float,
+        now: Moment,
+        loaded: bool,
     ) -> bool:
         """Measure noise and compare motions in a block, which follows on ``earlier`` readings."""
         columns = [*zip(*block, strict=True)]

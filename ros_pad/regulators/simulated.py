@@ -182,7 +182,8 @@ class SimulatedRegulator:
         """
         setpoint = permitted(gauge_pa, self._ceiling)
         rest = self._advance()
-        self._check_answer(self._now)
+        if self._faults:
+            self._check_answer(self._now)
         if setpoint != self._channel.setpoint:
             self._channel.step(self._channel.setpoint, rest)
             self._channel.step(setpoint, 0.0)
@@ -254,14 +255,14 @@ class SimulatedRegulator:
         self._now = now
         elapsed = now - self._epoch
         steps = int(elapsed / STEP + _ROUNDING)
-        channel, setpoint = self._channel, self._channel.setpoint
+        channel = self._channel
         while self._steps < steps:
             count = 1
             if channel.settled:
                 count = steps - self._steps
                 if self._faults:
                     count = max(1, int(min(count, channel.quiet_time / STEP)))
-            channel.step(setpoint, count * STEP)
+            channel.step(channel.setpoint, count * STEP)
             self._steps += count
         rest = elapsed - steps * STEP
         self._rest = rest if rest > _ROUNDING * STEP else 0.0

@@ -13,6 +13,7 @@ fidelity levels.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,13 +48,19 @@ _FAR = 1e6  # m: if the body is farther away than this, the solution has diverge
 
 
 def _import_mujoco() -> Any:
+    """Import MuJoCo, without OpenGL unless ``MUJOCO_GL`` asks for it: that takes as long again."""
+    given = os.environ.get('MUJOCO_GL')
+    os.environ['MUJOCO_GL'] = given or 'disable'
     try:
-        with children_spared():  # mujoco imports glfw, which starts a Python of its own
+        with children_spared():  # mujoco may import glfw, which starts a Python of its own
             import mujoco
     except ImportError as error:
         raise ConfigError(
             f'fidelity L2 needs MuJoCo ({error}): pip install "ros_pad[mujoco]"'
         ) from error
+    finally:
+        if not given:
+            del os.environ['MUJOCO_GL']
     return mujoco
 
 

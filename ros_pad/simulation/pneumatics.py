@@ -571,6 +571,9 @@ class PneumaticChannel:
         outlet = self._outlet
         if setpoint != outlet.setpoint and outlet.command(setpoint, self._time):
             self.settled = False
+        if self.settled and not self._edges:
+            self._time += dt if dt > _INSTANT else 0.0
+            return self.pad_pressure
         while dt > _INSTANT:
             sound = self.quiet_time if self._edges else math.inf
             if self.settled:

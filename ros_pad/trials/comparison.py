@@ -74,12 +74,16 @@ class Stream(NamedTuple):
         stamps, rows = self.block
         return self._replace(times=self.times[kept], block=Block(stamps[kept], rows[kept]))
 
+    def values(self, name: str) -> np.ndarray:
+        """Return the values of a field, (n, legs, components)."""
+        values: np.ndarray = self.block.rows[name]
+        return values if values.ndim == 3 else values[:, :, None]
+
     def tracks(self) -> dict[tuple[int, str], Track]:
         """Return the values of each quantity, by leg and name."""
-        stamps, rows = self.block
         return {
             (leg, quantity(field)): Track(
-                self.times, stamps, rows[field.name][:, place].reshape(len(stamps), -1)
+                self.times, self.block.stamps, self.values(field.name)[:, place]
             )
             for place, leg in enumerate(self.legs)
             for field in self.kind.fields

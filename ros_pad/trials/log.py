@@ -20,7 +20,6 @@ from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.label import settings
 from ros_pad.trials.metrics import summarise
 from ros_pad.trials.series import Records
-from ros_pad.trials.series import joined
 from ros_pad.trials.series import series
 from ros_pad.trials.trial import Trial
 
@@ -81,10 +80,10 @@ class TrialLog:
         """Return the trial with its series, settings and metrics."""
         legs = len(self._scene.legs)
         records = Records(
-            joined(SAMPLE, legs, self._samples),
-            joined(ESTIMATE, legs, self._estimates),
-            joined(COMMAND, legs, self._commands),
-            joined(PRESSURE, legs, self._pressures),
+            Block.joined(SAMPLE, self._samples, legs),
+            Block.joined(ESTIMATE, self._estimates, legs),
+            Block.joined(COMMAND, self._commands, legs),
+            Block.joined(PRESSURE, self._pressures, legs),
         )
         found = series(records)
         rows = np.isin(records.sample.stamps, found['time'])

@@ -231,6 +231,7 @@ class ClosedLoop:
         Parameters
         ----------
         controller : MorphologyController
+            Decides for all legs.
         foot : Foot or None
             What the estimator takes the feet to be; None: what they are.
         period_ns : int
@@ -283,7 +284,8 @@ class ClosedLoop:
         stamps, rows, body, odom = zip(
             *(each for each in rest if each[1] is not None), last, strict=True
         )
-        block = Block(np.array(stamps), np.array(rows))
+        numbers = np.stack([each.view('f8') for each in rows])
+        block = Block(np.array(stamps), numbers.view(SAMPLE.dtype))
         log.samples(block, body, odom if self.body else None)
         return block
 

@@ -99,7 +99,7 @@ def load(
     first = 0.4 if bag.problem else 0.0  # a bag without damage is opened at once
     trial = _described(bag)
     ambient = trial['settings']['ambient_pressure']
-    legs, records, log_times = read_records(bag, wanted, ambient, part(progress, first, 0.8))
+    legs, records, _ = read_records(bag, wanted, ambient, part(progress, first, 0.8))
     found = series(records)
     fast_ns = found.pop('time')
     slow_ns = found.pop('slow_time')
@@ -166,6 +166,7 @@ def read_records(
     Parameters
     ----------
     bag : BagReader
+        What was recorded.
     wanted : mapping
         What each topic is, see :func:`wanted_topics`.
     ambient : float

@@ -143,8 +143,7 @@ def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
 
 def _gaps_of_legs(pieces: Stream, fields: tuple[str, ...]) -> Iterator[Gap]:
     for name in fields:
-        values = pieces.block.rows[name]
-        there = ~np.isnan(values).reshape(*values.shape[:2], -1).all(axis=2)
+        there = ~np.isnan(pieces.values(name)).all(axis=2)
         for leg, own in zip(pieces.legs, there.T, strict=True):
             what = f'{name} of leg {leg}'
             yield from _gaps(what, pieces.times[own], pieces.block.stamps[own])
@@ -180,8 +179,7 @@ def missing(inputs: Inputs, settings: NodeSettings) -> list[str]:
     text = 'no wrench was recorded, so the decisions for other legs lack its footprints'
     found = [(inputs.absent, text)]
     for kind, field, text in needed:
-        values = inputs.streams[kind].block.rows[field]
-        known = np.isfinite(values).reshape(*values.shape[:2], -1).any(axis=(0, 2))
+        known = np.isfinite(inputs.streams[kind].values(field)).any(axis=(0, 2))
         legs = [leg for leg, there in zip(inputs.legs, known, strict=True) if not there]
         found.append((legs, text))
     return [f'leg {", ".join(map(str, legs))}: {text}' for legs, text in found if legs]

@@ -30,13 +30,6 @@ class Records(NamedTuple):
     pressure: Block
 
 
-def joined(kind: Kind, legs: int, blocks: Sequence[Block]) -> Block:
-    """Return the records of several blocks as one block, for so many legs if there are none."""
-    if not blocks:
-        return Block(np.empty(0, np.int64), kind.rows(0, legs))
-    return Block(*(np.concatenate(each) for each in zip(*blocks, strict=True)))
-
-
 def by_row(function: Callable[..., float], values: np.ndarray) -> np.ndarray:
     """Apply a function of ``math`` to the rows of the last axis.
 

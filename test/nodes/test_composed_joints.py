@@ -15,7 +15,10 @@ from ros_pad.bags import BagReader
 from ros_pad.bags import annotate
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
+from ros_pad.records import ESTIMATE
+from ros_pad.records import SAMPLE
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import replay_body
 from ros_pad.trials.node_settings import NodeSettings
@@ -83,13 +86,12 @@ def test_feet_are_where_they_truly_are(walked):
 
 def test_the_bag_has_the_topics_and_their_truths(walked):
     *_, bag = walked
-    topics = BagReader(bag).topics
-    for leg in LEGS:
-        for kind in ('foot_wrench', 'wrench', 'position', 'contact_velocity', 'wetness'):
-            assert f'/leg_{leg}/{kind}' in topics
     counts = BagReader(bag).counts
-    assert counts['/imu/data'] == counts['/joint_states'] == counts['/leg_3/foot_wrench'] == 1000
-    assert counts['/leg_3/contact_velocity'] == counts['/odom'] == SAMPLES
+    assert counts['/imu/data'] == counts['/joint_states'] == counts['/feet/force'] == 1000
+    assert counts['/odom'] == SAMPLES and counts['/feet/estimate'] == 201
+    _, _, samples = BagReader(bag).records({'/feet/sample': SAMPLE})['/feet/sample']
+    for name in ('force', 'position', 'velocity', 'variance'):
+        assert np.isfinite(samples.rows[name]).all(axis=(1, 2)).sum() == SAMPLES
     found = {}
     for topic, message, _ in BagReader(bag).messages(['/imu/data', '/odom', '/joint_states']):
         found.setdefault(topic, []).append(message)
@@ -129,10 +131,9 @@ faults:
     assert 'no IMU' in kinds
     assert kinds[kinds.index('no IMU') + 1] == 'gap'
     assert kinds[kinds.index('gap') + 1] == ''
-    legs = [
-        message.data for _, message, _ in BagReader(tmp_path / 'bag').messages(['/leg_2/doubt'])
-    ]
-    assert any(each.startswith('no wrench') for each in legs)
+    bag = BagReader(tmp_path / 'bag')
+    _, _, estimates = bag.records({'/feet/estimate': ESTIMATE})['/feet/estimate']
+    assert 'no wrench' in {doubts.kind(code) for code in estimates.rows['doubt'][:, 1]}
 
 
 @pytest.mark.parametrize('fidelity', ['L1', 'L0'])
@@ -146,6 +147,10 @@ def test_a_rail_leg_has_no_joints():
         trials.run('leg_dry_flat', 'flat', sensing='joints')
 
 
+def of_the_body(found):
+    return [each for each in found.comparisons if each.topic in ('/odom', '/feet/sample')]
+
+
 def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     *_, path = walked
     bag = BagReader(path)
@@ -155,12 +160,12 @@ def test_a_replay_of_the_bag_is_equal_to_the_bit(walked):
     assert found.verdict == 'equal'
     assert not found.refused
     assert found.samples == dict.fromkeys(LEGS, SAMPLES)
-    kinds = {each.kind for each in found.comparisons if each.recorded}
-    assert {'slip', 'wetness', 'doubt', 'pressure_setpoint', 'odom', 'contact_velocity'} <= kinds
-    of_body = [each for each in found.comparisons if each.kind in ('odom', 'contact_velocity')]
-    assert len(of_body) == 7
+    quantities = {each.quantity for each in found.comparisons}
+    assert {'slip', 'wetness', 'doubt', 'setpoint', 'orientation', 'velocity'} <= quantities
+    of_body = of_the_body(found)
+    assert len(of_body) == 2 + 6 * len(SAMPLE.fields)
     for each in of_body:
-        assert (each.recorded, each.replayed, each.equal) == (SAMPLES, SAMPLES, SAMPLES)
+        assert (each.equal, each.missing, each.not_recorded) == (SAMPLES, 0, 0)
     # Without the velocities it is another estimate: nothing of markers is in this bag.
     settings = NodeSettings.of(bag).changed({'alarm.threshold': 1.0})
     assert replay(bag, settings).verdict == 'different'
@@ -195,8 +200,7 @@ def test_joints_are_replayed_in_the_order_of_each_message(walked, tmp_path):
     turned = rewritten(walked[-1], tmp_path / 'bag', turn)
     found = replay(turned)
     assert found.verdict == 'equal'
-    of_body = [each for each in found.comparisons if each.kind in ('odom', 'contact_velocity')]
-    assert [each.equal for each in of_body] == [SAMPLES] * 7
+    assert {each.equal for each in of_the_body(found)} == {SAMPLES}
 
 
 def test_a_bag_with_the_joints_of_another_robot_has_a_note(walked, tmp_path):
@@ -217,4 +221,4 @@ def test_a_bag_without_its_robots_file_is_replayed_but_for_the_body(walked, monk
     found = replay(BagReader(walked[-1]))
     assert found.verdict == 'equal'
     assert found.notes == ['the body estimator is not replayed: mine.yaml: no such file']
-    assert 'odom' not in {each.kind for each in found.comparisons}
+    assert not of_the_body(found)
