@@ -212,13 +212,14 @@ class EstimationStage:
         stamps = block.stamps.tolist()
         ordinary, found, first = self._ordinary(stamps, values), [], 0
         for row, stamp_ns in enumerate(stamps):
+            if not ordinary:
+                self._use_some(stamp_ns, values[row])
+            # Who waits for an estimate receives one, also of feet without samples.
+            if not self._pace.due(stamp_ns):
+                continue
             if ordinary:
-                if not self._pace.due(stamp_ns):
-                    continue
                 self._use(stamps[first : row + 1], values[first : row + 1])
                 first = row + 1
-            elif not self._use_some(stamp_ns, values[row]) or not self._pace.due(stamp_ns):
-                continue
             found.append(self.estimate(stamp_ns))
             for each in self._inputs:
                 each.clear()
@@ -246,8 +247,8 @@ class EstimationStage:
         self._silences.clear()
         self._count(stamps[-1], len(stamps), np.ones(len(self._legs), np.int64))
 
-    def _use_some(self, stamp_ns: int, values: Array) -> bool:
-        """Use those samples of a moment that can be used; return whether there are any."""
+    def _use_some(self, stamp_ns: int, values: Array) -> None:
+        """Use those samples of a moment that can be used."""
         time, samples = stamp_ns * 1e-9, []
         for place, sample in enumerate(values.tolist()):
             found = None
@@ -265,13 +266,12 @@ class EstimationStage:
             samples.append((found,))
         used = np.array([bool(each) for (each,) in samples], np.int64)
         if not used.any():
-            return False
+            return
         ages = [(abs(time - each.first_ns * 1e-9),) for each in self._inputs]
         self.estimator.update(
             (time,), samples, self._pressures, ages if any(age for (age,) in ages) else None
         )
         self._count(stamp_ns, 1, used)
-        return True
 
     def _count(self, stamp_ns: int, moments: int, used: npt.NDArray[np.int64]) -> None:
         self.samples += moments

@@ -426,7 +426,7 @@ def run(
     controller, stopped, shared = (
         trial.walked,
         trial.stopped,
-        trial.estimator.stage.estimator.shared,
+        trial.estimator.stage.estimator.grounds.shared,
     )
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from ros_pad.records import Block
 from ros_pad.records import Field
 from ros_pad.records import Kind
-from ros_pad.trials.series import joined
 
 ROUNDING = 1e-12
 """Largest difference that counts as rounding, relative to the recorded number (below 1: to 1).
@@ -67,7 +66,9 @@ class Stream(NamedTuple):
     def of(cls, kind: Kind, legs: tuple[int, ...], records: list[tuple[int, Block]]) -> Stream:
         """Return the stream of blocks of one record each, with their log times, ns."""
         times = np.array([time_ns for time_ns, _ in records], np.int64)
-        return cls(kind, legs, times, joined(kind, len(legs), [block for _, block in records]))
+        return cls(
+            kind, legs, times, Block.joined(kind, [block for _, block in records], len(legs))
+        )
 
     def where(self, kept: npt.NDArray[Any]) -> Stream:
         """Return some of the records."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
 
@@ -13,7 +12,6 @@ import numpy as np
 
 from ros_pad.estimation import doubt as doubts
 from ros_pad.records import Block
-from ros_pad.records import Kind
 
 
 class Records(NamedTuple):
