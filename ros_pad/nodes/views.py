@@ -149,11 +149,7 @@ class ViewsNode(Node):
 
 def _doubt(row: Any) -> str | None:
     """Return the doubt in an estimate as text; None where it is missing."""
-    code = row['doubt']
-    if math.isnan(code):
-        return None
-    known = code in range(len(doubts.TABLE))
-    return doubts.text(code, *row['detail']) if known else f'unknown: code {code:g}'
+    return None if math.isnan(row['doubt']) else doubts.text(row['doubt'], *row['detail'])
 
 
 def _morphology(row: Any) -> str | None:
