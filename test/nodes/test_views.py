@@ -119,7 +119,7 @@ def test_texts_are_published_when_they_change(bench):
         return [each.data for each in bench.heard(topics.of_leg(schema), leg)]
 
     text = doubts.text(doubts.LOST, 0.2)
-    assert said(schemas.LEG_DOUBT, 1) == [text, '', 'unknown: code 1000', text]
+    assert said(schemas.LEG_DOUBT, 1) == [text, '', text]
     assert said(schemas.LEG_DOUBT, 2) == ['']
     assert said(schemas.LEG_MORPHOLOGY, 1) == ['flat', 'dome', 'flat']
     assert said(schemas.LEG_MORPHOLOGY, 2) == []
