@@ -234,7 +234,7 @@ def test_a_doubt_is_in_the_records_as_long_as_it_lasts(robot):
 def test_a_force_sensor_that_stands_still_is_an_error_at_once(robot):
     robot.start()
     robot.stance(0.1, 0.0, 0.2)
-    for number in range(40):
+    for number in range(60):
         jitter = 1e-9 * math.sin(number)
         position, force = (jitter, 0.0, 0.0), [(0.0, 0.0, LOAD), (jitter, 0.0, LOAD + jitter)]
         robot.sample(force=force, position=position)
@@ -341,7 +341,7 @@ def test_what_is_learnt_is_kept_and_reported(context, tmp_path):
     assert path.read_text() == 'foot: large37\n' + given  # nothing was learnt
     node = made()
     slips = -0.5 * (np.log(GRID / 0.6) / 0.05) ** 2
-    shared = node.stage.estimator.shared
+    shared = node.stage.estimator.grounds.shared
     for step in range(9):
         shared.add(Felt(step, 0, False, 1e-6, np.array([slips, slips]), 1.0))
     shared.expected(10.0)
