@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from ros_pad.configuration import instance
 from ros_pad.configuration import integer
@@ -28,6 +31,8 @@ from ros_pad.estimation.parts import Gate
 from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Slip
 from ros_pad.estimation.scales import DELAY
+from ros_pad.estimation.sensing import LEAP_DISTANCE
+from ros_pad.estimation.sensing import READINGS
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.track import Sample
 from ros_pad.estimation.track import Setup
@@ -35,6 +40,7 @@ from ros_pad.estimation.track import Track
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
 from ros_pad.estimation.watch import Watch
+from ros_pad.records import Array
 
 AIRBORNE_LOAD = 0.3
 """Share of the expected load above which a foot at that height may stand on higher ground. Smaller
@@ -107,12 +113,37 @@ class FeetEstimator:
             Slip(SlipAlarm(memory, threshold=tuning.alarm_threshold)),
         )
 
+    def update_all(
+        self, times: Sequence[float], values: Array, pressures: Sequence[float]
+    ) -> None:
+        """Process samples of all feet, with new positions, at times that advance, s.
+
+        The values are those of samples, feet and numbers, and all that are needed are there.
+        """
+        tracks, readings = self.tracks, values[:, :, READINGS]
+        last = np.array([[each.sensing.last for each in tracks]])
+        moves = readings - np.concatenate((last, readings[:-1]))
+        far = (moves[:, :, 3:] ** 2).sum(axis=2)
+        calm = moves.all(axis=2) & (far <= LEAP_DISTANCE**2)
+        if self.tuning.source == 'joints':
+            calm &= (values[:, :, 9:] < math.inf).all(axis=2)
+        quiet = calm.T.tolist()
+        for row, (before, time) in enumerate(pairwise((times[0], *times))):
+            for each, mine in zip(tracks, quiet, strict=True) if not row else ():
+                mine[0] &= time - each.time <= LONGEST_GAP
+            if time - before > LONGEST_GAP:
+                for mine in quiet:
+                    mine[row] = False
+        samples = values.transpose(1, 0, 2).tolist()
+        self.update(times, samples, pressures, quiet=quiet)
+
     def update(
         self,
         times: Sequence[float],
         samples: Sequence[Sequence[Sample | None]],
         pressures: Sequence[float],
         ages: Sequence[Sequence[float]] | None = None,
+        quiet: Sequence[Sequence[bool]] | None = None,
     ) -> None:
         """Process the samples of some times; a clock may have been set back in between.
 
@@ -126,6 +157,9 @@ class FeetEstimator:
             Gauge pressure in the pads of each foot, Pa.
         ages : sequence of sequence of float or None
             For each foot the ages of its positions, s; None: all are new.
+        quiet : sequence of sequence of bool or None
+            For each foot the samples in which nothing but landing and lifting can happen, see
+            :meth:`update_all`; None: unknown.
         """
         for track in self.tracks:
             track.fresh = False
@@ -137,12 +171,12 @@ class FeetEstimator:
                 end += 1
             whole = end - first == count
             for place, track in enumerate(self.tracks):
-                mine, old = samples[place], ages[place] if ages else None
-                if whole:
-                    track.update(times, mine, pressures[place], old)
-                else:
-                    part = slice(first, end)
-                    track.update(times[part], mine[part], pressures[place], old and old[part])
+                mine, part = samples[place], slice(first, end)
+                old = ages[place][part] if ages else None
+                calm = quiet[place][part] if quiet else None
+                track.update(
+                    times[part], mine if whole else mine[part], pressures[place], old, calm
+                )
             self.grounds.flush()
             first = end
 

@@ -13,6 +13,8 @@ from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.feet import FeetEstimator
 from ros_pad.estimation.feet import late
+from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.tuning import Tuning
 
 
@@ -124,7 +126,7 @@ class FootEstimator:
     estimate : Estimate
         Estimate after the last sample.
     feet : FeetEstimator
-        The estimator of all feet of a robot, here of a single one.
+        The estimator of all feet of a robot, mostly of this one alone.
 
     Raises
     ------
@@ -154,8 +156,18 @@ class FootEstimator:
     """
 
     def __init__(self, foot: Foot, expected_load: float, tuning: Tuning | None = None) -> None:
-        self.feet = FeetEstimator(1, foot, expected_load, tuning)
+        self.feet, self._place = FeetEstimator(1, foot, expected_load, tuning), 0
         self.estimate = self._estimate()
+
+    @classmethod
+    def of(cls, feet: FeetEstimator) -> list[FootEstimator]:
+        """Return an estimator for each foot of a robot, which learn together."""
+        found = []
+        for place in range(len(feet.tracks)):
+            found.append(cls.__new__(cls))
+            found[-1].feet, found[-1]._place = feet, place
+            found[-1].estimate = found[-1]._estimate()
+        return found
 
     def update(
         self,
@@ -200,7 +212,7 @@ class FootEstimator:
             When a value is not a finite number, force or position are not three numbers, time
             does not advance, or the motion is missing or has a deviation below 0.
         """
-        tuning, track = self.feet.tuning, self.feet.tracks[0]
+        tuning, track = self.feet.tuning, self.feet.tracks[self._place]
         motion = motion if tuning.source == 'joints' else None
         moment = moment if tuning.moment_noise > 0.0 else None
         if tuning.source == 'joints' and motion is None:
@@ -217,17 +229,30 @@ class FootEstimator:
         velocity = motion.velocity if motion else (0.0, 0.0)
         age = 0.0 if position_time is None else abs(time - position_time)
         sample = *force, yaw, *position, *velocity, variance, variance
-        self.feet.update((time,), ((sample,),), (pressure,), ((age,),) if age else None)
+        track.fresh = False
+        track.update((time,), (sample,), pressure, (age,) if age else None, None)
+        self.feet.grounds.flush()
         self.estimate = self._estimate()
         return self.estimate
 
+    @property
+    def ground(self) -> GroundFilter:
+        """Posterior of wet ground and friction."""
+        return self.feet.grounds.filters[self._place]
+
+    @property
+    def noise(self) -> SensorNoise:
+        """Configured and measured noise of the sensors."""
+        return self.feet.tracks[self._place].watch.noise
+
     def _estimate(self) -> Estimate:
-        track, grounds = self.feet.tracks[0], self.feet.grounds
+        place, grounds = self._place, self.feet.grounds
+        track = self.feet.tracks[place]
         now = track.standing
         return Estimate(
             track.time, track.gate.stands, now.slipping, now.slip_velocity, now.slip_speed,
-            track.slip.sd, *grounds.beliefs[0], track.margin, track.fresh,
-            doubt.text(*grounds.doubts[0]), track.sound,
+            track.slip.sd, *grounds.beliefs[place], track.margin, track.fresh,
+            doubt.text(*grounds.doubts[place]), track.sound,
         )  # fmt: skip
 
 

@@ -46,6 +46,7 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
+_HALF_NORMAL = _HALF_NORMAL.tolist()
 
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
@@ -97,34 +98,26 @@ class Evidence(NamedTuple):
     turning_known: bool = False
     scales: tuple[float, float] = (1.0, 1.0)
 
-    @property
-    def stick(self) -> float:
-        """Density of this speed while the foot sticks, s/m."""
-        away = self.speed / self.speed_noise
-        return math.exp(-0.5 * away * away) / (_ROOT_2_PI * self.speed_noise)
+    def factors(self, rim_speed: float) -> tuple[float, float, float]:
+        """Return how likely stick and slip are at this speed, and what of it shows friction.
 
-    @property
-    def slip(self) -> float:
-        """Density of this speed while it slips, s/m."""
-        swift = max(self.speed, 0.0) / SLIP_SPEED
-        return swift * math.exp(-swift) / SLIP_SPEED
-
-    @property
-    def rest(self) -> float:
-        """Density of this speed, T/N being the demand, while it sticks or creeps, s/m."""
-        density = self.stick
-        if self.speed > 0.0:
-            creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
-            density += CREEP * math.exp(-self.speed / creep) / creep
-        return density * math.exp(-self.ratio / DEMAND) / DEMAND
-
-    def shown(self, rim_speed: float) -> float:
-        """Return the share of the evidence that shows friction, not only wet or dry."""
-        if not self.speed > 0.0 or self.turning_known or not rim_speed > 0.0:
-            return 1.0
-        slid = self.slip / (self.slip + self.stick)
-        square = self.speed * self.speed
-        return 1.0 - slid * (1.0 - max(SLOWEST, square / (square + rim_speed**2)))
+        The first is the density of the speed, and of T/N as a demand, where the foot sticks or
+        creeps; the second that of the speed where it slips, both in s/m. The last is the share of
+        the evidence that shows friction, the rest shows only wet or dry.
+        """
+        speed, noise = self.speed, self.speed_noise
+        stick = math.exp(-0.5 * (speed / noise) ** 2) / (_ROOT_2_PI * noise)
+        demand = math.exp(-self.ratio / DEMAND) / DEMAND
+        if not speed > 0.0:
+            return stick * demand, 0.0, 1.0
+        creep = CREEP_SPEED * (self.ratio + LEAST_PULL)
+        rest = stick + CREEP * math.exp(-speed / creep) / creep
+        slip = speed / SLIP_SPEED * math.exp(-speed / SLIP_SPEED) / SLIP_SPEED
+        shown = 1.0
+        if rim_speed > 0.0 and not self.turning_known:
+            share = speed * speed / (speed * speed + rim_speed**2)
+            shown -= slip / (slip + stick) * (1.0 - max(SLOWEST, share))
+        return rest * demand, slip, shown
 
 
 class GroundModel:
@@ -142,45 +135,60 @@ class GroundModel:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
-        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
         error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         blur = (blur / blur.sum(axis=0)).T
         # From a posterior to sums of the blurred one up to each edge, and to its moments.
-        self.sums = np.concatenate((np.zeros_like(_ONES)[:, None], blur.cumsum(axis=1)), axis=1)
-        self.moments = np.stack((blur.dot(GRID), blur.dot(GRID * GRID)), axis=1)
+        self.summary = np.column_stack((
+            np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
+        ))  # fmt: skip
 
-    def likelihoods(self, samples: Sequence[Evidence]) -> np.ndarray:
-        """Return the likelihood of each sample, shape (samples, 2, grid)."""
-        friction = np.array([each.scales for each in samples])[:, :, None] * GRID
-        ratios, noises, rests = np.array(
-            [(each.ratio, each.ratio_noise, each.rest) for each in samples]
-        ).T[:, :, None, None]
+    def likelihoods(
+        self, samples: Sequence[Evidence], factors: Sequence[tuple[float, float, float]]
+    ) -> np.ndarray:
+        """Return the likelihood of each sample, shape (samples, 2, grid), from its factors."""
+        table = np.array([
+            (*each.scales, each.ratio, 1.0 / each.ratio_noise, rest, slip / each.ratio_noise)
+            for each, (rest, slip, _) in zip(samples, factors, strict=True)
+        ])  # fmt: skip
+        ratios, precisions, rests, slips = table.T[2:, :, None, None]
+        friction = table[:, :2, None] * GRID
         # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
         # and T/N is μ less the part used by turning.
-        found: np.ndarray = special.ndtr((friction - ratios) / noises)
+        found = friction - ratios
+        found *= precisions
+        special.ndtr(found, out=found)
         found *= rests
-        for each, mine, likelihood in zip(samples, friction, found, strict=True):
-            if each.speed > 0.0:
-                likelihood += self._slip(each, mine)
+        if slips.any():
+            shown = self._shown(samples, friction)
+            # The exponential is the share of demands that friction does not meet.
+            friction *= -1.0 / DEMAND
+            np.exp(friction, out=friction)
+            friction *= shown
+            friction *= slips / _ROOT_2_PI
+            found += friction
         return found
 
-    def _slip(self, sample: Evidence, friction: np.ndarray) -> np.ndarray:
-        """Return the likelihood that a foot slips so, by its friction on dry and wet ground."""
-        shown, noise = friction, sample.ratio_noise
-        if not sample.turning_known:
-            left = sample.speed / np.hypot(sample.speed, self._rim_speeds)
-            shown = left * friction[:, None]
-        away = (shown - sample.ratio) / noise
+    def _shown(self, samples: Sequence[Evidence], friction: np.ndarray) -> np.ndarray:
+        """Return the likelihood of T/N in a slip, mean over rim speeds, up to a factor."""
+        left, ratios = [], []
+        for each in samples:
+            precision, rim = math.sqrt(0.5) / each.ratio_noise, self.rim_speed
+            if each.turning_known or not each.speed > 0.0:
+                left.append([precision] * len(_SHARES))
+            else:
+                speed = each.speed
+                left.append([
+                    precision * speed / math.hypot(speed, rim * part) for part in _HALF_NORMAL
+                ])  # fmt: skip
+            ratios.append(each.ratio * precision)
+        away = np.array(left).T[:, :, None, None] * friction
+        away -= np.array(ratios)[:, None, None]
         away *= away
-        away *= -0.5
-        likely = np.exp(away, out=away)
-        if not sample.turning_known:
-            likely = _SHARES @ likely
-        # The exponential is the share of demands that friction does not meet.
-        likely *= np.exp(friction / -DEMAND)
-        likely *= sample.slip / (_ROOT_2_PI * noise)
-        return likely
+        np.negative(away, out=away)
+        np.exp(away, out=away)
+        found: np.ndarray = _SHARES.dot(away.reshape(len(_SHARES), -1)).reshape(friction.shape)
+        return found
 
 
 class GroundFilter:
@@ -210,8 +218,8 @@ class GroundFilter:
 
     Attributes
     ----------
-    shared : FrictionScales
-        As given.
+    shared, model
+        As given, or made of the other parameters.
     expected : Expected
         Friction of new ground by what the feet have learnt up to this stance.
     wet_probability : float
@@ -224,8 +232,8 @@ class GroundFilter:
     """
 
     __slots__ = (
-        '_counted', '_dome', '_felt', '_foot', '_model', '_posterior', '_travelled',
-        '_wet_before', 'expected', 'log_odds', 'scales', 'shared', 'wet_probability',
+        '_counted', '_dome', '_felt', '_foot', '_posterior', '_summed', '_travelled',
+        '_wet_before', 'expected', 'log_odds', 'model', 'scales', 'shared', 'wet_probability',
     )  # fmt: skip
 
     def __init__(
@@ -238,7 +246,7 @@ class GroundFilter:
         model_error: float = MODEL_ERROR,
         model: GroundModel | None = None,
     ) -> None:
-        self._model = model or GroundModel(
+        self.model = model or GroundModel(
             shared, wet_prior, patch_length, temper, rim_speed, model_error
         )
         self.shared, self._foot = shared, shared.join()
@@ -248,7 +256,8 @@ class GroundFilter:
         self._travelled = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
         self.expected = shared.expected(0.0)
-        self._normalise(self._model.grounds * self.expected.flat)
+        self.wet_probability = wet_prior
+        self._normalise(self.model.grounds * self.expected.flat)
         self._begin()
 
     def _begin(self) -> None:
@@ -262,7 +271,7 @@ class GroundFilter:
             # Stances on the same patch are no new evidence of what all patches have in common.
             since = self._travelled - self._counted[self._dome]
             self._counted[self._dome] = self._travelled
-            weight = -math.expm1(-since / self._model.patch_length)
+            weight = -math.expm1(-since / self.model.patch_length)
             self.shared.add(
                 Felt(time, self._foot, self._dome, self._wet_before, self._felt, weight)
             )
@@ -294,7 +303,7 @@ class GroundFilter:
         self.shared.forget(self._foot)
         self.expected = self.shared.expected(time)
         self._counted = {False: -math.inf, True: -math.inf}
-        self._normalise(self._model.grounds * self._priors)
+        self._normalise(self.model.grounds * self._priors)
         self._begin()
 
     @property
@@ -312,14 +321,15 @@ class GroundFilter:
         """Process one sample of T/N and of slip speed."""
         update([self], [sample])
 
-    def _learn(self, sample: Evidence, after: np.ndarray, evidence: np.ndarray) -> None:
-        """Use the posterior after a sample, and the logarithm of what it shows of friction."""
+    def _learn(
+        self, sample: Evidence, after: np.ndarray, evidence: np.ndarray, grounds: list[float]
+    ) -> None:
+        """Use the posterior after a sample, what it shows of friction, and the odds."""
         self.scales = sample.scales
         self._felt = evidence if self._felt is None else self._felt + evidence
-        before = self.wet_probability
-        self._posterior = after
-        dry, wet = after.dot(_ONES).tolist()
+        (dry, wet), before = grounds, self.wet_probability
         self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
+        self._posterior = after
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)
         if self._dome:
@@ -334,7 +344,7 @@ class GroundFilter:
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
         self._travelled += distance
-        stay, grounds = math.exp(-distance / self._model.patch_length), self._model.grounds
+        stay, grounds = math.exp(-distance / self.model.patch_length), self.model.grounds
         if self._dome:
             # Under domes the ground is unobservable: when friction fades, the probability of wet
             # ground must not change.
@@ -344,7 +354,8 @@ class GroundFilter:
             self._posterior = (stay * before + (1.0 - stay) * grounds) * friction
         else:
             new = ((1.0 - stay) * grounds) * self.expected.flat
-            self._posterior = stay * self._posterior + new
+            new += stay * self._posterior
+            self._posterior = new
 
     def _wet_or_dry(self) -> np.ndarray:
         return self._posterior.dot(_ONES)[:, None]
@@ -354,14 +365,20 @@ class GroundFilter:
         # would be zero.
         dry, wet = posterior.dot(_ONES).tolist()
         self._posterior = posterior / (dry + wet)
+        self._summed: np.ndarray | None = None
         self.wet_probability = wet / (dry + wet)
+
+    @property
+    def _summary(self) -> np.ndarray:
+        """Sums of the probabilities of friction on dry and on wet ground, and two moments."""
+        if self._summed is None:
+            self._summed = self._posterior.dot(self.model.summary)
+        return self._summed
 
     @property
     def friction(self) -> tuple[float, float]:
         """Mean and standard deviation of friction at the load of the last sample."""
-        (on_dry, dry_square), (on_wet, wet_square) = self._posterior.dot(
-            self._model.moments
-        ).tolist()
+        (on_dry, dry_square), (on_wet, wet_square) = self._summary[:, -2:].tolist()
         dry, wet = self.scales
         mean = dry * on_dry + wet * on_wet
         square = dry * dry * dry_square + wet * wet * wet_square
@@ -378,7 +395,7 @@ class GroundFilter:
         """Return the same for several shares."""
         dry, wet = self.scales
         edges = dry * EDGES
-        on_dry, on_wet = self._posterior.dot(self._model.sums)
+        on_dry, on_wet = self._summary[:, :-2]
         if dry != wet:
             on_wet = np.interp(edges, wet * EDGES, on_wet)
         found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
@@ -387,24 +404,27 @@ class GroundFilter:
 
 def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
     """Process one sample of each of several feet, which have one model, together."""
-    model = filters[0]._model
+    model = filters[0].model
+    factors = [each.factors(model.rim_speed) for each in samples]
+    evidence = model.likelihoods(samples, factors)
+    evidence += 1e-6
+    np.log(evidence, out=evidence)
+    evidence *= np.array([[[each.weight * model.temper]] for each in samples])
     posterior = np.array([each._posterior for each in filters])
-    evidence = np.log(model.likelihoods(samples) + 1e-6)
-    evidence *= np.array([each.weight * model.temper for each in samples])[:, None, None]
-    # The share that does not show friction shows only whether the ground is wet, or nothing
-    # under a dome.
-    domes = np.array([each._dome for each in filters])
-    shown = np.array([each.shown(model.rim_speed) for each in samples])
     after = posterior * np.exp(evidence)
     grounds = after.dot(_ONES)
-    if domes.any() or (shown < 1.0).any():
-        grounds[domes] = posterior.dot(_ONES)[domes]
-        evidence *= shown[:, None, None]
-        after = posterior * np.exp(evidence)
+    domes = [each._dome for each in filters]
+    shown = [share for _, _, share in factors]
+    # The share that does not show friction shows only whether the ground is wet, or nothing
+    # under a dome.
+    if any(domes) or min(shown) < 1.0:
+        grounds[domes] = posterior[domes].dot(_ONES)
+        evidence *= np.array(shown)[:, None, None]
+        np.multiply(posterior, np.exp(evidence), out=after)
         rest = grounds / after.dot(_ONES)
         after *= rest[:, :, None]
         rest[domes] = 1.0
         evidence += np.log(rest)[:, :, None]
-    after /= grounds.sum(axis=1)[:, None, None]
-    for each, sample, mine, felt in zip(filters, samples, after, evidence, strict=True):
-        each._learn(sample, mine, felt)
+    after /= grounds.dot(_ONES[:2])[:, None, None]
+    for place, each in enumerate(filters):
+        each._learn(samples[place], after[place], evidence[place], grounds[place].tolist())

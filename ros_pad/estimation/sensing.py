@@ -43,6 +43,9 @@ LEAP = 5.0
 LEAP_DISTANCE = 0.02
 """Distance above which a jump at such a speed cannot come from clock jitter, m."""
 
+READINGS = [0, 1, 2, 4, 5, 6]
+"""Places of force and position in the numbers of a sample."""
+
 
 class Repeats:
     """Measure for how long each of several values has not changed at all.

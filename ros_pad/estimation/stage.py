@@ -239,11 +239,10 @@ class EstimationStage:
 
     def _use(self, stamps: list[int], values: Array) -> None:
         """Use samples of all feet."""
-        samples = values.transpose(1, 0, 2).tolist()
-        self.estimator.update([each * 1e-9 for each in stamps], samples, self._pressures)
+        self.estimator.update_all([each * 1e-9 for each in stamps], values, self._pressures)
         loads = values[:, :, 2].max(axis=0).tolist()
-        for each, mine, load in zip(self._inputs, samples, loads, strict=True):
-            each.note(stamps[-1], mine[-1][4:7], load)
+        for each, mine, load in zip(self._inputs, values[-1, :, 4:7].tolist(), loads, strict=True):
+            each.note(stamps[-1], mine, load)
         self._silences.clear()
         self._count(stamps[-1], len(stamps), np.ones(len(self._legs), np.int64))
 

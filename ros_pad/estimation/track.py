@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
@@ -17,7 +18,6 @@ from ros_pad.estimation.parts import Gate
 from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Slip
 from ros_pad.estimation.parts import Window
-from ros_pad.estimation.sensing import LEAP_DISTANCE
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
@@ -179,23 +179,39 @@ class Track:
         samples: Samples,
         pressure: float,
         ages: Sequence[float] | None,
+        quiet: Sequence[bool] | None,
     ) -> None:
-        """Process samples at some times, s, with a pressure, Pa, and ages of positions, s."""
+        """Process samples at some times, s, with a pressure, Pa, and ages of positions, s.
+
+        In quiet samples nothing but landing and lifting can happen, while the sensors are sound.
+        """
         row, count = 0, len(times)
         while row < count:
-            sample = samples[row]
-            if sample is None:
-                row += 1
-                continue
-            end = row + 1 if ages or not self.sensing.calm else count
-            stands = self._take(times[row], sample, ages[row] if ages else 0.0, pressure)
-            if stands and self._setup.joints and max(sample[9:]) == math.inf:
-                self._in_doubt(times[row], sample)
-                row += 1
-            elif stands:
-                row = self._stand(times, samples, row, end, pressure)
-            else:
-                row = self._fly(times, samples, row + 1, end)
+            done = end = row
+            if quiet and quiet[row] and self.sound and self.sensing.calm:
+                end = quiet.index(False, row) if False in quiet[row:] else count
+                end = bisect_left(times, self.watch.end, row, end)
+            if end > row and self.gate.stands:
+                done = self._stand(times, samples, row, end, pressure)
+            elif end > row:
+                done = self._fly(times, samples, row, end)
+            if done == row:
+                done += 1
+                if samples[row] is not None:
+                    old = ages[row] if ages else 0.0
+                    self._take_and_stand(times, samples, row, old, pressure)
+            row = done
+
+    def _take_and_stand(
+        self, times: Sequence[float], samples: Samples, row: int, age: float, pressure: float
+    ) -> None:
+        """Process a sample with anything that may happen in it."""
+        if not self._take(times[row], samples[row], age, pressure):
+            return
+        if self._setup.joints and max(samples[row][9:]) == math.inf:
+            self._in_doubt(times[row], samples[row])
+        else:
+            self._stand(times, samples, row, row + 1, pressure, taken=True)
 
     def _take(self, time: float, sample: Sample, age: float, pressure: float) -> bool:
         """Process a sample up to whether the foot stands, which is returned."""
@@ -285,54 +301,53 @@ class Track:
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
         return False
 
-    def _ordinary(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
-        """Return up to where, after a first sample, nothing but landing and lifting can happen."""
-        before, block_end, joints = times[first], self.watch.end, self._setup.joints
-        a, b, c, _, d, e, f, *_ = samples[first]
-        for row in range(first + 1, end):
-            sample, time = samples[row], times[row]
-            if sample is None or not (before < time < block_end and time - before <= LONGEST_GAP):
-                return row
-            fx, fy, fz, _, x, y, z, _, _, *variances = sample
-            if fx == a or fy == b or fz == c or x == d or y == e or z == f:
-                return row
-            if (x - d) ** 2 + (y - e) ** 2 + (z - f) ** 2 > LEAP_DISTANCE**2:
-                return row
-            if joints and max(variances) == math.inf:
-                return row
-            before, a, b, c, d, e, f = time, fx, fy, fz, x, y, z
-        return end
-
     def _fly(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
-        """Process more samples of a foot in the air, as ordinary ones; return the next one."""
-        offset, gate, row = self.offset, self.gate, first
-        if not self.sound or self._setup.joints or first >= end:
-            return first
+        """Process ordinary samples of a foot in the air; return the next one."""
+        offset, gate, before, row = self.offset, self.gate, self.time, first
         least, air, moments = gate.least, gate.air, self._setup.moments
-        last = self._ordinary(times, samples, first - 1, end)
-        while row < last:
+        while row < end:
             fx, fy, fz, moment, _, _, z, *_ = samples[row]
             if not (z > air and fz - offset.z < least):
                 break
             yaw = moment if moments and moment == moment else 0.0
-            offset.update(times[row] - times[row - 1], fx, fy, fz, yaw)
-            row += 1
-        self._skip(times, samples, first, row)
+            offset.update(times[row] - before, fx, fy, fz, yaw)
+            before, row = times[row], row + 1
+        if row > first:
+            self._skip(times, samples, first, row)
+            self.slip.sd = self.slip.noise
+            if self._setup.joints:
+                self.slip.sd = math.hypot(math.sqrt(max(samples[row - 1][9:])), self.slip.noise)
         return row
 
-    def _skip(self, times: Sequence[float], samples: Samples, first: int, row: int) -> None:
-        """Take note of ordinary samples up to a row, the first of which have been sensed."""
-        if row > first:
-            fx, fy, fz, _, x, y, z, *_ = samples[row - 1]
-            self.sensing.skip(times[row - 1], (fx, fy, fz, x, y, z))
-        self.time = times[row - 1]
+    def _skip(self, times: Sequence[float], samples: Samples, first: int, end: int) -> None:
+        """Take note of ordinary samples."""
+        joints, looks, noted, before = self._setup.joints, self.watch.looks, [], self.time
+        if joints or looks:
+            for row in range(first, end):
+                fx, fy, fz, _, x, y, _, vx, vy, *_ = samples[row]
+                if joints:
+                    dt = min(times[row] - before, BLOCK)
+                    x, y = self._slid = self._slid[0] + vx * dt, self._slid[1] + vy * dt
+                before = times[row]
+                noted.append((before, x, y, fx, fy, fz))
+        if looks:
+            self.watch.note(noted)
+        fx, fy, fz, _, x, y, z, *_ = samples[end - 1]
+        self.sensing.skip(times[end - 1], (fx, fy, fz, x, y, z))
+        self.time = times[end - 1]
 
     def _stand(
-        self, times: Sequence[float], samples: Samples, first: int, end: int, pressure: float
+        self,
+        times: Sequence[float],
+        samples: Samples,
+        first: int,
+        end: int,
+        pressure: float,
+        taken: bool = False,
     ) -> int:
-        """Process samples of a standing foot, of which the first one has been taken.
+        """Process ordinary samples of a standing foot, or the one that has been taken.
 
-        Stop where another one is not ordinary, or a window ends; return the next one.
+        Stop where the foot may lift off, or a window ends; return the next one.
         """
         (tuning, joints, moments, shear, softness, lever), slip = self._setup, self.slip
         offset, window, gate = self.offset, self._window, self.gate
@@ -343,12 +358,11 @@ class Track:
         smoothing, own, peak, due = tuning.smoothing, slip.noise, window.peak, tuning.filter_period
         noise, turning, known, before, tests, row = own, 0.0, False, self.time, [], first
         due += window.start - 1e-9
-        last = self._ordinary(times, samples, first, end)
-        while row < last:
+        while row < end:
             fx, fy, fz, moment, x, y, z, vx, vy, *variances = samples[row]
             time = times[row]
             fx, fy, fz, dt = fx - ox, fy - oy, fz - oz, time - before
-            if row > first and (fz < firm or z > top):
+            if (fz < firm or z > top) and not taken:
                 break
             if not 0.0 < dt < math.inf:
                 dt = 0.1 * smoothing
@@ -379,28 +393,17 @@ class Track:
             before, standing, row = time, (speed, fx, fy, fz, turning), row + 1
             if time >= due:
                 break
+        if row == first:
+            return row
         slip.x, slip.y, slip.sd = sx, sy, noise
         window.sums, window.peak = (count, loads, pulls, turnings, speeds, noises), peak
         self.last = Standing(*standing, slip.alarm.update(tests))
-        self._note(times, samples, first + 1, row)
-        self._skip(times, samples, first + 1, row)
+        if not taken:
+            self._skip(times, samples, first, row)
+        self.time = before
         if before >= due:
             self._end_window(before, (place_x, place_y), pressure, known)
         return row
-
-    def _note(self, times: Sequence[float], samples: Samples, first: int, end: int) -> None:
-        """Take note of ordinary samples of a standing foot for the watch."""
-        joints, looks, noted = self._setup.joints, self.watch.looks, []
-        if not (joints or looks):
-            return
-        for row in range(first, end):
-            fx, fy, fz, _, x, y, _, vx, vy, *_ = samples[row]
-            if joints:
-                dt = min(times[row] - times[row - 1], BLOCK)
-                x, y = self._slid = self._slid[0] + vx * dt, self._slid[1] + vy * dt
-            noted.append((times[row], x, y, fx, fy, fz))
-        if looks:
-            self.watch.note(noted)
 
     def _end_window(
         self, time: float, place: tuple[float, float], pressure: float, known: bool

@@ -85,10 +85,12 @@ class Messages:
         write = FieldWriter(topic.message_type, paths, frame | dict(constants or {}))
         return lambda *values: publish(write(*values))
 
-    def record_output(self, topic: Topic, legs: Sequence[int]) -> Callable[[Block], None]:
-        """Return a function that publishes blocks of records of these legs."""
+    def record_output(
+        self, topic: Topic, legs: Sequence[int], fields: Sequence[str] | None = None
+    ) -> Callable[[Block], None]:
+        """Return a function that publishes blocks of records of these legs, with some fields."""
         assert topic.schema.record
-        encode = Wire(topic.schema.record, legs).encode
+        encode = Wire(topic.schema.record, legs, fields).encode
         publish = topic.publisher(self._node).publish
         return lambda block: publish(encode(block))
 

@@ -184,7 +184,9 @@ class SimulatorNode(Node):
         pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
         self._send_pose = messages.sender(topics.BODY_POSE, (*STAMP, *pose))
         record = topics.FORCE if self._body_sensors else topics.SAMPLE
-        self._send_block = messages.record_output(record, self.scene.legs)
+        measured = ['force'] if self._body_sensors else ['force', 'position']
+        measured += ['moment'] * bool(self.scene.sensors.moment)
+        self._send_block = messages.record_output(record, self.scene.legs, measured)
         parts = ('position', 'velocity', 'effort') if self._body_sensors else ('position',)
         angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
         zeros = {'name': joints} | {part: [0.0] * len(joints) for part in parts}

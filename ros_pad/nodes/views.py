@@ -99,6 +99,7 @@ class ViewsNode(Node):
         """Return a function that publishes numbers of a leg, if none of them is missing."""
         topic = topics.of_leg(schema)
         send = self.messages.sender(topic, (*(STAMP if schema.frame else ()), *schema.values), leg)
+        assert schema.record
         columns = [schema.record.columns.index(each) for each in schema.columns]
         needed = slice(0, 3) if schema is schemas.LEG_WRENCH else slice(None)
 
@@ -138,9 +139,11 @@ class ViewsNode(Node):
         if not self._pace.due(block.last_ns):
             return
         array = MarkerArray()
-        for leg, place, wetness in zip(self._legs, self._places, rows['wetness'], strict=True):
-            if np.isfinite(place).all():
-                marker: Marker = marker_of_foot(leg, *place.tolist(), float(wetness))
+        for leg, place, wetness in zip(
+            self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
+        ):
+            if math.isfinite(sum(place)):
+                marker: Marker = marker_of_foot(leg, place[0], place[1], wetness)
                 marker.header.frame_id = self._frame
                 set_stamp(marker.header.stamp, block.last_ns)
                 array.markers.append(marker)

@@ -254,7 +254,7 @@ class ClosedLoop:
         if self.body:
             rows, odom = self.body.sample(self._stamp_ns), self.body.odom
         else:
-            rows, odom = self.sensors.sample(self.robot), ()
+            rows, odom = self.sensors.sample(self.robot), (math.nan,) * 3
         self._block.append((self._stamp_ns, rows, self.robot.body, odom))
         if self._pace.due(self._stamp_ns):
             self._process(log)

@@ -15,7 +15,9 @@ import math
 import os
 import pathlib
 from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import asdict
 from dataclasses import dataclass
 from typing import Any
@@ -36,7 +38,6 @@ from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
 from ros_pad.trials.replay_body import compare_body
 from ros_pad.trials.replay_inputs import Inputs
-from ros_pad.trials.replay_inputs import missing
 from ros_pad.trials.replay_inputs import read
 from ros_pad.trials.replay_player import Player
 from ros_pad.trials.trial import BOUNCE
@@ -232,37 +233,29 @@ def replay(
     """
     settings = settings or NodeSettings.of(bag)
     wanted = wanted_topics(bag, namespace, remaps)
-    inputs, late = _begun(read(bag, wanted, settings, part(progress, 0.0, 0.2)))
+    inputs = read(bag, wanted, settings, part(progress, 0.0, 0.2))
     player = Player(settings, inputs)
     made = player.play(part(progress, 0.2, 0.9))
-    lacks = missing(inputs, settings)
     # What was lost may have changed all legs: they share what feet learn, and one controller.
-    gap_ns = -math.inf if lacks else min((each.time_ns for each in inputs.gaps), default=math.inf)
+    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
     comparisons = [
         found
         for kind, each in made.items()
         if kind in inputs.topics
-        for found in compare(inputs.topics[kind], inputs.streams[kind], each, bag.start, gap_ns)
+        for found in compare(
+            inputs.topics[kind],
+            inputs.streams[kind],
+            each,
+            bag.start,
+            -math.inf if inputs.lacks else gap_ns,
+        )
     ]
     # The body estimator is replayed beside the feet, which take what it published.
     of_body, note = compare_body(bag, wanted)
-    recorded = {
-        key: track for kind in made for key, track in inputs.streams[kind].tracks().items()
-    }
-    replayed = {key: track for each in made.values() for key, track in each.tracks().items()}
-    refused = {leg: (count, player.rejection[leg]) for leg, count in player.rejected.items()}
-    notes = [*settings.assumed, bag.problem, *_changes(bag), *lacks]
-    notes += _gaps(bag, inputs) if any(each.verdict == 'gap' for each in comparisons) else []
-    notes += [
-        f'leg {leg}: {count} samples rejected, the last one: {why}'
-        for leg, (count, why) in refused.items()
+    tracks = [
+        {key: track for kind in made for key, track in streams[kind].tracks().items()}
+        for streams in (inputs.streams, made)
     ]
-    different = [each for each in comparisons if each.verdict == 'different']
-    if different and not any(each.equal for each in different):
-        notes.append(
-            'the quantities that differ have no equal record: the nodes had other settings, or the'
-            ' bag begins in the middle of a walk'
-        )
     if progress:
         progress(1.0)
     return Replay(
@@ -272,49 +265,53 @@ def replay(
         start_ns=bag.start,
         duration_s=(bag.end - bag.start) * 1e-9,
         samples=dict(zip(inputs.legs, player.stages.estimation.used.tolist(), strict=True)),
-        refused=refused,
-        recorded=recorded,
-        replayed=replayed,
+        refused=player.refused,
+        recorded=tracks[0],
+        replayed=tracks[1],
         streams=made,
         comparisons=comparisons + of_body,
-        outcomes=[_outcome(inputs, settings, leg, recorded, replayed) for leg in inputs.legs],
-        notes=[text for text in (*notes, late, note) if text],
+        outcomes=[_outcome(inputs, settings, leg, *tracks) for leg in inputs.legs],
+        notes=[
+            text
+            for text in (
+                *settings.assumed,
+                bag.problem,
+                *_notes(bag, inputs, player.refused, comparisons),
+                inputs.late,
+                note,
+            )
+            if text
+        ],
     )
 
 
-def _changes(bag: BagReader) -> list[str]:
-    """Return a note for each parameter that changed while the bag was recorded."""
-    return [
-        f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r}; the'
-        ' replay keeps the first value'
-        for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]'))
-    ]
-
-
-def _gaps(bag: BagReader, inputs: Inputs) -> list[str]:
-    return [
-        f'{each.what}: {each.places} gap{"s" if each.places > 1 else ""}, the first'
-        f' {(each.time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded'
-        ' cannot be replayed'
-        for each in sorted(inputs.gaps)
-    ]
-
-
-def _begun(inputs: Inputs) -> tuple[Inputs, str]:
-    """Leave out the samples before the first recorded estimate; return a note if there are any.
-
-    An estimator makes its first estimate of its first sample: it started later than the recorder.
-    """
-    samples = inputs.streams['sample']
-    stamps, first = samples.block.stamps, inputs.streams['estimate'].block.stamps[:1]
-    kept = stamps >= first if len(first) else stamps >= 0
-    if kept.all() or not kept.any():
-        return inputs, ''
-    streams = inputs.streams | {'sample': samples.where(kept)}
-    return inputs._replace(streams=streams), (
-        'the estimator started later than the recorder, so the replay leaves out the'
-        f' {int(np.sum(~kept))} samples before its first recorded estimate'
-    )
+def _notes(
+    bag: BagReader,
+    inputs: Inputs,
+    refused: Mapping[int, tuple[int, str]],
+    comparisons: Sequence[Comparison],
+) -> Iterator[str]:
+    """Yield notes on a replay, one sentence each."""
+    for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]')):
+        yield (
+            f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r};'
+            ' the replay keeps the first value'
+        )
+    yield from inputs.lacks
+    for gap in sorted(inputs.gaps) if any(each.verdict == 'gap' for each in comparisons) else ():
+        yield (
+            f'{gap.what}: {gap.places} gap{"s" if gap.places > 1 else ""}, the first'
+            f' {(gap.time_ns - bag.start) * 1e-9:.3f} s after the beginning: what was not recorded'
+            ' cannot be replayed'
+        )
+    for leg, (count, reason) in refused.items():
+        yield f'leg {leg}: {count} samples rejected, the last one: {reason}'
+    different = [each for each in comparisons if each.verdict == 'different']
+    if different and not any(each.equal for each in different):
+        yield (
+            'the quantities that differ have no equal record: the nodes had other settings, or the'
+            ' bag begins in the middle of a walk'
+        )
 
 
 def _outcome(

@@ -9,6 +9,7 @@ import math
 import operator
 from collections.abc import Iterator
 from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -86,21 +87,21 @@ def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Com
     if len(found) != 1 or not sample or not all(bag.counts.get(name) for name in needed):
         return [], ''
     try:
-        player = _Player(bag, found[0])
-        player.play(*needed[:3])
+        made_poses, made_feet = _play(bag, found[0], *needed[:3])
     except (ConfigError, InvalidInput) as error:
         return [], f'the body estimator is not replayed: {error}'
     gap_ns = math.inf if bag.counts.get('/clock') else -math.inf
-    samples = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
+    feet = Stream(SAMPLES, *bag.records({sample: SAMPLES})[sample])
     # At moments without an estimate, the node sends records without values.
-    samples = samples.where(np.isfinite(samples.block.rows['force']).any(axis=(1, 2)))
+    feet = feet.where(np.isfinite(feet.block.rows['force']).any(axis=(1, 2)))
     times, table = bag.tables({needed[-1]: (*STAMP, *ODOM.values)})[needed[-1]]
     stamps = table[:, :2].astype(np.int64) @ np.array([1_000_000_000, 1])
-    poses = Stream(_POSE, (OF_BODY,), times, Block(stamps, table[:, 2:].copy().view(_POSE.dtype)))
-    legs = tuple(found[0]['legs'])
+    poses = made_poses._replace(
+        times=times, block=Block(stamps, table[:, 2:].copy().view(_POSE.dtype))
+    )
     return [
-        *compare(needed[-1], poses, Stream.of(_POSE, (OF_BODY,), player.poses), bag.start, gap_ns),
-        *compare(sample, samples, Stream.of(SAMPLES, legs, player.feet), bag.start, gap_ns),
+        *compare(needed[-1], poses, made_poses, bag.start, gap_ns),
+        *compare(sample, feet, made_feet, bag.start, gap_ns),
     ], ''
 
 
@@ -118,66 +119,64 @@ def _parts(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstima
         ) from error
 
 
-class _Player:
-    """Pass the recorded inputs of a body estimator to a sensing stage."""
+def _play(
+    bag: BagReader, values: Mapping[str, Any], force: str, imu: str, joints: str
+) -> tuple[Stream, Stream]:
+    """Pass what is on these topics to a sensing stage; return its poses and samples."""
+    robot, estimator = _parts(bag, values)
+    order, wrong = JointOrder(robot), InvalidInput('no reading can be used')
+    poses: list[tuple[int, Block]] = []
+    feet: list[tuple[int, Block]] = []
 
-    def __init__(self, bag: BagReader, values: Mapping[str, Any]) -> None:
-        self._bag = bag
-        robot, estimator = _parts(bag, values)
-        self._order, self._wrong = JointOrder(robot), InvalidInput('no reading can be used')
-        self._stage = SensingStage(
-            robot, estimator, self._take, lambda doubt: None, lambda error: None, values['forces']
-        )
-        self._log_ns = 0
-        # Log time, ns, and block of each estimate.
-        self.feet: list[tuple[int, Block]] = []
-        self.poses: list[tuple[int, Block]] = []
-
-    def play(self, force: str, imu: str, joints: str) -> None:
-        """Play the messages on these topics once."""
-        paths = {
-            imu: (*STAMP, *IMU.values),
-            joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
-        }
-        messages = ((log_ns, topic, values) for topic, values, log_ns in self._bag.values(paths))
-        # Forces come first: readings of the joints wait for those of the same moment.
-        both = heapq.merge(self._forces(force), messages, key=operator.itemgetter(0))
-        for self._log_ns, topic, (seconds, fraction, *values) in both:
-            stamp_ns = seconds * 1_000_000_000 + fraction
-            if topic == joints:
-                self._take_joints(stamp_ns, *values)
-            elif topic == imu:
-                if math.isfinite(sum(values)):
-                    self._stage.imu(stamp_ns, values[:3], values[3:])
-            else:
-                for index, each in enumerate(values):
-                    if math.isfinite(each.sum()):
-                        self._stage.force(index, stamp_ns, each)
-        if not self._stage.samples:
-            raise self._wrong
-
-    def _forces(self, topic: str) -> Iterator[tuple[int, str, tuple[Any, ...]]]:
-        _, times, (stamps, rows) = self._bag.records({topic: SAMPLES})[topic]
-        for time_ns, stamp_ns, forces in zip(
-            times.tolist(), stamps.tolist(), rows['force'], strict=True
-        ):
-            yield time_ns, topic, (0, stamp_ns, *forces)
-
-    def _take_joints(self, stamp_ns: int, *values: Any) -> None:
-        try:
-            ordered = self._order(*values)
-        except InvalidInput as error:
-            self._wrong = error
-            self._stage.reject(error)
-            return
-        if math.isfinite(ordered[0].sum()):
-            self._stage.joints(stamp_ns, *ordered)
-
-    def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+    def take(stamp_ns: int, estimate: BodyEstimate) -> None:
         pose = _POSE.rows(1)
         pose['position'], pose['orientation'] = estimate.position, estimate.orientation
-        self.poses.append((self._log_ns, Block.of(stamp_ns, pose)))
-        self.feet.append((self._log_ns, Block.of(stamp_ns, sample_of(estimate))))
+        poses.append((stamp_ns, Block.of(stamp_ns, pose)))
+        feet.append((stamp_ns, Block.of(stamp_ns, sample_of(estimate))))
+
+    stage = SensingStage(
+        robot, estimator, take, lambda doubt: None, lambda error: None, values['forces']
+    )
+    for _, topic, (seconds, fraction, *numbers) in _messages(bag, force, imu, joints):
+        stamp_ns = seconds * 1_000_000_000 + fraction
+        if topic == joints:
+            try:
+                ordered = order(*numbers)
+            except InvalidInput as error:
+                wrong = error
+                continue
+            if math.isfinite(ordered[0].sum()):
+                stage.joints(stamp_ns, *ordered)
+        elif topic == force:
+            for index, each in enumerate(numbers):
+                if math.isfinite(each.sum()):
+                    stage.force(index, stamp_ns, each)
+        elif math.isfinite(sum(numbers)):
+            stage.imu(stamp_ns, numbers[:3], numbers[3:])
+    if not stage.samples:
+        raise wrong
+    legs = tuple(values['legs'])
+    return Stream.of(_POSE, (OF_BODY,), poses), Stream.of(SAMPLES, legs, feet)
+
+
+def _messages(
+    bag: BagReader, force: str, imu: str, joints: str
+) -> Iterator[tuple[int, str, Sequence[Any]]]:
+    """Yield log time, ns, topic and values of all messages, which begin with the stamp."""
+    paths = {
+        imu: (*STAMP, *IMU.values),
+        joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
+    }
+    messages = ((log_ns, topic, values) for topic, values, log_ns in bag.values(paths))
+    _, times, (stamps, rows) = bag.records({force: SAMPLES})[force]
+    forces = (
+        (log_ns, force, (0, stamp_ns, *each))
+        for log_ns, stamp_ns, each in zip(
+            times.tolist(), stamps.tolist(), rows['force'], strict=True
+        )
+    )
+    # Forces come first: readings of the joints wait for those of the same moment.
+    return heapq.merge(forces, messages, key=operator.itemgetter(0))
 
 
 __all__ = ['compare_body']

@@ -15,11 +15,11 @@ from ros_pad.errors import BagError
 from ros_pad.joining import Joiner
 from ros_pad.pace import Progress
 from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
 from ros_pad.records import KINDS
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE
 from ros_pad.records import Block
+from ros_pad.records import Kind
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import Wanted
@@ -44,21 +44,24 @@ class Inputs(NamedTuple):
     ----------
     legs : tuple of int
         Legs that can be replayed.
-    absent : list of int
-        Other legs of the robot.
     streams : dict of Stream
         Records by name of their kind, of these legs.
     topics : dict of str
         Topic of those that were recorded as records, by name of their kind.
     gaps : list of Gap
         The gaps of each input that has any.
+    lacks : list of str
+        Notes on what was not recorded at all.
+    late : str
+        Note on samples that are left out because the estimator started later; empty if none are.
     """
 
     legs: tuple[int, ...]
-    absent: list[int]
     streams: dict[str, Stream]
     topics: dict[str, str]
     gaps: list[Gap]
+    lacks: list[str]
+    late: str
 
 
 def read(
@@ -92,38 +95,48 @@ def read(
         if each.topic.record and each.leg is None
     }
     felt = np.isfinite(records.sample.rows['force'][..., 2]).any(axis=0)
-    legs = {leg for leg, there in zip(known, felt, strict=True) if there or SAMPLE.name in topics}
-    if not legs or not len(records.sample.stamps):
+    there = {leg for leg, own in zip(known, felt, strict=True) if own or SAMPLE.name in topics}
+    if not there or not len(records.sample.stamps):
         raise BagError(
             f'{bag.path}: no wrench of a leg was recorded; the topics are'
             f' {", ".join(sorted(bag.topics))}. If one has wrenches, name it with a remap'
         )
     # Keep the order of the legs in the controller of the bag, around the body.
-    order = (*(leg for leg in settings.legs if leg in legs), *sorted(legs - {*settings.legs}))
-    places = [known.index(leg) for leg in order]
+    legs = (*(leg for leg in settings.legs if leg in there), *sorted(there - {*settings.legs}))
+    places = [known.index(leg) for leg in legs]
     streams = {
-        kind.name: Stream(kind, order, times[kind.name], Block(stamps, rows[:, places])).where(
+        kind.name: Stream(kind, legs, times[kind.name], Block(stamps, rows[:, places])).where(
             np.argsort(times[kind.name], kind='stable')
         )
         for kind, (stamps, rows) in zip(KINDS, records, strict=True)
     }
-    needed = ('force', 'position', 'velocity')[: 3 if settings.tuning.source == 'joints' else 2]
-    gaps: list[Gap] = []
-    for kind, fields in ((SAMPLE, needed), (PRESSURE, ('pressure',))):
-        if kind.name in topics:
-            stream = streams[kind.name]
-            gaps += _gaps(kind.name, stream.times, stream.block.stamps)
-        else:
-            gaps += _gaps_of_legs(streams[kind.name], fields)
-    command, estimate = streams[COMMAND.name], streams[ESTIMATE.name]
-    if not np.array_equal(command.times, command.block.stamps):
-        # In real time, commands without an estimate have stamps that no replay has.
-        kept = np.isin(command.block.stamps, estimate.block.stamps)
-        kept |= np.isfinite(command.block.rows['setpoint']).any(axis=1)
-        streams[COMMAND.name] = command.where(kept)
+    joints = settings.tuning.source == 'joints'
+    needed = ('force', 'position', 'velocity') if joints else ('force', 'position')
+    gaps = [*_gaps(streams, topics, SAMPLE, needed), *_gaps(streams, topics, PRESSURE)]
     if SAMPLE.name not in topics:
         streams[SAMPLE.name] = _joined(streams[SAMPLE.name], needed)
-    return Inputs(order, sorted({*known, *settings.legs} - legs), streams, topics, gaps)
+    late = _leave_out(streams)
+    lacks = _lacks(streams, legs, sorted({*known, *settings.legs} - there), joints)
+    return Inputs(legs, streams, topics, gaps, lacks, late)
+
+
+def _leave_out(streams: dict[str, Stream]) -> str:
+    """Leave out what no replay can have; return a note on samples among it."""
+    samples, estimates, commands = (streams[n] for n in ('sample', 'estimate', 'command'))
+    # Commands between estimates have no set-points, and stamps of the controller's own clock.
+    answers = np.isin(commands.block.stamps, estimates.block.stamps)
+    answers |= np.isfinite(commands.block.rows['setpoint']).any(axis=1)
+    streams[COMMAND.name] = commands.where(answers)
+    # An estimator makes its first estimate of its first sample.
+    first = estimates.block.stamps[0] if len(estimates.times) else 0
+    kept = samples.block.stamps >= first
+    if kept.all() or not kept.any():
+        return ''
+    streams[SAMPLE.name] = samples.where(kept)
+    return (
+        'the estimator started later than the recorder, so the replay leaves out the'
+        f' {int(np.sum(~kept))} samples before its first recorded estimate'
+    )
 
 
 def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
@@ -141,48 +154,48 @@ def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
     return Stream.of(kind, legs, found)
 
 
-def _gaps_of_legs(pieces: Stream, fields: tuple[str, ...]) -> Iterator[Gap]:
-    for name in fields:
-        there = ~np.isnan(pieces.values(name)).all(axis=2)
-        for leg, own in zip(pieces.legs, there.T, strict=True):
-            what = f'{name} of leg {leg}'
-            yield from _gaps(what, pieces.times[own], pieces.block.stamps[own])
+def _gaps(
+    streams: Mapping[str, Stream],
+    topics: Mapping[str, str],
+    kind: Kind,
+    fields: tuple[str, ...] = ('pressure',),
+) -> Iterator[Gap]:
+    """Yield the gaps of records or, where drivers published by leg, of each field and leg."""
+    stream, sources = streams[kind.name], {}
+    if kind.name in topics:
+        sources[kind.name] = np.full(len(stream.times), True)
+    else:
+        for name in fields:
+            own = ~np.isnan(stream.values(name)).all(axis=2)
+            sources |= {f'{name} of leg {leg}': own[:, i] for i, leg in enumerate(stream.legs)}
+    for what, there in sources.items():
+        steps = np.diff(stream.block.stamps[there])
+        usual = max(np.median(steps), 0.0) if len(steps) else 0.0
+        wide = np.flatnonzero(steps > LONGER * usual)
+        if len(wide):
+            yield Gap(int(stream.times[there][wide[0]]), what, len(wide))
 
 
-def _gaps(what: str, times: np.ndarray, stamps: np.ndarray) -> Iterator[Gap]:
-    steps = np.diff(stamps)
-    wide = np.flatnonzero(steps > LONGER * max(np.median(steps), 0.0)) if len(steps) else steps
-    if len(wide):
-        yield Gap(int(times[wide[0]]), what, len(wide))
-
-
-def missing(inputs: Inputs, settings: NodeSettings) -> list[str]:
-    """Return notes on legs of which something was not recorded at all, one sentence each.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What was recorded.
-    settings : NodeSettings
-        Settings of the replay.
-    """
+def _lacks(
+    streams: Mapping[str, Stream], legs: tuple[int, ...], absent: list[int], joints: bool
+) -> list[str]:
+    """Return notes on legs of which something was not recorded at all, one sentence each."""
     needed = [
         ('sample', 'position', 'no position was recorded, so there are no estimates'),
         ('pressure', 'pressure', 'no pressure was recorded, so its pads are assumed to be flat'),
     ]
-    if settings.tuning.source == 'joints':
+    if joints:
         text = (
             'no velocity of the contact was recorded, which source joints needs, so there are no'
             ' estimates'
         )
         needed.append(('sample', 'velocity', text))
     text = 'no wrench was recorded, so the decisions for other legs lack its footprints'
-    found = [(inputs.absent, text)]
+    found = [(absent, text)]
     for kind, field, text in needed:
-        known = np.isfinite(inputs.streams[kind].values(field)).any(axis=(0, 2))
-        legs = [leg for leg, there in zip(inputs.legs, known, strict=True) if not there]
-        found.append((legs, text))
-    return [f'leg {", ".join(map(str, legs))}: {text}' for legs, text in found if legs]
+        known = np.isfinite(streams[kind].values(field)).any(axis=(0, 2))
+        found.append(([leg for leg, own in zip(legs, known, strict=True) if not own], text))
+    return [f'leg {", ".join(map(str, some))}: {text}' for some, text in found if some]
 
 
-__all__ = ['Gap', 'Inputs', 'missing', 'read']
+__all__ = ['Gap', 'Inputs', 'read']

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -26,15 +25,13 @@ from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay_inputs import Inputs
 
-LONGEST_SILENCE_NS = 10_000_000_000
-"""The stages tick only in the last part of a pause; this is its length, ns."""
-
 
 class Player:
     """Pass the inputs of a robot to the stages of estimation and decision, once.
 
     Nodes process the samples up to a moment together, and then receive the pressures of this
-    moment. Both stages look for missing inputs before that.
+    moment. Both stages look for missing inputs before that; where there are no samples at all,
+    they do not, because differences after such a gap are excused.
 
     Parameters
     ----------
@@ -46,16 +43,13 @@ class Player:
     Attributes
     ----------
     stages : Pipeline
-    rejected : Counter of int
-        Number of rejected samples and estimates, by leg.
-    rejection : dict of str
-        Reason of the last one, by leg.
+    refused : dict
+        Number of rejected samples and estimates, and the reason of the last one, by leg.
     """
 
     def __init__(self, settings: NodeSettings, inputs: Inputs) -> None:
         self._inputs, legs = inputs, inputs.legs
-        self.rejected: Counter[int] = Counter()
-        self.rejection: dict[int, str] = {}
+        self.refused: dict[int, tuple[int, str]] = {}
         self.stages = Pipeline(
             EstimationStage(
                 settings.foot,
@@ -72,7 +66,6 @@ class Player:
         # Whether the set-point of each leg differs from the recorded one.
         self._apart = np.full(len(legs), not self._setpoints)
         self._pace = Pace(TICK_PERIOD_NS)
-        self._log_ns = self._sampled_ns = self._offset_ns = 0
         self._made: dict[Kind, list[tuple[int, Block]]] = {ESTIMATE: [], COMMAND: []}
 
     def play(self, progress: Progress | None = None) -> dict[str, Stream]:
@@ -84,54 +77,34 @@ class Player:
             Called now and then with the share that is done, 0 to 1.
         """
         samples, pressures = (self._inputs.streams[name] for name in ('sample', 'pressure'))
+        stamps, rows = samples.block
         done = 0
         for start, end, until in _blocks(samples.times, pressures.times):
-            self._press(pressures, done, until)
+            self._press(pressures.block, done, until)
             done = until
-            stamps, rows = samples.block
-            self._sample(samples.times[start:end], Block(stamps[start:end], rows[start:end]))
+            block = Block(stamps[start:end], rows[start:end])
+            self._sample(int(samples.times[end - 1]), block)
             if progress:
-                progress(end / len(samples.times))
-        self._press(pressures, done, len(pressures.times))
+                progress(end / len(stamps))
         legs = self._inputs.legs
         return {kind.name: Stream.of(kind, legs, each) for kind, each in self._made.items()}
 
-    def _sample(self, times: np.ndarray, block: Block) -> None:
-        """Process samples that came one after the other, with their log times, ns."""
-        self._pass_time(int(times[0]))
-        self._log_ns = self._sampled_ns = int(times[-1])
-        self._offset_ns = block.last_ns - self._log_ns
-        self._tick(self._log_ns)
+    def _sample(self, time_ns: int, block: Block) -> None:
+        """Process samples; the log time of the last one is in ns."""
+        if self._pace.due(block.last_ns):
+            self.stages.tick(block.last_ns)
         for estimate, command in self.stages.process(block):
-            self._made[ESTIMATE].append((self._log_ns, estimate))
-            self._made[COMMAND].append((self._log_ns, command))
+            self._made[ESTIMATE].append((time_ns, estimate))
+            self._made[COMMAND].append((time_ns, command))
             self._follow(command)
 
-    def _press(self, pressures: Stream, start: int, end: int) -> None:
+    def _press(self, pressures: Block, start: int, end: int) -> None:
         """Process pressure records."""
-        stamps, rows = pressures.block
-        for row, time_ns in enumerate(pressures.times[start:end].tolist(), start):
-            self._pass_time(time_ns)
-            if time_ns - self._sampled_ns > TICK_PERIOD_NS:
-                self._tick(time_ns)
-            self.stages.estimation.pressure(rows[row])
-            own = rows[row].copy()
+        for stamp_ns, rows in zip(*(each[start:end] for each in pressures), strict=True):
+            self.stages.estimation.pressure(rows)
+            own = rows.copy()
             own['pressure'][self._apart] = math.nan
-            self.stages.decision.pressure(Block.of(int(stamps[row]), own))
-
-    def _pass_time(self, until_ns: int) -> None:
-        """Tick in a silence until a log time, ns, as the timers of the nodes do."""
-        first = max(self._log_ns + TICK_PERIOD_NS, until_ns - LONGEST_SILENCE_NS)
-        for time_ns in range(first, until_ns, TICK_PERIOD_NS):
-            self._tick(time_ns)
-        self._log_ns = until_ns
-
-    def _tick(self, log_ns: int) -> None:
-        now_ns = log_ns + self._offset_ns  # on the clock of the stamps
-        if not self._sampled_ns or not self._pace.due(now_ns):
-            return
-        if command := self.stages.tick(now_ns):
-            self._made[COMMAND].append((log_ns, command))
+            self.stages.decision.pressure(Block.of(int(stamp_ns), own))
 
     def _follow(self, command: Block) -> None:
         """Let the pressure be the set-point while the set-point differs from the recorded one.
@@ -150,8 +123,8 @@ class Player:
             self.stages.decision.pressure(Block.of(command.last_ns, rows))
 
     def _reject(self, leg: int, error: InvalidInput) -> None:
-        self.rejected[leg] += 1
-        self.rejection[leg] = str(error)
+        count, _ = self.refused.get(leg, (0, ''))
+        self.refused[leg] = count + 1, str(error)
 
 
 def _blocks(samples: np.ndarray, pressures: np.ndarray) -> Iterator[tuple[int, int, int]]:

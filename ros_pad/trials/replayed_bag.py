@@ -21,7 +21,7 @@ from ros_pad.trials.comparison import Stream
 from ros_pad.trials.label import KEY
 from ros_pad.trials.replay import Replay
 
-_REPORT_EVERY = 1000  # messages
+_REPORT_EVERY = 100  # messages
 
 
 def write(

@@ -33,8 +33,8 @@ from ros_pad.control import adaptive
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.footprints import Footprints
+from ros_pad.estimation import FeetEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import estimators_of
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -281,15 +281,16 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         position_noise=configured.sensors.position,
         force_noise=configured.sensors.force,
     )
-    estimators, shared = estimators_of(len(configured.legs), configured.foot, load, tuning)
-    for estimator in estimators:
-        estimator.ground = GroundFilter(
-            shared,
-            wet_prior=tuning.wet_prior,
-            patch_length=tuning.patch_length,
-            rim_speed=tuning.rim_speed(configured.foot),
-            **setup.ground,
-        )
+    feet = FeetEstimator(len(configured.legs), configured.foot, load, tuning)
+    first = GroundFilter(
+        feet.grounds.shared,
+        wet_prior=tuning.wet_prior,
+        patch_length=tuning.patch_length,
+        rim_speed=tuning.rim_speed(configured.foot),
+        **setup.ground,
+    )
+    others = [GroundFilter(first.shared, model=first.model) for _ in feet.tracks[1:]]
+    feet.grounds.filters[:] = [first, *others]
     choose = policy_named(policy, loop.floor.wet)
     if policy == 'adaptive':
         choose = adaptive(**setup.adaptive)
@@ -303,7 +304,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         **setup.controller,
     )
     controller.footprints = Footprints(**setup.footprints)
-    loop.connect(estimators, controller, round(setup.control_period * 1e9))
+    loop.connect(feet, controller, round(setup.control_period * 1e9))
     loops.walk(loop, world)
     return loop.robot.body[0] / world.cycles, loop.robot.verdict
 

@@ -31,7 +31,9 @@ from scipy import special
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
+from ros_pad.estimation.alarm import SLOW_SLIP
 from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
@@ -352,13 +354,14 @@ def cusum(recording: Recording, speed: np.ndarray, quiet: float) -> np.ndarray:
     The noise is the speed of the quiet foot, m/s, with the default noise of Tuning. Nothing else
     is fitted to the robot: the alarm tests for its default slip speed.
     """
-    alarm = SlipAlarm(math.hypot(quiet, Tuning().speed_noise), Tuning().smoothing)
+    noise = math.hypot(quiet, Tuning().speed_noise)
+    alarm = SlipAlarm(Tuning().smoothing, (SLOW_SLIP,))
     statistic = np.zeros(len(speed))
     for start, stop in recording.stances:
         alarm.reset()
         for index in range(start, stop):
-            alarm.update(float(speed[index]), recording.period)
-            statistic[index] = alarm.statistic
+            alarm.update([(float(speed[index]), noise, recording.period)])
+            (statistic[index],) = alarm.statistics
     return statistic
 
 
@@ -380,7 +383,8 @@ def margin(recording: Recording) -> np.ndarray:
             ratio = float(recording.ratio[first:end].mean())
             weight = -math.expm1(-0.5 * ((ratio - last) / noise) ** 2)
             last = ratio if math.isinf(last) else last + weight * (ratio - last)
-            ground.update(ratio, noise, 0.0, 1.0, (end - first) * recording.period, weight)
+            duration = (end - first) * recording.period
+            ground.update(Evidence(ratio, noise, 0.0, 1.0, duration, weight))
             quantile[first:end] = ground.quantile(0.05)
     return quantile - recording.ratio
 

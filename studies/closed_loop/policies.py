@@ -36,7 +36,7 @@ from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.policies import IsWet
 from ros_pad.control.policies import Policy
-from ros_pad.estimation import estimators_of
+from ros_pad.estimation import FeetEstimator
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
@@ -173,7 +173,7 @@ def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: in
     """Return a loop that has walked; ``first`` names the policy by which feet begin."""
     loop = ClosedLoop(scene, first, seed, LEVEL)
     load, foot = scene.expected_load, known or scene.foot
-    estimators, _ = estimators_of(len(scene.legs), foot, load, tuning_for(scene))
+    feet = FeetEstimator(len(scene.legs), foot, load, tuning_for(scene))
     controller = MorphologyController(
         foot,
         scene.legs,
@@ -182,7 +182,7 @@ def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: in
         start=first_morphologies(first, scene.legs),
         fixed_pressure=scene.dome_pressure,
     )
-    loop.connect(estimators, controller)
+    loop.connect(feet, controller)
     loops.walk(loop, scene)
     return loop
 

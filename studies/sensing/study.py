@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.estimation.alarm import SlipAlarms
+from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies import command
@@ -76,11 +76,12 @@ def alarms_of(track: Track, rate: float) -> Flags:
     speeds = -(track.slip * tangential).sum(2) / strength
     found = np.zeros(speeds.shape, dtype=bool)
     for leg in range(speeds.shape[1]):
-        alarms = SlipAlarms(ALARM_NOISE, WINDOW)
+        alarm = SlipAlarm(WINDOW)
         for start, stop in runs(track.standing[:, leg]):
-            alarms.reset()
+            alarm.reset()
             for row in range(start + round(SETTLED * rate), stop):
-                found[row, leg] = alarms.update(float(speeds[row, leg]), 1.0 / rate)
+                sample = float(speeds[row, leg]), ALARM_NOISE, 1.0 / rate
+                found[row, leg] = alarm.update([sample])
     return found
 
 

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
+from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import SENSOR_FAULTS
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import sensor_fault
+from ros_pad.estimation import doubt
 from ros_pad.estimation.scales import FrictionPrior
 
 FOOT = Foot.load('large37')
@@ -205,9 +207,32 @@ def test_doubts_are_where_the_errors_are():
 
 
 def test_faults_of_sensors_are_distinguished_from_unobservable_ground():
-    assert sensor_fault('force stands still: 6.8 N, unchanged') == 'force stands still'
-    assert sensor_fault('domed: cannot be distinguished') == ''
-    assert sensor_fault('') == ''
+    assert doubt.is_fault(doubt.STILL) and 'force stands still' in SENSOR_FAULTS
+    assert not doubt.is_fault(doubt.ALL_DOME) and not doubt.is_fault(doubt.NONE)
+    assert not {'', 'domed', 'motion unknown'} & {*SENSOR_FAULTS}
+
+
+@pytest.mark.parametrize('code', range(len(doubt.TABLE)))
+def test_every_code_has_a_text_that_begins_with_its_kind(code):
+    text = doubt.text(code, 1.0, -2.0)
+    assert text.partition(':')[0] == doubt.kind(code)
+    assert doubt.kind(code) in DOUBTS
+    assert (doubt.kind(code) in SENSOR_FAULTS) == doubt.is_fault(code)
+
+
+@pytest.mark.parametrize(
+    ('given', 'text'),
+    [
+        ((doubt.NONE,), ''),
+        ((doubt.LOST, 0.2), 'marker lost: last seen 0.2 s ago'),
+        ((doubt.RANGE, 2, -5.0), 'force out of range: z = -5 N'),
+        ((doubt.NORMAL, 0, -4.0), 'axes: the normal force is along -x of the sensor, not z'),
+        ((doubt.TURNED, 1), 'axes: force axes turned by about 90° about z'),
+        ((doubt.FAINT, 1.23, 6.8), 'light: 1.2 N of 6.8 N'),
+    ],
+)
+def test_texts_of_codes(given, text):
+    assert doubt.text(*given) == text
 
 
 # --- the sensors --------------------------------------------------------------------------------

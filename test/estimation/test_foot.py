@@ -14,8 +14,8 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.foot import LONGEST_GAP
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.watch import LONGEST_GAP
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N

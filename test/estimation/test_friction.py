@@ -10,7 +10,10 @@ from scipy import stats
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.friction import GRID
+from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation.friction import update
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
@@ -35,13 +38,13 @@ def flat(**options):
 
 def stick(ground, ratio, count=1, noise=0.03):
     for _ in range(count):
-        ground.update(ratio, noise, STILL, 0.003, DT)
+        ground.update(Evidence(ratio, noise, STILL, 0.003, DT))
     return ground
 
 
 def slip(ground, ratio, count=5, speed=0.1):
     for _ in range(count):
-        ground.update(ratio, 0.03, speed, 0.003, DT)
+        ground.update(Evidence(ratio, 0.03, speed, 0.003, DT))
     return ground
 
 
@@ -55,7 +58,7 @@ def test_the_prior_is_the_contact_model_of_the_foot():
 
 def test_nothing_felt_is_the_prior(exact):
     ground = GroundFilter(FrictionScales(PRIOR), wet_prior=0.3, model_error=EXACT)
-    dry, wet, *_ = FrictionScales(PRIOR).expected(0.0)
+    dry, wet, *_ = FrictionScales(PRIOR).expected(0.0).rows
     marginal = 0.7 * dry + 0.3 * wet
     mean = marginal @ GRID
     assert ground.wet_probability == pytest.approx(0.3, abs=1e-12)
@@ -68,7 +71,7 @@ def test_nothing_felt_is_the_prior(exact):
 def test_stick_excludes_friction_below_and_nothing_else(ratio, exact):
     """The posterior is the prior times Φ((μ - ρ)/σ), normalised; here with SciPy's Φ."""
     ground = stick(flat(wet_prior=0.4, temper=1.0, model_error=EXACT), ratio, noise=0.02)
-    dry, wet, *_ = FrictionScales(PRIOR).expected(0.0)
+    dry, wet, *_ = FrictionScales(PRIOR).expected(0.0).rows
     cut = stats.norm.cdf(GRID, ratio, 0.02)
     on_dry, on_wet = 0.6 * dry * cut, 0.4 * wet * cut
     total = on_dry.sum() + on_wet.sum()
@@ -122,7 +125,7 @@ def test_low_excitation_shows_nothing(wet_prior, speed):
     """Half a minute at T/N = 0.02, also if speed has a third more noise than assumed."""
     ground = flat(wet_prior=wet_prior)
     for sample in range(750):
-        ground.update(0.02, 0.03, speed * (-1.0) ** sample, 0.003, DT)
+        ground.update(Evidence(0.02, 0.03, speed * (-1.0) ** sample, 0.003, DT))
     odds = ground.wet_probability / (1.0 - ground.wet_probability)
     assert abs(math.log(odds * (1.0 - wet_prior) / wet_prior)) < 0.6
 
@@ -167,7 +170,7 @@ def test_beliefs_stay_probabilities(samples):
         if new:
             dome ^= other
             ground.touch_down(distance, dome)
-        ground.update(ratio, ratio_noise, speed, speed_noise, dt)
+        ground.update(Evidence(ratio, ratio_noise, speed, speed_noise, dt))
         assert 0.0 < ground.wet_probability < 1.0
         mean, sd = ground.friction
         assert 0.0 <= sd <= 1.3
@@ -188,7 +191,7 @@ def test_a_dome_that_holds_learns_nothing_of_wetness(samples):
     assert before > 0.95
     ground.touch_down(0.0, dome=True)
     for ratio, speed in samples:
-        ground.update(ratio, 0.03, speed, 0.003, DT)
+        ground.update(Evidence(ratio, 0.03, speed, 0.003, DT))
     assert ground.wet_probability == pytest.approx(before, abs=1e-9)
 
 
@@ -212,7 +215,7 @@ def test_friction_of_one_morphology_shows_nothing_of_the_other(exact):
     ground = slip(flat(model_error=EXACT), 0.12)
     ground.touch_down(0.0, dome=True)
     wet = ground.wet_probability
-    _, _, on_dry, _, on_wet = FrictionScales(PRIOR).expected(0.0)
+    _, _, on_dry, _, on_wet = FrictionScales(PRIOR).expected(0.0).rows
     expected = ((1.0 - wet) * on_dry + wet * on_wet) @ GRID
     assert ground.friction[0] == pytest.approx(expected, abs=1e-6)
 
@@ -248,7 +251,7 @@ def test_forgetting_under_domes_follows_a_film_that_drains():
 def test_samples_that_nothing_explains_leave_it_standing(ratio, speed):
     ground = flat()
     for _ in range(50):
-        ground.update(ratio, 0.03, speed, 0.003, DT)
+        ground.update(Evidence(ratio, 0.03, speed, 0.003, DT))
     assert math.isfinite(sum(ground.friction)) and 0.0 < ground.wet_probability < 1.0
     # The filter recovers with plausible samples.
     slip(ground, 0.12, 40)
@@ -276,7 +279,7 @@ def test_no_number_of_samples_averages_the_model_error_out(monkeypatch):
 def test_a_foot_that_turns_shows_no_more_than_a_part_of_its_friction(rim_speed):
     """At slip speed v and rim speed s, T/N is μ v/hypot(v, s) (Howe, Cutkosky); s is random."""
     straight, turning = (slip(flat(rim_speed=s), 0.2, 1, 0.02) for s in (0.0, rim_speed))
-    table = FrictionScales(PRIOR).expected(0.0)[:2]
+    table = FrictionScales(PRIOR).expected(0.0).rows[:2]
     draws = np.abs(np.random.default_rng(0).normal(0.0, rim_speed, 20_000))
     shown = 0.02 / np.hypot(0.02, draws)
     likelihood = [np.exp(-0.5 * ((mu * shown - 0.2) / 0.03) ** 2).mean() for mu in GRID]
@@ -298,7 +301,7 @@ def test_a_foot_that_turns_shows_no_more_than_a_part_of_its_friction(rim_speed):
 def test_what_is_not_new_weighs_nothing():
     ground = flat()
     before = (*ground.friction, ground.wet_probability)
-    ground.update(0.6, 0.03, STILL, 0.003, DT, weight=0.0)
+    ground.update(Evidence(0.6, 0.03, STILL, 0.003, DT, weight=0.0))
     assert (*ground.friction, ground.wet_probability) == pytest.approx(before)
 
 
@@ -327,3 +330,30 @@ def test_a_foot_that_has_forgotten_learns_again_like_a_new_one():
         each.touch_down(0.5, False, 20.0)
     assert shared.scales['flat_dry'] == pytest.approx(other.scales['flat_dry'])
     assert shared.scales['flat_dry'].scale == pytest.approx(0.5 / 0.8, rel=0.15)
+
+
+def test_feet_that_are_updated_together_are_as_alone():
+    """Flat feet and domes that stick, slip and turn: nothing of one is felt by another."""
+    samples = [
+        Evidence(0.3, 0.03, 0.05, 0.003, DT),
+        Evidence(0.2, 0.04, STILL, 0.003, DT, 0.5, False, (1.1, 0.9)),
+        Evidence(0.25, 0.03, 0.01, 0.004, DT, 0.7, True),
+        Evidence(0.1, 0.05, -0.002, 0.003, DT),
+    ]
+
+    def feet():
+        model = GroundModel(FrictionScales(PRIOR), 0.5, 1.5, 0.5, 0.05, EXACT)
+        found = [GroundFilter(model.shared, model=model) for _ in samples]
+        for place, each in enumerate(found):
+            each.touch_down(0.0, dome=place % 2 > 0)
+        return found
+
+    together, alone = feet(), feet()
+    for _ in range(3):
+        update(together, samples)
+        for each, sample in zip(alone, samples, strict=True):
+            each.update(sample)
+    for one, other in zip(together, alone, strict=True):
+        assert one.friction == pytest.approx(other.friction, rel=1e-12)
+        assert one.wet_probability == pytest.approx(other.wet_probability, rel=1e-12)
+        assert one.log_odds == pytest.approx(other.log_odds, rel=1e-9, abs=1e-12)

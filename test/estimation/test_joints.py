@@ -10,11 +10,14 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import SENSOR_FAULTS
 from ros_pad.estimation import ContactMotion
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation import Tuning
-from ros_pad.estimation import sensor_fault
+from ros_pad.estimation import doubt
 from ros_pad.estimation.stage import EstimationStage
+from ros_pad.records import SAMPLE
+from ros_pad.records import Block
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N
@@ -95,14 +98,14 @@ def test_a_body_in_doubt_stops_alarm_and_learning():
     assert before.wet_probability < 0.5  # it sticks at more than wet ground holds
     for _ in range(100):
         estimate = stance.sample(0.12, 0.2, 'slipping: all feet that stand may slip')
-        assert estimate.doubt == 'motion unknown: slipping: all feet that stand may slip'
+        assert estimate.doubt == 'motion unknown: the body is in doubt'
         assert not estimate.slipping
         assert estimate.standing
         assert estimate.sound
         assert estimate.slip_speed_sd == math.inf
         assert estimate.wet_probability == before.wet_probability
     assert 'motion unknown' in DOUBTS
-    assert not sensor_fault(estimate.doubt)  # force and pads are fine
+    assert 'motion unknown' not in SENSOR_FAULTS  # force and pads are fine
     for _ in range(12):  # the window after the doubt has no sample of the doubt
         estimate = stance.sample(0.3)
     assert not estimate.slipping
@@ -154,75 +157,60 @@ def test_the_source_is_one_of_two():
         Tuning(source='camera')
 
 
-class Watched:
-    """A stage whose samples are recorded."""
-
-    def __init__(self, tuning=JOINTS):
-        self.samples, self.rejected, self.doubts = [], [], []
-        estimator = FootEstimator(FOOT, LOAD, tuning)
-        update = estimator.update
-        estimator.update = lambda *sample: self.samples.append(sample) or update(*sample)
-        self.stage = EstimationStage(
-            estimator, 20 * MS, lambda _: None, self.doubts.append, self.rejected.append
-        )
-
-    def send(self, ms, *kinds):
-        for kind in kinds:
-            if kind == 'wrench':
-                self.stage.wrench(ms * MS, (0.5, 0.0, 6.0), None)
-            elif kind == 'position':
-                self.stage.position(ms * MS, (0.001 * ms, 0.0, 0.0))
-            else:
-                self.stage.contact_velocity(ms * MS, 0.001 * ms, 0.0, 1e-4, 9e-5)
+def stage_with(tuning=JOINTS):
+    rejected = []
+    stage = EstimationStage(
+        FOOT, LOAD, tuning, [1], reject=lambda leg, error: rejected.append(error)
+    )
+    return stage, rejected
 
 
-@pytest.mark.parametrize(
-    'order',
-    [('wrench', 'position', 'velocity'), ('velocity', 'wrench', 'position'),
-     ('position', 'velocity', 'wrench')],
-)  # fmt: skip
-def test_a_sample_needs_all_three_of_one_stamp(order):
-    watched = Watched()
-    watched.send(4, *order)
-    watched.send(8, *order[:2])
-    watched.send(12, *order)
-    assert [each[0] for each in watched.samples] == [0.004, 0.012]
-    assert [each[6].velocity[0] for each in watched.samples] == [0.004, 0.012]
-    assert {each[6].sd for each in watched.samples} == {0.01}
-    assert not watched.rejected
+def send(stage, ms, **values):
+    rows = SAMPLE.rows(1)
+    given = {'force': (0.5, 0.0, 6.0 + ms % 7), 'position': (0.001 * ms, 0.0, 1e-5 * ms),
+             'velocity': (0.001 * ms, 0.0), 'variance': (1e-4, 9e-5)}  # fmt: skip
+    for name, value in (given | values).items():
+        rows[name] = value
+    return stage.process(Block.of(ms * MS, rows))
+
+
+@pytest.mark.parametrize('missing', ['force', 'position', 'velocity', 'variance'])
+def test_a_sample_needs_all_of_one_stamp(missing):
+    stage, rejected = stage_with()
+    send(stage, 4)
+    send(stage, 8, **{missing: math.nan})
+    send(stage, 12)
+    assert stage.samples == 2 and stage.used.tolist() == [2]
+    assert not rejected
+    assert stage.estimator.tracks[0].slip.sd == pytest.approx(math.hypot(0.01, 0.002))
 
 
 def test_with_markers_a_velocity_is_not_used():
-    watched = Watched(Tuning())
-    watched.send(4, 'velocity', 'wrench', 'position')
-    assert [len(each) for each in watched.samples] == [6]
+    stage, _ = stage_with(Tuning())
+    send(stage, 4, velocity=math.inf)
+    assert stage.samples == 1
 
 
-def test_a_negative_variance_is_a_doubt_with_the_reason_of_the_body():
-    watched = Watched()
-    watched.stage.body_doubt('gap: no readings for 0.3 s')
-    watched.send(4, 'wrench', 'position')
-    watched.stage.contact_velocity(4 * MS, math.nan, 0.0, -1.0, -1.0)
-    assert watched.samples[0][6] == ContactMotion((0.0, 0.0), 0.0, 'gap: no readings for 0.3 s')
-    assert watched.doubts == ['motion unknown: gap: no readings for 0.3 s']
-    watched.stage.body_doubt('')
-    watched.send(8, 'wrench', 'position')
-    watched.stage.contact_velocity(8 * MS, 0.0, 0.0, 1e-4, -1.0)
-    assert watched.stage.doubt == 'motion unknown: no reason was received'
+def test_an_infinite_variance_is_a_doubt():
+    stage, _ = stage_with()
+    send(stage, 4)
+    (found,) = send(stage, 20, velocity=math.nan, variance=math.inf)
+    assert doubt.kind(found.rows[0]['doubt'][0]) == 'motion unknown'
+    assert found.rows[0]['slip_speed_sd'][0] == math.inf
+    assert stage.samples == 2
 
 
-def test_a_variance_that_is_no_number_is_refused():
-    watched = Watched()
-    watched.send(4, 'wrench', 'position')
-    watched.stage.contact_velocity(4 * MS, 0.0, 0.0, math.nan, 1e-4)
-    assert len(watched.rejected) == 1
+@pytest.mark.parametrize(('name', 'value'), [('variance', -1e-4), ('velocity', math.inf)])
+def test_a_variance_below_zero_and_an_infinite_velocity_are_refused(name, value):
+    stage, rejected = stage_with()
+    send(stage, 4, **{name: value})
+    assert len(rejected) == 1 and not stage.samples
 
 
 def test_a_missing_velocity_becomes_a_fault():
-    watched = Watched()
+    stage, _ = stage_with()
     for ms in range(4, 600, 4):
-        watched.send(ms, 'wrench', 'position')
-        watched.stage.tick(ms * MS)
-    assert watched.stage.doubt.startswith('no contact velocity: for 0.')
-    assert sensor_fault(watched.stage.doubt) == 'no contact velocity'
-    assert not watched.stage.sound
+        send(stage, ms, velocity=math.nan)
+        stage.tick(ms * MS)
+    code = stage.estimate(600 * MS).rows[0]['doubt'][0]
+    assert doubt.kind(code) == 'no contact velocity' and doubt.is_fault(code)

@@ -11,7 +11,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
 from ros_pad.errors import PadError
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.foot import shared_friction
+from ros_pad.estimation.ground import shared_friction
 from ros_pad.estimation.scales import SCALE_RANGE
 from ros_pad.estimation.scales import Scale
 from ros_pad.trials import learnt

@@ -111,7 +111,7 @@ class SpeedCusum(SpeedThreshold):
         self, settings: tuple[Foot, float, Tuning], speed: float, threshold: float
     ) -> None:
         super().__init__(settings, math.inf)
-        self._alarm = alarm_of(settings, speed, threshold)
+        self._noise, self._alarm = alarm_of(settings, speed, threshold)
 
     def update(
         self, time: float, force: Sequence[float], position: Sequence[float], pressure: float
@@ -121,7 +121,8 @@ class SpeedCusum(SpeedThreshold):
         if found is None:
             self._alarm.reset()
             return False
-        return self._alarm.update(*found)
+        speed, dt = found
+        return self._alarm.update([(speed, self._noise, dt)])
 
 
 class BayesMargin:
@@ -151,12 +152,14 @@ class ShippedAlarm:
         return self._estimator.update(time, force, position, pressure).slipping
 
 
-def alarm_of(settings: tuple[Foot, float, Tuning], speed: float, threshold: float) -> SlipAlarm:
-    """Return the alarm for a slip speed, m/s, with the noise that the estimator assumes."""
+def alarm_of(
+    settings: tuple[Foot, float, Tuning], speed: float, threshold: float
+) -> tuple[float, SlipAlarm]:
+    """Return the noise that the estimator assumes, and the alarm for a slip speed, both in m/s."""
     foot, _, tuning = settings
     noise = math.hypot(tuning.position_noise, tuning.force_noise / foot.shear_stiffness)
     noise = math.hypot(noise / tuning.smoothing, tuning.speed_noise)
-    return SlipAlarm(noise, tuning.smoothing, speed, threshold)
+    return noise, SlipAlarm(tuning.smoothing, (speed,), threshold)
 
 
 @dataclass(frozen=True)

@@ -42,9 +42,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy import ndimage
 
-from ros_pad.estimation import estimators_of
-from ros_pad.estimation.foot import shared_friction
+from ros_pad.estimation import FeetEstimator
+from ros_pad.estimation import FootEstimator
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.ground import shared_friction
 from ros_pad.estimation.scales import SCALE_SD
 from ros_pad.estimation.scales import SPREADS
 from ros_pad.estimation.tuning import Tuning
@@ -207,7 +208,8 @@ def updates(walk: Recording, learns: bool) -> Iterator[tuple[float, int, int, in
     """Yield time, leg, stance, class, true friction and estimator at each update under load."""
     foot, load, tuning = walk.settings
     legs = range(walk.load.shape[1])
-    estimators, _ = estimators_of(len(legs), foot, load, replace(tuning, learn_friction=learns))
+    tuning = replace(tuning, learn_friction=learns)
+    estimators = FootEstimator.of(FeetEstimator(len(legs), foot, load, tuning))
     rows, stood, stances = walk.rows, [False] * len(legs), [0] * len(legs)
     for sample, time in enumerate(walk.stamps.tolist()):
         for leg in legs:

@@ -16,7 +16,8 @@ from typing import TypedDict
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import estimators_of
+from ros_pad.estimation import FeetEstimator
+from ros_pad.estimation import FootEstimator
 from studies.work_precision.estimator.walks import LOADED
 from studies.work_precision.estimator.walks import SETTLED
 from studies.work_precision.estimator.walks import Flags
@@ -83,7 +84,7 @@ class Estimates:
 def replay(walk: Recording) -> Estimates:
     """Return the results for the readings of a robot, whose feet learn together."""
     legs = walk.load.shape[1]
-    estimators, _ = estimators_of(legs, *walk.settings)
+    estimators = FootEstimator.of(FeetEstimator(legs, *walk.settings))
     out = np.empty((*walk.load.shape, 9))
     rows = walk.rows
     for sample, (stamp, arrived) in enumerate(

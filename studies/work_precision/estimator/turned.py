@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.estimation import estimators_of
+from ros_pad.estimation import FeetEstimator
+from ros_pad.estimation import FootEstimator
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
@@ -95,7 +96,7 @@ class Walk(NamedTuple):
     Attributes
     ----------
     settings : tuple
-        Arguments of :func:`ros_pad.estimation.estimators_of`.
+        Arguments of :class:`ros_pad.estimation.FeetEstimator`.
     calls : list of tuple
         Leg, and arguments of its estimator.
     touch_downs : list of list of float
@@ -170,7 +171,7 @@ def recorded(
                 doubted[each.estimate.doubt] = None
     period = loop.period_ns * 1e-9
     stands = np.array(loads) > LOADED * scene.expected_load
-    settings = (len(scene.legs), scene.foot, scene.expected_load, loop.estimators[0].tuning)
+    settings = (len(scene.legs), scene.foot, scene.expected_load, loop.estimators[0].feet.tuning)
     return Walk(settings, calls, [_begins(each, period) for each in stands.T], [*doubted])
 
 
@@ -188,7 +189,7 @@ def stances_until(walk: Walk, fault: str) -> list[tuple[int | None, bool]]:
     Beside them, whether the doubt names the fault in the end.
     """
     forces, positions, words = FAULTS[fault]
-    estimators, _ = estimators_of(*walk.settings)
+    estimators = FootEstimator.of(FeetEstimator(*walk.settings))
     first: list[float | None] = [None] * len(estimators)
     for leg, (time, force, position, *rest) in walk.calls:
         if len(rest) > 3:  # a velocity in the axes of the position
