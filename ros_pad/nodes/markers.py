@@ -184,12 +184,13 @@ class WalkMarkers:
 
 
 def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Any:
-    """Return a foot at a place, m, in a colour from dry to wet by its P(wet), 0 to 1."""
+    """Return a foot at a place, m, in a colour from dry to wet by its P(wet); grey for NaN."""
     marker = _marker('feet', leg, _MARKER.SPHERE)
     marker.pose.position = Point(x=x, y=y, z=0.01)
     marker.scale = Vector3(x=0.02, y=0.02, z=0.02)
-    red, green, blue = (d + wetness * (w - d) for d, w in zip(_DRY, _WET, strict=True))
-    marker.color = _colour((red, green, blue))
+    share = min(max(wetness, 0.0), 1.0)
+    red, green, blue = (d + share * (w - d) for d, w in zip(_DRY, _WET, strict=True))
+    marker.color = _colour(_SWING if math.isnan(wetness) else (red, green, blue))
     return marker
 
 

@@ -92,12 +92,12 @@ _LATEST_NS = 50_000_000  # difference of stamps from the clock up to which they 
 class SimulatorNode(Node):
     """Simulate a robot from the pressures of its pads, and publish the readings of its sensors.
 
-    These are the wrench and position of each foot, the pose of the body, and joint positions if
-    the robot has joints. With the parameter ``sensing: joints`` they are the force on each foot in
+    These are samples of all feet, the pose of the body, and joint positions if the robot has
+    joints. With the parameter ``sensing: joints`` they are the force on each foot in
     the axes of its link, IMU, positions, velocities and efforts of the joints, and, to compare
     with, the true pose of the body. Parameters are in :data:`PARAMETERS`. Pads are flat until
     their pressure is received. In real time, ``/diagnostics`` has once a second the wanted and the
-    reached rate: where the computer is too slow, samples are left out, and at last time itself.
+    reached rate: where the computer is too slow, simulated time is left out.
 
     Attributes
     ----------

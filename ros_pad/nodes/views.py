@@ -113,13 +113,13 @@ class ViewsNode(Node):
 
         return show
 
-    def _text(self, schema: schemas.Topic, leg: int, text_of: Callable[[Any], str]) -> Show:
+    def _text(self, schema: schemas.Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
         """Return a function that publishes a text of a leg when it changes."""
         publish, last = self.messages.output(topics.of_leg(schema), leg), ['?']
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             text = text_of(row)
-            if text != last[0]:
+            if text is not None and text != last[0]:
                 last[0] = text
                 publish(String(data=text))
 
@@ -149,12 +149,14 @@ class ViewsNode(Node):
         self._send_markers(ARRAY.encode(array))
 
 
-def _doubt(row: Any) -> str:
-    return doubts.text(row['doubt'], *row['detail'])
+def _doubt(row: Any) -> str | None:
+    """Return the doubt in an estimate as text; None where it is missing."""
+    return None if math.isnan(row['doubt']) else doubts.text(row['doubt'], *row['detail'])
 
 
-def _morphology(row: Any) -> str:
-    return DOME if row['dome'] == 1.0 else FLAT
+def _morphology(row: Any) -> str | None:
+    """Return the morphology in a command; None where it is missing."""
+    return None if math.isnan(row['dome']) else DOME if row['dome'] == 1.0 else FLAT
 
 
 def main(args: list[str] | None = None) -> int:
