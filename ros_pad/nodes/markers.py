@@ -176,7 +176,9 @@ class WalkMarkers:
         for left, right, bottom, top in _rectangles(wet):
             x0, x1 = column * TILE + left * cell, column * TILE + right * cell
             y0, y1 = row * TILE + bottom * cell, row * TILE + top * cell
-            a, b, c, d = (Point(x=x, y=y, z=0.0) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+            a, b, c, d = (
+                Point(x=x, y=y, z=0.0) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+            )
             marker.points += [a, b, c, a, c, d]
         marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
         marker.color = _colour(_WET, 0.5)
