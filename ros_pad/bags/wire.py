@@ -13,6 +13,7 @@ import functools
 import itertools
 import struct
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,6 +54,38 @@ def _type() -> MessageType:
     return message_type(TYPE, _DEFINITION)
 
 
+class _Layout(NamedTuple):
+    """Where the numbers of a message are.
+
+    Attributes
+    ----------
+    head : bytes
+        All that comes between the stamp and the number of values.
+    names : tuple of str
+        Names of the numbers of a record, beginning with the time.
+    places : array of int
+        Place of each of them, but the time, among all numbers of a record.
+    """
+
+    head: bytes
+    names: tuple[str, ...]
+    places: np.ndarray
+
+    @property
+    def start(self) -> int:
+        """Place of the first value; CDR aligns it to what follows the encapsulation."""
+        end = _HEAD.size + len(self.head) + _COUNT.size - len(_ENCAPSULATION)
+        return len(_ENCAPSULATION) + end + -end % 8
+
+    def message(self, stamp_ns: int, values: np.ndarray) -> bytes:
+        """Return the message of some rows of values that begin at a time, ns."""
+        seconds, rest = divmod(stamp_ns, 1_000_000_000)
+        head = _HEAD.pack(_ENCAPSULATION, (seconds + 2**31) % 2**32 - 2**31, rest)
+        count = _COUNT.pack(values.size)
+        gap = bytes(self.start - _HEAD.size - len(self.head) - _COUNT.size)
+        return b''.join((head, self.head, count, gap, values.tobytes(), _NOTHING))
+
+
 class Wire:
     """Convert blocks of records of a kind, and messages.
 
@@ -62,38 +95,40 @@ class Wire:
         Kind of the records.
     legs : sequence of int
         Numbers of the legs, in the order of the rows.
+    fields : sequence of str or None
+        Fields that messages have; None: all.
 
     Notes
     -----
-    The bytes of names are compared with those of ros_pad's own messages; where they are equal, the
-    numbers are read as they stand. Otherwise the message is converted as a whole: its numbers may
-    have another order, and those that it lacks are NaN.
+    Names are the same in message after message: their bytes are compared with those of the last
+    one, and the numbers are read as they stand. Where they differ, the message is converted as a
+    whole; its numbers may have another order, and those that it lacks are NaN.
     """
 
-    def __init__(self, kind: Kind, legs: Sequence[int]) -> None:
+    def __init__(
+        self, kind: Kind, legs: Sequence[int], fields: Sequence[str] | None = None
+    ) -> None:
         self.kind, self.legs = kind, tuple(legs)
-        self._names = (TIME, *kind.names(legs))
-        self._width = len(self._names)
+        self._all = kind.names(legs)
+        left = [c for f in kind.fields if fields is None or f.name in fields for c in f.columns]
+        names = [each for each in self._all if each.partition('/')[2] in left]
         message = _type().blank()
-        message.name = list(self._names)
-        self._head = _type().encode(message)[_HEAD.size : -3 * _COUNT.size]
-        self._count_at = _HEAD.size + len(self._head)
-        # CDR aligns numbers of 8 bytes to what follows the encapsulation.
-        start = self._count_at + _COUNT.size - len(_ENCAPSULATION)
-        self._padding = bytes(-start % 8)
-        self._start = len(_ENCAPSULATION) + start + len(self._padding)
+        message.name = [TIME, *names]
+        head = _type().encode(message)[_HEAD.size : -3 * _COUNT.size]
+        self._own = self._last = self._layout(head, message.name)
+
+    def _layout(self, head: bytes, names: Sequence[str]) -> _Layout:
+        places = np.array([self._all.index(name) for name in names[1:]], np.intp)
+        return _Layout(head, tuple(names), places)
 
     def encode(self, block: Block) -> bytes:
         """Return the message of a block."""
         stamps, rows = block
-        first = int(stamps[0])
-        values = np.empty((len(stamps), self._width))
+        first, places = int(stamps[0]), self._own.places
+        values = np.empty((len(stamps), len(places) + 1))
         values[:, 0] = (stamps - first) * 1e-9
-        values[:, 1:] = rows.view('f8').reshape(len(stamps), -1)
-        seconds, rest = divmod(first, 1_000_000_000)
-        head = _HEAD.pack(_ENCAPSULATION, (seconds + 2**31) % 2**32 - 2**31, rest)
-        count = _COUNT.pack(values.size)
-        return b''.join((head, self._head, count, self._padding, values.tobytes(), _NOTHING))
+        values[:, 1:] = rows.view('f8').reshape(len(stamps), -1)[:, places]
+        return self._own.message(first, values)
 
     def decode(self, data: bytes) -> Block:
         """Return the block of a message.
@@ -104,18 +139,8 @@ class Wire:
             When the bytes are no such message, a name is unknown, there is not a value for each
             name, or stamps do not advance.
         """
-        if not (
-            data.startswith(_ENCAPSULATION)
-            and data.startswith(self._head, _HEAD.size)
-            and len(data) >= self._start
-        ):
-            return self._converted(data)
-        _, seconds, rest = _HEAD.unpack_from(data)
-        (size,) = _COUNT.unpack_from(data, self._count_at)
-        if size % self._width or len(data) < self._start + 8 * size:
-            raise BadMessage(f'{len(data)} bytes are no records of {self._width} numbers')
-        values = np.frombuffer(data, '<f8', size, self._start).reshape(-1, self._width)
-        return self._block(seconds * 1_000_000_000 + rest, values)
+        stamps, values = self._values(data)
+        return Block(np.array(stamps), self._rows(values))
 
     def split(self, data: bytes) -> list[tuple[int, bytes]]:
         """Return the stamp, ns, and the message of each record of a message.
@@ -125,13 +150,14 @@ class Wire:
         BadMessage
             As :meth:`decode`.
         """
-        block = self.decode(data)
-        if len(block.stamps) == 1:
-            return [(block.last_ns, data)]
-        cuts = [slice(place, place + 1) for place in range(len(block.stamps))]
+        stamps, values = self._values(data)
+        if len(stamps) == 1:
+            return [(stamps[0], data)]
+        values = values.copy()
+        values[:, 0] = 0.0
         return [
-            (stamp_ns, self.encode(Block(block.stamps[cut], block.rows[cut])))
-            for stamp_ns, cut in zip(block.stamps.tolist(), cuts, strict=True)
+            (stamp_ns, self._last.message(stamp_ns, row))
+            for stamp_ns, row in zip(stamps, values, strict=True)
         ]
 
     def table(self, data: bytes, starts: np.ndarray, sizes: np.ndarray) -> Block:
@@ -149,63 +175,93 @@ class Wire:
         BadMessage
             As for a single message.
         """
-        size = self._start + 8 * self._width + len(_NOTHING)
-        if len(starts) and np.all(sizes == size):
-            found = items(data, f'V{size}')[starts]
-            octets = found.view(np.uint8).reshape(len(starts), size)
-            ours = np.frombuffer(
-                _ENCAPSULATION + self._head + _COUNT.pack(self._width), np.uint8
-            )  # all that comes before the numbers, but not the stamp
-            place = np.r_[0 : len(_ENCAPSULATION), _HEAD.size : self._count_at + _COUNT.size]
-            if (octets[:, place] == ours).all():
-                stamps = octets[:, 4:12].copy().view('<i4').astype(np.int64)
-                numbers = octets[:, self._start : -len(_NOTHING)].copy().view('<f8')
-                return Block(
-                    stamps[:, 0] * 1_000_000_000 + stamps[:, 1].astype(np.uint32),
-                    self._rows(numbers),
-                )
         ends = (starts + sizes).tolist()
+        if len(starts):
+            self._values(data[starts[0] : ends[0]])  # of which the others have the names
+            layout = self._last
+            size = layout.start + 8 * len(layout.names) + len(_NOTHING)
+            if np.all(sizes == size):
+                octets = items(data, f'V{size}')[starts].view(np.uint8).reshape(-1, size)
+                names = layout.head + _COUNT.pack(len(layout.names))
+                head = octets[:, _HEAD.size : _HEAD.size + len(names)]
+                if (octets[:, :4] == np.frombuffer(_ENCAPSULATION, np.uint8)).all() and (
+                    head == np.frombuffer(names, np.uint8)
+                ).all():
+                    stamps = octets[:, 4:12].copy().view('<i4').astype(np.int64)
+                    numbers = octets[:, layout.start : -len(_NOTHING)].copy().view('<f8')
+                    return Block(
+                        stamps[:, 0] * 1_000_000_000 + stamps[:, 1].astype(np.uint32),
+                        self._rows(numbers),
+                    )
         blocks = [self.decode(data[a:b]) for a, b in zip(starts.tolist(), ends, strict=True)]
-        if not blocks:
-            return Block(np.empty(0, np.int64), self.kind.rows(0, len(self.legs)))
-        stamps = np.concatenate([each.stamps for each in blocks])
-        return Block(stamps, np.concatenate([each.rows for each in blocks]))
+        return Block.joined(self.kind, blocks, len(self.legs))
 
     def _rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows of a table of numbers with their time."""
-        numbers = np.ascontiguousarray(values[:, 1:], 'f8')
-        return numbers.view(self.kind.dtype).reshape(len(values), len(self.legs))
+        places = self._last.places
+        if len(places) == len(self._all) and np.array_equal(places, np.arange(len(places))):
+            numbers = np.ascontiguousarray(values[:, 1:], 'f8')
+        else:
+            numbers = np.full((len(values), len(self._all)), np.nan)
+            numbers[:, places] = values[:, 1:]
+        return numbers.view(self.kind.dtype)
 
-    def _block(self, first_ns: int, values: np.ndarray) -> Block:
-        times = values[:, 0].tolist()  # there are few: this takes less time than arrays
-        if not times or times[0] != 0.0 or not all(a < b for a, b in itertools.pairwise(times)):
-            raise BadMessage('the times of the records in it do not advance from 0')
-        if len(times) > _LONGEST or not times[-1] < _LONGEST:
-            raise BadMessage(f'{len(times)} records up to {times[-1]:g} s are too many')
-        stamps = np.array([first_ns + round(1e9 * each) for each in times])
-        return Block(stamps, self._rows(values))
+    def _values(self, data: bytes) -> tuple[list[int], np.ndarray]:
+        """Return stamps, ns, and values of a message, whose layout is then the last one."""
+        last = self._last
+        if not (
+            data.startswith(_ENCAPSULATION)
+            and data.startswith(last.head, _HEAD.size)
+            and len(data) >= last.start
+        ):
+            return self._converted(data)
+        _, seconds, rest = _HEAD.unpack_from(data)
+        (size,) = _COUNT.unpack_from(data, _HEAD.size + len(last.head))
+        if size % len(last.names) or len(data) < last.start + 8 * size:
+            raise BadMessage(f'{len(data)} bytes are no records of {len(last.names)} numbers')
+        values = np.frombuffer(data, '<f8', size, last.start).reshape(-1, len(last.names))
+        return _stamps(seconds * 1_000_000_000 + rest, values), values
 
-    def _converted(self, data: bytes) -> Block:
+    def _converted(self, data: bytes) -> tuple[list[int], np.ndarray]:
+        """Return the same of a message with other names than the last one."""
         try:
             message = _type().decode(data)
         except Exception as error:  # invalid bytes can raise any exception
             raise BadMessage(f'{len(data)} bytes are no {TYPE}: {error}') from None
         names = list(message.name)
-        unknown = sorted(set(names) - set(self._names))
+        unknown = sorted(set(names) - {TIME, *self._all})
         if unknown or len(set(names)) < len(names) or not names:
             wrong = f'unknown names {", ".join(unknown[:3])}' if unknown else 'no names, or two'
             raise BadMessage(
-                f'{wrong}: names such as {self._names[1]} of the legs'
+                f'{wrong}: names such as {self._all[0]} of the legs'
                 f' {", ".join(map(str, self.legs))} are needed'
             )
         if len(message.position) % len(names):
             raise BadMessage(f'{len(message.position)} values for {len(names)} names')
-        given = message.position.reshape(-1, len(names))
-        values = np.full((len(given), self._width), np.nan)
-        values[:, 0] = 0.0
-        values[:, [self._names.index(name) for name in names]] = given
+        values = np.array(message.position, float).reshape(-1, len(names))
+        times = np.zeros((len(values), 1))
+        if TIME in names:
+            times = values[:, [names.index(TIME)]]
+            values = np.delete(values, names.index(TIME), axis=1)
+            names.remove(TIME)
+        values = np.hstack([times, values])
+        message.name, message.position = [TIME, *names], np.empty(0)
+        message.velocity = message.effort = np.empty(0)
         stamp = message.header.stamp
-        return self._block(stamp.sec * 1_000_000_000 + stamp.nanosec, values)
+        stamps = _stamps(stamp.sec * 1_000_000_000 + stamp.nanosec, values)
+        head = _type().encode(message)[_HEAD.size : -3 * _COUNT.size]
+        self._last = self._layout(head, message.name)
+        return stamps, values
+
+
+def _stamps(first_ns: int, values: np.ndarray) -> list[int]:
+    """Return the stamps of rows of values that begin with their time, ns."""
+    times = values[:, 0].tolist()  # there are few: this takes less time than arrays
+    if not times or times[0] != 0.0 or not all(a < b for a, b in itertools.pairwise(times)):
+        raise BadMessage('the times of the records in it do not advance from 0')
+    if len(times) > _LONGEST or not times[-1] < _LONGEST:
+        raise BadMessage(f'{len(times)} records up to {times[-1]:g} s are too many')
+    return [first_ns + round(1e9 * each) for each in times]
 
 
 def legs_of(data: bytes) -> tuple[int, ...]:

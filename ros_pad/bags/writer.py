@@ -27,7 +27,7 @@ from ros_pad.bags.storage import scan
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 
-CHUNK_SIZE = 64 * 1024
+CHUNK_SIZE = 192 * 1024
 """Size of a chunk of messages, bytes; a killed writer may lose its last chunk."""
 
 FLUSH_PERIOD = 1.0

@@ -112,18 +112,23 @@ FAULTS = tuple(dict.fromkeys(each.kind for each in TABLE if each.fault))
 """Kinds of doubt about sensors, not about the ground."""
 
 
+def _row(code: float) -> Row:
+    """Return what a code means; a code of records of others may mean nothing."""
+    return TABLE[int(code) if 0 <= code < len(TABLE) else NONE]
+
+
 def kind(code: float) -> str:
-    """Return the kind of a code."""
-    return TABLE[int(code)].kind
+    """Return the kind of a code; '' for codes not known."""
+    return _row(code).kind
 
 
 def is_fault(code: float) -> bool:
     """Return whether a code is a fault of the sensors."""
-    return TABLE[int(code)].fault
+    return _row(code).fault
 
 
 def text(code: float, a: float = 0.0, b: float = 0.0) -> str:
-    """Return a doubt for people: its kind, a colon, and details; '' without one.
+    """Return a doubt for people: its kind, a colon, and details; '' without one, or not known.
 
     Examples
     --------
@@ -131,7 +136,7 @@ def text(code: float, a: float = 0.0, b: float = 0.0) -> str:
     >>> doubt.text(doubt.LOST, 0.2)
     'marker lost: last seen 0.2 s ago'
     """
-    row = TABLE[int(code)]
+    row = _row(code)
     if not row.kind:
         return ''
     place = int(a) if 0.0 <= a < len(TURNS) else 0

@@ -259,7 +259,7 @@ class BodyEstimatorNode(Node):
             self._tick(block.last_ns)
         for stamp_ns, rows in zip(block.stamps.tolist(), block.rows['force'], strict=True):
             for index, force in enumerate(rows):
-                if math.isfinite(force.sum()):
+                if np.isfinite(force).all():
                     self.stage.force(index, stamp_ns, force)
         self._settle('forces', block.last_ns)
 
@@ -287,7 +287,7 @@ class BodyEstimatorNode(Node):
             self.stage.reject(error)
             return
         stamp_ns = nanoseconds(message.header.stamp)
-        if math.isfinite(values[0].sum()):
+        if np.isfinite(values[0]).all():
             self.stage.joints(stamp_ns, *values)
         self._settle('joints', stamp_ns)
 

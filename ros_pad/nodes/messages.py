@@ -63,10 +63,16 @@ class Messages:
         self._record_ns = 0
 
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes whole messages."""
+        """Return a function that publishes whole messages, or their bytes."""
         publish, of_type = topic.publisher(self._node, leg).publish, topic.message_type
-        # rclpy leaves what was in memory between numbers; a trial has the same bytes each time.
-        return lambda message: publish(of_type.encode(of_type.decode(serialize_message(message))))
+
+        def send(message: Any) -> None:
+            if not isinstance(message, bytes):
+                # rclpy leaves what was in memory between numbers: a trial has the same bytes.
+                message = of_type.encode(of_type.decode(serialize_message(message)))
+            publish(message)
+
+        return send
 
     def sender(
         self,
@@ -85,10 +91,12 @@ class Messages:
         write = FieldWriter(topic.message_type, paths, frame | dict(constants or {}))
         return lambda *values: publish(write(*values))
 
-    def record_output(self, topic: Topic, legs: Sequence[int]) -> Callable[[Block], None]:
-        """Return a function that publishes blocks of records of these legs."""
+    def record_output(
+        self, topic: Topic, legs: Sequence[int], fields: Sequence[str] | None = None
+    ) -> Callable[[Block], None]:
+        """Return a function that publishes blocks of records of these legs, with some fields."""
         assert topic.schema.record
-        encode = Wire(topic.schema.record, legs).encode
+        encode = Wire(topic.schema.record, legs, fields).encode
         publish = topic.publisher(self._node).publish
         return lambda block: publish(encode(block))
 

@@ -321,6 +321,7 @@ class RegulatorNode(LifecycleNode):
         self._mismatch = warning
 
     def _on_command(self, block: Block) -> None:
+        self._mismatch = ''
         now_ns = self.messages.now_ns()
         if not self.messages.simulated or self.messages.follows_clock:
             self.supervision.command(block, now_ns, self._elapsed(now_ns))

@@ -24,6 +24,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
+from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import SCENE
@@ -91,12 +92,12 @@ _LATEST_NS = 50_000_000  # difference of stamps from the clock up to which they 
 class SimulatorNode(Node):
     """Simulate a robot from the pressures of its pads, and publish the readings of its sensors.
 
-    These are the wrench and position of each foot, the pose of the body, and joint positions if
-    the robot has joints. With the parameter ``sensing: joints`` they are the force on each foot in
+    These are samples of all feet, the pose of the body, and joint positions if the robot has
+    joints. With the parameter ``sensing: joints`` they are the force on each foot in
     the axes of its link, IMU, positions, velocities and efforts of the joints, and, to compare
     with, the true pose of the body. Parameters are in :data:`PARAMETERS`. Pads are flat until
     their pressure is received. In real time, ``/diagnostics`` has once a second the wanted and the
-    reached rate: where the computer is too slow, samples are left out, and at last time itself.
+    reached rate: where the computer is too slow, simulated time is left out.
 
     Attributes
     ----------
@@ -184,7 +185,9 @@ class SimulatorNode(Node):
         pose = ('pose.position.x', 'pose.position.y', 'pose.orientation.z', 'pose.orientation.w')
         self._send_pose = messages.sender(topics.BODY_POSE, (*STAMP, *pose))
         record = topics.FORCE if self._body_sensors else topics.SAMPLE
-        self._send_block = messages.record_output(record, self.scene.legs)
+        measured = ['force'] if self._body_sensors else ['force', 'position']
+        measured += ['moment'] * bool(self.scene.sensors.moment)
+        self._send_block = messages.record_output(record, self.scene.legs, measured)
         parts = ('position', 'velocity', 'effort') if self._body_sensors else ('position',)
         angles = [f'{part}[{place}]' for part in parts for place in range(len(joints))]
         zeros = {'name': joints} | {part: [0.0] * len(joints) for part in parts}
@@ -304,7 +307,8 @@ class SimulatorNode(Node):
             self._send_joints(*split(self._last_ns), *self.robot.joint_positions)
         if self._markers and self._markers_pace and self._markers_pace.due(self._last_ns):
             assert self._send_markers
-            self._send_markers(self._markers.message(self.robot, self.pressures, self._last_ns))
+            array = self._markers.message(self.robot, self.pressures, self._last_ns)
+            self._send_markers(ARRAY.encode(array))
         return count
 
     def _sense(self, stamp: tuple[int, int], later: list[tuple[Any, Any]]) -> np.ndarray:

@@ -30,5 +30,5 @@ def split(time_ns: int) -> tuple[int, int]:
 
 
 def set_stamp(stamp: Time, time_ns: int) -> None:
-    """Write a time in ns into a stamp."""
-    stamp.sec, stamp.nanosec = divmod(time_ns, 1_000_000_000)
+    """Write a time in ns into a stamp; see :func:`split`."""
+    stamp.sec, stamp.nanosec = split(time_ns)

@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import String
-from visualization_msgs.msg import Marker
-from visualization_msgs.msg import MarkerArray
 
 from ros_pad.bags import topics as schemas
 from ros_pad.bags.topics import STAMP
@@ -26,6 +24,7 @@ from ros_pad.control.policies import DOME
 from ros_pad.control.policies import FLAT
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import topics
+from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import marker_of_foot
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -114,13 +113,13 @@ class ViewsNode(Node):
 
         return show
 
-    def _text(self, schema: schemas.Topic, leg: int, text_of: Callable[[Any], str]) -> Show:
+    def _text(self, schema: schemas.Topic, leg: int, text_of: Callable[[Any], str | None]) -> Show:
         """Return a function that publishes a text of a leg when it changes."""
         publish, last = self.messages.output(topics.of_leg(schema), leg), ['?']
 
         def show(stamp_ns: int, row: np.ndarray) -> None:
             text = text_of(row)
-            if text != last[0]:
+            if text is not None and text != last[0]:
                 last[0] = text
                 publish(String(data=text))
 
@@ -138,24 +137,26 @@ class ViewsNode(Node):
         self._places[known] = rows['position'][known]
         if not self._pace.due(block.last_ns):
             return
-        array = MarkerArray()
+        array = ARRAY.blank()
         for leg, place, wetness in zip(
             self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
         ):
             if math.isfinite(sum(place)):
-                marker: Marker = marker_of_foot(leg, place[0], place[1], wetness)
+                marker = marker_of_foot(leg, place[0], place[1], wetness)
                 marker.header.frame_id = self._frame
                 set_stamp(marker.header.stamp, block.last_ns)
                 array.markers.append(marker)
-        self._send_markers(array)
+        self._send_markers(ARRAY.encode(array))
 
 
-def _doubt(row: Any) -> str:
-    return doubts.text(row['doubt'], *row['detail'])
+def _doubt(row: Any) -> str | None:
+    """Return the doubt in an estimate as text; None where it is missing."""
+    return None if math.isnan(row['doubt']) else doubts.text(row['doubt'], *row['detail'])
 
 
-def _morphology(row: Any) -> str:
-    return DOME if row['dome'] == 1.0 else FLAT
+def _morphology(row: Any) -> str | None:
+    """Return the morphology in a command; None where it is missing."""
+    return None if math.isnan(row['dome']) else DOME if row['dome'] == 1.0 else FLAT
 
 
 def main(args: list[str] | None = None) -> int:

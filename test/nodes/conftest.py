@@ -3,7 +3,7 @@
 
 A test creates its nodes with ``context=context`` and adds them to ``executor``, which destroys
 them at the end. ``until(predicate)`` spins the executor until the predicate holds, and fails the
-test after a timeout.
+test after a timeout. ``bench`` hands messages to nodes without DDS: see helpers.py.
 """
 
 from __future__ import annotations
@@ -63,3 +63,10 @@ def until(executor: rclpy.executors.Executor) -> Until:
             executor.spin_once(timeout_sec=0.01)
 
     return until
+
+
+@pytest.fixture
+def bench(context, executor, until, monkeypatch):
+    from helpers import Bench
+
+    return Bench(context, executor, until, monkeypatch)

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-import collections
+"""Composed nodes in lock-step: the same walk as the loop without ROS, and its bag."""
+
 import contextlib
 import dataclasses
 import gc
+import math
 import os
 import signal
-import struct
 import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 
 import numpy as np
 import pytest
 import rclpy
+from helpers import MS
+from helpers import overrides
+from helpers import pressure
 from mcap.reader import make_reader
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
@@ -26,23 +30,23 @@ from ros_pad import configuration
 from ros_pad import trials
 from ros_pad.bags import BagReader
 from ros_pad.bags import BagWriter
+from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError
 from ros_pad.errors import PadError
+from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
 from ros_pad.nodes import topics
-from ros_pad.nodes.batches import BatchReader
 from ros_pad.nodes.composed import ComposedTrial
 from ros_pad.nodes.recorder import RecorderNode
+from ros_pad.records import KINDS
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import label
 
-AMBIENT = 101325.0
-LEGS = (1, 2, 3, 4, 5, 6)
 SERIES = (
     'time', 'force', 'position', 'slow_time', 'pressure', 'setpoint', 'wet_probability',
-    'friction', 'margin', 'slip_speed', 'slipping', 'dome', 'doubt',
+    'friction', 'margin', 'slip_speed', 'slipping', 'dome', 'doubt', 'odom',
 )  # fmt: skip
+RECORDS = {f'/feet/{kind.name}': kind for kind in KINDS}
 
 
 def scene_of(name, cycles):
@@ -64,38 +68,49 @@ def trial_of(scene, policy, seed, bag):
         rclpy.shutdown(context=context)
 
 
-def messages_of(bag):
-    """Return the messages in a bag, by topic."""
+def records_of(bag):
+    """Return the blocks of all records in a bag, by kind."""
+    found = BagReader(bag).records(RECORDS)
+    return {RECORDS[topic].name: block for topic, (_, _, block) in found.items()}
+
+
+def raw_messages(bag):
+    """Return log times and bytes of the messages in a bag, by topic."""
+    (file,) = bag.glob('*.mcap')
     found = {}
-    for topic, message, _ in BagReader(bag).messages():
-        found.setdefault(topic, []).append(message)
+    with file.open('rb') as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            found.setdefault(channel.topic, []).append((message.log_time, message.data))
     return found
 
 
-def gauges(messages):
-    return [message.fluid_pressure - AMBIENT for message in messages]
+def both(scene, policy, seed, bag):
+    """Walk on nodes and without ROS, compare all but the heading, and return both."""
+    on_nodes = composed.run(scene, policy, seed=seed, bag=bag)
+    without = trials.run(scene, policy, seed=seed)
+    for series in SERIES:
+        one, other = getattr(on_nodes, series), getattr(without, series)
+        assert np.array_equal(one, other, equal_nan=series != 'dome'), series
+    assert np.array_equal(on_nodes.body[:, :2], without.body[:, :2])
+    # The heading is sent as a quaternion, which costs 1e-15 rad.
+    assert np.max(np.abs(on_nodes.body[:, 2] - without.body[:, 2])) < 1e-15
+    assert on_nodes.metrics == without.metrics
+    return on_nodes, without
 
 
 @pytest.mark.parametrize(
     ('name', 'policy', 'cycles', 'moves'),
     [
-        pytest.param('hexapod_patches', 'adaptive', 8, 1, marks=pytest.mark.slow),
+        ('hexapod_patches', 'adaptive', 8, 1),
         ('hexapod_patches', 'oracle', 3, 1),
-        pytest.param('hexapod_patches', 'dome', 3, 0, marks=pytest.mark.slow),
+        ('hexapod_patches', 'dome', 3, 0),
         ('leg_wet_dome_60', 'dome', 2, 0),
     ],
 )
 def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves, tmp_path):
     scene = scene_of(name, cycles)
-    on_nodes = composed.run(scene, policy, seed=2, bag=tmp_path / 'bag')
-    without = trials.run(scene, policy, seed=2)
+    on_nodes, _ = both(scene, policy, 2, tmp_path / 'bag')
     assert len(on_nodes.time) == round(scene.duration * 250)
-    for series in SERIES:
-        assert np.array_equal(getattr(on_nodes, series), getattr(without, series)), series
-    assert np.array_equal(on_nodes.body[:, :2], without.body[:, :2])
-    # The heading is sent as a quaternion, which costs 1e-15 rad.
-    assert np.max(np.abs(on_nodes.body[:, 2] - without.body[:, 2])) < 1e-15
-    assert on_nodes.metrics == without.metrics
     assert not on_nodes.settings['interrupted']
     # The walks are not trivial: there is pressure, switches and distance.
     assert np.max(on_nodes.pressure) > 30e3
@@ -103,7 +118,6 @@ def test_the_nodes_walk_as_the_loop_without_ros_does(name, policy, cycles, moves
     assert on_nodes.metrics.distance_m > 0.0
 
 
-@pytest.mark.slow
 def test_no_node_stays_behind(tmp_path):
     """A second walk in one process must not find nodes of the first one on the graph."""
     gc.collect()
@@ -120,8 +134,7 @@ def living_nodes():
     return [each for each in gc.get_objects() if isinstance(each, Node)]
 
 
-@pytest.mark.slow
-def test_faults_come_to_both_alike(tmp_path):
+def test_faults_come_to_both_alike_and_records_have_the_true_pressures(tmp_path):
     """Regulators are stuck, leaking, drifting and silent, and the supply fails for a while."""
     texts = (
         '{kind: silence, legs: [1], start: 1.51, end: 1.93}',  # too short to be reported
@@ -133,22 +146,22 @@ def test_faults_come_to_both_alike(tmp_path):
     )
     faults = tuple(Fault.parse(text) for text in texts)
     scene = dataclasses.replace(scene_of('hexapod_patches', 4), faults=faults)
-    on_nodes = composed.run(scene, 'dome', seed=3, bag=tmp_path / 'bag')
-    without = trials.run(scene, 'dome', seed=3)
-    for series in SERIES:
-        one, other = getattr(on_nodes, series), getattr(without, series)
-        assert np.array_equal(one, other), series
-    assert on_nodes.metrics == without.metrics
+    on_nodes, _ = both(scene, 'dome', 3, tmp_path / 'bag')
     sound = trials.run(scene_of('hexapod_patches', 4), 'dome', seed=3)
     at = {round(time, 3): row for row, time in enumerate(sound.slow_time)}
-    assert on_nodes.pressure[at[2.16], 5] < 60e3 < sound.pressure[at[2.16], 5]  # last value
     assert on_nodes.pressure[at[2.6], 5] > 70e3  # received again
     assert np.ptp(on_nodes.pressure[at[0.5] : at[3.0], 3]) < 20.0  # stuck
     assert (on_nodes.pressure[at[3.56]] < 30e3).all()
     assert on_nodes.pressure[at[2.9], 1] < sound.pressure[at[2.9], 1]
+    block = records_of(tmp_path / 'bag')['pressure']
+    rows = {stamp // MS: row for stamp, row in zip(block.stamps.tolist(), block.rows, strict=True)}
+    assert np.isnan(rows[1900]['pressure'][[0, 5]]).all()
+    assert rows[1900]['pad'][5] > 70e3  # nobody hears of it, but the robot stands on it
+    drift = rows[2900]['pad'][2] - rows[2900]['pressure'][2]
+    assert drift == pytest.approx(8e3, abs=10.0)
+    assert np.isfinite(block.rows['pad']).all()
 
 
-@pytest.mark.slow
 def test_faulty_sensors_and_moments_come_to_both_alike(tmp_path):
     """The scene is a file that is not shipped; each node loads it."""
     text = configuration.locate('scenes', 'hexapod_patches').read_text()
@@ -166,222 +179,125 @@ faults:
     path.write_text(text)
     scene = Scene.load(path)
     assert (scene.cycles, scene.sensors.moment) == (4, 5e-4)
-    on_nodes = composed.run(scene, 'adaptive', seed=3, bag=tmp_path / 'bag')
-    without = trials.run(scene, 'adaptive', seed=3)
-    for series in SERIES:
-        one, other = getattr(on_nodes, series), getattr(without, series)
-        assert np.array_equal(one, other, equal_nan=True), series
-    assert on_nodes.metrics == without.metrics
+    _, without = both(scene, 'adaptive', 3, tmp_path / 'bag')
     faults = {(fault['leg'], fault['reason']): fault for fault in without.metrics.faults}
     assert faults[1, 'force stands still']['end'] is not None
     assert faults[2, 'force stands still']['start'] < 1.5 + 1.2  # reported in the next stance
-    doubts = messages_of(tmp_path / 'bag')
-    for leg, doubt in {
+    codes = records_of(tmp_path / 'bag')['estimate'].rows['doubt']
+    for leg, kind in {
         1: 'force stands still', 2: 'force stands still', 4: 'force out of range',
         5: 'marker stands still',
     }.items():  # fmt: skip
-        said = [message.data.partition(':')[0] for message in doubts[f'/leg_{leg}/doubt']]
-        assert doubt in said
+        said = [doubts.kind(code) for code in codes[:, leg - 1]]
+        assert kind in said
         if leg in (1, 5):  # this fault ends
-            assert said[-1] != doubt
-    assert not any('still' in message.data for message in doubts['/leg_6/doubt'])
+            assert said[-1] != kind
+    assert not any('still' in doubts.kind(code) for code in codes[:, 5])
 
 
-@pytest.mark.slow
-def test_every_message_arrives(tmp_path):
-    """Numbers that one node publishes reach the functions of the next one unchanged, in order."""
+def test_every_record_is_answered_by_one_of_its_moment(tmp_path):
     scene = scene_of('hexapod_patches', 3)
-    felt = {leg: [] for leg in LEGS}
-    commanded = {leg: [] for leg in LEGS}
     stepped = []
     with trial_of(scene, 'oracle', 2, tmp_path / 'bag') as trial:
-
-        def watch(thing, name, see):
-            method = getattr(thing, name)
-
-            def watched(*arguments):
-                see(*arguments)
-                return method(*arguments)
-
-            setattr(thing, name, watched)
-
-        for leg in LEGS:
-            watch(
-                trial.estimator.legs[leg].stage.estimator,
-                'update',
-                lambda *arguments, leg=leg: felt[leg].append(arguments),
-            )
-            watch(trial.regulator.channels[leg].regulator, 'set_pressure', commanded[leg].append)
-        watch(trial.simulator.robot, 'step', lambda p: stepped.append(tuple(p)))
+        step = trial.simulator.robot.step
+        trial.simulator.robot.step = lambda given: stepped.append(tuple(given)) or step(given)
         trial.walk()
-        samples = trial.estimator.samples
-    heard = messages_of(tmp_path / 'bag')
+        assert trial.estimator.stage.used.tolist() == [len(stepped)] * 6
+    found = records_of(tmp_path / 'bag')
     steps = round(scene.duration * 250)
-    assert samples == 6 * steps
-    assert len(stepped) == steps
-    for index, leg in enumerate(LEGS):
-        wrenches, positions = heard[f'/leg_{leg}/wrench'], heard[f'/leg_{leg}/position']
-        assert len(wrenches) == len(positions) == len(felt[leg]) == steps
-        for (at, force, place, *_), wrench, position in zip(
-            felt[leg], wrenches, positions, strict=True
-        ):
-            stamp, f, p = wrench.header.stamp, wrench.wrench.force, position.point
-            assert at == (stamp.sec * 10**9 + stamp.nanosec) * 1e-9
-            assert force == (f.x, f.y, f.z)
-            assert place == (p.x, p.y, p.z)
-        assert len({at for at, *_ in felt[leg]}) == steps
-        setpoints = gauges(heard[f'/leg_{leg}/pressure_setpoint'])
-        # There is a set-point at each control step; at the end the regulator vents without one.
-        assert setpoints == commanded[leg][: len(setpoints)]
-        assert set(commanded[leg][len(setpoints) :]) <= {0.0}
-        assert len(heard[f'/leg_{leg}/wetness']) == len(setpoints) == 201
-        # A pressure reaches robot and estimator before the next sample.
-        pressures = heard[f'/leg_{leg}/pressure']
-        by_time = {
-            m.header.stamp.sec * 10**9 + m.header.stamp.nanosec: m.fluid_pressure - AMBIENT
-            for m in pressures
-        }
-        expected, last = [], 0.0
-        for number in range(1, steps + 1):
-            expected.append(last)
-            last = by_time.get(number * 4_000_000, last)
-        assert [row[index] for row in stepped] == expected
-        assert [each[3] for each in felt[leg]] == expected
-    assert any(max(row) > 30e3 for row in stepped)
+    assert found['sample'].stamps.tolist() == [4 * MS * n for n in range(1, steps + 1)]
+    moments = found['estimate'].stamps.tolist()
+    assert moments == [4 * MS, *range(20 * MS, steps * 4 * MS + 1, 20 * MS)]
+    assert found['command'].stamps.tolist() == moments
+    answers = found['pressure'].stamps.tolist()
+    assert answers[: len(moments)] == moments  # then the pads are vented, without commands
+    # A pressure reaches the robot before the next sample.
+    place = np.searchsorted(answers, found['sample'].stamps, side='left')
+    pads = np.concatenate([np.zeros((1, 6)), found['pressure'].rows['pad']])
+    assert np.array_equal(stepped, pads[place])
+    assert np.max(stepped) > 30e3
 
 
-def raw_messages(bag):
-    (file,) = bag.glob('*.mcap')
-    found = {}
-    with file.open('rb') as stream:
-        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
-            found.setdefault(channel.topic, []).append((message.log_time, message.data))
-    return found
-
-
-@pytest.mark.slow
 def test_the_same_seed_gives_the_same_messages(tmp_path):
     for name, cycles, seed in [('first', 3, 5), ('second', 3, 5), ('other', 1, 6)]:
         scene = scene_of('hexapod_patches', cycles)
         composed.run(scene, 'adaptive', seed=seed, bag=tmp_path / name)
     one, two, other = (raw_messages(tmp_path / name) for name in ('first', 'second', 'other'))
-    assert set(one) == set(two)
-    assert len(one) == 6 * 13 + 5  # thirteen of each leg; pose, joints, clock, diagnostics
-    # rclpy leaves the bytes between numbers of these messages as it finds them in memory.
-    padded = {'/diagnostics', '/markers'}
-    for topic in set(one) - padded:
-        assert one[topic] == two[topic], topic
-    first, second = (
-        [(topic, log_ns, repr(message)) for topic, message, log_ns in reader.messages(padded)]
-        for reader in map(BagReader, (tmp_path / 'first', tmp_path / 'second'))
-    )
-    assert {topic for topic, *_ in first} == padded
-    assert first == second
-    assert one['/leg_1/wrench'][:250] != other['/leg_1/wrench'][:250]
+    assert set(one) == {*RECORDS, '/clock', '/body/pose', '/joint_states', '/markers',
+                        '/diagnostics'}  # fmt: skip
+    assert one == two
+    assert one['/feet/sample'][:250] != other['/feet/sample'][:250]
 
 
 def test_the_bag_has_what_is_published_in_order(monkeypatch, tmp_path):
     """The reference are the calls of rclpy's publishers: none may pass the recorder by."""
-    published, batches = [], []
+    published = {}
     publish = Publisher.publish
 
     def watched(publisher, message):
         data = message if isinstance(message, bytes) else serialize_message(message)
-        if publisher.topic_name.startswith('/_batches/'):
-            batches.append(publisher.topic_name)
-            published.extend(BatchReader()(data))
-        else:
-            published.append((publisher.topic_name, data))
+        kind = RECORDS.get(publisher.topic_name)
+        messages = [each for _, each in Wire(kind, (1,)).split(data)] if kind else [data]
+        published.setdefault(publisher.topic_name, []).extend(messages)
         publish(publisher, message)
 
     monkeypatch.setattr(Publisher, 'publish', watched)
     with trial_of(scene_of('leg_wet_dome_60', 2), 'dome', 0, tmp_path / 'bag') as trial:
         trial.walk()
         assert trial.recorder.lost == {}
-        # Only the node's own clock comes through DDS.
-        assert {each.topic_name for each in trial.recorder.subscriptions} <= {'/clock'}
-    (file,) = (tmp_path / 'bag').glob('*.mcap')
-    with file.open('rb') as stream:
-        recorded = [
-            (channel.topic, message.data, message.log_time)
-            for _, channel, message in make_reader(stream).iter_messages(log_time_order=False)
-        ]
-    reader = BagReader(tmp_path / 'bag')
-    assert reader.custom_data[label.RECORDED_AT] == 'publisher'
-    published = [each for each in published if each[0] in reader.topics]
-
-    def of(name, messages):
-        return [data for topic, data, *_ in messages if topic == name]
-
-    for name in reader.topics:
-        assert of(name, recorded) == of(name, published), name
-    # All of one moment are one message; no other node subscribes to them alone.
-    # Without markers there would be a body estimator, too.
-    sources = set(topics.BATCHES) - {'body_estimator'}
-    assert set(batches) == {f'/_batches/{source}' for source in sources}
-    assert len(published) > 2 * len(batches)
-    counts = collections.Counter(name for name, _ in published)
-    absent = topics.FOOT_WRENCH, topics.CONTACT_VELOCITY
-    always = {topic.name(1) for topic in topics.LEG_TOPICS if topic not in absent}
-    always |= {'clock', 'body/pose', 'diagnostics'}
-    assert {f'/{name}' for name in always} <= set(counts)
-    assert counts['/leg_1/contact_load'] == counts['/leg_1/wetness'] > 100
-    assert counts['/leg_1/wrench'] == counts['/leg_1/position'] > 700
-    # The log time is that of the last clock before.
-    clock = 0
-    for topic, data, log_time in recorded:
-        if topic == '/clock':
-            seconds, fraction = struct.unpack('<4xiI', data)
-            clock = seconds * 10**9 + fraction
-        assert log_time == clock
+    recorded = raw_messages(tmp_path / 'bag')
+    assert {*RECORDS, '/clock', '/body/pose', '/diagnostics', '/markers'} <= recorded.keys()
+    for name, messages in recorded.items():
+        assert [data for _, data in messages] == published[name], name
+        log_times = [log_time for log_time, _ in messages]
+        assert log_times == sorted(log_times)
+    for name, kind in RECORDS.items():  # their log time is their stamp
+        blocks = [Wire(kind, (1,)).decode(data) for _, data in recorded[name]]
+        assert [each.last_ns for each in blocks] == [at for at, _ in recorded[name]]
 
 
 def test_another_recorder_receives_what_the_trial_publishes(context, executor, until, tmp_path):
-    parameters = {'folder': str(tmp_path / 'other'), 'reliable': True}
-    other = RecorderNode(
-        context=context,
-        parameter_overrides=[Parameter(name, value=each) for name, each in parameters.items()],
-    )
+    values = {'folder': str(tmp_path / 'other'), 'reliable': True, 'legs': [1]}
+    other = RecorderNode(context=context, parameter_overrides=overrides(values))
     executor.add_node(other)
-    names = {other.resolve_topic_name(name) for name in topics.names(topics.LEGS)}
     with trial_of(scene_of('leg_wet_dome_60', 2), 'dome', 0, tmp_path / 'bag') as trial:
-        inside = [each for node in trial.executor.get_nodes() for each in node.subscriptions]
-        expected = collections.Counter(each.topic_name for each in inside)
-        recorded = {
-            each: expected[each.topic_name] + 1
-            for node in trial.executor.get_nodes()
-            for each in node.publishers
-            if each.topic_name in names
-        }
-        assert len(recorded) > 13
-        until(lambda: all(each.get_subscription_count() == n for each, n in recorded.items()))
-        for _ in range(50):
-            trial.step()
-            executor.spin_once(timeout_sec=0.0)
+        names = {other.resolve_topic_name(name) for name in topics.names()}
+        inside = Counter(s.topic_name for node in trial._nodes for s in node.subscriptions)
+        publishers = [
+            each for node in trial._nodes for each in node.publishers if each.topic_name in names
+        ]
+        assert len(publishers) > 6
+
+        def found():
+            counts = inside + Counter({'/clock': 1})  # the recorder's own are not listed
+            return all(
+                each.get_subscription_count() > counts[each.topic_name] for each in publishers
+            )
+
+        until(found, what='the other recorder')
+        trial.walk(lambda at: executor.spin_once(timeout_sec=0.0))
+        trial.recorder._take()
         until(lambda: other.message_count == trial.recorder.message_count)
     other.close()
     bags = raw_messages(tmp_path / 'bag'), raw_messages(tmp_path / 'other')
-    sent, received = ({name: [data for _, data in m] for name, m in bag.items()} for bag in bags)
-    # The venting at the end is not in the other bag.
-    assert set(received) > {'/clock', '/leg_1/wrench', '/leg_1/contact_load', '/leg_1/wetness'}
-    for name, messages in received.items():
-        assert messages == sent[name][: len(messages)], name
-    assert len(received['/leg_1/wrench']) == 50
-    assert BagReader(tmp_path / 'other').custom_data[label.RECORDED_AT] == 'receiver'
+    one, two = ({name: [data for _, data in m] for name, m in bag.items()} for bag in bags)
+    assert one == two
+    assert len(one['/feet/sample']) > 500
+
+
+# --- ends ---------------------------------------------------------------------------------------
 
 
 def check_vented(bag):
     """Check that the bag is complete, and that pads had pressure and are flat at its end."""
     assert BagReader(bag).problem is None
-    heard = messages_of(bag)
-    for leg in LEGS:
-        pressures = gauges(heard[f'/leg_{leg}/pressure'])
-        assert max(pressures) > 30e3
-        assert pressures[-1] < 1000.0
-    return heard
+    found = records_of(bag)
+    pads = found['pressure'].rows['pad']
+    assert (pads.max(axis=0) > 30e3).all()
+    assert (pads[-1] < 1000.0).all()
+    return found
 
 
-@pytest.mark.slow
 def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
     with trial_of(scene_of('hexapod_patches', 30), 'dome', 0, tmp_path / 'bag') as trial:
 
@@ -390,17 +306,15 @@ def test_a_trial_that_is_stopped_leaves_the_pads_flat(tmp_path):
 
         trial.walk(progress)
         assert 2.5 < trial.simulator.robot.time < 2.7
-    heard = check_vented(tmp_path / 'bag')
-    assert len(heard['/leg_1/wrench']) == round(trial.simulator.robot.time * 250)
+    found = check_vented(tmp_path / 'bag')
+    assert len(found['sample'].stamps) == round(trial.simulator.robot.time * 250)
 
 
-@pytest.mark.slow
 def test_a_trial_that_comes_to_its_end_leaves_the_pads_flat(tmp_path):
     composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
     check_vented(tmp_path / 'bag')
 
 
-@pytest.mark.slow
 def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     sent = []
@@ -422,7 +336,7 @@ def test_a_signal_stops_a_trial_that_is_run_from_python(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
-    arguments = ['run', 'hexapod_patches', '--cycles', '30', '--policy', 'dome']
+    arguments = ['run', 'hexapod_patches', '--cycles', '300', '--policy', 'dome']
     out = tmp_path / 'out'
     process = subprocess.Popen(
         [sys.executable, '-m', 'ros_pad.cli', *arguments, '--out', str(out)],
@@ -436,7 +350,7 @@ def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
         def recorded():
             return sum(file.stat().st_size for file in out.glob('bag/*.mcap'))
 
-        while recorded() < 1_000_000 and process.poll() is None:
+        while recorded() < 200_000 and process.poll() is None:
             assert time.monotonic() < deadline, 'the bag does not grow'
             time.sleep(0.05)
         process.send_signal(number)
@@ -449,23 +363,53 @@ def test_a_signal_to_pad_run_leaves_the_pads_flat(number, tmp_path):
     check_vented(out / 'bag')
 
 
-@pytest.mark.slow
+class Hasty:
+    """An executor that waits less long once a node is gone."""
+
+    def __init__(self, executor, gone):
+        self._executor, self._gone = executor, gone
+
+    def __getattr__(self, name):
+        return getattr(self._executor, name)
+
+    def spin_until_future_complete(self, done, timeout_sec):
+        while not done.done() and not self._gone:
+            self._executor.spin_until_future_complete(done, 0.1)
+        self._executor.spin_until_future_complete(done, 0.3)
+
+
 @pytest.mark.parametrize('deaf', ['controller', 'estimator', 'regulator', 'simulator'])
-def test_a_node_that_does_not_answer_is_reported(deaf, monkeypatch, tmp_path):
-    with (
-        trial_of(scene_of('hexapod_patches', 2), 'dome', 0, tmp_path / 'bag') as trial,
-        pytest.raises(PadError, match=r'waited more than 0\.3 s of wall time for .* 0\.5'),
-    ):
+def test_a_node_that_does_not_answer_is_reported(deaf, tmp_path):
+    with trial_of(scene_of('hexapod_patches', 2), 'dome', 0, tmp_path / 'bag') as trial:
+        gone = []
+        trial.executor = Hasty(trial.executor, gone)
 
         def progress(at):
-            if at > 0.49:
-                # Later than the first step, which takes long on a busy machine.
-                monkeypatch.setattr(composed, 'PATIENCE', 0.3)
+            if at > 0.49 and not gone:
+                gone.append(at)
                 trial.executor.remove_node(getattr(trial, deaf))
 
-        trial.walk(progress)
+        words = r'waited more than 30 s of wall time for the pressures that answer the samples at'
+        with pytest.raises(PadError, match=rf'{words} 0\.5\d\d s: pad doctor checks ROS 2'):
+            trial.walk(progress)
     assert BagReader(tmp_path / 'bag').problem is None
-    assert len(messages_of(tmp_path / 'bag')['/leg_1/wrench']) > 120
+    assert len(records_of(tmp_path / 'bag')['sample'].stamps) > 120
+
+
+def test_an_answer_that_comes_twice_or_late_does_no_harm(monkeypatch, tmp_path):
+    """The simulator steps once for each of its moments."""
+    scene = scene_of('leg_wet_dome_60', 2)
+    send = composed.RegulatorNode._on_command
+
+    def again(node, block):
+        send(node, block)
+        for stamp_ns in (block.last_ns, block.last_ns - 20 * MS):
+            late = pressure(stamp_ns, math.nan)
+            node._send(late._replace(rows=late.rows[:, :1]))
+
+    monkeypatch.setattr(composed.RegulatorNode, '_on_command', again)
+    on_nodes = composed.run(scene, 'dome', seed=2, bag=tmp_path / 'bag')
+    assert np.array_equal(on_nodes.force, trials.run(scene, 'dome', seed=2).force)
 
 
 def test_a_full_disk_ends_the_trial_with_its_message(context, monkeypatch, tmp_path):
@@ -475,17 +419,17 @@ def test_a_full_disk_ends_the_trial_with_its_message(context, monkeypatch, tmp_p
     def until_full(self, *arguments):
         nonlocal count
         count += 1
-        if count > 5000:
-            raise BagError('no space left: 5000 messages are saved')
+        if count > 500:
+            raise BagError('no space left: 500 messages are saved')
         write(self, *arguments)
 
     monkeypatch.setattr(BagWriter, 'write', until_full)
-    with pytest.raises(BagError, match='5000 messages are saved'):
+    with pytest.raises(BagError, match='500 messages are saved'):
         composed.run(scene_of('hexapod_patches', 2), 'dome', bag=tmp_path / 'bag')
     # No node remains and publishes.
     observer = Node('observer', context=context)
     deadline = time.monotonic() + 60.0
-    while observer.count_publishers('/leg_1/morphology'):
+    while observer.count_publishers('/feet/command'):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     observer.destroy_node()

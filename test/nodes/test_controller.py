@@ -1,325 +1,197 @@
 # SPDX-License-Identifier: Apache-2.0
+"""The controller node: each estimate record is answered by a command record."""
+
 import math
 import re
-from itertools import pairwise
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import PointStamped
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-from std_msgs.msg import Float64
+from helpers import LOAD
+from helpers import MS
+from helpers import estimate
+from helpers import pressure
 
-from ros_pad.control.stage import DecisionStage
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode
-from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.stamps import set_stamp
 
-AMBIENT = 101325.0
-LOAD = 6.83
-LEGS = (1, 2)
-INPUTS = (topics.CONTACT_LOAD, topics.CONTACT_POSITION, topics.WETNESS)
-TIME_NS = 5_000_000_000
+START_NS = 5_000 * MS
 
 
 class Robot:
-    """Publishes loads, positions, estimates and clock; records set-points and morphologies."""
+    """A controller node on a bench, and estimates for it, one every 20 ms."""
 
-    def __init__(self, context, executor, until):
-        self.node = Node('robot', context=context)
-        executor.add_node(self.node)
-        self._context, self._executor, self.until = context, executor, until
-        self.inputs = {t.name(leg): t.publisher(self.node, leg) for leg in LEGS for t in INPUTS}
-        self._clock = topics.CLOCK.publisher(self.node)
-        self.setpoints = {leg: [] for leg in LEGS}
-        self.shapes = {leg: [] for leg in LEGS}
-        for leg in LEGS:
-            topics.PRESSURE_SETPOINT.subscription(self.node, self.setpoints[leg].append, leg)
-            topics.MORPHOLOGY.subscription(
-                self.node, lambda m, leg=leg: self.shapes[leg].append(m.data), leg
-            )
-        self.diagnostics = []
-        topics.DIAGNOSTICS.subscription(self.node, self.diagnostics.append)
-        self.controller = None
-        self.taken = {'load': 0, 'position': 0}  # number of values that the stages have received
-        self.position = 0.0
-        self.time_ns = TIME_NS
+    def __init__(self, bench):
+        self.bench = bench
+        self.x = 0.0
 
     def start(self, **parameters):
-        parameters = {'legs': list(LEGS), 'use_sim_time': True, **parameters}
-        self.controller = ControllerNode(
-            context=self._context,
-            parameter_overrides=[Parameter(name, value=v) for name, v in parameters.items()],
-        )
-        self._executor.add_node(self.controller)
-        self.until(
-            lambda: (
-                all(p.get_subscription_count() for p in (*self.inputs.values(), self._clock))
-                and all(
-                    self.node.count_publishers(topic.name(leg))
-                    for topic in (topics.PRESSURE_SETPOINT, topics.MORPHOLOGY)
-                    for leg in LEGS
-                )
-            )
-        )
-        self.tick(0)
-        return self.controller
+        self.now_ns = START_NS
+        self.node = self.bench.start(ControllerNode, **parameters)
+        return self.node
 
-    def tick(self, milliseconds=20):
-        """Advance simulated time, ms, and wait until the controller has received it."""
-        self.time_ns += milliseconds * 1_000_000
-        message = topics.CLOCK.message()
-        set_stamp(message.clock, self.time_ns)
-        self._clock.publish(message)
-        self.until(lambda: self.controller.get_clock().now().nanoseconds == self.time_ns)
+    def estimate(self, **fields):
+        """Send an estimate, 20 ms after the last one; return the rows of the command."""
+        self.now_ns += 20 * MS
+        fields = {'position': (self.x, 0.0)} | fields
+        self.bench.give(topics.ESTIMATE, estimate(self.now_ns, **fields))
+        block = self.bench.heard(topics.COMMAND)[-1]
+        assert block.last_ns == self.now_ns
+        return block.rows[-1]
 
-    def sense(self, load, position=None, leg=1, seen=True):
-        """Publish load and, if ``seen``, position of a leg, and wait for the controller."""
-        before = dict(self.taken)
-        point = PointStamped()
-        point.point.x = self.position if position is None else position
-        if seen:
-            self.inputs[topics.CONTACT_POSITION.name(leg)].publish(point)
-        self.inputs[topics.CONTACT_LOAD.name(leg)].publish(Float64(data=load))
-        self.until(lambda: self.taken['load'] > before['load'], what='the load')
-        if seen:
-            self.until(lambda: self.taken['position'] > before['position'], what='the position')
+    def step(self, wetness):
+        """Make a stance and a swing; return the set-points in the swing."""
+        self.x += 0.08
+        ground = {'wetness': wetness, 'friction': 0.9 - 0.6 * wetness}
+        self.estimate(**ground)
+        return self.estimate(**ground, load=0.0)['setpoint']
 
-    def estimate(self, wet, leg=1):
-        """Publish an estimate of wetness; return the set-point that follows."""
-        count = len(self.setpoints[leg])
-        self.inputs[topics.WETNESS.name(leg)].publish(Float64(data=wet))
-        self.until(lambda: len(self.setpoints[leg]) > count, what='a set-point')
-        return self.setpoints[leg][-1]
-
-    def unanswered(self, wet, leg=1):
-        """Publish an estimate and check that no set-point follows.
-
-        A later estimate of another leg is answered, so the first one was processed.
-        """
-        count = len(self.setpoints[leg])
-        self.inputs[topics.WETNESS.name(leg)].publish(Float64(data=wet))
-        other = 3 - leg
-        self.sense(LOAD, leg=other)
-        self.estimate(0.5, leg=other)
-        assert len(self.setpoints[leg]) == count
-
-    def step(self, wet, leg=1):
-        """Make a stance and a swing; return the set-point in the swing, Pa gauge."""
-        self.position += 0.08
-        self.sense(LOAD, leg=leg)
-        self.estimate(wet, leg)
-        self.sense(0.0, leg=leg)
-        return self.estimate(wet, leg).fluid_pressure - AMBIENT
+    def errors(self, leg=1):
+        return [
+            (at, each.message)
+            for at, each in self.bench.statuses(f'leg {leg} pad')
+            if each.level == DiagnosticStatus.ERROR
+        ]
 
 
 @pytest.fixture
-def robot(context, executor, until, monkeypatch):
-    robot = Robot(context, executor, until)
-
-    def count(name):
-        method = getattr(DecisionStage, name)
-
-        def counted(stage, *values):
-            method(stage, *values)
-            robot.taken[name] += 1
-
-        monkeypatch.setattr(DecisionStage, name, counted)
-
-    for name in robot.taken:
-        count(name)
-    return robot
+def robot(bench):
+    return Robot(bench)
 
 
-def test_every_estimate_is_answered_by_a_setpoint(robot):
+def test_every_estimate_is_answered_by_a_command(robot):
     robot.start()
-    robot.sense(LOAD)
     for number in range(1, 6):
-        setpoint = robot.estimate(0.5)
-        assert len(robot.setpoints[1]) == number
-        assert setpoint.header.frame_id == 'leg_1_pad'
-        assert nanoseconds(setpoint.header.stamp) == TIME_NS
-        assert setpoint.fluid_pressure == AMBIENT  # flat; the pressure is absolute
-    assert robot.setpoints[2] == []
-    robot.sense(LOAD, leg=2)
-    assert robot.estimate(0.5, leg=2).header.frame_id == 'leg_2_pad'
+        assert robot.estimate().tolist() == [(0.0, 0.0), (0.0, 0.0)]  # flat, gauge pressure
+        assert len(robot.bench.heard(topics.COMMAND)) == number
 
 
-def test_when_the_estimates_stop_so_do_the_setpoints(robot):
-    robot.start()
-    robot.sense(LOAD)
-    robot.estimate(0.5)
-    for _ in range(50):
-        robot.sense(LOAD)
-    assert len(robot.setpoints[1]) == 1
-
-
-def test_without_sensors_there_is_no_setpoint(robot):
-    robot.start()
-    robot.unanswered(0.9)
-    assert robot.setpoints[1] == [] and robot.setpoints[2]
+def test_when_the_estimates_stop_so_do_the_commands(robot):
+    robot.start(policy='dome')
+    assert robot.estimate()['setpoint'].min() > 0.0
+    count = len(robot.bench.heard(topics.COMMAND))
+    robot.bench.now_ns = robot.now_ns
+    robot.bench.tick(2.0)
+    later = robot.bench.heard(topics.COMMAND)[count:]
+    # Only the morphology is told: the feet are flat, because regulators vent them.
+    assert all(np.isnan(each.rows['setpoint']).all() for each in later)
+    assert later[-1].rows['dome'].tolist() == [[0.0, 0.0]]
+    assert len(later) <= 2
 
 
 def test_dome_on_wet_ground_and_flat_again_on_dry(robot):
     robot.start(policy='adaptive')
-    shapes = []
-    for wet in 8 * [0.98] + 20 * [0.02]:
-        gauge = robot.step(wet)
-        shapes.append('dome' if gauge > 0.0 else 'flat')
-    assert 'dome' in shapes[:8]
-    assert shapes[7] == 'dome'
-    assert shapes[-1] == 'flat'
-    assert robot.shapes[1][0] == 'flat'
-    assert 'dome' in robot.shapes[1]
-    # The topic is latched, so a morphology is published once for each change.
-    assert all(old != new for old, new in pairwise(robot.shapes[1]))
+    shapes = [robot.step(wet)[0] > 0.0 for wet in 8 * [0.98] + 20 * [0.02]]
+    assert shapes[7] and not shapes[-1]
+    domes = [each.rows['dome'][0, 0] for each in robot.bench.heard(topics.COMMAND)]
+    assert (domes[0], max(domes), domes[-1]) == (0.0, 1.0, 0.0)
 
 
 def test_a_heavier_robot_gets_more_pressure(robot):
-    gauges = []
+    setpoints = []
     for load in (3.0, LOAD):
-        controller = robot.start(policy='dome', expected_load=load)
-        robot.sense(LOAD)
-        gauges.append(robot.estimate(0.5).fluid_pressure - AMBIENT)
-        controller.destroy_node()
-    assert 0.0 < gauges[0] < gauges[1] <= 90e3
+        robot.start(policy='dome', expected_load=load)
+        setpoints.append(robot.estimate()['setpoint'][0])
+        robot.bench.stop()
+    assert 0.0 < setpoints[0] < setpoints[1] <= 90e3
 
 
 def test_a_fixed_pressure_is_taken_as_it_is(robot):
-    robot.start(policy='dome', dome_pressure=40e3, ambient_pressure=90000.0)
-    robot.sense(LOAD)
-    assert robot.estimate(0.5).fluid_pressure == 130e3
+    robot.start(policy='dome', dome_pressure=40e3)
+    assert robot.estimate().tolist() == [(1.0, 40e3), (1.0, 40e3)]
 
 
 @pytest.mark.parametrize('policy', ['flat', 'dome'])
 def test_the_simple_policies_never_change(robot, policy):
     robot.start(policy=policy)
     for wet in (0.02, 0.98, 0.98, 0.98, 0.02):
-        assert (robot.step(wet) > 0.0) is (policy == 'dome')
-    assert robot.shapes[1] == [policy]
+        assert ((robot.step(wet) > 0.0) == (policy == 'dome')).all()
 
 
 @pytest.mark.parametrize('ground', ['wet', 'dry'])
 def test_the_oracle_sees_the_ground(robot, ground):
     robot.start(policy='oracle', scene=f'hexapod_smooth_{ground}_flat')
-    assert (robot.step(0.5) > 0.0) is (ground == 'wet')
-
-
-def test_the_shape_reaches_who_comes_late(robot, context, executor):
-    robot.start(policy='dome')
-    robot.sense(LOAD)
-    robot.estimate(0.5)
-    late = Node('late', context=context)
-    executor.add_node(late)
-    heard = []
-    topics.MORPHOLOGY.subscription(late, lambda message: heard.append(message.data), 1)
-    robot.until(lambda: heard, what='the latched shape')
-    assert heard == ['dome']
+    assert (robot.step(0.5)[0] > 0.0) == (ground == 'wet')
 
 
 LOST = {
-    'all': {},
-    'estimate': {'load': LOAD},
-    'position': {'load': LOAD, 'wet': 0.98, 'seen': False},
-    'load': {'load': math.nan, 'wet': 0.98},
-    'wetness': {'load': LOAD, 'wet': math.nan},
-}
+    'position': {'position': [(math.nan, math.nan), (0.0, 0.0)]},
+    'load': {'load': [math.nan, LOAD]},
+    'infinite load': {'load': [math.inf, LOAD]},
+    'wetness': {'wetness': [math.nan, 0.5]},
+    'invalid wetness': {'wetness': [1.5, 0.5]},
+    'all': {
+        'load': [math.nan, LOAD], 'wetness': [math.nan, 0.5],
+        'position': [(math.nan, math.nan), (0.0, 0.0)], 'doubt': [math.nan, 0.0],
+    },
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('case', LOST)
-def test_a_leg_without_estimates_is_flat_and_reported_within_a_second(robot, case):
-    """Set-points of the leg stop, so that its regulator vents; the other leg goes on."""
-    given = LOST[case]
-    robot.start(policy='dome')
-
-    def step():
-        robot.tick()
-        robot.sense(LOAD, leg=2)
-        robot.estimate(0.5, leg=2)
-
+def test_a_row_that_lacks_something_concerns_its_leg_only(robot, case):
+    """It gets no set-point, so that its pad is vented, and is reported within a second."""
+    node = robot.start(policy='dome')
     for _ in range(5):
-        step()
-        robot.sense(LOAD)
-        assert robot.estimate(0.5).fluid_pressure > AMBIENT
-    lost_ns, count = robot.time_ns, len(robot.setpoints[1])
-    while robot.controller.controller.fault(1) == '':
-        assert robot.time_ns < lost_ns + 800_000_000
-        step()
-        if 'load' in given:
-            robot.sense(given['load'], seen=given.get('seen', True))
-        if 'wet' in given:
-            robot.inputs[topics.WETNESS.name(1)].publish(Float64(data=given['wet']))
-
-    def errors():
-        return [
-            (nanoseconds(array.header.stamp), status.message)
-            for array in robot.diagnostics
-            for status in array.status
-            if status.name == 'controller: leg 1 pad' and status.level == DiagnosticStatus.ERROR
-        ]
-
-    while not errors():
-        assert robot.time_ns < lost_ns + 1_000_000_000
-        step()
-    assert errors()[0][0] <= lost_ns + 900_000_000
-    assert re.search(r'estimate for 0\.\d s', errors()[0][1])
-    assert robot.shapes[1][-1] == 'flat'
-    assert robot.shapes[2] == ['dome']
-    # The last position of a marker is used for 0.2 s.
-    assert len(robot.setpoints[1]) - count <= (10 if case == 'position' else 0)
-    assert robot.setpoints[2][-1].fluid_pressure > AMBIENT
-    # With new samples the foot steps again.
-    for _ in range(2):
-        robot.tick()
-        robot.sense(LOAD)
-        robot.estimate(0.5)
-    assert robot.controller.controller.fault(1) == ''
-    assert robot.step(0.5) > 0.0
+        assert robot.estimate()['setpoint'].min() > 0.0
+    lost_ns, given = robot.now_ns, 0
+    while not node.controller.fault(1):
+        assert robot.now_ns < lost_ns + 800 * MS
+        setpoint, other = robot.estimate(**LOST[case])['setpoint']
+        given += not math.isnan(setpoint)
+        assert other > 0.0
+    while not robot.errors():
+        assert robot.now_ns < lost_ns + 1_000 * MS
+        dome, other = robot.estimate(**LOST[case])['dome']
+    assert (dome, other) == (0.0, 1.0)
+    # The last position of a marker is used for 0.2 s, the last finite load until the decision.
+    assert given <= (10 if case == 'position' else 0)
+    (at, text), *_ = robot.errors()
+    assert at <= lost_ns * 1e-9 + 0.9
+    assert re.search(r'estimate for 0\.\d s', text)
+    assert not robot.errors(2)
+    for _ in range(2):  # with new estimates the foot steps again
+        robot.estimate()
+    assert not node.controller.fault(1)
+    assert (robot.step(0.5) > 0.0).all()
 
 
-BAD = {
-    'load': ((math.nan, 0.0), 0.98),
-    'infinite load': ((-math.inf, 0.0), 0.98),
-    'position': ((LOAD, math.nan), 0.98),
-    'wetness': ((LOAD, 0.0), math.nan),
-}
-
-
-@pytest.mark.parametrize('case', BAD)
-def test_values_that_are_not_finite_move_no_foot(robot, case):
-    """Such a value must not count as lift-off: a foot must not switch while it stands."""
-    (load, position), wet = BAD[case]
-    robot.start()
+def test_values_that_are_missing_do_not_count_as_a_step(robot):
+    """A foot must not switch while it stands."""
+    node = robot.start()
     for _ in range(3):
         robot.step(0.5)
-    robot.sense(LOAD)
-    before = robot.estimate(0.98).fluid_pressure
-    switches = dict(robot.controller.controller.switches)
-    robot.sense(load, position)
-    robot.unanswered(wet)  # if this lasts, the regulator vents
-    robot.sense(LOAD)
-    assert robot.estimate(0.98).fluid_pressure == before
-    assert robot.controller.controller.switches == switches
-    assert robot.shapes[1] == ['flat']
-
-
-def test_one_infinite_load_among_good_ones_is_passed_over(robot):
-    """As from a loose cable: the node goes on with the largest of the finite loads."""
-    robot.start()
-    robot.sense(LOAD)
-    robot.sense(math.inf)
-    robot.sense(math.nan)
-    robot.sense(0.5 * LOAD)
-    assert robot.estimate(0.5).fluid_pressure == AMBIENT
+    robot.estimate(wetness=0.98)
+    switches = dict(node.controller.switches)
+    for fields in LOST.values():
+        robot.estimate(**({'wetness': 0.98} | fields))
+        assert robot.estimate(wetness=0.98)['setpoint'].tolist() == [0.0, 0.0]
+    assert node.controller.switches == switches
 
 
 def test_a_foot_that_bounces_has_not_stepped(robot):
-    """The foot has no load when an estimate arrives, but had load since the previous one."""
+    """The load of an estimate is the largest since the one before."""
     robot.start(policy='adaptive')
     for _ in range(10):
-        robot.sense(LOAD)
-        robot.sense(0.0)
-        assert robot.estimate(0.98).fluid_pressure == AMBIENT
-    shapes = [robot.step(0.98) for _ in range(4)]
-    assert shapes[-1] > 30e3
+        assert robot.estimate(wetness=0.98)['setpoint'][0] == 0.0
+    assert [robot.step(0.98)[0] for _ in range(4)][-1] > 30e3
+
+
+def test_estimates_that_come_twice_or_late_do_no_harm(robot):
+    robot.start(policy='dome')
+    first = robot.estimate()['setpoint'].tolist()
+    early = estimate(robot.now_ns - 60 * MS)
+    for _ in range(2):
+        robot.bench.give(topics.ESTIMATE, early)
+    assert robot.bench.last(topics.COMMAND)['setpoint'].tolist() == first
+    assert robot.estimate()['setpoint'].tolist() == first
+    assert not robot.errors()
+
+
+def test_a_pressure_that_does_not_follow_is_a_fault_of_its_leg(robot):
+    robot.start(policy='dome', dome_pressure=60e3)
+    for _ in range(100):
+        robot.estimate()
+        robot.bench.give(topics.PRESSURE, pressure(robot.now_ns, (0.0, 60e3)))
+    assert robot.errors()[0][1].startswith('does not fill: 0.0 kPa')
+    assert not robot.errors(2)
+    assert robot.estimate()['dome'].tolist() == [0.0, 1.0]

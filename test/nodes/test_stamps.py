@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 from builtin_interfaces.msg import Time
+from helpers import MS
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
-from ros_pad.nodes import topics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
@@ -28,24 +27,36 @@ def test_stamps_are_whole_nanoseconds(time_ns, sec, nanosec):
     assert (stamp.sec, stamp.nanosec) == (sec, nanosec)
     assert nanoseconds(stamp) == time_ns
     assert split(time_ns) == (sec, nanosec)
-    assert split(time_ns + 2**32 * 10**9) == (sec, nanosec)  # a stamp has no more seconds
+    late_ns = time_ns + 2**32 * 10**9  # a stamp has no more seconds
+    assert split(late_ns) == (sec, nanosec)
+    set_stamp(stamp, late_ns)
+    assert nanoseconds(stamp) == time_ns
 
 
-def test_in_simulated_time_each_clock_message_is_a_tick(context, executor, until):
-    node = Node(
-        'probe', context=context, parameter_overrides=[Parameter('use_sim_time', value=True)]
-    )
-    executor.add_node(node)
+def test_in_simulated_time_each_clock_message_is_a_tick_where_no_records_come(bench):
+    """Which of a record and the clock of its moment comes first means nothing."""
     ticks = []
-    Messages(node).on_tick(0.001, ticks.append)
-    clock = topics.CLOCK.publisher(node)
-    until(lambda: clock.get_subscription_count() == 2)  # two subscriptions: time and ticks
-    for time_ns in (7, 1_000_000_000, 3_000_000_004):
-        message = topics.CLOCK.message()
-        set_stamp(message.clock, time_ns)
-        clock.publish(message)
-        until(lambda t=time_ns: ticks and ticks[-1] == t)
-    assert ticks == [7, 1_000_000_000, 3_000_000_004]
+
+    def probe(**kwargs):
+        node = Node('probe', **kwargs)
+        node.declare_parameter('legs', [1])
+        node.messages = Messages(node)
+        node.messages.on_tick(0.001, ticks.append)
+        return node
+
+    messages = bench.start(probe).messages
+
+    def clock(*times_ms):
+        ticks.clear()
+        for time_ms in times_ms:
+            bench.clock(time_ms * MS)
+        return [each // MS for each in ticks]
+
+    assert clock(1_000, 3_000, 2_000) == [1_000, 3_000, 2_000]
+    messages.advance(2_020 * MS)
+    assert clock(1_919, 1_920, 2_000, 2_020, 2_040, 2_120, 2_121, 2_200) == [1_919, 2_121, 2_200]
+    messages.follows_clock = True
+    assert clock(2_000, 2_020, 2_040) == [2_000, 2_020, 2_040]
 
 
 def test_in_real_time_a_timer_ticks(context, executor, until):

@@ -2,14 +2,17 @@
 """If DDS does not connect two ends of a topic, a warning states where, why, and what to change."""
 
 import pytest
+from helpers import command
+from helpers import encoded
+from helpers import overrides
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import LivelinessPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
+from ros_pad.bags import topics as schemas
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
 from ros_pad.nodes.regulator import RegulatorNode
@@ -76,26 +79,24 @@ def foreign(context, executor):
 
 @pytest.fixture
 def ours(context, executor):
-    remapped = ['--ros-args', '-r', 'leg_2/doubt:=leg_2/other']
+    remapped = ['--ros-args', '-r', 'body/doubt:=body/other']
     node = Node('ours', namespace='/robot', context=context, cli_args=remapped)
     executor.add_node(node)
     return node
 
 
 @pytest.mark.parametrize(
-    ('topic', 'leg', 'name', 'offered', 'words'),
+    ('topic', 'name', 'offered', 'words'),
     [
         (
-            topics.PRESSURE_SETPOINT,
-            1,
-            '/robot/leg_1/pressure_setpoint',
+            topics.COMMAND,
+            '/robot/feet/command',
             BEST_EFFORT,
             ('reliability best_effort', 'change the publisher to reliability reliable'),
         ),
         (
-            topics.DOUBT,
-            2,
-            '/robot/leg_2/other',
+            topics.BODY_DOUBT,
+            '/robot/body/other',
             RELIABLE,
             ('durability volatile', 'change the publisher to durability transient_local'),
         ),
@@ -103,10 +104,10 @@ def ours(context, executor):
     ids=['best effort', 'volatile'],
 )
 def test_a_subscription_warns_of_a_publisher_that_offers_too_little(
-    foreign, ours, until, warnings, topic, leg, name, offered, words
+    foreign, ours, until, warnings, topic, name, offered, words
 ):
     passed_on = []
-    topic.subscription(ours, print, leg, on_mismatch=passed_on.append)
+    topic.subscription(ours, print, on_mismatch=passed_on.append)
     foreign.create_publisher(topic.message, name, offered)
     until(lambda: warnings, what='a warning')
     assert all(word in warnings[0] for word in (f'{name}: ', 'node /lab/foreign ', *words))
@@ -116,46 +117,53 @@ def test_a_subscription_warns_of_a_publisher_that_offers_too_little(
 def test_a_publisher_warns_of_a_subscription_that_requests_too_much(
     foreign, ours, until, warnings
 ):
-    topics.PRESSURE.publisher(ours, 1)
-    name = '/robot/leg_1/pressure'
+    topics.PRESSURE.publisher(ours)
+    name = '/robot/feet/pressure'
     foreign.create_subscription(topics.PRESSURE.message, name, print, LATCHED)
     until(lambda: warnings, what='a warning')
     words = (f'{name}: node /lab/foreign ', 'durability transient_local', 'durability volatile')
     assert all(word in warnings[0] for word in words)
 
 
-@pytest.mark.parametrize('topic', topics.LEG_TOPICS, ids=lambda topic: topic.pattern)
+OF_LEGS = [topics.of_leg(schema) for schema in schemas.OF_LEGS]
+
+
+@pytest.mark.parametrize(
+    'topic',
+    (*topics.COMMON_TOPICS, *OF_LEGS, topics.FEET_MARKERS),
+    ids=lambda topic: topic.pattern,
+)
 def test_both_ends_of_each_topic_here_match(topic):
     assert qos.mismatches(topic.publish, topic.subscribe) == []
 
 
-def test_the_regulator_has_it_on_diagnostics_until_set_points_come(
+def test_records_of_a_best_effort_publisher_arrive(foreign, ours, until):
+    """As from a driver of others; commands alone must be reliable."""
+    for topic in (topics.SAMPLE, topics.FORCE, topics.ESTIMATE, topics.PRESSURE):
+        assert qos.mismatches(BEST_EFFORT, topic.subscribe) == []
+    assert qos.mismatches(BEST_EFFORT, topics.COMMAND.subscribe)
+
+
+def test_the_regulator_has_it_on_diagnostics_until_commands_come(
     context, executor, foreign, until
 ):
-    regulator = RegulatorNode(context=context, parameter_overrides=[Parameter('legs', value=[1])])
+    regulator = RegulatorNode(context=context, parameter_overrides=overrides({'legs': [1, 2]}))
     executor.add_node(regulator)
     said = []
-    foreign.create_subscription(
-        topics.DIAGNOSTICS.message,
-        '/diagnostics',
-        lambda array: said.append(array.status[0].message),
-        topics.DIAGNOSTICS.subscribe,
-    )
-    message = topics.PRESSURE_SETPOINT.message
-    name = '/leg_1/pressure_setpoint'
-    foreign.create_publisher(message, name, BEST_EFFORT)
+    topics.DIAGNOSTICS.subscription(foreign, lambda array: said.append(array.status[0].message))
+    topic, name = topics.COMMAND, '/feet/command'
+    foreign.create_publisher(topic.message, name, BEST_EFFORT)
     until(lambda: any('change the publisher to reliability reliable' in words for words in said))
-    assert regulator.answered == 0
-    setpoint = message(fluid_pressure=101325.0)
-    publisher = foreign.create_publisher(message, name, topics.PRESSURE_SETPOINT.publish)
+    answers = regulator.channels[1].answers
+    assert answers.accepted == 0
+    publisher = foreign.create_publisher(topic.message, name, topic.publish)
 
     def accepted():
-        setpoint.header.stamp = foreign.get_clock().now().to_msg()
-        publisher.publish(setpoint)
-        return regulator.answered
+        block = command(foreign.get_clock().now().nanoseconds, 0.0)
+        publisher.publish(encoded(topic, block, (1, 2)))
+        return answers.accepted
 
     until(accepted)
     said.clear()
     until(lambda: said and said[-1] == 'no set-points are received: vented')
-    assert regulator.channels[1].accepted >= 1
     assert not any('change the publisher to' in words for words in said[-1:])
