@@ -473,7 +473,7 @@ def test_ctrl_c_leaves_vented_pads_and_a_readable_bag(
 
 
 def test_a_walk_that_is_stopped_before_its_first_sample_is_a_trial(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
     composed = pytest.importorskip('ros_pad.nodes.composed')
     walk = composed.ComposedTrial.walk
@@ -485,7 +485,7 @@ def test_a_walk_that_is_stopped_before_its_first_sample_is_a_trial(
     monkeypatch.setattr(composed.ComposedTrial, 'walk', stopped)
     words = ['run', 'hexapod_patches', '--no-compare', '--out', str(tmp_path / 'walk')]
     assert cli.main(words) == INTERRUPTED
-    assert 'stopped at 0.0 s' in capsys.readouterr().err
+    assert 'stopped at 0.0 s' in capfd.readouterr().err
 
 
 def test_domes_that_cannot_carry_the_robot_are_reported(
