@@ -94,9 +94,7 @@ class BagWriter:
         self._synced: Future[None] | None = None
         try:
             self._stream = self._path.open('xb')
-            self._writer = Writer(
-                self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION
-            )
+            self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION)
             self._writer.start(profile='ros2', library='ros_pad')
         except OSError as error:
             self._fail(error)
