@@ -17,19 +17,28 @@ PAGE = pathlib.Path(__file__).resolve().parents[1] / 'docs' / 'topics.md'
 
 
 def tables():
-    yield 'records', '| topic | number | unit | meaning |\n|---|---|---|---|\n' + ''.join(
-        f'| `feet/{kind.name}` | `{field.name}{"_" * bool(field.axes)}{"/".join(field.axes)}` |'
-        f' {field.unit or "–"} | {field.meaning} |\n'
-        for kind in KINDS
-        for field in kind.fields
+    yield (
+        'records',
+        '| topic | number | unit | meaning |\n|---|---|---|---|\n'
+        + ''.join(
+            f'| `feet/{kind.name}` | `{field.name}{"_" * bool(field.axes)}{"/".join(field.axes)}` |'
+            f' {field.unit or "–"} | {field.meaning} |\n'
+            for kind in KINDS
+            for field in kind.fields
+        ),
     )
     rows = [f'| {code} | {row.kind} | {row.details} |\n' for code, row in enumerate(doubt.TABLE)]
     rows[0] = '| 0 | no doubt |  |\n'
     text = '| `doubt` | kind | details, with the two numbers a and b |\n|---|---|---|\n'
     yield 'doubts', text + ''.join(rows)
     text = '| `fault` | kind | two numbers |\n|---|---|---|\n'
-    yield 'faults', text + ''.join(
-        f'| {kind.code} | {kind.label or "no fault"} | {kind.numbers} |\n' for kind in faults.Kind
+    yield (
+        'faults',
+        text
+        + ''.join(
+            f'| {kind.code} | {kind.label or "no fault"} | {kind.numbers} |\n'
+            for kind in faults.Kind
+        ),
     )
 
 

@@ -269,27 +269,6 @@ class FieldWriter:
             end = places[place] + struct.calcsize(fields[place][1])
         self._compile([*pieces, template[end:]])
 
-    @classmethod
-    def joined(cls, writers: Sequence[FieldWriter]) -> FieldWriter:
-        """Return a writer of several messages one after another, which is faster than them.
-
-        Its values are those of all the writers, in their order.
-        """
-        pieces: list[_Piece] = []
-        before = 0
-        for writer in writers:
-            for piece in writer._pieces:
-                if isinstance(piece, tuple):
-                    pieces.append((before + piece[0], piece[1]))
-                elif pieces and isinstance(pieces[-1], bytes):
-                    pieces[-1] += piece
-                else:
-                    pieces.append(piece)
-            before += writer._count
-        self = cls.__new__(cls)
-        self._compile(pieces)
-        return self
-
     def _compile(self, pieces: Sequence[_Piece]) -> None:
         self._pieces = [piece for piece in pieces if piece != b'']
         self._between = tuple(piece for piece in self._pieces if isinstance(piece, bytes))

@@ -17,11 +17,11 @@ from typing import Any
 from mcap.records import Channel
 from mcap.records import Schema
 from mcap.writer import CompressionType
+from mcap.writer import Writer
 
 from ros_pad.bags import metadata
 from ros_pad.bags.definitions import message_definition
 from ros_pad.bags.definitions import type_hash
-from ros_pad.bags.messages_writer import MessagesWriter
 from ros_pad.bags.storage import Contents
 from ros_pad.bags.storage import scan
 from ros_pad.errors import BagError
@@ -94,9 +94,7 @@ class BagWriter:
         self._synced: Future[None] | None = None
         try:
             self._stream = self._path.open('xb')
-            self._writer = MessagesWriter(
-                self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION
-            )
+            self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=COMPRESSION)
             self._writer.start(profile='ros2', library='ros_pad')
         except OSError as error:
             self._fail(error)

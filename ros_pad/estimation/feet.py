@@ -2,8 +2,7 @@
 """Estimator of all feet of a robot: slip, wetness, friction, and friction margin.
 
 Each foot follows a whole block of samples before the next one does: as long as it stands, or
-swings, and its readings are ordinary, little is to be done for a sample. Then the filters of all
-feet are updated together.
+swings, and its readings are ordinary, little is to be done for a sample.
 """
 
 from __future__ import annotations
@@ -120,22 +119,28 @@ class FeetEstimator:
 
         The values are those of samples, feet and numbers, and all that are needed are there.
         """
-        tracks, readings = self.tracks, values[:, :, READINGS]
-        last = np.array([[each.sensing.last for each in tracks]])
-        moves = readings - np.concatenate((last, readings[:-1]))
-        far = (moves[:, :, 3:] ** 2).sum(axis=2)
-        calm = moves.all(axis=2) & (far <= LEAP_DISTANCE**2)
-        if self.tuning.source == 'joints':
-            calm &= (values[:, :, 9:] < math.inf).all(axis=2)
-        quiet = calm.T.tolist()
-        for row, (before, time) in enumerate(pairwise((times[0], *times))):
-            for each, mine in zip(tracks, quiet, strict=True) if not row else ():
-                mine[0] &= time - each.time <= LONGEST_GAP
-            if time - before > LONGEST_GAP:
-                for mine in quiet:
-                    mine[row] = False
+        gaps = [time - before for before, time in pairwise((self.tracks[0].time, *times))]
+        quiet = None
+        if max(gaps) <= LONGEST_GAP and self._in_step:
+            quiet = self._quiet(values)
         samples = values.transpose(1, 0, 2).tolist()
         self.update(times, samples, pressures, quiet=quiet)
+
+    @property
+    def _in_step(self) -> bool:
+        """Whether all feet have had their last sample at the same time."""
+        return len({each.time for each in self.tracks}) == 1
+
+    def _quiet(self, values: Array) -> list[list[bool]]:
+        """Return for each foot whether all its readings change, and none of them leaps."""
+        last = np.array([[each.sensing.last for each in self.tracks]])
+        readings = values[:, :, READINGS]
+        moves = np.abs(readings - np.concatenate((last, readings[:-1])))
+        if moves.all() and moves[:, :, 3:].max() <= 0.5 * LEAP_DISTANCE:
+            return [[True] * len(values)] * len(self.tracks)
+        found = moves.all(axis=2) & (moves[:, :, 3:] <= 0.5 * LEAP_DISTANCE).all(axis=2)
+        quiet: list[list[bool]] = found.T.tolist()
+        return quiet
 
     def update(
         self,
@@ -177,7 +182,6 @@ class FeetEstimator:
                 track.update(
                     times[part], mine if whole else mine[part], pressures[place], old, calm
                 )
-            self.grounds.flush()
             first = end
 
 

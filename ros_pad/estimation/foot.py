@@ -231,7 +231,6 @@ class FootEstimator:
         sample = *force, yaw, *position, *velocity, variance, variance
         track.fresh = False
         track.update((time,), (sample,), pressure, (age,) if age else None, None)
-        self.feet.grounds.flush()
         self.estimate = self._estimate()
         return self.estimate
 

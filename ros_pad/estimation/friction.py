@@ -46,7 +46,6 @@ v. This density is zero at zero speed, so that the noise of a foot at rest does 
 # The half-normal distribution in eight parts, finer in its tail, each represented by its middle.
 _SHARES = np.array([0.15, 0.15, 0.15, 0.15, 0.15, 0.15, 0.08, 0.02])
 _HALF_NORMAL = math.sqrt(2.0) * special.erfinv(np.cumsum(_SHARES) - 0.5 * _SHARES)
-_HALF_NORMAL = _HALF_NORMAL.tolist()
 
 SLOWEST = 0.1
 """Least weight of a slip as evidence of friction. Slips much slower than feet turn show friction
@@ -135,6 +134,7 @@ class GroundModel:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
         self.patch_length, self.temper, self.rim_speed = patch_length, temper, rim_speed
+        self._rim_speeds = rim_speed * _HALF_NORMAL[:, None]
         error = np.hypot(model_error, MODEL_SQUARE * GRID * GRID)
         blur = np.exp(-0.5 * ((GRID[:, None] - GRID) / error) ** 2) * np.diff(EDGES)[:, None]
         blur = (blur / blur.sum(axis=0)).T
@@ -143,52 +143,39 @@ class GroundModel:
             np.zeros_like(GRID), blur.cumsum(axis=1), blur.dot(GRID), blur.dot(GRID * GRID),
         ))  # fmt: skip
 
-    def likelihoods(
-        self, samples: Sequence[Evidence], factors: Sequence[tuple[float, float, float]]
-    ) -> np.ndarray:
-        """Return the likelihood of each sample, shape (samples, 2, grid), from its factors."""
-        table = np.array([
-            (*each.scales, each.ratio, 1.0 / each.ratio_noise, rest, slip / each.ratio_noise)
-            for each, (rest, slip, _) in zip(samples, factors, strict=True)
-        ])  # fmt: skip
-        ratios, precisions, rests, slips = table.T[2:, :, None, None]
-        friction = table[:, :2, None] * GRID
+    def likelihood(self, sample: Evidence, rest: float, slip: float) -> np.ndarray:
+        """Return the likelihood of a sample, shape (2, grid), from its first two factors."""
+        friction = np.array(sample.scales)[:, None] * GRID
         # Stick or creep: T/N is the gait's demand, and μ is above it. Slip: the demand is above μ,
         # and T/N is μ less the part used by turning.
-        found = friction - ratios
-        found *= precisions
+        found = friction - sample.ratio
+        found *= 1.0 / sample.ratio_noise
         special.ndtr(found, out=found)
-        found *= rests
-        if slips.any():
-            shown = self._shown(samples, friction)
+        found *= rest
+        if slip > 0.0:
+            shown = self._shown(sample, friction)
             # The exponential is the share of demands that friction does not meet.
             friction *= -1.0 / DEMAND
             np.exp(friction, out=friction)
             friction *= shown
-            friction *= slips / _ROOT_2_PI
+            friction *= slip / (_ROOT_2_PI * sample.ratio_noise)
             found += friction
         return found
 
-    def _shown(self, samples: Sequence[Evidence], friction: np.ndarray) -> np.ndarray:
+    def _shown(self, sample: Evidence, friction: np.ndarray) -> np.ndarray:
         """Return the likelihood of T/N in a slip, mean over rim speeds, up to a factor."""
-        left, ratios = [], []
-        for each in samples:
-            precision, rim = math.sqrt(0.5) / each.ratio_noise, self.rim_speed
-            if each.turning_known or not each.speed > 0.0:
-                left.append([precision] * len(_SHARES))
-            else:
-                speed = each.speed
-                left.append([
-                    precision * speed / math.hypot(speed, rim * part) for part in _HALF_NORMAL
-                ])  # fmt: skip
-            ratios.append(each.ratio * precision)
-        away = np.array(left).T[:, :, None, None] * friction
-        away -= np.array(ratios)[:, None, None]
+        if sample.turning_known:
+            away = friction - sample.ratio
+        else:
+            left = sample.speed / np.hypot(sample.speed, self._rim_speeds)
+            away = left * friction.reshape(-1)
+            away -= sample.ratio
+        away *= math.sqrt(0.5) / sample.ratio_noise
         away *= away
         np.negative(away, out=away)
         np.exp(away, out=away)
-        found: np.ndarray = _SHARES.dot(away.reshape(len(_SHARES), -1)).reshape(friction.shape)
-        return found
+        found: np.ndarray = away if sample.turning_known else _SHARES.dot(away)
+        return found.reshape(friction.shape)
 
 
 class GroundFilter:
@@ -319,27 +306,49 @@ class GroundFilter:
 
     def update(self, sample: Evidence) -> None:
         """Process one sample of T/N and of slip speed."""
-        update([self], [sample])
-
-    def _learn(
-        self, sample: Evidence, after: np.ndarray, evidence: np.ndarray, grounds: list[float]
-    ) -> None:
-        """Use the posterior after a sample, what it shows of friction, and the odds."""
         self.scales = sample.scales
-        self._felt = evidence if self._felt is None else self._felt + evidence
-        (dry, wet), before = grounds, self.wet_probability
-        self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
-        self._posterior = after
+        rest, slip, shown = sample.factors(self.model.rim_speed)
+        evidence = self.model.likelihood(sample, rest, slip)
+        evidence += 1e-6
+        np.log(evidence, out=evidence)
+        evidence *= sample.weight * self.model.temper
+        self._multiply(evidence, shown)
         if sample.speed > 0.0:
             self._move(sample.speed * sample.dt)
         if self._dome:
-            # The film under domes drains during a stance, so friction rises on the same ground.
-            keep = math.exp(-sample.dt / DRAINING_TIME)
-            wet = self._posterior[1].dot(_ONES)
-            self._posterior[1] *= keep
-            self._posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
-            self._felt[1] *= keep
+            self._drain(sample.dt)
         self._normalise(self._posterior)
+
+    def _multiply(self, evidence: np.ndarray, shown: float) -> None:
+        """Multiply by a likelihood, given as logarithm; a share of it shows friction.
+
+        The rest shows only whether the ground is wet, or nothing under a dome.
+        """
+        after = np.exp(evidence)
+        after *= self._posterior
+        grounds = (self._posterior if self._dome else after).dot(_ONES)
+        if self._dome or shown < 1.0:
+            evidence *= shown
+            np.exp(evidence, out=after)
+            after *= self._posterior
+            rest = (grounds / after.dot(_ONES))[:, None]
+            after *= rest
+            if not self._dome:
+                evidence += np.log(rest)
+        self._felt = evidence if self._felt is None else self._felt + evidence
+        (dry, wet), before = grounds.tolist(), self.wet_probability
+        self.log_odds += math.log(wet / dry) - math.log(before / (1.0 - before))
+        after *= 1.0 / (dry + wet)
+        self._posterior = after
+
+    def _drain(self, dt: float) -> None:
+        """Let friction rise on the same ground, as the film under a dome drains for a time, s."""
+        keep, posterior = math.exp(-dt / DRAINING_TIME), self._posterior
+        wet = posterior[1].dot(_ONES)
+        posterior[1] *= keep
+        posterior[1] += (1.0 - keep) * wet * self.expected.dome[1]
+        if self._felt is not None:
+            self._felt[1] *= keep
 
     def _move(self, distance: float) -> None:
         """Move by a distance, m: new ground, if it is reached, has the prior's probabilities."""
@@ -400,31 +409,3 @@ class GroundFilter:
             on_wet = np.interp(edges, wet * EDGES, on_wet)
         found: np.ndarray = np.interp(np.asarray(shares), on_dry + on_wet, edges)
         return found
-
-
-def update(filters: Sequence[GroundFilter], samples: Sequence[Evidence]) -> None:
-    """Process one sample of each of several feet, which have one model, together."""
-    model = filters[0].model
-    factors = [each.factors(model.rim_speed) for each in samples]
-    evidence = model.likelihoods(samples, factors)
-    evidence += 1e-6
-    np.log(evidence, out=evidence)
-    evidence *= np.array([[[each.weight * model.temper]] for each in samples])
-    posterior = np.array([each._posterior for each in filters])
-    after = posterior * np.exp(evidence)
-    grounds = after.dot(_ONES)
-    domes = [each._dome for each in filters]
-    shown = [share for _, _, share in factors]
-    # The share that does not show friction shows only whether the ground is wet, or nothing
-    # under a dome.
-    if any(domes) or min(shown) < 1.0:
-        grounds[domes] = posterior[domes].dot(_ONES)
-        evidence *= np.array(shown)[:, None, None]
-        np.multiply(posterior, np.exp(evidence), out=after)
-        rest = grounds / after.dot(_ONES)
-        after *= rest[:, :, None]
-        rest[domes] = 1.0
-        evidence += np.log(rest)[:, :, None]
-    after /= grounds.dot(_ONES[:2])[:, None, None]
-    for place, each in enumerate(filters):
-        each._learn(samples[place], after[place], evidence[place], grounds[place].tolist())

@@ -8,7 +8,6 @@ import math
 from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import doubt
-from ros_pad.estimation import friction
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.friction import MODEL_ERROR
 from ros_pad.estimation.friction import Evidence
@@ -76,11 +75,9 @@ class Grounds:
         self.beliefs = [(tuning.wet_prior, *each.friction) for each in self.filters]
         self.quantiles = [each.quantile(MARGIN_SHARE) for each in self.filters]
         self.doubts = [Doubt(doubt.NOT_YET)] * feet
-        self._due: dict[int, tuple[float, float, Evidence]] = {}  # time, peak load, and evidence
 
     def touch_down(self, foot: int, time: float, x: float, y: float, pressure: float) -> None:
         """Begin a stance of a foot at a time, s, and place, m, with a pressure, Pa."""
-        self.flush()
         ground, stance = self.filters[foot], Stance(self._share_on_domes(pressure))
         self._stances[foot] = stance
         ground.touch_down(
@@ -97,7 +94,6 @@ class Grounds:
         The sample is dt seconds after the last one, at a place, m, None if that is unknown.
         Return whether the posterior has changed.
         """
-        self.flush()
         ground, path = self.filters[foot], self.paths[foot]
         posterior = self.histories[foot].undo(since)
         if posterior is not None:
@@ -112,20 +108,17 @@ class Grounds:
 
     def doubt(self, foot: int) -> bool:
         """Take the motion of a foot for unknown; return whether it was known."""
-        self.flush()
         known = self.doubts[foot].code != doubt.MOTION
         self.doubts[foot] = Doubt(doubt.MOTION)
         return known
 
     def set_back(self, foot: int) -> None:
         """Forget the times of a foot, because the clock has been set back."""
-        self.flush()
         self.paths[foot].restart()
         self.histories[foot].clear()
 
     def forget(self, foot: int, time: float) -> None:
         """Forget what a foot has learnt in wrong axes until a time, s."""
-        self.flush()
         self.histories[foot].clear()
         self.filters[foot].forget(time)
         self.beliefs[foot] = self.beliefs[foot][0], *self.filters[foot].friction
@@ -140,7 +133,7 @@ class Grounds:
         noises: tuple[float, float, float],
         turning_known: bool,
     ) -> None:
-        """Use a window of a foot that ends at a time, s, with the next :meth:`flush`.
+        """Use a window of a foot that ends at a time, s.
 
         Parameters
         ----------
@@ -160,20 +153,10 @@ class Grounds:
         turning_known : bool
             Whether the torque about z was measured.
         """
-        if foot in self._due:
-            self.flush()
         self._follow_pressure(foot, time, pressure)
         evidence = self._evidence(foot, time - window.start, window, place, noises, turning_known)
-        self._due[foot] = time, window.peak, evidence
-
-    def flush(self) -> None:
-        """Update the filters of all feet with windows that have ended, together."""
-        due, self._due = self._due, {}
-        if due:
-            filters = [self.filters[foot] for foot in due]
-            friction.update(filters, [evidence for _, _, evidence in due.values()])
-        for foot, (time, peak, _) in due.items():
-            self._use(foot, time, peak)
+        self.filters[foot].update(evidence)
+        self._use(foot, time, window.peak)
 
     def _use(self, foot: int, time: float, peak_load: float) -> None:
         """Use the updated filter of a foot."""

@@ -192,13 +192,6 @@ class EstimationStage:
         self._silences: dict[int, Doubt] = {}  # doubts of feet that are silent
         self.used: npt.NDArray[np.int64] = np.zeros(len(legs), np.int64)
         self.samples = self.last_ns = 0
-        largest = [LARGEST_FORCE] * 3 + [LARGEST_MOMENT] + [LARGEST_POSITION] * 3
-        # Numbers that are not used are not checked.
-        self._checked = [*range(3), *([3] if tuning.moment_noise > 0.0 else []), *range(4, 7)]
-        self._largest = np.array(largest)[self._checked]
-        if tuning.source == 'joints':
-            self._checked += range(7, 11)
-            self._largest = np.append(self._largest, 4 * [1e300])
 
     def pressure(self, rows: np.ndarray) -> None:
         """Store gauge pressures of the pads, rows of PRESSURE; not NaN and beyond 1e7 Pa."""
@@ -232,10 +225,17 @@ class EstimationStage:
         last = max(each.time for each in self.estimator.tracks)
         if not stamps or stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
             return False
-        checked = values[:, :, self._checked]
-        if not (np.abs(checked) <= self._largest).all():
+        # Not a number is not within limits either.
+        forces, places = np.abs(values[:, :, :3]).max(), np.abs(values[:, :, 4:7]).max()
+        if not (forces <= LARGEST_FORCE and places <= LARGEST_POSITION):
             return False
-        return self.estimator.tuning.source != 'joints' or bool((checked[:, :, -2:] >= 0.0).all())
+        tuning = self.estimator.tuning
+        if tuning.moment_noise > 0.0 and (np.abs(values[:, :, 3]) > LARGEST_MOMENT).any():
+            return False
+        # A variance that is infinite, whatever the velocity, is for the check of single samples.
+        return tuning.source != 'joints' or bool(
+            np.isfinite(values[:, :, 7:]).all() and (values[:, :, 9:] >= 0.0).all()
+        )
 
     def _use(self, stamps: list[int], values: Array) -> None:
         """Use samples of all feet."""

@@ -359,7 +359,7 @@ class Track:
         noise, turning, known, before, tests, row = own, 0.0, False, self.time, [], first
         due += window.start - 1e-9
         while row < end:
-            fx, fy, fz, moment, x, y, z, vx, vy, *variances = samples[row]
+            fx, fy, fz, moment, x, y, z, vx, vy, xx, yy = samples[row]
             time = times[row]
             fx, fy, fz, dt = fx - ox, fy - oy, fz - oz, time - before
             if (fz < firm or z > top) and not taken:
@@ -372,7 +372,7 @@ class Track:
             sx += share * (to_x - sx)
             sy += share * (to_y - sy)
             if joints:
-                noise = math.hypot(own, math.sqrt(max(variances)))
+                noise = math.hypot(own, math.sqrt(max(xx, yy)))
                 vx, vy = vx + (to_x - sx) / smoothing, vy + (to_y - sy) / smoothing
             else:
                 vx, vy, place_x, place_y = (to_x - sx) / smoothing, (to_y - sy) / smoothing, sx, sy

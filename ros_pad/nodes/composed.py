@@ -291,7 +291,9 @@ class ComposedTrial:
         end_ns = round(self.scene.duration * 1e9) // simulator.period_ns * simulator.period_ns
 
         def step() -> bool:
-            if simulator.time_ns >= end_ns or simulator.robot.verdict or self.stopped:
+            # The first records are awaited: a bag without them would tell of no legs.
+            stopped = self.stopped and simulator.time_ns > 0
+            if simulator.time_ns >= end_ns or simulator.robot.verdict or stopped:
                 return False
             if progress:
                 progress(simulator.robot.time)

@@ -3,24 +3,32 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point
-from geometry_msgs.msg import Vector3
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker
-from visualization_msgs.msg import MarkerArray
 
+from ros_pad.bags.codec import message_type
+from ros_pad.bags.definitions import message_definition
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.simulation.robot import FootState
 from ros_pad.simulation.robot import SimulatedRobot
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
+
+ARRAY = message_type(
+    'visualization_msgs/msg/MarkerArray', message_definition('visualization_msgs/msg/MarkerArray')
+)
+"""Type of the messages. Classes of rclpy check each number, and take ten times as long."""
+
+_MARKER = ARRAY.blank('visualization_msgs/msg/Marker')
+Marker, Header, Time = type(_MARKER), type(_MARKER.header), type(_MARKER.header.stamp)
+Pose, Point, Vector3 = type(_MARKER.pose), type(_MARKER.pose.position), type(_MARKER.scale)
+Quaternion, ColorRGBA = type(_MARKER.pose.orientation), type(_MARKER.color)
 
 FORCE_SCALE = 0.01
 """Length of an arrow for one newton, m."""
@@ -61,8 +69,8 @@ class WalkMarkers:
     def __init__(self, scene: Scene, floor: Floor) -> None:
         self._scene = scene
         self._floor = floor
-        self._tiles: dict[tuple[int, int], Marker] = {}
-        self._path: list[Point] = []
+        self._tiles: dict[tuple[int, int], Any] = {}
+        self._path: list[Any] = []
         self._slow_ns: int | None = None
         outline: Sequence[tuple[float, float]] = ()
         if isinstance(scene.body, LeggedBody):
@@ -72,9 +80,7 @@ class WalkMarkers:
         self._outline = [(0.5 * x, 0.5 * y) for x, y in outline]
         list(self._ground(0.0, 0.0))  # in advance, because it would delay the walk
 
-    def message(
-        self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int
-    ) -> MarkerArray:
+    def message(self, robot: SimulatedRobot, pressures: Sequence[float], time_ns: int) -> Any:
         """Return the markers of this moment.
 
         Parameters
@@ -88,7 +94,7 @@ class WalkMarkers:
         """
         seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
-        array = MarkerArray()
+        array = ARRAY.blank()
         for leg, foot, pressure in zip(robot.legs, robot.feet, pressures, strict=True):
             array.markers.append(self._sole(leg, foot, pressure))
             array.markers.append(self._force(leg, foot))
@@ -104,9 +110,9 @@ class WalkMarkers:
             marker.header.stamp = stamp
         return array
 
-    def _sole(self, leg: int, foot: FootState, pressure: float) -> Marker:
+    def _sole(self, leg: int, foot: FootState, pressure: float) -> Any:
         x, y, z = foot.position
-        marker = _marker('soles', leg, Marker.CYLINDER)
+        marker = _marker('soles', leg, _MARKER.CYLINDER)
         height = 0.006 if pressure > DOME_PRESSURE else 0.002
         ground = self._floor.height(x, y) if foot.standing else z
         marker.pose.position = Point(x=x, y=y, z=ground + 0.5 * height)
@@ -115,12 +121,12 @@ class WalkMarkers:
         marker.color = _colour((_WET if foot.wet else _DRY) if foot.standing else _SWING)
         return marker
 
-    def _force(self, leg: int, foot: FootState) -> Marker:
-        marker = _marker('forces', leg, Marker.ARROW)
+    def _force(self, leg: int, foot: FootState) -> Any:
+        marker = _marker('forces', leg, _MARKER.ARROW)
         x, y, _ = foot.position
         fx, fy, fz = (FORCE_SCALE * each for each in foot.force)
         if not foot.standing or not math.hypot(fx, fy, fz) > 0.0:
-            marker.action = Marker.DELETE
+            marker.action = _MARKER.DELETE
             return marker
         z = self._floor.height(x, y)
         marker.points = [Point(x=x, y=y, z=z), Point(x=x + fx, y=y + fy, z=z + fz)]
@@ -128,7 +134,7 @@ class WalkMarkers:
         marker.color = _colour(_SLIPPING if foot.slip_speed > 0.005 else _BLACK)
         return marker
 
-    def _body(self, x: float, y: float, heading: float) -> Marker:
+    def _body(self, x: float, y: float, heading: float) -> Any:
         cosine, sine = math.cos(heading), math.sin(heading)
         corners = [
             Point(
@@ -141,16 +147,16 @@ class WalkMarkers:
         return self._line('body', corners, _BLACK, 0.008)
 
     def _line(
-        self, name: str, points: list[Point], colour: tuple[float, float, float], width: float
-    ) -> Marker:
-        marker = _marker(name, 0, Marker.LINE_STRIP)
+        self, name: str, points: list[Any], colour: tuple[float, float, float], width: float
+    ) -> Any:
+        marker = _marker(name, 0, _MARKER.LINE_STRIP)
         # RViz warns about a line of one point.
         marker.points = points if len(points) > 1 else points * 2
-        marker.scale = Vector3(x=width)
+        marker.scale = Vector3(x=width, y=0.0, z=0.0)
         marker.color = _colour(colour)
         return marker
 
-    def _ground(self, x: float, y: float) -> Iterator[Marker]:
+    def _ground(self, x: float, y: float) -> Iterator[Any]:
         """Yield the wet floor around the body, square by square."""
         for column in range(math.floor((x - _SIGHT) / TILE), math.floor((x + _SIGHT) / TILE) + 1):
             for row in range(
@@ -161,25 +167,27 @@ class WalkMarkers:
                 if self._tiles[column, row].points:
                     yield self._tiles[column, row]
 
-    def _tile(self, column: int, row: int) -> Marker:
+    def _tile(self, column: int, row: int) -> Any:
         number = column * 1000 + row  # unique over a kilometre of floor
-        marker = _marker('wet ground', number, Marker.TRIANGLE_LIST)
+        marker = _marker('wet ground', number, _MARKER.TRIANGLE_LIST)
         cell = TILE / _CELLS
         centres = (np.arange(_CELLS) + 0.5) * cell
         wet = self._floor.wet_along(*np.meshgrid(column * TILE + centres, row * TILE + centres))
         for left, right, bottom, top in _rectangles(wet):
             x0, x1 = column * TILE + left * cell, column * TILE + right * cell
             y0, y1 = row * TILE + bottom * cell, row * TILE + top * cell
-            a, b, c, d = (Point(x=x, y=y) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+            a, b, c, d = (
+                Point(x=x, y=y, z=0.0) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+            )
             marker.points += [a, b, c, a, c, d]
         marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
         marker.color = _colour(_WET, 0.5)
         return marker
 
 
-def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Marker:
+def marker_of_foot(leg: int, x: float, y: float, wetness: float) -> Any:
     """Return a foot at a place, m, in a colour from dry to wet by its P(wet); grey for NaN."""
-    marker = _marker('feet', leg, Marker.SPHERE)
+    marker = _marker('feet', leg, _MARKER.SPHERE)
     marker.pose.position = Point(x=x, y=y, z=0.01)
     marker.scale = Vector3(x=0.02, y=0.02, z=0.02)
     share = min(max(wetness, 0.0), 1.0)
@@ -205,13 +213,17 @@ def _rectangles(wet: np.ndarray) -> Iterator[tuple[int, int, int, int]]:
             growing.setdefault(run, row)
 
 
-def _marker(name: str, number: int, kind: int) -> Marker:
-    marker = Marker(ns=name, id=number, type=kind, action=Marker.ADD)
-    marker.header.frame_id = 'world'
-    marker.pose.orientation.w = 1.0
+def _marker(name: str, number: int, kind: int) -> Any:
+    marker = copy.copy(_MARKER)
+    marker.ns, marker.id, marker.type = name, number, kind
+    marker.header = Header(stamp=Time(sec=0, nanosec=0), frame_id='world')
+    marker.pose = Pose(
+        position=Point(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+    )
+    marker.points = []
     return marker
 
 
-def _colour(rgb: tuple[float, float, float], opacity: float = 1.0) -> ColorRGBA:
+def _colour(rgb: tuple[float, float, float], opacity: float = 1.0) -> Any:
     red, green, blue = rgb
     return ColorRGBA(r=red, g=green, b=blue, a=opacity)

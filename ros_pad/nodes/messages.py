@@ -63,10 +63,16 @@ class Messages:
         self._record_ns = 0
 
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
-        """Return a function that publishes whole messages."""
+        """Return a function that publishes whole messages, or their bytes."""
         publish, of_type = topic.publisher(self._node, leg).publish, topic.message_type
-        # rclpy leaves what was in memory between numbers; a trial has the same bytes each time.
-        return lambda message: publish(of_type.encode(of_type.decode(serialize_message(message))))
+
+        def send(message: Any) -> None:
+            if not isinstance(message, bytes):
+                # rclpy leaves what was in memory between numbers: a trial has the same bytes.
+                message = of_type.encode(of_type.decode(serialize_message(message)))
+            publish(message)
+
+        return send
 
     def sender(
         self,

@@ -33,6 +33,7 @@ from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.records import Block
 from ros_pad.regulators import BACKENDS
@@ -325,9 +326,10 @@ class RegulatorNode(LifecycleNode):
         if not self.messages.simulated or self.messages.follows_clock:
             self.supervision.command(block, now_ns, self._elapsed(now_ns))
             return
-        # The record may come before the message of /clock of its moment.
-        now_ns = max(now_ns, block.last_ns)
-        self.messages.advance(block.last_ns)
+        if abs(block.last_ns - now_ns) <= TICK_PERIOD_NS:
+            # The record may come before the message of /clock of its moment.
+            now_ns = max(now_ns, block.last_ns)
+            self.messages.advance(block.last_ns)
         self._supervise(now_ns)
         if self.channels:
             answer = self.supervision.read(block.last_ns, now_ns)

@@ -24,6 +24,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
+from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import SCENE
@@ -306,7 +307,8 @@ class SimulatorNode(Node):
             self._send_joints(*split(self._last_ns), *self.robot.joint_positions)
         if self._markers and self._markers_pace and self._markers_pace.due(self._last_ns):
             assert self._send_markers
-            self._send_markers(self._markers.message(self.robot, self.pressures, self._last_ns))
+            array = self._markers.message(self.robot, self.pressures, self._last_ns)
+            self._send_markers(ARRAY.encode(array))
         return count
 
     def _sense(self, stamp: tuple[int, int], later: list[tuple[Any, Any]]) -> np.ndarray:

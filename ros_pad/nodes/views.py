@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import String
-from visualization_msgs.msg import Marker
-from visualization_msgs.msg import MarkerArray
 
 from ros_pad.bags import topics as schemas
 from ros_pad.bags.topics import STAMP
@@ -26,6 +24,7 @@ from ros_pad.control.policies import DOME
 from ros_pad.control.policies import FLAT
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import topics
+from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import marker_of_foot
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -138,16 +137,16 @@ class ViewsNode(Node):
         self._places[known] = rows['position'][known]
         if not self._pace.due(block.last_ns):
             return
-        array = MarkerArray()
+        array = ARRAY.blank()
         for leg, place, wetness in zip(
             self._legs, self._places.tolist(), rows['wetness'].tolist(), strict=True
         ):
             if math.isfinite(sum(place)):
-                marker: Marker = marker_of_foot(leg, place[0], place[1], wetness)
+                marker = marker_of_foot(leg, place[0], place[1], wetness)
                 marker.header.frame_id = self._frame
                 set_stamp(marker.header.stamp, block.last_ns)
                 array.markers.append(marker)
-        self._send_markers(array)
+        self._send_markers(ARRAY.encode(array))
 
 
 def _doubt(row: Any) -> str | None:

@@ -70,6 +70,17 @@ class TrialLog:
         self._commands.append(command)
         self._pressures.append(pressure)
 
+    @property
+    def records(self) -> Records:
+        """All records until now."""
+        legs = len(self._scene.legs)
+        return Records(
+            Block.joined(SAMPLE, self._samples, legs),
+            Block.joined(ESTIMATE, self._estimates, legs),
+            Block.joined(COMMAND, self._commands, legs),
+            Block.joined(PRESSURE, self._pressures, legs),
+        )
+
     def finish(
         self,
         robot: SimulatedRobot,
@@ -78,13 +89,7 @@ class TrialLog:
         real_time_factor: float | None,
     ) -> Trial:
         """Return the trial with its series, settings and metrics."""
-        legs = len(self._scene.legs)
-        records = Records(
-            Block.joined(SAMPLE, self._samples, legs),
-            Block.joined(ESTIMATE, self._estimates, legs),
-            Block.joined(COMMAND, self._commands, legs),
-            Block.joined(PRESSURE, self._pressures, legs),
-        )
+        records = self.records
         found = series(records)
         rows = np.isin(records.sample.stamps, found['time'])
         found |= {name: found[name] * 1e-9 for name in ('time', 'slow_time')}

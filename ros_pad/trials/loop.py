@@ -91,6 +91,8 @@ class BodySensing:
     stage : SensingStage
     odom : tuple of float
         Estimated position x and y, m, and heading, rad, of the body; NaN before the first.
+    estimate : BodyEstimate or None
+        Estimate of the last sample, if there was one.
     """
 
     def __init__(self, scene: Scene, seed: int, robot: FullRobot) -> None:
@@ -106,17 +108,17 @@ class BodySensing:
             lambda error: None,  # the stage reports repeated rejections as a doubt
             values['forces'],
         )
-        self._rows: np.ndarray | None = None
+        self.estimate: BodyEstimate | None = None
         self.odom = (math.nan, math.nan, math.nan)
 
     def _take(self, stamp_ns: int, estimate: BodyEstimate) -> None:
-        self._rows = sample_of(estimate)
+        self.estimate = estimate
         x, y, _ = estimate.position.tolist()
         self.odom = x, y, heading(*estimate.orientation.tolist())
 
     def sample(self, stamp_ns: int) -> np.ndarray | None:
         """Measure and estimate; return rows of a sample, or None if there is no estimate."""
-        self._rows = None
+        self.estimate = None
         reading = self._sensors.read(self._robot.proprioception(), self._robot.time)
         for index, force in enumerate(reading.rows['force']):
             self.stage.force(index, stamp_ns, force)
@@ -125,7 +127,7 @@ class BodySensing:
             self.stage.imu(stamp_ns, *reading.imu)
         if math.isfinite(reading.joints[0, 0]):
             self.stage.joints(stamp_ns, *reading.joints)
-        return self._rows
+        return sample_of(self.estimate) if self.estimate else None
 
 
 class ClosedLoop:

@@ -236,20 +236,7 @@ def replay(
     inputs = read(bag, wanted, settings, part(progress, 0.0, 0.2))
     player = Player(settings, inputs)
     made = player.play(part(progress, 0.2, 0.9))
-    # What was lost may have changed all legs: they share what feet learn, and one controller.
-    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
-    comparisons = [
-        found
-        for kind, each in made.items()
-        if kind in inputs.topics
-        for found in compare(
-            inputs.topics[kind],
-            inputs.streams[kind],
-            each,
-            bag.start,
-            -math.inf if inputs.lacks else gap_ns,
-        )
-    ]
+    comparisons = _compared(bag, inputs, made)
     # The body estimator is replayed beside the feet, which take what it published.
     of_body, note = compare_body(bag, wanted)
     tracks = [
@@ -272,17 +259,27 @@ def replay(
         comparisons=comparisons + of_body,
         outcomes=[_outcome(inputs, settings, leg, *tracks) for leg in inputs.legs],
         notes=[
-            text
-            for text in (
-                *settings.assumed,
-                bag.problem,
-                *_notes(bag, inputs, player.refused, comparisons),
-                inputs.late,
-                note,
-            )
-            if text
+            *settings.assumed,
+            *_notes(bag, inputs, player.refused, comparisons),
+            *([note] if note else []),
         ],
     )
+
+
+def _compared(bag: BagReader, inputs: Inputs, made: Mapping[str, Stream]) -> list[Comparison]:
+    """Compare what was recorded as records with what was made again."""
+    # What was lost may have changed all legs: they share what feet learn, and one controller.
+    gap_ns = min((gap.time_ns for gap in inputs.gaps), default=math.inf)
+    if inputs.lacks:
+        gap_ns = -math.inf
+    there = [kind for kind in made if kind in inputs.topics]
+    return [
+        found
+        for kind in there
+        for found in compare(
+            inputs.topics[kind], inputs.streams[kind], made[kind], bag.start, gap_ns
+        )
+    ]
 
 
 def _notes(
@@ -292,6 +289,8 @@ def _notes(
     comparisons: Sequence[Comparison],
 ) -> Iterator[str]:
     """Yield notes on a replay, one sentence each."""
+    if bag.problem:
+        yield bag.problem
     for time_ns, node, name, value in json.loads(bag.custom_data.get(CHANGES, '[]')):
         yield (
             f'{(time_ns - bag.start) * 1e-9:.2f} s: parameter {name} of {node} became {value!r};'
@@ -312,6 +311,8 @@ def _notes(
             'the quantities that differ have no equal record: the nodes had other settings, or the'
             ' bag begins in the middle of a walk'
         )
+    if inputs.late:
+        yield inputs.late
 
 
 def _outcome(

@@ -14,7 +14,6 @@ from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
 from ros_pad.joining import Joiner
 from ros_pad.pace import Progress
-from ros_pad.records import COMMAND
 from ros_pad.records import KINDS
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE
@@ -27,6 +26,8 @@ from ros_pad.trials.recorded import read_records
 
 LONGER = 1.6
 """A time between two messages that is longer than their median time by this factor is a gap."""
+
+_NEVER = np.iinfo(np.int64).max
 
 
 class Gap(NamedTuple):
@@ -105,9 +106,7 @@ def read(
     legs = (*(leg for leg in settings.legs if leg in there), *sorted(there - {*settings.legs}))
     places = [known.index(leg) for leg in legs]
     streams = {
-        kind.name: Stream(kind, legs, times[kind.name], Block(stamps, rows[:, places])).where(
-            np.argsort(times[kind.name], kind='stable')
-        )
+        kind.name: Stream(kind, legs, times[kind.name], Block(stamps, rows[:, places]))
         for kind, (stamps, rows) in zip(KINDS, records, strict=True)
     }
     joints = settings.tuning.source == 'joints'
@@ -116,6 +115,7 @@ def read(
     if SAMPLE.name not in topics:
         streams[SAMPLE.name] = _joined(streams[SAMPLE.name], needed)
     late = _leave_out(streams)
+    gaps = [gap for gap in gaps if gap.time_ns >= streams[SAMPLE.name].times[0]]
     lacks = _lacks(streams, legs, sorted({*known, *settings.legs} - there), joints)
     return Inputs(legs, streams, topics, gaps, lacks, late)
 
@@ -123,14 +123,17 @@ def read(
 def _leave_out(streams: dict[str, Stream]) -> str:
     """Leave out what no replay can have; return a note on samples among it."""
     samples, estimates, commands = (streams[n] for n in ('sample', 'estimate', 'command'))
-    # Commands between estimates have no set-points, and stamps of the controller's own clock.
-    answers = np.isin(commands.block.stamps, estimates.block.stamps)
-    answers |= np.isfinite(commands.block.rows['setpoint']).any(axis=1)
-    streams[COMMAND.name] = commands.where(answers)
+    for each in (estimates, commands):
+        # Between samples, nodes tell of silent feet, with stamps that no replay has.
+        stamps, wide = each.block.stamps, _wide(samples.block.stamps)
+        there = np.isin(np.searchsorted(samples.block.stamps, stamps) - 1, wide)
+        there |= np.isin(stamps, samples.block.stamps)
+        streams[each.kind.name] = each.where(there)
     # An estimator makes its first estimate of its first sample.
-    first = estimates.block.stamps[0] if len(estimates.times) else 0
-    kept = samples.block.stamps >= first
-    if kept.all() or not kept.any():
+    stamps, rows = estimates.block
+    begun = np.isin(stamps, samples.block.stamps) | np.isfinite(rows['load']).any(axis=1)
+    kept = samples.block.stamps >= stamps[begun].min(initial=_NEVER)
+    if kept.all() or not kept.any():  # none, where there are no estimates
         return ''
     streams[SAMPLE.name] = samples.where(kept)
     return (
@@ -141,7 +144,7 @@ def _leave_out(streams: dict[str, Stream]) -> str:
 
 def _joined(pieces: Stream, needed: tuple[str, ...]) -> Stream:
     """Return records of all legs, with the log time of the last piece of each."""
-    kind, legs, times, (stamps, rows) = pieces
+    kind, legs, times, (stamps, rows) = pieces.where(np.argsort(pieces.times, kind='stable'))
     joiner, found, time_ns = Joiner(kind, legs, needed), [], 0
     numbers = rows.view('f8').reshape(*rows.shape, -1)
     columns = zip(times.tolist(), stamps.tolist(), numbers, strict=True)
@@ -169,11 +172,15 @@ def _gaps(
             own = ~np.isnan(stream.values(name)).all(axis=2)
             sources |= {f'{name} of leg {leg}': own[:, i] for i, leg in enumerate(stream.legs)}
     for what, there in sources.items():
-        steps = np.diff(stream.block.stamps[there])
-        usual = max(np.median(steps), 0.0) if len(steps) else 0.0
-        wide = np.flatnonzero(steps > LONGER * usual)
+        wide = _wide(stream.block.stamps[there])
         if len(wide):
             yield Gap(int(stream.times[there][wide[0]]), what, len(wide))
+
+
+def _wide(stamps: np.ndarray) -> np.ndarray:
+    """Return the places of the records after which there is a gap."""
+    steps = np.diff(stamps)
+    return np.flatnonzero(steps > LONGER * max(np.median(steps), 0.0)) if len(steps) else steps
 
 
 def _lacks(

@@ -30,8 +30,7 @@ class Player:
     """Pass the inputs of a robot to the stages of estimation and decision, once.
 
     Nodes process the samples up to a moment together, and then receive the pressures of this
-    moment. Both stages look for missing inputs before that; where there are no samples at all,
-    they do not, because differences after such a gap are excused.
+    moment. Both stages look for missing inputs before that.
 
     Parameters
     ----------
@@ -91,8 +90,7 @@ class Player:
 
     def _sample(self, time_ns: int, block: Block) -> None:
         """Process samples; the log time of the last one is in ns."""
-        if self._pace.due(block.last_ns):
-            self.stages.tick(block.last_ns)
+        self._tick(block.last_ns)
         for estimate, command in self.stages.process(block):
             self._made[ESTIMATE].append((time_ns, estimate))
             self._made[COMMAND].append((time_ns, command))
@@ -101,10 +99,15 @@ class Player:
     def _press(self, pressures: Block, start: int, end: int) -> None:
         """Process pressure records."""
         for stamp_ns, rows in zip(*(each[start:end] for each in pressures), strict=True):
+            self._tick(int(stamp_ns))
             self.stages.estimation.pressure(rows)
             own = rows.copy()
             own['pressure'][self._apart] = math.nan
             self.stages.decision.pressure(Block.of(int(stamp_ns), own))
+
+    def _tick(self, now_ns: int) -> None:
+        if self._pace.due(now_ns):
+            self.stages.tick(now_ns)
 
     def _follow(self, command: Block) -> None:
         """Let the pressure be the set-point while the set-point differs from the recorded one.
@@ -134,7 +137,7 @@ def _blocks(samples: np.ndarray, pressures: np.ndarray) -> Iterator[tuple[int, i
     """
     if not len(samples):
         return
-    # Where the computer's clock was set back, the order of the records still is that of the file.
+    # Records are in the order of their stamps, even if their log times are not.
     samples, pressures = np.maximum.accumulate(samples), np.maximum.accumulate(pressures)
     before = np.searchsorted(pressures, samples, side='left')
     ticks = (samples - samples[np.searchsorted(before, before)]) // TICK_PERIOD_NS

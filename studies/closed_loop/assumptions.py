@@ -33,9 +33,9 @@ from ros_pad.control import adaptive
 from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.footprints import Footprints
-from ros_pad.estimation import FeetEstimator
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
 from ros_pad.simulation import Scene
@@ -281,16 +281,10 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         position_noise=configured.sensors.position,
         force_noise=configured.sensors.force,
     )
-    feet = FeetEstimator(len(configured.legs), configured.foot, load, tuning)
-    first = GroundFilter(
-        feet.grounds.shared,
-        wet_prior=tuning.wet_prior,
-        patch_length=tuning.patch_length,
-        rim_speed=tuning.rim_speed(configured.foot),
-        **setup.ground,
-    )
-    others = [GroundFilter(first.shared, model=first.model) for _ in feet.tracks[1:]]
-    feet.grounds.filters[:] = [first, *others]
+    period_ns = round(setup.control_period * 1e9)
+    estimation = EstimationStage(configured.foot, load, tuning, configured.legs, period_ns)
+    # All feet have one model of the ground.
+    estimation.estimator.grounds.filters[0].model.temper = setup.ground['temper']
     choose = policy_named(policy, loop.floor.wet)
     if policy == 'adaptive':
         choose = adaptive(**setup.adaptive)
@@ -304,7 +298,8 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
         **setup.controller,
     )
     controller.footprints = Footprints(**setup.footprints)
-    loop.connect(feet, controller, round(setup.control_period * 1e9))
+    loop.connect(controller, period_ns=period_ns)
+    loop.pipeline = loop.pipeline._replace(estimation=estimation)
     loops.walk(loop, world)
     return loop.robot.body[0] / world.cycles, loop.robot.verdict
 

@@ -19,11 +19,14 @@ import numpy as np
 
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.control import POLICIES
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.sensing import BodyEstimate
 from ros_pad.simulation import Scene
-from ros_pad.simulation.robot import SimulatedRobot
+from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.series import held
 from ros_pad.trials.trial import heading
 from studies import command
 from studies.closed_loop import loops
@@ -94,6 +97,7 @@ class _Truth:
 
     def __init__(self, robot: Any) -> None:
         self._robot = robot
+        self._geoms = [robot.model.geom(f'foot_{leg}').id for leg in robot.legs]
         self._places: list[np.ndarray] = []
         self._ages = np.zeros(len(robot.legs), dtype=int)
         self.body: list[tuple[float, float]] = []
@@ -104,9 +108,8 @@ class _Truth:
         """Add the errors of a sample; call it for each."""
         robot = self._robot
         # The contact is ahead of the marker by the shear of the pads.
-        self._places = [*self._places[-WINDOW:], robot._places[:, :2].copy()]
-        loaded = np.array([foot.force[2] > gate for foot in robot.feet])
-        self._ages = np.where(loaded, self._ages + 1, 0)
+        self._places = [*self._places[-WINDOW:], robot.data.geom_xpos[self._geoms, :2]]
+        self._ages = np.where(robot.contacts[:, 2] > gate, self._ages + 1, 0)
         if estimate is None or robot.time < BEGINS:
             return
         self.doubts.append(bool(estimate.doubt))
@@ -129,31 +132,31 @@ def walked(name: str, cycles: int, seed: int, policy: str, sensing: str) -> Walk
     """Walk a shipped scene on full dynamics for a number of gait cycles."""
     scene = replace(Scene.load(name), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2', sensing=sensing)
-    robot: SimulatedRobot = loop.robot
+    robot, log = loop.robot, TrialLog(scene, policy, seed, 'L2', sensing)
     truth, gate = _Truth(robot), GATE * scene.expected_load
     rows = []
-    for _ in loops.samples(loop, scene):
-        rows.append([
-            (foot.force[2], foot.slip_speed, foot.wet, each.estimate.slipping,
-             each.estimate.wet_probability, pressure < DOME_PRESSURE)
-            for foot, each, pressure in zip(
-                robot.feet, loop.estimators, loop.pressures, strict=True
-            )
-        ])  # fmt: skip
+    for _ in loops.samples(loop, scene, log):
+        rows.append([(foot.force[2], foot.slip_speed, foot.wet) for foot in robot.feet])
         if loop.body:
             truth.compare(loop.body.estimate, gate)
-    load, speed, wet, alarm, probability, flat = np.moveaxis(np.array(rows, dtype=float), 2, 0)
-    period = loop.period_ns * 1e-9
+    load, speed, wet = np.moveaxis(np.array(rows, dtype=float), 2, 0)
+    stamps = loop.period_ns * np.arange(1, len(rows) + 1)
+    estimate = loops.estimated(
+        EstimationStage(
+            scene.foot, scene.expected_load, tuning_for(scene, sensing), scene.legs, loop.period_ns
+        ),
+        log.records,
+    )
     return Walk(
-        period,
+        loop.period_ns * 1e-9,
         scene.expected_load,
-        period * np.arange(1, len(rows) + 1),
+        1e-9 * stamps,
         load,
         speed,
-        alarm > 0.5,
+        held(estimate.stamps, estimate.rows['slipping'], stamps) == 1.0,
         wet > 0.5,
-        flat > 0.5,
-        probability,
+        loops.pressures(log.records, stamps) < DOME_PRESSURE,
+        held(estimate.stamps, estimate.rows['wetness'], stamps),
         np.array(truth.body).reshape(-1, 2),
         np.array(truth.feet).reshape(-1, 2),
         float(np.mean(truth.doubts)) if truth.doubts else 0.0,

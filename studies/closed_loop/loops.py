@@ -6,9 +6,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
+from ros_pad.estimation.stage import EstimationStage
+from ros_pad.records import ESTIMATE
+from ros_pad.records import Block
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.series import Records
+from ros_pad.trials.series import held
 
 
 class NoLog(TrialLog):
@@ -17,8 +24,8 @@ class NoLog(TrialLog):
     def __init__(self) -> None:
         pass
 
-    def sample(self, *_: Any) -> None:
-        """Ignore a sample."""
+    def samples(self, *_: Any) -> None:
+        """Ignore samples."""
 
     def control(self, *_: Any) -> None:
         """Ignore a control step."""
@@ -36,6 +43,7 @@ def samples(loop: ClosedLoop, scene: Scene, log: TrialLog | None = None) -> Iter
             yield
             if loop.robot.verdict:
                 break
+        loop.finish(log)
     finally:
         loop.close()
 
@@ -44,3 +52,24 @@ def walk(loop: ClosedLoop, scene: Scene, log: TrialLog | None = None) -> None:
     """Walk a scene until it ends or a verdict ends it early."""
     for _ in samples(loop, scene, log):
         pass
+
+
+def estimated(stage: EstimationStage, records: Records) -> Block:
+    """Return what a stage estimates from the samples and pressures of a walk."""
+    sample, pressure = records.sample, records.pressure
+    cuts = np.searchsorted(sample.stamps, pressure.stamps, side='right').tolist()
+    estimates: list[Block] = []
+    for first, end, rows in zip(
+        [0, *cuts], [*cuts, len(sample.stamps)], [*pressure.rows, None], strict=True
+    ):
+        if end > first:
+            estimates += stage.process(Block(sample.stamps[first:end], sample.rows[first:end]))
+        if rows is not None:
+            stage.pressure(rows)
+    return Block.joined(ESTIMATE, estimates, sample.rows.shape[1])
+
+
+def pressures(records: Records, stamps: np.ndarray) -> np.ndarray:
+    """Return the pressures, Pa gauge, that were reported last before each time, ns; at first 0."""
+    found = held(records.pressure.stamps + 1, records.pressure.rows['pressure'], stamps)
+    return np.nan_to_num(found)

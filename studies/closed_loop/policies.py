@@ -36,11 +36,9 @@ from ros_pad.control import first_morphologies
 from ros_pad.control import policy_named
 from ros_pad.control.policies import IsWet
 from ros_pad.control.policies import Policy
-from ros_pad.estimation import FeetEstimator
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.node_settings import tuning_for
 from studies import command
 from studies.closed_loop import loops
 from studies.closed_loop import quick_walk
@@ -172,17 +170,15 @@ def walk(job: Job) -> tuple[float, int, str | None]:
 def _walk(scene: Scene, known: Foot | None, policy: Policy, first: str, seed: int) -> ClosedLoop:
     """Return a loop that has walked; ``first`` names the policy by which feet begin."""
     loop = ClosedLoop(scene, first, seed, LEVEL)
-    load, foot = scene.expected_load, known or scene.foot
-    feet = FeetEstimator(len(scene.legs), foot, load, tuning_for(scene))
     controller = MorphologyController(
-        foot,
+        known or scene.foot,
         scene.legs,
         policy,
-        load,
+        scene.expected_load,
         start=first_morphologies(first, scene.legs),
         fixed_pressure=scene.dome_pressure,
     )
-    loop.connect(feet, controller)
+    loop.connect(controller, known)
     loops.walk(loop, scene)
     return loop
 

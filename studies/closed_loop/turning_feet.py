@@ -18,8 +18,11 @@ import mujoco
 import numpy as np
 
 from ros_pad.estimation import Tuning
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation import Scene
+from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
 from studies import command
 from studies.closed_loop import loops
 from studies.samples import auc
@@ -53,7 +56,7 @@ class Walk:
     load, speed, rate : ndarray
         True normal force, N, slip speed, m/s, and angular rate of the shank, rad/s.
     alarm : ndarray of bool
-        Alarm of FootEstimator, from noisy readings.
+        Slip alarm, from noisy readings.
     sticks_only : bool
         As for the recordings of ``work_precision.estimator``; always False here.
     """
@@ -78,20 +81,21 @@ def walked(cycles: int, seed: int) -> Walk:
     scene = replace(Scene.load(SCENE), cycles=cycles)
     loop = ClosedLoop(scene, 'adaptive', seed, 'L2')
     robot: Any = loop.robot
+    log = TrialLog(scene, 'adaptive', seed, 'L2')
     feet = [robot.model.geom(f'foot_{leg}').id for leg in scene.legs]
-    rows: list[list[tuple[float, float, float, bool]]] = []
+    rows: list[list[tuple[float, float, float]]] = []
     velocity, kind = np.zeros(6), mujoco.mjtObj.mjOBJ_GEOM
-    for _ in loops.samples(loop, scene):
+    for _ in loops.samples(loop, scene, log):
         row = []
-        for foot, geom, estimator in zip(robot.feet, feet, loop.estimators, strict=True):
+        for foot, geom in zip(robot.feet, feet, strict=True):
             mujoco.mj_objectVelocity(robot.model, robot.data, kind, geom, velocity, 0)
-            rate = float(np.linalg.norm(velocity[:3]))
-            row.append((foot.force[2], foot.slip_speed, rate, estimator.estimate.slipping))
+            row.append((foot.force[2], foot.slip_speed, float(np.linalg.norm(velocity[:3]))))
         rows.append(row)
-    load, speed, rate, alarm = np.moveaxis(np.array(rows, dtype=float), 2, 0)
-    period = loop.period_ns * 1e-9
-    stamps = period * np.arange(1, len(rows) + 1)
-    return Walk(period, scene.expected_load, stamps, load, speed, rate, alarm > 0.5)
+    truth, expected = np.moveaxis(np.array(rows), 2, 0), scene.expected_load
+    stage = EstimationStage(scene.foot, expected, tuning_for(scene), scene.legs, loop.period_ns)
+    estimate = loops.estimated(stage, log.records)
+    alarm = estimate.rows['slipping'] == 1.0
+    return Walk(loop.period_ns * 1e-9, expected, 1e-9 * estimate.stamps, *truth, alarm)
 
 
 def own_robot(walks: Sequence[Walk], cycle: float) -> dict[str, Any]:

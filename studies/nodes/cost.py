@@ -1,22 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time of nodes in real time, of a trial on nodes, of reading a bag, of the loop.
+"""Time that trials and nodes take, and size of their bags, beside another checkout of ros_pad.
 
-Another checkout of ros_pad with its own .venv, given by --against, is measured in turn with this
-one. The ratios are those of the medians; processor times are those of all threads and children.
+The other checkout, with its own .venv, is given by --against, and measured in turn with this one.
+Processor times are those of all threads and processes.
 
-- live: five processes, six legs, and a floor: a bare publisher and one bare subscriber
-- awake: the same while work of lowest priority keeps the cores awake, as other programs of a robot
-  do; a core that sleeps between two messages finds its caches cold, and takes longer
-- trial: pad run hexapod_patches on nodes, from start to report
-- reading: the trial in a recorded bag, decoded to arrays
-- loop: the closed loop without ROS on L2, per sample
+- loop: a third of the walk without ROS, from start to report
+- trial: the walk on nodes in one process, with bag and report, from start to report
+- reading: the bag of that walk, each checkout its own, decoded to the arrays of a report
+- live: five nodes in processes of their own, in real time, with six legs
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import dataclasses
 import os
 import pathlib
 import resource
@@ -26,17 +22,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from collections.abc import Iterator
 from collections.abc import Sequence
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from ros_pad.commands.run import alone
 from ros_pad.errors import PadError
-from ros_pad.nodes import composed
-from ros_pad.simulation.scene import Scene
 from studies import command
 from studies.drawing import BLUE
 from studies.drawing import GREEN
@@ -47,86 +38,40 @@ from studies.drawing import STYLE
 from studies.machine import memory
 from studies.machine import processor_time
 
-UNITS = {
-    'live': 'processor time of all processes per second of wall time (s/s)',
-    'awake': 'the same while the cores stay awake (s/s)',
-    'trial': 'processor time of one run of the command (s)',
-    'reading': 'processor time of reading one bag (s)',
-    'loop': 'processor time of one sample (s)',
+NODES = {
+    **{'estimator': SKY, 'controller': GREEN, 'regulator': ORANGE, 'recorder': BLUE},
+    'simulator': PURPLE,
 }
-"""What each part measures."""
+"""Nodes that run live, with the colour of each."""
+
+PARTS = ('loop', 'trial', 'reading', 'live')
+WALL, PROCESSOR = 'wall time (s)', 'processor time (s)'
+SIZE, A_SAMPLE = 'size of the bag (MB)', 'processor time a sample (ms)'
+RATE, MEMORY = 'samples a second', 'memory (MB)'
 
 Result = dict[str, dict[str, dict[str, float]]]
 """Medians by part, checkout and quantity."""
 
-OTHERS = ('rate', 'memory', 'wall')
-"""Quantities that are no processor time: Hz, MB and s."""
-
-_COLOURS = {
-    **{'recorder': BLUE, 'regulator': ORANGE, 'estimator': SKY, 'controller': GREEN},
-    **{'simulator': PURPLE, 'publish': '0.7', 'subscribe': '0.8'},
-}
-
-NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')
 WARM_UP = 8.0  # s, until all nodes have found one another
 _HERE = pathlib.Path(__file__).resolve().parents[2]
 
-# These run in either checkout; the second name of the module is that of earlier versions.
+# These run in either checkout.
 _READING = """
 import sys, time
-try:
-    from ros_pad.trials.recorded import load
-except ImportError:
-    from ros_pad.trials.bag import load
-started = time.process_time()
+from ros_pad.trials.recorded import load
+wall, processor = time.perf_counter(), time.process_time()
 load(sys.argv[1])
-print(time.process_time() - started)
-"""
-_LOOP = """
-import dataclasses, sys, time
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials import run
-scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=int(sys.argv[1]))
-run(dataclasses.replace(scene, cycles=1), fidelity='L2')
-started = time.process_time()
-trial = run(scene, fidelity='L2')
-print((time.process_time() - started) / len(trial.time))
+print(time.perf_counter() - wall, time.process_time() - processor)
 """
 _RATE = """
 import sys
 from ros_pad.bags import BagReader
-times = [time for _, _, time in BagReader(sys.argv[1]).messages(['/leg_1/wrench'])]
-last = [time for time in times if time > times[-1] - 8e9]
+bag = BagReader(sys.argv[1])
+topic = next(each for each in ('/feet/sample', '/leg_1/wrench') if each in bag.topics)
+times = [time for _, _, time in bag.messages([topic])]
+last = [time for time in times if time > times[-1] - 1e9 * float(sys.argv[2])]
 print((len(last) - 1) / (last[-1] - last[0]) * 1e9)
 """
-
-
-_AWAKE = """
-import os
-os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-while True:
-    pass
-"""
-
-
-@contextlib.contextmanager
-def _awake() -> Iterator[None]:
-    """Keep all cores awake."""
-    loops = [subprocess.Popen([sys.executable, '-c', _AWAKE]) for _ in range(os.cpu_count() or 1)]
-    try:
-        yield
-    finally:
-        for each in loops:
-            each.kill()
-            each.wait()
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment of the processes: a domain of their own, on this computer."""
-    return os.environ | {
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-    }
 
 
 def _python(checkout: pathlib.Path) -> str:
@@ -138,21 +83,44 @@ def _python(checkout: pathlib.Path) -> str:
     return os.fspath(python)
 
 
-def _printed(checkout: pathlib.Path, code: str, *words: object) -> float:
-    """Run code in a checkout, and return the number that it prints."""
+def _environment(checkout: pathlib.Path) -> dict[str, str]:
+    """Return the environment of the processes: a domain of their own, on this computer."""
+    return os.environ | {
+        'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'PYTHONPATH': os.pathsep.join(filter(None, (f'{checkout}', os.getenv('PYTHONPATH')))),
+    }
+
+
+def _printed(checkout: pathlib.Path, *words: object) -> str:
+    """Run Python in a checkout, and return what it prints."""
     result = subprocess.run(
-        [_python(checkout), '-c', code, *map(str, words)],
-        cwd=checkout, env=_environment(), capture_output=True, text=True, check=False,
+        [_python(checkout), *map(str, words)],
+        cwd=checkout, env=_environment(checkout), capture_output=True, text=True, check=False,
     )  # fmt: skip
     if result.returncode:
         raise PadError(f'{checkout}: {result.stderr}')
-    return float(result.stdout.split()[-1])
+    return result.stdout
 
 
-def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -> dict[str, float]:
+def _walk(checkout: pathlib.Path, out: pathlib.Path, *words: object) -> dict[str, float]:
+    """Return wall and processor time of ``pad run`` without comparison, from start to report."""
+    before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    walk = ('run', 'hexapod_patches', '--no-compare', '--out', out)
+    _printed(checkout, '-m', 'ros_pad', *walk, *words)
+    wall, after = time.monotonic() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {WALL: wall, PROCESSOR: used}
+
+
+def _shares(
+    commands: dict[str, list[str]], checkout: pathlib.Path, seconds: float
+) -> dict[str, float]:
     """Run processes; return the processor time of each, s/s, and the memory of all, MB."""
     processes = {
-        name: subprocess.Popen(words, cwd=cwd, env=_environment(), stderr=subprocess.DEVNULL)
+        name: subprocess.Popen(
+            words, cwd=checkout, env=_environment(checkout), stderr=subprocess.DEVNULL
+        )
         for name, words in commands.items()
     }
     try:
@@ -165,7 +133,7 @@ def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -
             name: (processor_time(each.pid) - before[name]) / passed
             for name, each in processes.items()
         }
-        return shares | {'memory': sum(memory(each.pid) for each in processes.values())}
+        return shares | {MEMORY: sum(memory(each.pid) for each in processes.values())}
     finally:
         for each in processes.values():
             each.send_signal(signal.SIGINT)
@@ -176,142 +144,99 @@ def _shares(commands: dict[str, list[str]], cwd: pathlib.Path, seconds: float) -
                 each.kill()
 
 
-def live(checkout: pathlib.Path, seconds: float, rate: float) -> dict[str, float]:
-    """Return the processor time a second of each node, memory, MB, and the reached rate, Hz."""
-    with tempfile.TemporaryDirectory() as folder:
-        bag = f'{folder}/bag'
-        own = {'recorder': ('-p', f'folder:={bag}'), 'simulator': ('-p', f'rate:={rate}')}
-        commands = {
-            node: [
-                *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
-                *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
-                *own.get(node, ()),
-            ]
-            for node in NODES
-        }
-        shares = _shares(commands, checkout, seconds)
-        return shares | {'rate': _printed(_HERE, _RATE, bag)}
-
-
-def floor(seconds: float) -> dict[str, float]:
-    """Return the processor time a second of the bare publisher and the bare subscriber."""
-    module = 'studies.nodes.floor'
-    commands = {role: [sys.executable, '-m', module, role] for role in ('publish', 'subscribe')}
-    return _shares(commands, _HERE, seconds)
-
-
-def trial(checkout: pathlib.Path, cycles: int) -> dict[str, float]:
-    """Return wall and processor time of ``pad run`` with report and comparison, s."""
-    with tempfile.TemporaryDirectory() as folder:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        started = time.monotonic()
-        subprocess.run(
-            [
-                *(_python(checkout), '-m', 'ros_pad', 'run', 'hexapod_patches'),
-                *('--cycles', str(cycles), '--out', f'{folder}/run'),
-            ],
-            cwd=checkout, env=_environment(), check=True, capture_output=True,
-        )  # fmt: skip
-        wall = time.monotonic() - started
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {'wall': wall, 'processor': used}
-
-
-def _record(bag: str, cycles: int) -> None:
-    """Record a walk of this checkout on nodes."""
-    scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
-    with alone():
-        composed.run(scene, bag=bag)
-
-
-def _used(checkout: pathlib.Path, code: str, *words: object) -> dict[str, float]:
-    return {'processor': _printed(checkout, code, *words)}
-
-
-def _measures(
-    options: argparse.Namespace, bag: str
-) -> dict[str, Callable[[pathlib.Path], dict[str, float]]]:
-    """Return a function for each part, which measures it in a checkout."""
-    return {
-        'live': lambda checkout: live(checkout, options.seconds, options.rate),
-        'awake': lambda checkout: live(checkout, options.seconds, options.rate),
-        'trial': lambda checkout: trial(checkout, options.cycles),
-        'reading': lambda checkout: _used(checkout, _READING, bag),
-        'loop': lambda checkout: _used(checkout, _LOOP, options.cycles),
+def _live(
+    checkout: pathlib.Path, bag: pathlib.Path, seconds: float, rate: float
+) -> dict[str, float]:
+    """Return the processor time a sample, ms, of all nodes and of each, memory, and the rate."""
+    own = {'recorder': f'folder:={bag}', 'simulator': f'rate:={rate}'}
+    commands = {
+        node: [
+            *(_python(checkout), '-m', f'ros_pad.nodes.{node}', '--ros-args'),
+            *('--params-file', os.fspath(checkout / 'config' / 'params.yaml')),
+            *(('-p', own[node]) if node in own else ()),
+        ]
+        for node in NODES
     }
+    shares = _shares(commands, checkout, seconds)
+    reached = float(_printed(_HERE, '-c', _RATE, bag, seconds))
+    each = {node: 1e3 * shares[node] / reached for node in NODES}
+    return {A_SAMPLE: sum(each.values()), **each, RATE: reached, MEMORY: shares[MEMORY]}
 
 
-def _medians(rows: Sequence[dict[str, float]]) -> dict[str, float]:
-    return {name: statistics.median(row[name] for row in rows) for name in rows[0]}
+def _measured(
+    part: str, checkout: pathlib.Path, folder: pathlib.Path, options: argparse.Namespace
+) -> dict[str, float]:
+    """Return the quantities of a part; ``folder`` is an empty one that a checkout keeps."""
+    if part == 'live':
+        with tempfile.TemporaryDirectory(dir=folder) as own:
+            return _live(checkout, pathlib.Path(own) / 'bag', options.seconds, options.rate)
+    if part == 'reading':
+        bag = folder / 'walk' / 'bag'
+        if not bag.exists():
+            _walk(checkout, bag.parent, '--cycles', options.cycles)
+        times = map(float, _printed(checkout, '-c', _READING, bag).split())
+        size = sum(each.stat().st_size for each in bag.iterdir())
+        return dict(zip((WALL, PROCESSOR), times, strict=True)) | {SIZE: 1e-6 * size}
+    short = part == 'loop'
+    words = ['--cycles', max(1, options.cycles // 3) if short else options.cycles]
+    with tempfile.TemporaryDirectory(dir=folder) as own:
+        return _walk(checkout, pathlib.Path(own) / 'out', *words, *['--no-ros'] * short)
 
 
-def _measured(options: argparse.Namespace, bag: str) -> Result:
-    """Measure all parts in turn; return medians by part and checkout."""
+def measure(options: argparse.Namespace, folder: pathlib.Path) -> Result:
+    """Measure all parts in turn; return medians."""
     checkouts = {'now': _HERE}
     if options.against:
         checkouts = {'before': options.against.resolve(), **checkouts}
-    if 'reading' in options.parts:
-        _record(bag, options.cycles)
-    measures = _measures(options, bag)
     rows: dict[str, dict[str, list[dict[str, float]]]] = {}
     for part in command.each(options.parts * options.repeats, 'nodes', 'part'):
-        of_part = rows.setdefault(part, {})
-        with _awake() if part == 'awake' else contextlib.nullcontext():
-            for name, checkout in checkouts.items():
-                of_part.setdefault(name, []).append(measures[part](checkout))
-            if part in ('live', 'awake'):
-                of_part.setdefault('floor', []).append(floor(options.seconds))
+        for name, checkout in checkouts.items():
+            own = folder / name
+            own.mkdir(exist_ok=True)
+            found = _measured(part, checkout, own, options)
+            rows.setdefault(part, {}).setdefault(name, []).append(found)
     return {
-        part: {name: _medians(each) for name, each in of_part.items()}
+        part: {
+            name: {key: statistics.median(row[key] for row in each) for key in each[0]}
+            for name, each in of_part.items()
+        }
         for part, of_part in rows.items()
     }
 
 
-def _total(values: dict[str, float]) -> float:
-    """Return the processor time of a row."""
-    return sum(value for name, value in values.items() if name not in OTHERS)
-
-
-def ratio(rows: dict[str, dict[str, float]]) -> float:
-    """Return the processor time now as a share of that before; live, of one sample."""
-    now, before = (_total(rows[name]) / rows[name].get('rate', 1.0) for name in ('now', 'before'))
-    return now / before
-
-
 def table(result: Result) -> str:
-    """Return the medians as text, with the ratios of the checkouts."""
+    """Return the medians as text, those of the other checkout and their ratio beside them."""
     lines = []
     for part, rows in result.items():
-        lines.append(f'{part:10}' + UNITS[part])
-        for name, values in rows.items():
-            each = '  '.join(f'{key} {value:.4g}' for key, value in values.items())
-            lines.append(f'  {name:8}{_total(values):10.4g}   ({each})')
-        if 'before' in rows:
-            lines.append(f'  {"ratio":8}{ratio(rows):10.3f}')
+        heads = [*rows, *(('ratio',) if 'before' in rows else ())]
+        lines.append(f'{part:32}' + ''.join(f'{head:>10}' for head in heads))
+        for key, now in rows['now'].items():
+            values = [row[key] for row in rows.values()]
+            if 'before' in rows:
+                values.append(now / values[0])
+            lines.append(f'  {key:30}' + ''.join(f'{value:10.4g}' for value in values))
     return '\n'.join(lines)
 
 
 def chart(rows: dict[str, dict[str, float]]) -> Figure:
-    """Draw the live processor time by process, as bars end to end."""
-    widest = max(map(_total, rows.values()))
+    """Draw the processor time of a sample by node, as bars end to end."""
+    widest = max(values[A_SAMPLE] for values in rows.values())
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 1.2 + 0.4 * len(rows)), layout='constrained')
         axes = figure.subplots()
         for row, values in enumerate(rows.values()):
             left = 0.0
-            parts = {name: value for name, value in values.items() if name not in OTHERS}
-            for part, share in parts.items():
-                axes.barh(row, share, left=left, color=_COLOURS[part], edgecolor='white')
-                if share > 0.1 * widest:  # wide enough for the word
-                    axes.text(left + share / 2, row, part, ha='center', va='center', fontsize=6.5)
-                left += share
-            rate = f' at {values["rate"]:.0f} Hz' if 'rate' in values else ''
-            axes.text(left, row, f' {left:.2f}{rate}', va='center')
+            for node, colour in NODES.items():
+                own = values[node]
+                axes.barh(row, own, left=left, color=colour, edgecolor='white')
+                if own > 0.1 * widest:  # wide enough for the word
+                    axes.text(left + own / 2, row, node, ha='center', va='center', fontsize=6.5)
+                left += own
+            axes.text(left, row, f' {left:.2f} at {values[RATE]:.0f} Hz', va='center')
         axes.set_yticks(range(len(rows)), list(rows))
         axes.invert_yaxis()
-        axes.set_xlabel('processor time of all processes per second (1 is one core)')
-        axes.set_title('Five nodes in real time, six legs', loc='left')
+        axes.set_xlabel('processor time of all nodes for a sample of six legs, ms')
+        axes.set_title('Five nodes in real time', loc='left')
         axes.margins(x=0.15)
     return figure
 
@@ -321,10 +246,10 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('nodes', __doc__)
     parser.add_argument('--against', type=pathlib.Path, metavar='DIR', help='the other checkout')
     parser.add_argument(
-        '--parts', nargs='+', choices=UNITS, default=list(UNITS), help='what to measure'
+        '--parts', nargs='+', choices=PARTS, default=list(PARTS), help='what to measure'
     )
     command.add_count(parser, '--repeats', 5, 'measurements of each part')
-    command.add_count(parser, '--cycles', 60, 'gait cycles of a walk')
+    command.add_count(parser, '--cycles', 60, 'gait cycles of the walk')
     parser.add_argument(
         '--rate', type=float, default=250.0, help='samples a second, live, Hz (default: 250)'
     )
@@ -332,13 +257,8 @@ def main(words: Sequence[str]) -> int:
     command.add_out(parser)
     options = parser.parse_args(words)
     with tempfile.TemporaryDirectory() as folder:
-        result = _measured(options, f'{folder}/bag')
-    drawn = {
-        f'{name}, awake' if part == 'awake' else name: values
-        for part in ('live', 'awake')
-        for name, values in result.get(part, {}).items()
-    }
-    pictures = {'nodes_live': chart(drawn)} if drawn else {}
+        result = measure(options, pathlib.Path(folder))
+    pictures = {'nodes_live': chart(result['live'])} if 'live' in result else {}
     document = {'repeats': options.repeats, 'cycles': options.cycles, 'medians': result}
     kept = command.write(options.out, 'nodes', document, pictures)
     command.show(options, kept, table(result))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flood one leg of the regulator node with set-points from another process; measure the others.
+"""Flood the regulator node with commands of one leg from another process; measure the others.
 
 Starts the node for all six legs with simulated regulators in a process of its own, as ``ros2 run``
-does. A second process publishes set-points for leg 1 at a high rate: valid ones, invalid ones,
-both in turn, and bytes that are no messages. This process repeats rounds: it commands the other
-legs for a while, stops, and measures the time from its last set-points until their pads vent. It
-also counts messages on ``/diagnostics``, and reads the node's memory and processor time. No
-message leaves the machine.
+does. A second process publishes records with a set-point for leg 1 alone at a high rate: valid
+ones, invalid ones, both in turn, and bytes that are no messages. This process repeats rounds: it
+commands the other legs for a while, stops, and measures the time from its last record until their
+pads vent. It also counts messages on ``/diagnostics``, and reads the node's memory and processor
+time. No message leaves the machine.
 
 The exit status is 1 if a pad of another leg vents later than ``command_timeout`` plus 0.25 s; the
 0.25 s are for reading the pressures.
@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import functools
 import math
 import os
 import subprocess
@@ -32,16 +31,18 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.nodes import topics
-from ros_pad.nodes.stamps import set_stamp
+from ros_pad.nodes.messages import Messages
+from ros_pad.records import COMMAND
+from ros_pad.records import Block
 from studies import command
 from studies.machine import memory
 from studies.machine import processor_time
 
-AMBIENT = 101325.0
 TIMEOUT = 0.3  # command_timeout, s
-RATE = 10_000.0  # set-points a second
+RATE = 10_000.0  # records a second
 ROUND = 2.5  # length of a round: commands, then silence, s
 COMMANDED = 1.0  # part of a round with commands, s
 LONGEST = 20.0  # s, until all pads must be up
@@ -70,7 +71,7 @@ class Result:
     flooded_up : bool
         Whether the flooded pad was under pressure at the end of any round.
     pressures : float
-        Lowest rate at which the pressure of one commanded pad was received in any round, 1/s.
+        Lowest rate at which records of pressures were received in any round, 1/s.
     diagnostics : float
         Messages of the node on ``/diagnostics`` a second.
     growth : float
@@ -94,12 +95,9 @@ def flood(kind: str, rate: float) -> None:
     """Publish one kind of flood for one leg until standard input ends; print the rate, 1/s."""
     rclpy.init()
     node = Node('flood', start_parameter_services=False, enable_rosout=False)
-    publisher = topics.PRESSURE_SETPOINT.publisher(node, FLOODED)
-    good, bad = topics.PRESSURE_SETPOINT.message(), topics.PRESSURE_SETPOINT.message()
-    good.fluid_pressure, bad.fluid_pressure = AMBIENT + GAUGE, AMBIENT + 1e9
-    messages: list[object] = {
-        'valid': [good], 'invalid': [bad], 'mixed': [good, bad], 'torn': [b'\0\1\0\0' + b'\1' * 9],
-    }[kind]  # fmt: skip
+    publisher = topics.COMMAND.publisher(node)
+    gauges = {'valid': [GAUGE], 'invalid': [1e9], 'mixed': [GAUGE, 1e9]}.get(kind, [])
+    messages = [b'\0\1\0\0' + b'\1' * 9]
     os.set_blocking(sys.stdin.fileno(), False)
     count, start = 0, time.monotonic()
     while True:
@@ -107,14 +105,22 @@ def flood(kind: str, rate: float) -> None:
             with contextlib.suppress(BlockingIOError):
                 if os.read(sys.stdin.fileno(), 1) == b'':
                     break
-            for each in (good, bad):
-                set_stamp(each.header.stamp, time.time_ns())
+            messages = [_command((FLOODED,), each) for each in gauges] or messages
         publisher.publish(messages[count % len(messages)])
         count += 1
         ahead = start + count / rate - time.monotonic()
         if ahead > 1e-3:
             time.sleep(ahead)
     print(count / (time.monotonic() - start))
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def _command(legs: Sequence[int], gauge: float) -> bytes:
+    """Return the message of a record of this time with set-points, Pa, for some legs."""
+    rows = COMMAND.rows(len(topics.LEGS))
+    rows['setpoint'][[leg in legs for leg in topics.LEGS]] = gauge
+    return Wire(COMMAND, topics.LEGS).encode(Block.of(time.time_ns(), rows))
 
 
 @contextlib.contextmanager
@@ -137,18 +143,16 @@ class Commander:
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.legs = [leg for leg in legs if leg != FLOODED]
-        self._publishers = [topics.PRESSURE_SETPOINT.publisher(self.node, x) for x in self.legs]
-        self._message = topics.PRESSURE_SETPOINT.message()
+        self._publisher = topics.COMMAND.publisher(self.node)
         self.gauges = dict.fromkeys(legs, 0.0)
-        self.counts = dict.fromkeys(legs, 0)
-        self.diagnostics = 0
-        for leg in legs:
-            topics.PRESSURE.subscription(self.node, functools.partial(self._receive, leg), leg)
+        self.count = self.diagnostics = 0
+        Messages(self.node).receive_record(topics.PRESSURE, legs, self._receive)
         topics.DIAGNOSTICS.subscription(self.node, self._count)
 
-    def _receive(self, leg: int, message: Any) -> None:
-        self.gauges[leg] = message.fluid_pressure - AMBIENT
-        self.counts[leg] += 1
+    def _receive(self, block: Block) -> None:
+        pressures = block.rows[-1]['pressure'].tolist()
+        self.gauges = dict(zip(self.gauges, pressures, strict=True))
+        self.count += 1
 
     def _count(self, message: object) -> None:
         self.diagnostics += 1
@@ -170,23 +174,18 @@ class Commander:
                 return
 
     def connected(self) -> bool:
-        """Return whether the regulator node has subscribed and all its pressures have arrived."""
-        return all(each.get_subscription_count() for each in self._publishers) and all(
-            self.counts.values()
-        )
+        """Return whether the regulator node has subscribed and its pressures have arrived."""
+        return self._publisher.get_subscription_count() > 0 and self.count > 0
 
     def command(self) -> None:
         """Send a set-point to each leg without flood."""
-        set_stamp(self._message.header.stamp, time.time_ns())
-        self._message.fluid_pressure = AMBIENT + GAUGE
-        for publisher in self._publishers:
-            publisher.publish(self._message)
+        self._publisher.publish(_command(self.legs, GAUGE))
 
 
 def _round(commander: Commander, result: Result) -> None:
     """Command the other legs, stop, and wait until their pads vent; add to the result."""
     start = time.monotonic()
-    before = dict(commander.counts)
+    before = commander.count
     last = start
     up = 0.9 * GAUGE
 
@@ -218,8 +217,7 @@ def _round(commander: Commander, result: Result) -> None:
     result.rounds += 1
     result.reaction = max(result.reaction, *fallen.values())
     result.flooded_up |= commander.gauges[FLOODED] > 0.1 * GAUGE
-    slowest = min(commander.counts[leg] - before[leg] for leg in commander.legs) / seconds
-    result.pressures = min(result.pressures, slowest)
+    result.pressures = min(result.pressures, (commander.count - before) / seconds)
 
 
 def run(
@@ -256,9 +254,9 @@ def run(
                         stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                     )
                 )  # fmt: skip
-                name = topics.PRESSURE_SETPOINT.name(FLOODED)
+                name = topics.COMMAND.name()
                 commander.until(
-                    lambda: commander.node.count_publishers(name), PATIENCE, 'the flood'
+                    lambda: commander.node.count_publishers(name) > 1, PATIENCE, 'the flood'
                 )
                 commander.until(lambda: False, 1.0)
             _round(commander, Result(kind))  # not counted: memory and discovery settle first
@@ -283,7 +281,7 @@ def run(
 def table(results: Sequence[Result]) -> str:
     """Return the results as text."""
     lines = [
-        'flood    set-points/s  vent after (s)  flooded pad  pressures/s  diagnostics/s'
+        'flood       records/s  vent after (s)  flooded pad  pressures/s  diagnostics/s'
         '  growth (MB)  processor'
     ]
     for each in results:
@@ -300,7 +298,7 @@ def main(words: Sequence[str]) -> int:
     parser = command.parser('flood', __doc__)
     command.add_count(parser, '--rounds', 8, f'rounds of {ROUND:g} s for each kind')
     parser.add_argument(
-        '--rate', type=float, default=RATE, help=f'set-points a second (default: {RATE:g})'
+        '--rate', type=float, default=RATE, help=f'records a second (default: {RATE:g})'
     )
     parser.add_argument('--kinds', nargs='+', choices=KINDS, default=KINDS, help='kinds of flood')
     parser.add_argument('--flood', choices=KINDS, help=argparse.SUPPRESS)

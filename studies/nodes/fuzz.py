@@ -337,6 +337,43 @@ def _fields() -> Target:
     return Target(feed, seeds)
 
 
+def _records() -> Target:
+    """Return a target that reads records of two legs; the first byte picks the kind."""
+    import numpy as np
+
+    from ros_pad.records import KINDS
+    from ros_pad.records import Block
+
+    with _watched_imports():
+        from ros_pad.bags.wire import Wire
+
+    wires = [Wire(kind, (1, 2)) for kind in KINDS]
+    blocks = [Block(10**9 + np.arange(n), wire.kind.rows(n, 2)) for wire in wires for n in (1, 2)]
+
+    def feed(data: bytes) -> None:
+        wire, message = wires[data[0] % len(wires) if data else 0], data[1:]
+        try:
+            block = wire.decode(message)
+        except BadMessage:
+            raise
+        except PadError as error:
+            raise AssertionError('bytes of a message raise nothing but BadMessage') from error
+        size = len(message)
+        twice = wire.table(2 * message, np.array([0, size]), np.array([size, size]))
+        for part, whole in zip(block, twice, strict=True):
+            if whole.tobytes() != 2 * part.tobytes():
+                raise AssertionError(f'{part}, but {whole} in a table')
+        again = wire.decode(wire.encode(block))
+        if again.rows.tobytes() != block.rows.tobytes():
+            raise AssertionError(f'{block} is read as {again}')
+
+    places = [place for place in range(len(wires)) for _ in range(2)]
+    return Target(
+        feed,
+        [bytes([i]) + wires[i].encode(block) for i, block in zip(places, blocks, strict=True)],
+    )
+
+
 def _metadata() -> Target:
     return Target(_file(_read_metadata, 'metadata.yaml'), [_METADATA])
 
@@ -352,6 +389,7 @@ TARGETS: dict[str, Callable[[], Target]] = {
     'bags': _bags,
     'metadata': _metadata,
     'fields': _fields,
+    'records': _records,
 }
 """Functions that make the targets, by name."""
 

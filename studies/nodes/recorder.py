@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure the message rate that the recorder node can record, and its processor time.
 
-This process sends wrenches of six legs in turn, at each rate to two receivers one after the other,
-each in a process of its own:
+This process sends records of all kinds in turn, at each rate to two receivers one after
+the other, each in a process of its own:
 
 - bare: rclpy's EventsExecutor with raw, reliable subscriptions and callbacks that only count;
 - recorder: the recorder node as ``ros2 run`` starts it, with a bag in a temporary folder.
@@ -29,17 +29,17 @@ import time
 from collections.abc import Sequence
 
 import rclpy
-from geometry_msgs.msg import WrenchStamped
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.wire import Wire
 from ros_pad.errors import PadError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.records import Block
 from ros_pad.trials import label
 from studies import command
 from studies.machine import processor_time
@@ -118,10 +118,10 @@ def measured(name: str, rate: float, seconds: float) -> Row:
     Raises
     ------
     PadError
-        When the receiver does not subscribe to the wrenches in time.
+        When the receiver does not subscribe to the records in time.
     """
     node = Node('sender')
-    publishers = [topics.WRENCH.publisher(node, leg) for leg in topics.LEGS]
+    publishers = [topic.publisher(node) for topic in topics.RECORDS]
     with tempfile.TemporaryDirectory() as folder:
         bag = pathlib.Path(folder) / 'bag'
         receiver = {
@@ -139,7 +139,7 @@ def measured(name: str, rate: float, seconds: float) -> Row:
             while any(each.get_subscription_count() == 0 for each in publishers):
                 if time.monotonic() > until:
                     raise PadError(
-                        f'receiver {name} has not subscribed to all wrenches in {PATIENCE:g} s'
+                        f'receiver {name} has not subscribed to all records in {PATIENCE:g} s'
                     )
                 time.sleep(0.05)
             time.sleep(1.0)  # the start of the process is not measured
@@ -167,11 +167,13 @@ def measured(name: str, rate: float, seconds: float) -> Row:
 
 def _send(publishers: Sequence[Publisher], rate: float, seconds: float) -> tuple[int, float]:
     """Publish at a rate, 1/s, for a time, s; return number of messages and time of sending, s."""
-    data = serialize_message(WrenchStamped())
+    legs, kinds = topics.LEGS, [topic.schema.record for topic in topics.RECORDS]
+    data = [Wire(k, legs).encode(Block.of(0, k.rows(len(legs)))) for k in kinds if k]
     started, sent = time.monotonic(), 0
     while (elapsed := time.monotonic() - started) < seconds:
         while sent < int(elapsed * rate):
-            publishers[sent % len(publishers)].publish(data)
+            place = sent % len(publishers)
+            publishers[place].publish(data[place])
             sent += 1
         time.sleep(0.0005)
     for each in publishers:
@@ -195,10 +197,8 @@ def receive() -> int:
     signal.signal(signal.SIGTERM, stop)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node('receiver')
-    for leg in topics.LEGS:
-        node.create_subscription(
-            WrenchStamped, topics.WRENCH.name(leg), callback, qos.RECORD, raw=True
-        )
+    for topic in topics.RECORDS:
+        node.create_subscription(topic.message, topic.name(), callback, qos.RECORD, raw=True)
     executor = EventsExecutor()
     executor.add_node(node)
     while not stopped:

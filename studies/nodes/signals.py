@@ -42,11 +42,14 @@ import rclpy
 from rclpy.node import Node
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import BagError
 from ros_pad.nodes import topics
-from ros_pad.nodes.stamps import set_stamp
+from ros_pad.records import COMMAND
+from ros_pad.records import PRESSURE
+from ros_pad.records import Block
 from ros_pad.regulators.emulate import AlicatEmulator
 from ros_pad.regulators.emulate import Emulator
 from studies import command
@@ -64,7 +67,7 @@ WORK_OF_NODE = 8.0
 SHORTEST, LONGEST = 1e-3, 1.0  # between two signals, s
 PATIENCE = 10.0  # for the end of a process, s
 START = 60.0  # for the start of Python, s
-AMBIENT, GAUGE = 101325.0, 40e3  # Pa
+GAUGE = 40e3  # Pa
 _WALK = ('run', 'hexapod_patches', '--policy', 'dome', '--no-compare', '--cycles', '1')
 
 
@@ -204,18 +207,16 @@ class Commander:
     def __enter__(self) -> None:
         rclpy.init(args=[])
         self._node = Node('commander', start_parameter_services=False, enable_rosout=False)
-        self._publishers = [topics.PRESSURE_SETPOINT.publisher(self._node, x) for x in topics.LEGS]
+        self._publisher = topics.COMMAND.publisher(self._node)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._publish, daemon=True)
         self._thread.start()
 
     def _publish(self) -> None:
-        message = topics.PRESSURE_SETPOINT.message()
-        message.fluid_pressure = AMBIENT + GAUGE
+        wire, rows = Wire(COMMAND, topics.LEGS), COMMAND.rows(len(topics.LEGS))
+        rows['setpoint'] = GAUGE
         while not self._end.wait(0.02):
-            set_stamp(message.header.stamp, time.time_ns())
-            for publisher in self._publishers:
-                publisher.publish(message)
+            self._publisher.publish(wire.encode(Block.of(time.time_ns(), rows)))
 
     def __exit__(self, *_: object) -> None:
         self._end.set()
@@ -240,15 +241,14 @@ def check_bag(one: Try, bag: pathlib.Path) -> None:
     if reader.problem:
         one.problems.append(reader.problem)
     if one.target == 'pad':
-        names = [topics.PRESSURE.name(leg) for leg in topics.LEGS]
-        last = {
-            name: message.fluid_pressure - AMBIENT
-            for name, message, _ in reader.messages([f'/{name}' for name in names])
-        }
+        name = f'/{topics.PRESSURE.name()}'
+        legs, _, block = reader.records({name: PRESSURE}).get(name, ((), None, None))
+        last = block.rows[-1]['pressure'].tolist() if block and len(block.stamps) else []
         one.problems += [
-            f'{name}: last pressure {gauge:g} Pa' for name, gauge in last.items()
+            f'leg {leg}: last pressure {gauge:g} Pa'
+            for leg, gauge in zip(legs, last, strict=False)
             if gauge >= DOME_PRESSURE
-        ]  # fmt: skip
+        ]
 
 
 def _regulator(one: Try, number: int, folder: pathlib.Path) -> None:

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the regulator node for an hour with faults; count missed vents, measure growth of memory.
 
-The regulator node runs in this process with simulated regulators, and receives set-points for six
+The regulator node runs in this process with simulated regulators, and receives commands for six
 feet at 100 Hz of simulated time. Devices become silent, stick, leak, drift and lose their supply;
-commands stop, have wrong stamps, are above the ceiling, negative or not finite; ``~/vent`` is
-called; and every five minutes the node is cleaned up and configured again. All events follow from
-a seed.
+commands stop, of one foot or of all, have wrong stamps, are above the ceiling, negative or not
+finite; ``~/vent`` is called; and every five minutes the node is cleaned up and configured again.
+All events follow from a seed.
 
 Devices record the commands that they receive. A pad whose commands have stopped, or whose pressure
-is above the ceiling, must receive a vent within ``command_timeout`` and one tick. A device that
-did not answer must receive another vent at each tick. After its pressure was above the ceiling, a
-pad must receive no pressure until the node is activated again. The exit status is 1 if any of
-these rules was broken.
+is above the ceiling, must receive a vent within ``command_timeout`` and one tick. The node ticks
+with each record and, 0.1 s after the last one, with each time on /clock. A device that did not
+answer must receive another vent at each tick. After its pressure was above the ceiling, a pad must
+receive no pressure until the node is activated again. The exit status is 1 if any of these rules
+was broken.
 """
 
 from __future__ import annotations
@@ -37,11 +38,16 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from ros_pad import regulators
+from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.commands.run import alone
 from ros_pad.nodes import topics
+from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.stamps import set_stamp
+from ros_pad.pace import TICK_PERIOD_NS
+from ros_pad.records import COMMAND
+from ros_pad.records import Block
 from ros_pad.regulators import Reading
 from ros_pad.regulators import SimulatedRegulator
 from ros_pad.simulation.faults import Fault
@@ -54,14 +60,17 @@ ROUND = 300.0  # time between two configurations of the node, s
 TIMEOUT = 0.3  # command_timeout, s
 CEILING = 90e3  # Pa gauge
 TOLERANCE = 0.02
-AMBIENT = 101325.0
 START = 100.0  # simulated time at the start, s: the stamps of old commands stay positive
 PATIENCE = 10.0  # s of wall time for one tick
 LEGS = topics.LEGS
 # Mean times, s: between faults of one leg's device, between losses of supply, between troubles of
 # one leg's commands, and between calls of ~/vent.
 FAULT_EVERY, SUPPLY_EVERY, TROUBLE_EVERY, VENT_EVERY = 60.0, 150.0, 15.0, 60.0
-TROUBLES = ('stop', 'stale', 'future', 'above', 'nan')
+TROUBLES = ('stop', 'above', 'wrong')
+"""Troubles of the commands of one leg."""
+
+OF_ALL = ('stop', 'stale', 'future')
+"""Troubles of whole records."""
 
 
 class Device(SimulatedRegulator):
@@ -148,46 +157,52 @@ class Result:
     threads: tuple[int, int] = (0, 0)
 
 
+class Trouble:
+    """Disturbances of commands at random times."""
+
+    def __init__(self, chance: random.Random, kinds: Sequence[str]) -> None:
+        self._chance, self._kinds = chance, kinds
+        self._until = START + chance.expovariate(1.0 / TROUBLE_EVERY)
+        self.kind = ''
+
+    def at(self, now: float) -> str:
+        """Return the present one at a time, s, which never goes back; empty if there is none."""
+        if now >= self._until:
+            self.kind = '' if self.kind else self._chance.choice(self._kinds)
+            mean = 1.0 if self.kind else TROUBLE_EVERY
+            self._until = now + self._chance.expovariate(1.0 / mean)
+        return self.kind
+
+
 class Commander:
-    """Commands of one leg: dome and flat in turn, with disturbances at random times."""
+    """Commands of one leg: dome and flat in turn, with disturbances."""
 
     def __init__(self, chance: random.Random) -> None:
         self._chance = chance
         self._gauge, self._until = 0.0, START
-        self._trouble, self._trouble_until = '', START + chance.expovariate(1.0 / TROUBLE_EVERY)
+        self._trouble = Trouble(chance, TROUBLES)
         self.good: float | None = None  # time of the last valid command since the activation, s
         self.stopped = False  # whether the pad has received a vent since that command
 
-    def next(self, now: float) -> tuple[float, float] | None:
-        """Return gauge pressure, Pa, and age of the stamp, s, of the command at a time, s.
-
-        None if no command is to be sent.
-        """
+    def next(self, now: float) -> float:
+        """Return the set-point at a time, s, Pa gauge; NaN if there is none."""
         chance = self._chance
         if now >= self._until:
             self._gauge = 0.0 if self._gauge else chance.uniform(0.4, 1.0) * CEILING
             self._until = now + chance.uniform(0.3, 1.5)
-        if now >= self._trouble_until:
-            self._trouble = '' if self._trouble else chance.choice(TROUBLES)
-            mean = 1.0 if self._trouble else TROUBLE_EVERY
-            self._trouble_until = now + chance.expovariate(1.0 / mean)
-        match self._trouble:
+        match self._trouble.at(now):
             case 'stop':
-                return None
-            case 'stale':
-                return self._gauge, TIMEOUT + 0.01 + chance.random()
-            case 'future':
-                return self._gauge, -TIMEOUT - 0.02 - chance.random()
+                return math.nan
             case 'above':
-                return CEILING + 1.0 + chance.random() * 1e6, 0.0
-            case 'nan':
-                return chance.choice((math.nan, math.inf, -math.inf, -1.0)), 0.0
-        return self._gauge, 0.0
+                return CEILING + 1.0 + chance.random() * 1e6
+            case 'wrong':
+                return chance.choice((math.inf, -math.inf, -1.0))
+        return self._gauge
 
     @property
     def obeyed(self) -> bool:
         """Whether the present commands are valid, so that the node accepts them."""
-        return not self._trouble
+        return not self._trouble.kind
 
 
 def drawn_faults(chance: random.Random, start: float, end: float) -> list[Fault]:
@@ -239,22 +254,29 @@ class Soak:
             self._executor.add_node(node)
         self._clock = topics.CLOCK.publisher(self._robot)
         self._clock_message = topics.CLOCK.message()
-        self._message = topics.PRESSURE_SETPOINT.message()
-        self._publishers = [topics.PRESSURE_SETPOINT.publisher(self._robot, leg) for leg in LEGS]
+        self._output, self._wire = topics.COMMAND.publisher(self._robot), Wire(COMMAND, LEGS)
+        Messages(self._robot).receive_record(topics.PRESSURE, LEGS, self._receive)
+        self._answered_ns = 0  # stamp of the last pressures
+        self._record_ns = 0  # stamp of the last record that the node processed
+        self._trouble = Trouble(random.Random(seed + 1), OF_ALL)
         self._vent_client = self._robot.create_client(Trigger, 'regulator/vent')
         self._commanders = [Commander(random.Random(seed + 100 * leg)) for leg in LEGS]
         self._ticks = round(START / PERIOD)
-        self._last_ns = 0
         self._round_until = START
         self._vent_at = START + self._chance.expovariate(1.0 / VENT_EVERY)
         self._active = False
         self._spin(self._connected, 'the node')
+        self._ticked = True  # whether the node did in this period
         self._show(self._ticks * round(PERIOD * 1e9))
 
     def _connected(self) -> bool:
-        matched = all(each.get_subscription_count() for each in self._publishers)
+        outputs = self.node.count_subscribers(topics.PRESSURE.name())
         clocks = self._clock.get_subscription_count() == 2  # for the node's time and its ticks
-        return matched and clocks and self._vent_client.service_is_ready()
+        matched = outputs and self._output.get_subscription_count()
+        return bool(matched and clocks and self._vent_client.service_is_ready())
+
+    def _receive(self, block: Block) -> None:
+        self._answered_ns = block.last_ns
 
     def _spin(self, done: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -304,14 +326,47 @@ class Soak:
         self._deactivated()
 
     def _show(self, now_ns: int) -> None:
-        """Publish a time on /clock, and wait until the node has done the tick of this time."""
+        """Publish a time on /clock, and wait until it is the node's time.
+
+        Where no records come, wait also until the node has done the tick of this time.
+        """
         set_stamp(self._clock_message.clock, now_ns)
         self._clock.publish(self._clock_message)
-        self._spin(lambda: self.node.tick_ns == now_ns, f'the tick of the node at {now_ns} ns')
-        self._last_ns = now_ns
+        ticks = not self._active or abs(now_ns - self._record_ns) > TICK_PERIOD_NS
+        self._ticked = ticks
+        self._spin(
+            lambda: (
+                self.node.messages.now_ns() == now_ns
+                and (not ticks or self.node.tick_ns == now_ns)
+            ),
+            f'the time of the node, {now_ns} ns',
+        )
+
+    def _send(self, now_ns: int) -> int:
+        """Send the commands of a time, ns, and wait for the answer; return their number."""
+        now, kind, age = now_ns * 1e-9, self._trouble.at(now_ns * 1e-9), 0.0
+        setpoints = [each.next(now) for each in self._commanders]
+        if kind == 'stop':
+            return 0
+        if kind:
+            age = TIMEOUT + 0.01 + self._chance.random()
+            age = -age - 0.01 if kind == 'future' else age
+        rows = COMMAND.rows(len(LEGS))
+        rows['setpoint'] = setpoints
+        stamp_ns = now_ns - round(age * 1e9)
+        self._output.publish(self._wire.encode(Block.of(stamp_ns, rows)))
+        if self._active:
+            self._spin(lambda: self._answered_ns == stamp_ns, 'the answer to a command')
+            self._ticked = True
+            if not kind:
+                self._record_ns = now_ns
+                for commander in self._commanders:
+                    if commander.obeyed:
+                        commander.good, commander.stopped = now, False
+        return int(np.count_nonzero(~np.isnan(rows['setpoint'])))
 
     def tick(self) -> None:
-        """Send the commands that are due, advance the clock, and count vents."""
+        """Advance the clock, send the commands that are due, and count vents."""
         self._ticks += 1
         now_ns = self._ticks * round(PERIOD * 1e9)
         now = now_ns * 1e-9
@@ -326,39 +381,26 @@ class Soak:
             else:
                 self._activate()
                 self._vent_at = now + self._chance.expovariate(1.0 / VENT_EVERY)
-        node, message = self.node, self._message
         vents = [each.vents for each in Device.made]
-        refusals = sum(each.answers.refused for each in node.channels.values())
-        answered, sent = node.answered, 0
-        for commander, publisher in zip(self._commanders, self._publishers, strict=True):
-            command = commander.next(now)
-            if command is None:
-                continue
-            gauge, age = command
-            message.fluid_pressure = gauge + AMBIENT
-            # The sender is like a controller that takes the stamp from its last tick.
-            set_stamp(message.header.stamp, self._last_ns - round(age * 1e9))
-            publisher.publish(message)
-            sent += 1
-            if self._active and commander.obeyed:
-                commander.good, commander.stopped = now, False
+        before = self._refused
         if self._active:
-            self._spin(
-                lambda: node.answered >= answered + sent, f'the node to process {sent} set-points'
-            )
-        self._show(now_ns)
-        self.result.set_points += sent
-        self.result.refused += (
-            sum(each.answers.refused for each in node.channels.values()) - refusals
-        )
-        for commander, device, before in zip(self._commanders, Device.made, vents, strict=True):
-            self._judge(commander, device, now, device.vents > before)
+            self._show(now_ns)
+        self.result.set_points += self._send(now_ns)
+        if not self._active:  # no answer tells when the record has come, but the tick after it
+            self._show(now_ns)
+        self.result.refused += self._refused - before
+        for commander, device, count in zip(self._commanders, Device.made, vents, strict=True):
+            self._judge(commander, device, now, device.vents > count)
+
+    @property
+    def _refused(self) -> int:
+        return sum(each.answers.refused for each in self.node.channels.values())
 
     def _judge(self, commander: Commander, device: Device, now: float, vented: bool) -> None:
         """Count what a device did against the rules at this tick, and its reaction times."""
         result = self.result
         late = TIMEOUT + PERIOD + 1e-6
-        overdue = commander.good is None or now - commander.good > late
+        overdue = self._ticked and (commander.good is None or now - commander.good > late)
         if overdue and device.filled and not vented:
             result.missed += 1
         if device.over is not None and now - device.over > late:

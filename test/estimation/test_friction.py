@@ -12,8 +12,6 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.friction import GRID
 from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.friction import update
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
@@ -330,30 +328,3 @@ def test_a_foot_that_has_forgotten_learns_again_like_a_new_one():
         each.touch_down(0.5, False, 20.0)
     assert shared.scales['flat_dry'] == pytest.approx(other.scales['flat_dry'])
     assert shared.scales['flat_dry'].scale == pytest.approx(0.5 / 0.8, rel=0.15)
-
-
-def test_feet_that_are_updated_together_are_as_alone():
-    """Flat feet and domes that stick, slip and turn: nothing of one is felt by another."""
-    samples = [
-        Evidence(0.3, 0.03, 0.05, 0.003, DT),
-        Evidence(0.2, 0.04, STILL, 0.003, DT, 0.5, False, (1.1, 0.9)),
-        Evidence(0.25, 0.03, 0.01, 0.004, DT, 0.7, True),
-        Evidence(0.1, 0.05, -0.002, 0.003, DT),
-    ]
-
-    def feet():
-        model = GroundModel(FrictionScales(PRIOR), 0.5, 1.5, 0.5, 0.05, EXACT)
-        found = [GroundFilter(model.shared, model=model) for _ in samples]
-        for place, each in enumerate(found):
-            each.touch_down(0.0, dome=place % 2 > 0)
-        return found
-
-    together, alone = feet(), feet()
-    for _ in range(3):
-        update(together, samples)
-        for each, sample in zip(alone, samples, strict=True):
-            each.update(sample)
-    for one, other in zip(together, alone, strict=True):
-        assert one.friction == pytest.approx(other.friction, rel=1e-12)
-        assert one.wet_probability == pytest.approx(other.wet_probability, rel=1e-12)
-        assert one.log_odds == pytest.approx(other.log_odds, rel=1e-9, abs=1e-12)

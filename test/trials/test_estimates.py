@@ -2,14 +2,17 @@
 """Accuracy of estimators on walks with full dynamics, where feet scuff and turn."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
 
+from ros_pad.estimation import doubt
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
+from studies.closed_loop import loops
 from studies.work_precision.estimator.priors import Condition
 from studies.work_precision.estimator.priors import updates
 from studies.work_precision.estimator.priors import walked as walked_on
@@ -28,27 +31,21 @@ def walked(policy, seed, cycles=12):
     scene = dataclasses.replace(Scene.load('hexapod_patches'), cycles=cycles)
     loop = ClosedLoop(scene, policy, seed, 'L2')
     log = TrialLog(scene, policy, seed, 'L2')
-    rows = []
-    for _ in range(round(scene.duration / PERIOD)):
-        loop.tick(log)
-        row = []
-        for foot, estimator in zip(loop.robot.feet, loop.estimators, strict=True):
-            told, load = estimator.estimate, foot.force[2]
-            assert not told.doubt.startswith('axes')
-            ratio = math.hypot(*foot.force[:2]) / load if load > 0.0 else 0.0
-            row.append((
-                load, foot.grip / load if load > 0.0 else math.nan, foot.slip_speed, foot.wet,
-                told.standing, told.fresh, told.slipping, told.wet_probability,
-                told.friction_mean, told.friction_sd, told.margin + ratio,
-            ))  # fmt: skip
-        row.append((*loop.pressures, *[0.0] * 5))
-        rows.append(row)
+    rows = [
+        [(foot.force[2], foot.slip_speed, foot.wet) for foot in loop.robot.feet]
+        for _ in loops.samples(loop, scene, log)
+    ]
     assert loop.robot.verdict is None
-    feet = np.array(rows, dtype=float)[round(scene.settle / PERIOD) :]
-    names = ('load', 'grip', 'speed', 'wet', 'standing', 'fresh', 'alarm', 'wetness', 'mean', 'sd',
-             'quantile')  # fmt: skip
-    series = {name: feet[:, :6, column] for column, name in enumerate(names)}
-    return series | {'pressure': feet[:, 6, :6]}
+    tuning, load = tuning_for(scene), scene.expected_load
+    stage = EstimationStage(scene.foot, load, tuning, scene.legs, loop.period_ns)
+    told = loops.estimated(stage, log.records)
+    assert 'axes' not in {doubt.kind(each) for each in np.unique(told.rows['doubt'])}
+    true = np.moveaxis(np.array(rows, dtype=float), 2, 0)
+    series = dict(zip(('load', 'speed', 'wet'), true, strict=True))
+    series |= {'alarm': told.rows['slipping'], 'wetness': told.rows['wetness']}
+    series |= {'pressure': loops.pressures(log.records, told.stamps)}
+    series |= {'standing': log.records.sample.rows['force'][..., 2] > tuning.load_gate * load}
+    return {name: each[round(scene.settle / PERIOD) :] for name, each in series.items()}
 
 
 @pytest.fixture(scope='module')

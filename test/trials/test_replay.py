@@ -4,6 +4,7 @@
 import dataclasses
 import json
 import math
+import operator
 import pathlib
 import re
 
@@ -387,25 +388,33 @@ def test_times_of_day_that_jitter_are_no_difference(tmp_path, legs):
     assert found.start_ns - start < 10 * MS and found.duration_s == pytest.approx(2.03, abs=0.02)
 
 
-def test_samples_before_the_estimator_received_any_are_left_out(tmp_path):
-    """The recorder starts first, and the estimator receives samples from 4 ms on."""
+def test_what_nodes_say_and_receive_before_the_first_estimate_is_left_out(tmp_path):
+    """The recorder starts first, and the estimator receives samples from 4 ms on.
+
+    Between samples, nodes tell of feet whose sensors are silent.
+    """
     bag = copy(tmp_path / 'bag', without_clock, end=1.0)
     with AnyReader([bag]) as reader:
-        messages = list(reader.messages())
-    first = next(data for each, _, data in messages if each.topic == '/feet/sample')
-    with Writer(tmp_path / 'late', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        messages = [(each.topic, ns, data) for each, ns, data in reader.messages()]
+    nothing = Wire(ESTIMATE, LEGS).encode(Block.of(500_000, ESTIMATE.rows(6)))
+    messages.append(('/feet/estimate', 500_000, nothing))
+    added = [('/feet/sample', 1.0), ('/feet/sample', 2.0), ('/feet/sample', 3.0)]
+    added += [('/feet/estimate', 701.3), ('/feet/command', 701.3)]
+    for topic, ms in added:
+        data = next(data for each, ns, data in messages if each == topic and ns >= 4 * MS)
+        # The nanoseconds of the stamp follow the CDR header and the seconds.
+        other = data[:8] + round(ms * MS).to_bytes(4, 'little') + data[12:]
+        messages.append((topic, round(ms * MS), other))
+    made = Writer(tmp_path / 'late', version=9, storage_plugin=StoragePlugin.MCAP)
+    with made as writer:
         connections = {
             topic: writer.add_connection(topic, topics.SAMPLE.type_name, typestore=STORE)
-            for topic in {each.topic for each, _, _ in messages}
+            for topic in {topic for topic, _, _ in messages}
         }
-        for ms in (1, 2, 3):
-            # The nanoseconds of the stamp follow the CDR header and the seconds.
-            data = first[:8] + (ms * MS).to_bytes(4, 'little') + first[12:]
-            writer.write(connections['/feet/sample'], ms * MS, data)
-        for connection, ns, data in messages:
-            writer.write(connections[connection.topic], ns, data)
+        for topic, ns, data in sorted(messages, key=operator.itemgetter(1)):
+            writer.write(connections[topic], ns, data)
     found = found_in(tmp_path / 'late', TOLD)
-    assert fine(found)
+    assert fine(found) and {each.compared for each in found.comparisons} == {51}
     assert re.match('the estimator started later .* 3 samples', found.notes[-1])
     assert set(found.samples.values()) == {250}
 

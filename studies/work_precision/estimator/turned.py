@@ -8,8 +8,6 @@ doubt.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
@@ -18,11 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.estimation import FeetEstimator
-from ros_pad.estimation import FootEstimator
+from ros_pad.estimation import doubt
+from ros_pad.estimation.stage import EstimationStage
+from ros_pad.records import Block
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
+from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.series import Records
 from studies.closed_loop import loops
 from studies.samples import runs
 from studies.work_precision.estimator.walks import LOADED
@@ -91,14 +93,14 @@ JOINED = 0.1  # s: a foot that lifts for less has not stepped
 
 
 class Walk(NamedTuple):
-    """What the estimators of a walk got, in its order, and what they doubted.
+    """What the estimator of a walk got, and what it doubted.
 
     Attributes
     ----------
     settings : tuple
-        Arguments of :class:`ros_pad.estimation.FeetEstimator`.
-    calls : list of tuple
-        Leg, and arguments of its estimator.
+        Arguments of :class:`ros_pad.estimation.stage.EstimationStage`.
+    records : Records
+        The samples and pressures that it got.
     touch_downs : list of list of float
         For each leg, times at which stances began after the first second, s.
     doubted : list of str
@@ -106,7 +108,7 @@ class Walk(NamedTuple):
     """
 
     settings: tuple[Any, ...]
-    calls: list[tuple[int, tuple[Any, ...]]]
+    records: Records
     touch_downs: list[list[float]]
     doubted: list[str]
 
@@ -148,31 +150,27 @@ class Honest:
     doubts: list[str]
 
 
-def recorded(
-    scene: Scene, policy: str, seed: int, level: str, sensing: str, keep: bool = True
-) -> Walk:
-    """Walk once, and keep what the estimators get, if wanted."""
+def recorded(scene: Scene, policy: str, seed: int, level: str, sensing: str) -> Walk:
+    """Walk once."""
     loop = ClosedLoop(scene, policy, seed, level, sensing=sensing)
-    calls: list[tuple[int, tuple[Any, ...]]] = []
-
-    def kept(leg: int, update: Callable[..., Any], *values: Any) -> Any:
-        calls.append((leg, values))
-        return update(*values)
-
-    if keep:
-        for leg, each in enumerate(loop.estimators):
-            each.update = functools.partial(kept, leg, each.update)  # type: ignore[method-assign]
-    doubted: dict[str, None] = {}
-    loads = []
-    for _ in loops.samples(loop, scene):
-        loads.append([foot.force[2] for foot in loop.robot.feet])
-        for each in loop.estimators:
-            if each.estimate.doubt.startswith('axes'):
-                doubted[each.estimate.doubt] = None
+    log = TrialLog(scene, policy, seed, level, sensing)
+    loads = [loop.robot.contacts[:, 2].tolist() for _ in loops.samples(loop, scene, log)]
     period = loop.period_ns * 1e-9
     stands = np.array(loads) > LOADED * scene.expected_load
-    settings = (len(scene.legs), scene.foot, scene.expected_load, loop.estimators[0].feet.tuning)
-    return Walk(settings, calls, [_begins(each, period) for each in stands.T], [*doubted])
+    tuning = tuning_for(scene, sensing)
+    settings = (scene.foot, scene.expected_load, tuning, scene.legs, loop.period_ns)
+    doubted = {each for row in _doubts(log.records.estimate.rows) for each in row if each}
+    begins = [_begins(each, period) for each in stands.T]
+    return Walk(settings, log.records, begins, sorted(doubted))
+
+
+def _doubts(rows: np.ndarray) -> list[list[str]]:
+    """Return the doubts about axes in each estimate, for each foot; empty if there is none."""
+    texts = [
+        [doubt.text(code, *detail) for code, detail in zip(codes, details, strict=True)]
+        for codes, details in zip(rows['doubt'].tolist(), rows['detail'].tolist(), strict=True)
+    ]
+    return [[text if text.startswith('axes') else '' for text in row] for row in texts]
 
 
 def _begins(stands: Flags, period: float) -> list[float]:
@@ -189,26 +187,20 @@ def stances_until(walk: Walk, fault: str) -> list[tuple[int | None, bool]]:
     Beside them, whether the doubt names the fault in the end.
     """
     forces, positions, words = FAULTS[fault]
-    estimators = FootEstimator.of(FeetEstimator(*walk.settings))
-    first: list[float | None] = [None] * len(estimators)
-    for leg, (time, force, position, *rest) in walk.calls:
-        if len(rest) > 3:  # a velocity in the axes of the position
-            x, y, _ = _turned(positions, (*rest[3].velocity, 0.0))
-            rest[3] = rest[3]._replace(velocity=(x, y))
-        now = estimators[leg].update(
-            time, _turned(forces, force), _turned(positions, position), *rest
-        )
-        if first[leg] is None and now.doubt.startswith('axes'):
-            first[leg] = time
-    return [
-        (None if time is None else sum(at <= time for at in begun), words in each.estimate.doubt)
-        for begun, time, each in zip(walk.touch_downs, first, estimators, strict=True)
-    ]
-
-
-def _turned(matrix: Matrix, vector: Sequence[float]) -> tuple[float, ...]:
-    x, y, z = vector
-    return tuple(a * x + b * y + c * z for a, b, c in matrix)
+    stamps, given = walk.records.sample
+    rows = given.copy()
+    rows['force'] = given['force'] @ np.transpose(forces)
+    rows['position'] = given['position'] @ np.transpose(positions)
+    rows['velocity'] = given['velocity'] @ np.transpose(positions)[:2, :2]
+    records = walk.records._replace(sample=Block(stamps, rows))
+    estimate = loops.estimated(EstimationStage(*walk.settings), records)
+    found: list[tuple[int | None, bool]] = []
+    of_feet = zip(*_doubts(estimate.rows), strict=True)
+    for begun, doubts in zip(walk.touch_downs, of_feet, strict=True):
+        times = (1e-9 * estimate.stamps[[bool(each) for each in doubts]]).tolist()
+        count = sum(at <= times[0] for at in begun) if times else None
+        found.append((count, words in doubts[-1]))
+    return found
 
 
 Case = tuple[str, str, str, int]
@@ -288,7 +280,7 @@ def check(
         floor=replace(scene.floor, slope=slope or scene.floor.slope),
         faults=(Fault.parse(fault),) if fault else (),
     )
-    walk = recorded(scene, scene.policy, seed, level, sensing, keep=False)
+    walk = recorded(scene, scene.policy, seed, level, sensing)
     return sum(map(len, walk.touch_downs)), walk.doubted
 
 

@@ -17,10 +17,11 @@ import numpy as np
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.foot import Tuning
 from ros_pad.estimation.scales import FrictionPrior
-from ros_pad.simulation.robot import Vector
 from ros_pad.simulation.scene import Scene
+from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
+from studies.closed_loop import loops
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -93,31 +94,6 @@ class Recording:
         return np.swapaxes(table, 0, 1).tolist()
 
 
-class _SensorTap:
-    """Sensors that keep the readings that the loop took last."""
-
-    def __init__(self, loop: ClosedLoop) -> None:
-        self._sensors = loop.sensors
-        self.readings: list[tuple[Vector, Vector]] = []
-
-    def read(self, robot: Any) -> list[tuple[Vector, Vector]]:
-        self.readings = self._sensors.read(robot)
-        return self.readings
-
-    def read_moments(self, robot: Any) -> list[float | None]:
-        return self._sensors.read_moments(robot)
-
-
-class _NoLog:
-    """Log that keeps nothing."""
-
-    def sample(self, *_: Any) -> None:
-        pass
-
-    def control(self, *_: Any) -> None:
-        pass
-
-
 def record(
     scene: Scene,
     policy: str,
@@ -132,34 +108,27 @@ def record(
     loop = ClosedLoop(scene, policy, seed, level)
     if prepare:
         prepare(loop)
-    tap = _SensorTap(loop)
-    loop.sensors = tap  # type: ignore[assignment]
-    log: Any = _NoLog()
-    read, true = [], []
-    for _ in range(round(scene.duration * 1e9) // loop.period_ns):
-        pressures = list(loop.pressures)
-        loop.tick(log)
-        if loop.robot.verdict:
-            break
-        read.append([(*f, *p, q) for (f, p), q in zip(tap.readings, pressures, strict=True)])
-        true.append(
-            [(*foot.position, *foot.force, foot.grip, foot.slip_speed, foot.wet)
-             for foot in loop.robot.feet]
-        )  # fmt: skip
-    loop.close()
-    taken, truth = np.array(read), np.array(true, dtype=np.float64)
+    log = TrialLog(scene, policy, seed, level)
+    true = [
+        [(*foot.position, *foot.force, foot.grip, foot.slip_speed, foot.wet)
+         for foot in loop.robot.feet]
+        for _ in loops.samples(loop, scene, log)
+        if not loop.robot.verdict
+    ]  # fmt: skip
+    truth, records = np.array(true, dtype=np.float64), log.records
+    stamps, taken = (each[: len(truth)] for each in records.sample)
     return Recording(
         name=f'{scene.name}, {policy}, {seed}, {level}',
         period=loop.period_ns * 1e-9,
         foot=scene.foot,
         expected_load=scene.expected_load,
         settings=(scene.foot, scene.expected_load, tuning_for(scene)),
-        stamps=loop.period_ns * 1e-9 * np.arange(1, len(taken) + 1, dtype=np.float64),
-        force=taken[..., :3],
-        position=taken[..., 3:6],
-        noise=taken[..., 3:6] - truth[..., :3],
-        pressure=taken[..., 6],
-        arrived=np.ones(taken.shape[:2], dtype=bool),
+        stamps=1e-9 * stamps,
+        force=taken['force'],
+        position=taken['position'],
+        noise=taken['position'] - truth[..., :3],
+        pressure=loops.pressures(records, stamps),
+        arrived=np.ones(taken.shape, dtype=bool),
         load=truth[..., 5],
         tangential=np.hypot(truth[..., 3], truth[..., 4]),
         grip=truth[..., 6],
