@@ -122,7 +122,7 @@ class FeetEstimator:
         times : sequence of float
             Times, s.
         values : array (times, feet, 11)
-            Numbers of SAMPLE rows, of which none that is needed is missing.
+            Numbers of SAMPLE rows in their units (no unit of their own); none is missing.
         pressures : sequence of float
             Gauge pressure in the pads of each foot, Pa.
         """
