@@ -116,7 +116,7 @@ def record(
         if not loop.robot.verdict
     ]  # fmt: skip
     truth, records = np.array(true, dtype=np.float64), log.records
-    stamps, taken = (each[: len(truth)] for each in records.sample)
+    stamps, taken = records.sample.stamps[: len(truth)], records.sample.rows[: len(truth)]
     return Recording(
         name=f'{scene.name}, {policy}, {seed}, {level}',
         period=loop.period_ns * 1e-9,
