@@ -123,7 +123,7 @@ def record(
         foot=scene.foot,
         expected_load=scene.expected_load,
         settings=(scene.foot, scene.expected_load, tuning_for(scene)),
-        stamps=1e-9 * stamps,
+        stamps=np.multiply(1e-9, stamps, dtype=np.float64),
         force=taken['force'],
         position=taken['position'],
         noise=taken['position'] - truth[..., :3],
