@@ -16,9 +16,9 @@ PACKAGE = xml.etree.ElementTree.parse(ROOT / 'package.xml').getroot()
 URLS = {each.get('type'): each.text for each in PACKAGE.iter('url')}
 NAME = 'ros_pad'
 NODES = [
-    *('body_estimator', 'controller', 'estimator', 'merge', 'recorder', 'regulator', 'simulator'),
+    'body_estimator', 'controller', 'estimator', 'merge', 'recorder', 'regulator', 'simulator',
     'views',
-]
+]  # fmt: skip
 DOCS = ['furo>=2024.8', 'matplotlib>=3.6', 'myst-parser>=4.0', 'sphinx>=8.1']
 
 

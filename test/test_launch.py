@@ -15,8 +15,12 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 FILE = ROOT / 'launch' / 'ros_pad.launch.py'
 NODES = (
     *('recorder_node', 'regulator_node', 'body_estimator_node', 'estimator_node'),
-    *('controller_node', 'simulator_node'),
+    *('controller_node', 'merge_node', 'views_node', 'simulator_node'),
 )
+
+
+DRIVERS = ('body_estimator_node', 'merge_node', 'views_node')
+"""Nodes that a simulated walk with markers does not need."""
 
 
 def assigned(tree: ast.Module, name: str) -> object:
@@ -68,17 +72,21 @@ def test_every_argument_is_used_and_described_with_its_unit_or_kind(tree: ast.Mo
     assert flags | first_arguments(tree, 'text') == set(arguments)
     for name, (default, description) in arguments.items():
         assert re.fullmatch(r'[A-Z].*\. \[[a-zA-Z, ]+\]', description), name
-        assert (default in ('true', 'false')) == (name in flags), name
+        assert description.endswith('[true, false]') == (name in flags), name
+        assert default in ('true', 'false', '') or name not in flags, name
 
 
 @pytest.mark.parametrize(
     ('given', 'missing'),
     [
-        ({}, set()),
-        ({'simulate': 'false'}, {'simulator_node'}),
-        ({'simulate': 'false', 'record': 'false'}, {'simulator_node', 'recorder_node'}),
+        ({}, set(DRIVERS)),
+        ({'sensing': 'joints', 'views': 'true'}, {'merge_node'}),
+        ({'merge': 'true'}, {'body_estimator_node', 'views_node'}),
+        ({'simulate': 'false'}, {'simulator_node', 'body_estimator_node', 'views_node'}),
+        ({'simulate': 'false', 'merge': 'false'}, {'simulator_node', *DRIVERS}),
+        ({'views': 'true', 'record': 'false'}, {'recorder_node', 'merge_node', DRIVERS[0]}),
     ],
-    ids=['all', 'robot', 'robot, not recorded'],
+    ids=['simulated', 'joints', 'merge', 'robot', 'robot with records', 'not recorded'],
 )
 def test_it_starts_the_nodes_that_are_asked_for(given: dict[str, str], missing: set[str]):
     pytest.importorskip('launch_ros', reason='launch is not installed')

@@ -105,8 +105,10 @@ def _of_leg(
     )
 
 
-def _number(name: str, column: str, type_name: str = 'std_msgs/msg/Float64') -> Topic:
-    return _of_leg(name, type_name, ESTIMATES, (column,), ('data',))
+def _number(
+    name: str, column: str, type_name: str = 'std_msgs/msg/Float64', unit: str = ''
+) -> Topic:
+    return _of_leg(name, type_name, ESTIMATES, (column,), ('data',), unit)
 
 
 _WRENCH = 'geometry_msgs/msg/WrenchStamped'
@@ -144,7 +146,7 @@ LEG_SLIPPING = _number('slipping', 'slipping', 'std_msgs/msg/Bool')
 LEG_WETNESS = _number('wetness', 'wetness')
 LEG_FRICTION = _number('friction', 'friction')
 LEG_MARGIN = _number('friction_margin', 'margin')
-LEG_LOAD = _number('contact_load', 'load')
+LEG_LOAD = _number('contact_load', 'load', unit='N')
 LEG_DOUBT = Topic(
     'leg_{leg}/doubt', 'std_msgs/msg/String', values=('data',), text=True, record=ESTIMATES
 )

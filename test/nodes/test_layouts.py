@@ -23,7 +23,8 @@ LAYOUT = json.loads((CONFIG / 'foxglove' / 'ros_pad.json').read_text())
 RVIZ = yaml.safe_load((CONFIG / 'rviz' / 'ros_pad.rviz').read_text())
 
 # Panels of both Foxglove and Lichtblick that need no account or extension.
-PANELS = {'3D', 'Plot', 'StateTransitions', 'DiagnosticSummary', 'RawMessages', 'Tab'}
+PANELS = {'3D', 'Plot', 'DiagnosticSummary', 'RawMessages', 'Tab'}
+OF_VIEWS = '/feet/markers'  # not in a bag
 DRAWN = {'visualization_msgs/msg/MarkerArray', 'geometry_msgs/msg/PoseStamped'}
 RVIZ_TYPES = {
     'rviz_default_plugins/MarkerArray': 'visualization_msgs/msg/MarkerArray',
@@ -99,16 +100,18 @@ def plain(value: Any) -> Any:
 
 def values(path: str, messages: dict[str, list[Any]]) -> list[Any]:
     """Return the values of a message path in all messages of the bag."""
-    match = re.fullmatch(r'((?:/\w+)+)((?:\.\w+(?:\[:\])?(?:\{\w+[!=]=\d+\})?)*)', path)
+    match = re.fullmatch(r'((?:/\w+)+)((?:\.\w+(?:\[(?::|\d+)\])?(?:\{\w+[!=]=\d+\})?)*)', path)
     assert match, f'{path} is no message path'
     assert match[1] in messages, f'{path}: the bag has no such topic'
     found = messages[match[1]]
-    for name, every, key, sign, number in re.findall(
-        r'\.(\w+)(\[:\])?(?:\{(\w+)([!=]=)(\d+)\})?', match[2]
+    for name, place, key, sign, number in re.findall(
+        r'\.(\w+)(?:\[(:|\d+)\])?(?:\{(\w+)([!=]=)(\d+)\})?', match[2]
     ):
         found = [getattr(each, name) for each in found]
-        if every:
+        if place == ':':
             found = [each for array in found for each in array]
+        elif place:
+            found = [array[int(place)] for array in found]
         if key:
             found = [
                 each
@@ -118,20 +121,41 @@ def values(path: str, messages: dict[str, list[Any]]) -> list[Any]:
     return found
 
 
-@pytest.mark.slow
+# The number of a record that each panel plots, for each leg.
+PLOTTED = {
+    'Plot!wetness': 'wetness', 'Plot!slip': 'slip_x', 'Plot!margin': 'margin', 'Plot!dome': 'dome',
+    'Plot!alarms': 'slipping', 'Plot!doubts': 'doubt',
+}  # fmt: skip
+
+
 def test_every_plotted_path_is_a_number_in_the_bag(messages: dict[str, list[Any]]):
-    shown = set()
     for name, config in panels('Plot'):
         axis = [config['xAxisPath']] if config['xAxisVal'] == 'custom' else []
         assert config['paths'] and config['yAxisLabel'], name
         for path in (*config['paths'], *axis):
             found = values(path['value'], messages)
             assert found and all(isinstance(each, float) for each in found), (name, path)
-            shown.add(path['value'])
-    for leg in range(1, 7):
-        for quantity in ('pressure.fluid', 'pressure_setpoint.fluid', 'wetness', 'slip.twist',
-                         'friction_margin'):  # fmt: skip
-            assert any(each.startswith(f'/leg_{leg}/{quantity}') for each in shown)
+
+
+def test_the_places_of_numbers_of_records_are_those_of_their_names(
+    messages: dict[str, list[Any]],
+):
+    def named(path: dict[str, Any]) -> str:
+        topic, _, place = path['value'].removesuffix(']').partition('.position[')
+        (names,) = {tuple(each.name) for each in messages[topic]}
+        return names[int(place)]
+
+    shown = dict(panels('Plot'))
+    legs = range(1, 7)
+    for name, column in PLOTTED.items():
+        found = [(named(path), path['label']) for path in shown.pop(name)['paths']]
+        assert found == [(f'leg_{leg}/{column}', f'leg {leg}') for leg in legs]
+    for leg in legs:
+        paths = shown.pop(f'Plot!pressure{leg}')['paths']
+        assert [(named(path), path['label']) for path in paths] == [
+            (f'leg_{leg}/pressure', 'measured'), (f'leg_{leg}/setpoint', 'set-point')
+        ]  # fmt: skip
+    assert set(shown) == {'Plot!path'}
 
 
 def test_the_range_of_the_pressures_holds_all_of_them(messages: dict[str, list[Any]]):
@@ -142,27 +166,14 @@ def test_the_range_of_the_pressures_holds_all_of_them(messages: dict[str, list[A
                 assert config['minYValue'] < min(found) <= max(found) < config['maxYValue']
 
 
-def test_every_state_is_one_in_the_bag(messages: dict[str, list[Any]]):
-    shown = []
-    for name, config in panels('StateTransitions'):
-        for path in config['paths']:
-            found = values(path['value'], messages)
-            # States are texts or booleans; a plot of states cannot show other numbers.
-            assert found and all(isinstance(each, bool | str) for each in found), (name, path)
-            shown.append(path['value'])
-    for leg in range(1, 7):
-        for state in ('morphology', 'slipping', 'doubt'):
-            assert f'/leg_{leg}/{state}.data' in shown
-
-
 def test_what_is_drawn_is_in_the_bag_and_in_the_fixed_frame(
     bag: BagReader, messages: dict[str, list[Any]]
 ):
     ((_, config),) = panels('3D')
     assert config['followTf'] == 'world'
-    assert set(config['topics']) == {'/markers', '/body/pose'}
+    assert set(config['topics']) == {'/markers', '/body/pose', OF_VIEWS}
     for topic, shown in config['topics'].items():
-        assert shown['visible'] and bag.topics[topic] in DRAWN
+        assert shown['visible'] and (topic == OF_VIEWS or bag.topics[topic] in DRAWN)
     frames = {each.header.frame_id for array in messages['/markers'] for each in array.markers}
     frames |= {each.header.frame_id for each in messages['/body/pose']}
     assert frames == {'world'} == {RVIZ['Visualization Manager']['Global Options']['Fixed Frame']}
@@ -180,12 +191,12 @@ def test_health_is_in_the_bag(bag: BagReader, messages: dict[str, list[Any]]):
 
 def test_rviz_shows_topics_of_the_bag(bag: BagReader):
     displays = RVIZ['Visualization Manager']['Displays']
-    shown = {each['Class']: each['Topic'] for each in displays if 'Topic' in each}
-    assert set(shown) == set(RVIZ_TYPES)
-    for kind, topic in shown.items():
-        # Names are relative, so that a namespace applies to rviz2 as to the nodes.
-        assert not topic['Value'].startswith('/')
-        assert bag.topics[f'/{topic["Value"]}'] == RVIZ_TYPES[kind]
-        assert topic['Reliability Policy'] == 'Best Effort'  # fits every publisher
+    shown = {each['Topic']['Value']: each for each in displays if 'Topic' in each}
+    # Names are relative, so that a namespace applies to rviz2 as to the nodes.
+    assert set(shown) == {'markers', 'body/pose', OF_VIEWS.removeprefix('/')}
+    types = bag.topics | {OF_VIEWS: 'visualization_msgs/msg/MarkerArray'}
+    for name, each in shown.items():
+        assert types[f'/{name}'] == RVIZ_TYPES[each['Class']]
+        assert each['Topic']['Reliability Policy'] == 'Best Effort'  # fits every publisher
     for each in displays:
         assert each['Enabled'] and each['Value'] is True

@@ -29,7 +29,10 @@ from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.regulators import SimulatedRegulator
 
-NODES = ['simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'recorder']
+NODES = [
+    'simulator', 'body_estimator', 'estimator', 'controller', 'regulator', 'recorder', 'merge',
+    'views',
+]  # fmt: skip
 FILE = shared_folder() / 'params.yaml'
 PAGE = pathlib.Path(__file__).resolve().parents[2] / 'docs' / 'parameters.md'
 RATE = Parameter('rate', 50.0, 'Samples a second.', 'Hz', 1.0, 1000.0)
@@ -45,7 +48,9 @@ def table_of(name):
 
 
 def in_yaml(value):
-    return yaml.safe_dump(value, default_flow_style=True).removesuffix('\n...\n').strip()
+    return (
+        yaml.safe_dump(value, default_flow_style=True, width=1000).removesuffix('\n...\n').strip()
+    )
 
 
 @pytest.mark.parametrize('name', NODES)
@@ -243,6 +248,14 @@ def test_each_parameter_of_each_node_changes_or_is_refused(name, context, tmp_pa
         node.destroy_node()
 
 
+def test_a_file_for_earlier_versions_gives_a_warning(bench, capfd):
+    """Ambient pressure was a parameter of all nodes; gauge pressures do not depend on it."""
+    for kind in (RegulatorNode, ControllerNode):
+        bench.start(kind, ambient_pressure=85000.0)
+        words = 'parameter ambient_pressure is ignored: merge and views have it'
+        assert words in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     ('parameter', 'given', 'allowed'),
     [
@@ -382,11 +395,12 @@ def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp
     observer = Node('observer', context=context)
     executor.add_node(observer)
     served = {
-        'simulator': '/lab/leg_1/position',
+        'simulator': '/lab/feet/sample',
         'body_estimator': '/lab/body/odom',
-        'estimator': '/lab/leg_4/wetness',
-        'controller': '/lab/leg_4/morphology',
-        'regulator': '/lab/leg_4/pressure',
+        'estimator': '/lab/feet/estimate',
+        'controller': '/lab/feet/command',
+        'regulator': '/lab/feet/pressure',
+        'views': '/lab/leg_4/wetness',
     }
     arguments = ('--params-file', str(tmp_path / 'params.yaml'), '-r', '__ns:=/lab')
     processes = {name: run_node(name, *arguments) for name in NODES if name != 'body_estimator'}
@@ -395,8 +409,9 @@ def test_every_node_comes_up_with_the_shipped_file(context, executor, until, tmp
     try:
         for topic in served.values():
             until(lambda t=topic: observer.count_publishers(t), 30.0, f'a publisher of {topic}')
-        assert not observer.count_publishers('/lab/leg_4/position')
         assert not observer.count_publishers('/lab/leg_1/wetness')
+        until(lambda: observer.count_subscribers('/lab/leg_4/wrench'), 30.0, 'merge')
+        assert not observer.count_subscribers('/lab/leg_1/wrench')
         until((tmp_path / 'bag' / 'metadata.yaml').exists, 10.0, 'the bag')
     finally:
         for process in processes.values():

@@ -10,16 +10,18 @@ import sys
 import xml.etree.ElementTree
 
 import pytest
+from helpers import overrides
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from ros_pad.nodes import topics
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
+from ros_pad.nodes.merge import MergeNode
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.nodes.views import ViewsNode
 
 POLICY = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'security' / 'policy.xml'
 NODES = {
@@ -28,6 +30,8 @@ NODES = {
     'estimator': EstimatorNode,
     'controller': ControllerNode,
     'simulator': SimulatorNode,
+    'merge': MergeNode,
+    'views': ViewsNode,
     'recorder': RecorderNode,
 }
 OWN = {
@@ -39,25 +43,22 @@ OWN = {
     },
     'recorder': {},
 }
-SETPOINT = topics.PRESSURE_SETPOINT.name('?')
+SERVING = [name for name in NODES if name != 'recorder']
 # Allowed, but not always used: joints exist at L2 only, the clock in simulated time only.
 AT_TIMES = {
     ('simulator', 'publish', '/joint_states'),
     # Without markers:
-    ('simulator', 'publish', '/leg_?/foot_wrench'),
+    ('simulator', 'publish', '/feet/force'),
     ('simulator', 'publish', '/imu/data'),
     ('body_estimator', 'publish', '/tf'),
-    ('estimator', 'subscribe', '/leg_?/contact_velocity'),
-    ('estimator', 'subscribe', '/body/doubt'),
-    ('body_estimator', 'subscribe', '/clock'),
-    ('regulator', 'subscribe', '/clock'),
-    ('estimator', 'subscribe', '/clock'),
-    ('controller', 'subscribe', '/clock'),
-    ('simulator', 'subscribe', '/clock'),
+    ('merge', 'subscribe', '/leg_?/contact_velocity'),
+    # With the first message of a driver:
+    *(('merge', 'publish', f'/feet/{name}') for name in ('sample', 'force', 'pressure')),
+    *((name, 'subscribe', '/clock') for name in SERVING),
     # The recorder requests parameters of the nodes that run.
     *(
         ('recorder', 'request', f'/{node}/{verb}_parameters')
-        for node in ('regulator', 'body_estimator', 'estimator', 'controller', 'simulator')
+        for node in SERVING
         for verb in ('list', 'get')
     ),
 }
@@ -88,7 +89,7 @@ def test_sros2_can_read_the_file():
     root = xml.etree.ElementTree.parse(POLICY, parser).getroot()
     assert (root.tag, root.attrib) == ('policy', {'version': '0.2.0'})
     (enclaves,) = root
-    assert [each.tag for each in enclaves] == ['enclave'] * 7
+    assert [each.tag for each in enclaves] == ['enclave'] * 9
 
 
 @pytest.mark.parametrize('name', NODES)
@@ -99,7 +100,7 @@ def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, 
         parameters = {'legs': list(topics.LEGS), 'folder': str(tmp_path / 'bag')}
     node = NODES[name](
         context=context,
-        parameter_overrides=[Parameter(key, value=value) for key, value in parameters.items()],
+        parameter_overrides=overrides(parameters),
     )
     executor.add_node(node)
     observer = Node('observer', context=context, start_parameter_services=False)
@@ -131,12 +132,17 @@ def test_the_policy_names_what_a_node_has_and_no_more(context, executor, until, 
 
 def test_only_the_controller_may_move_pads_and_only_an_operator_may_call():
     policy = allowed()
-    movers = {
-        name
-        for (name, kind), expressions in policy.items()
-        if kind == 'publish' and any(fnmatch.fnmatchcase(f'/{SETPOINT}', e) for e in expressions)
-    }
-    assert movers == {'controller'}
+
+    def movers(topic):
+        return {
+            name
+            for (name, kind), expressions in policy.items()
+            if kind == 'publish' and any(fnmatch.fnmatchcase(topic, e) for e in expressions)
+        }
+
+    assert movers('/feet/command') == {'controller'}
+    assert movers('/leg_3/pressure_setpoint') == {'views'}  # for regulators of others
+    assert movers('/feet/pressure') == {'regulator', 'merge'}
     asking = {name for name, kind in policy if kind == 'request'}
     assert asking == {'operator', 'recorder', 'controller'}
     # These two may read parameters, and no more.
@@ -152,7 +158,7 @@ def test_an_operator_may_call_whatever_there_is_and_hear_every_topic():
     offered = set().union(*(policy[name, 'reply'] for name in NODES))
     assert policy['operator', 'request'] == offered
     heard = policy['operator', 'subscribe']
-    for name in topics.names(topics.LEGS):
+    for name in topics.names():
         full = f'/{name.removeprefix("/")}'
         assert any(fnmatch.fnmatchcase(full, each) for each in heard), name
 
@@ -184,13 +190,13 @@ def test_pad_run_is_isolated_unless_it_is_live(context, executor, until, tmp_pat
         until(lambda: walking('closed'), timeout=60.0, what='the closed walk')
         walk('live', '--live')
         until(
-            lambda: observer.count_publishers('/leg_1/pressure_setpoint'),
+            lambda: observer.count_publishers('/feet/command'),
             timeout=60.0,
             what='the live walk',
         )
         until(lambda: walking('live'), timeout=60.0)
         assert [each.poll() for each in walks] == [None, None]  # both still walk
-        assert observer.count_publishers('/leg_1/pressure_setpoint') == 1
+        assert observer.count_publishers('/feet/command') == 1
     finally:
         for each in walks:
             each.send_signal(signal.SIGINT)
