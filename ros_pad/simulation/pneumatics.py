@@ -496,7 +496,7 @@ class PneumaticChannel:
         self._edges = sorted({each.start for each in faults} | {each.end for each in faults})
         self._time = 0.0
         self._origin = 0.0  # time on the schedule of faults at which this channel started, s
-        self._outlet = Outlet(regulator)
+        self.outlet = Outlet(regulator)
         self._air = PadAir(pad_volume, hose, ambient, regulator.full_scale)
         self._content = self._air.content(0.0) + self._air.before * ambient
         self._drawn = 0.0
@@ -505,23 +505,23 @@ class PneumaticChannel:
         """Return a channel in the same state, which moves on its own."""
         twin = object.__new__(PneumaticChannel)
         twin.__dict__.update(self.__dict__)
-        twin._outlet = copy.copy(self._outlet)
+        twin.outlet = copy.copy(self.outlet)
         return twin
 
     @property
     def regulator(self) -> RegulatorModel:
         """The regulator."""
-        return self._outlet.model
+        return self.outlet.model
 
     @property
     def outlet_pressure(self) -> float:
         """Pressure at the outlet of the regulator, gauge Pa, in [0, full scale]."""
-        return self._outlet.pressure
+        return self.outlet.pressure
 
     @property
     def setpoint(self) -> float:
         """The last set-point commanded, gauge Pa."""
-        return self._outlet.setpoint
+        return self.outlet.setpoint
 
     @property
     def air_used(self) -> float:
@@ -568,7 +568,7 @@ class PneumaticChannel:
         """
         if not 0.0 <= dt < math.inf:
             raise InvalidInput(f'dt = {dt!r} s is not allowed: it must be finite and not negative')
-        outlet = self._outlet
+        outlet = self.outlet
         if setpoint != outlet.setpoint and outlet.command(setpoint, self._time):
             self.settled = False
         if self.settled and not self._edges:
@@ -597,7 +597,7 @@ class PneumaticChannel:
 
     def _advance(self, h: float, slope: float) -> None:
         """Move regulator and pad by a time h, s, with a reference that rises at a slope, Pa/s."""
-        outlet, hardware = self._outlet, SOUND
+        outlet, hardware = self.outlet, SOUND
         if self._faults:
             # Steps end where a fault starts or ends: one at mid-step acts during the whole step.
             now = self.time
@@ -621,7 +621,7 @@ class PneumaticChannel:
         Together they draw it to a share of the outlet's pressure. gap = pad - share outlet obeys
         gap' = -relaxation gap - ramp.
         """
-        outlet, before = self._outlet.pressure, self.pad_pressure
+        outlet, before = self.outlet.pressure, self.pad_pressure
         relaxation, share = self._relaxation(start, before, leak)
         gap = before - share * start
         ramp = share * (outlet - start) / h
@@ -666,7 +666,7 @@ class PneumaticChannel:
     def _fill(self, pressure: float, lost: float = 0.0) -> None:
         """Set the pad's pressure, Pa, and add the air drawn; ``lost`` is the air leaked, Pa m³."""
         content = self._air.content(pressure)
-        content += self._air.before * (self._outlet.pressure + self._ambient)
+        content += self._air.before * (self.outlet.pressure + self._ambient)
         if content + lost > self._content:
             self._drawn += content + lost - self._content
         self._content = content
