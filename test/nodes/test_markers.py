@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
-from rclpy.serialization import serialize_message
 from visualization_msgs.msg import Marker
 from visualization_msgs.msg import MarkerArray
 
+from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import FORCE_SCALE
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.simulation import fidelity
@@ -28,7 +28,7 @@ def walked(scene_name, seconds, pressure=0.0):
         robot.step(pressures)
         if step % 25 == 0:
             message = markers.message(robot, pressures, round(robot.time * 1e9))
-            wire = deserialize_message(serialize_message(message), MarkerArray)
+            wire = deserialize_message(ARRAY.encode(message), MarkerArray)
             yield scene, floor, robot, {(each.ns, each.id): each for each in wire.markers}
 
 

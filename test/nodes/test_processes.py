@@ -12,25 +12,25 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import FluidPressure
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.wire import Wire
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
 
 pytestmark = pytest.mark.realtime
 
 LEGS = (1, 2, 3, 4, 5, 6)
-AMBIENT = 101325.0
 RATE = 100.0  # Hz
 COMMAND_TIMEOUT = 0.5  # s
 SECONDS = 5.0
-TOPICS = (topics.WRENCH, topics.WETNESS, topics.PRESSURE_SETPOINT, topics.PRESSURE)
+TOPICS = (topics.SAMPLE, topics.ESTIMATE, topics.COMMAND, topics.PRESSURE)
+
 PARAMETERS = {
     'simulator': (f'rate:={RATE}', 'scene:=hexapod_smooth_wet_dome'),
     'estimator': (f'publish_rate:={RATE}',),
@@ -49,28 +49,27 @@ def start(name, *parameters):
 
 
 class Observer:
-    """Records arrival times and the last message of the topics of every leg."""
+    """Records arrival times of the records of each topic, and the last one."""
 
     def __init__(self):
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
-        # EventsExecutor keeps up with thousands of messages a second, and is safe because no
-        # other thread publishes here.
+        # EventsExecutor is safe because no other thread publishes here.
         self._executor = EventsExecutor(context=self._context)
         self.node = Node('observer', context=self._context)
-        self.times = {topic.name(leg): [] for topic in TOPICS for leg in LEGS}
+        self.times = {topic.name(): [] for topic in TOPICS}
         self.last = {}
-        for topic, leg in itertools.product(TOPICS, LEGS):
-            self._listen(topic, leg)
+        for topic in TOPICS:
+            self._listen(topic)
         self._executor.add_node(self.node)
 
-    def _listen(self, topic, leg):
-        name = topic.name(leg)
+    def _listen(self, topic):
+        name, decode = topic.name(), Wire(topic.schema.record, LEGS).decode
         times = self.times[name]
 
         def callback(data):
-            times.append(time.monotonic())
-            self.last[name] = data
+            self.last[name] = block = decode(data)
+            times.extend([time.monotonic()] * len(block.stamps))
 
         self.node.create_subscription(topic.message, name, callback, qos.RECORD, raw=True)
 
@@ -93,9 +92,9 @@ class Observer:
             gaps = [b - a for a, b in itertools.pairwise([begin, *counted, end])]
             result.longest[name] = max(gaps)
 
-    def gauge(self, leg):
-        message = deserialize_message(self.last[topics.PRESSURE.name(leg)], FluidPressure)
-        return message.fluid_pressure - AMBIENT
+    @property
+    def gauges(self):
+        return self.last['feet/pressure'].rows[-1]['pressure']
 
     def close(self):
         self._executor.remove_node(self.node)
@@ -133,9 +132,7 @@ def walk(tmp_path_factory, skip_if_slow_now):
         observer.until(lambda: all(observer.times.values()), 10.0, 'a message on every topic')
         result.discovery = time.monotonic() - up
         observer.until(lambda: bag.exists(), 10.0, 'the bag')
-        observer.until(
-            lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 10.0, 'pads under pressure'
-        )
+        observer.until(lambda: observer.gauges.min() > 55e3, 10.0, 'pads under pressure')
         # Other work on the machine may disturb one or two of these measurements.
         for _ in range(3):
             began = time.time_ns()
@@ -149,15 +146,11 @@ def walk(tmp_path_factory, skip_if_slow_now):
         # Set-points end with the controller, and the regulator vents.
         end('controller', signal.SIGTERM)
         gone = time.monotonic()
-        observer.until(
-            lambda: max(observer.gauge(leg) for leg in LEGS) < 1000.0, 5.0, 'vented pads'
-        )
+        observer.until(lambda: observer.gauges.max() < 1000.0, 5.0, 'vented pads')
         result.vented_after = time.monotonic() - gone
         # Pads are under pressure again when the regulator ends.
         processes['controller'] = start('controller', *PARAMETERS['controller'])
-        observer.until(
-            lambda: min(observer.gauge(leg) for leg in LEGS) > 55e3, 15.0, 'pads under pressure'
-        )
+        observer.until(lambda: observer.gauges.min() > 55e3, 15.0, 'pads under pressure')
         for name, number in [
             ('regulator', signal.SIGINT),
             ('simulator', signal.SIGINT),
@@ -181,13 +174,11 @@ def test_they_find_one_another(walk):
     assert walk.discovery < 10.0
 
 
-@pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.pattern.split('/')[1])
+@pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.name())
 def test_they_keep_100_hz(walk, topic):
-    """Mean over five seconds on every leg; no gap is longer than the command timeout."""
-    rates = {leg: walk.rates[topic.name(leg)] for leg in LEGS}
-    assert all(rate >= 0.95 * RATE for rate in rates.values()), rates
-    assert all(rate <= 1.05 * RATE for rate in rates.values()), rates
-    assert max(walk.longest[topic.name(leg)] for leg in LEGS) < COMMAND_TIMEOUT
+    """Mean over five seconds; no gap is longer than the command timeout."""
+    assert 0.95 * RATE <= walk.rates[topic.name()] <= 1.05 * RATE
+    assert walk.longest[topic.name()] < COMMAND_TIMEOUT
 
 
 def test_pads_are_vented_when_the_controller_dies(walk):
@@ -209,17 +200,15 @@ def test_the_regulator_logs_its_vent_at_shutdown(walk):
 def test_the_bag_has_the_walk(walk):
     reader = BagReader(walk.bag)
     assert reader.problem is None
-    for topic, leg in itertools.product(TOPICS, LEGS):
-        assert reader.counts[f'/{topic.name(leg)}'] >= 0.95 * RATE * SECONDS, topic.name(leg)
+    for topic in TOPICS:
+        assert reader.counts[f'/{topic.name()}'] >= 0.95 * RATE * SECONDS, topic.name()
     assert reader.counts['/body/pose'] >= 0.95 * RATE * SECONDS
     assert reader.counts['/diagnostics'] >= 4
     # While nodes start or end, feet may be flat for want of estimates or air.
+    kinds = {f'/{topic.name()}': topic.schema.record for topic in TOPICS}
+    found = reader.records(kinds)
     begin, end = walk.measured
-    messages = reader.messages({'/leg_3/morphology'})
-    shapes = [(message.data, log_ns) for _, message, log_ns in messages if log_ns < end]
-    before = [shape for shape, log_ns in shapes if log_ns < begin]
-    # The last one before the measurement is still in force; discovery may bring it only now.
-    in_force = before[-1:] + [shape for shape, log_ns in shapes if log_ns >= begin]
-    assert set(in_force) == {'dome'}, shapes
-    highest = max(m.fluid_pressure for _, m, _ in reader.messages({'/leg_3/pressure'})) - AMBIENT
+    _, times, commands = found['/feet/command']
+    assert commands.rows['dome'][(begin < times) & (times < end)].min() == 1.0
+    highest = np.nanmax(found['/feet/pressure'][2].rows['pressure'])
     assert 55e3 < highest < 61e3
