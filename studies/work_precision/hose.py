@@ -44,7 +44,7 @@ def filling_time(hose: Hose, volume: Volume, regulated: bool = True) -> float:
     model = RegulatorModel() if regulated else RegulatorModel(dead_time=0.0)
     channel = PneumaticChannel(model, hose, volume)
     if not regulated:
-        channel.outlet_pressure = GOAL
+        channel._outlet.pressure = GOAL
     return time_to(channel, GOAL, 0.9 * GOAL)
 
 
