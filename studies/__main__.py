@@ -53,7 +53,7 @@ STUDIES = {
     ),
     'lead_picture': ('closed_loop.lead_picture', 'picture and figures of the README (2 min)'),
     'real_time': ('nodes.real_time', 'speed of a trial without ROS and on nodes (1 min)'),
-    'nodes': ('nodes.cost', 'processor time of the nodes, beside another checkout (20 min)'),
+    'nodes': ('nodes.cost', 'time of trials and nodes, beside another checkout (20 min)'),
     'recorder': ('nodes.recorder', 'messages that the recorder takes, and their cost (1 min)'),
     'regulators': ('nodes.regulators', 'time of commands and readings of drivers (1 min)'),
     'soak': ('nodes.soak', 'an hour of the regulator node with faults (10 min)'),

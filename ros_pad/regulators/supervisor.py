@@ -362,9 +362,13 @@ class SupervisedChannel:
         return True
 
     def refuse(self, error: PadError) -> None:
-        """Count, log and report a refused command; the driver calls it for its own checks."""
+        """Count and report a refused command, and log the first one since the last report."""
+        news = not self.answers.refusal  # rclpy takes 0.3 ms to find that a text comes too soon
         self.answers.refuse(str(error))
-        self._log.warning(f'leg {self.leg}: set-point refused: {error}', throttle_duration_sec=1.0)
+        if news:
+            self._log.warning(
+                f'leg {self.leg}: set-point refused: {error}', throttle_duration_sec=1.0
+            )
 
     def expire(self, elapsed_ns: int) -> None:
         """Vent the pad if its last command is too old at a time, ns."""
