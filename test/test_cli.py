@@ -20,6 +20,7 @@ from ros_pad import configuration
 from ros_pad.bags import BagReader
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.errors import BagError
+from ros_pad.records import PRESSURE
 
 CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 SCENE = configuration.shared_folder() / 'scenes' / 'hexapod_patches.yaml'
@@ -465,13 +466,26 @@ def test_ctrl_c_leaves_vented_pads_and_a_readable_bag(
     assert 'pads vented, bag closed' in said
     reader = BagReader(out / 'bag')
     assert reader.problem is None
-    last = {}
-    highest = 0.0
-    for name, message, _ in reader.messages([f'/leg_{leg}/pressure' for leg in range(1, 7)]):
-        last[name] = message.fluid_pressure - 101325.0
-        highest = max(highest, last[name])
-    assert highest > 60e3
-    assert len(last) == 6 and max(last.values()) < 1000.0
+    _, _, block = reader.records({'/feet/pressure': PRESSURE})['/feet/pressure']
+    pressures = block.rows['pressure']
+    assert pressures.max() > 60e3
+    assert pressures.shape[1] == 6 and pressures[-1].max() < 1000.0
+
+
+def test_a_walk_that_is_stopped_before_its_first_sample_is_a_trial(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    composed = pytest.importorskip('ros_pad.nodes.composed')
+    walk = composed.ComposedTrial.walk
+
+    def stopped(trial, progress):
+        trial.stopped = True
+        walk(trial, progress)
+
+    monkeypatch.setattr(composed.ComposedTrial, 'walk', stopped)
+    words = ['run', 'hexapod_patches', '--no-compare', '--out', str(tmp_path / 'walk')]
+    assert cli.main(words) == INTERRUPTED
+    assert 'stopped at 0.0 s' in capfd.readouterr().err
 
 
 def test_domes_that_cannot_carry_the_robot_are_reported(

@@ -21,7 +21,7 @@ def tables():
         'records',
         '| topic | number | unit | meaning |\n|---|---|---|---|\n'
         + ''.join(
-            f'| `feet/{kind.name}` | `{field.name}{"_" * bool(field.axes)}{"/".join(field.axes)}` |'
+            f'| `feet/{kind.name}` | `{field.name}{field.axes and "_"}{"/".join(field.axes)}` |'
             f' {field.unit or "–"} | {field.meaning} |\n'
             for kind in KINDS
             for field in kind.fields

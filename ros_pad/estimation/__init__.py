@@ -10,9 +10,11 @@ from ros_pad.estimation.foot import FootEstimator
 from ros_pad.estimation.tuning import SETTINGS
 from ros_pad.estimation.tuning import Tuning
 
-DOUBTS, SENSOR_FAULTS = KINDS, FAULTS
-"""Kinds of doubt, which are the texts before the colon; the first one, empty, is no doubt. And
-those of the sensors, not of the ground."""
+DOUBTS = KINDS
+"""Kinds of doubt, which are the texts before the colon; the first one, empty, is no doubt."""
+
+SENSOR_FAULTS = FAULTS
+"""Kinds of doubt about sensors, not about the ground."""
 
 __all__ = [
     'DOUBTS',

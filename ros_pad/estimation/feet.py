@@ -115,9 +115,16 @@ class FeetEstimator:
     def update_all(
         self, times: Sequence[float], values: Array, pressures: Sequence[float]
     ) -> None:
-        """Process samples of all feet, with new positions, at times that advance, s.
+        """Process samples of all feet, with new positions, at times that advance.
 
-        The values are those of samples, feet and numbers, and all that are needed are there.
+        Parameters
+        ----------
+        times : sequence of float
+            Times, s.
+        values : array (times, feet, 11)
+            Numbers of SAMPLE rows in their units (no unit of their own); none is missing.
+        pressures : sequence of float
+            Gauge pressure in the pads of each foot, Pa.
         """
         gaps = [time - before for before, time in pairwise((self.tracks[0].time, *times))]
         quiet = None

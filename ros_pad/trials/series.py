@@ -62,14 +62,14 @@ def held(stamps: np.ndarray, values: np.ndarray, grid: np.ndarray) -> np.ndarray
 def series(records: Records) -> dict[str, Any]:
     """Return the series of :class:`ros_pad.trials.trial.Trial` by name, times in ns.
 
-    Fast series have a row for each sample of any foot; slow ones for each estimate with a sample
-    or, without estimates, for each pressure.
+    Fast series have a row for each sample of any foot; slow ones for each estimate with a sample,
+    without loads for each wetness, and without that for each pressure.
     """
     sample, estimate, command, pressure = records
     fast = sample.stamps[np.isfinite(sample.rows['force']).all(axis=2).any(axis=1)]
-    slow = estimate.stamps[np.isfinite(estimate.rows['load']).any(axis=1)]
-    if not len(estimate.stamps):
-        slow = pressure.stamps
+    grids = (estimate.stamps[np.isfinite(estimate.rows[name]).any(axis=1)]
+             for name in ('load', 'wetness'))  # fmt: skip
+    slow = next((each for each in grids if len(each)), pressure.stamps)
     fast, slow = np.unique(fast), np.unique(slow)
 
     def of(block: Block, name: str, grid: np.ndarray = slow) -> np.ndarray:

@@ -91,11 +91,13 @@ def walked(cycles: int, seed: int) -> Walk:
             mujoco.mj_objectVelocity(robot.model, robot.data, kind, geom, velocity, 0)
             row.append((foot.force[2], foot.slip_speed, float(np.linalg.norm(velocity[:3]))))
         rows.append(row)
-    truth, expected = np.moveaxis(np.array(rows), 2, 0), scene.expected_load
+    load, speed, rate = np.moveaxis(np.array(rows), 2, 0)
+    expected = scene.expected_load
     stage = EstimationStage(scene.foot, expected, tuning_for(scene), scene.legs, loop.period_ns)
     estimate = loops.estimated(stage, log.records)
     alarm = estimate.rows['slipping'] == 1.0
-    return Walk(loop.period_ns * 1e-9, expected, 1e-9 * estimate.stamps, *truth, alarm)
+    stamps = 1e-9 * estimate.stamps
+    return Walk(loop.period_ns * 1e-9, expected, stamps, load, speed, rate, alarm)
 
 
 def own_robot(walks: Sequence[Walk], cycle: float) -> dict[str, Any]:

@@ -130,10 +130,11 @@ def plain(value):
 
 
 @pytest.fixture
-def recorded(tmp_path):
-    """Return a bag and what was written into it: (topic, message, time)."""
+def recorded(tmp_path, monkeypatch):
+    """Return a bag of several chunks and what was written into it: (topic, message, time)."""
     chance = random.Random(7)
     written = []
+    monkeypatch.setattr('ros_pad.bags.writer.CHUNK_SIZE', 64 * 1024)
     with BagWriter(tmp_path / 'trial', {'scene': 'hexapod_patches', 'seed': '0'}) as writer:
         for message_class in MESSAGES:
             writer.add_topic(f'/{message_class.__name__}', type_name(message_class), QOS)

@@ -5,7 +5,7 @@ from ros_pad.control.faults import KINDS
 from ros_pad.control.faults import Kind
 from ros_pad.control.faults import joined
 from ros_pad.control.faults import text
-from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import doubt as doubts
 
 
 def test_codes_are_the_places_in_the_table():
@@ -29,7 +29,7 @@ def test_no_fault_has_no_text():
 
 
 def test_a_doubt_about_sensors_names_itself():
-    doubt = Kind.DOUBT(DOUBTS.index('marker lost'))
+    doubt = Kind.DOUBT(doubts.LOST)
     assert (str(doubt), doubt.label) == ('marker lost', 'marker lost')
     assert joined(Kind.STUCK(5e3), doubt) == (
         'stuck: 5.0 kPa, neither fills nor vents; marker lost'

@@ -8,10 +8,12 @@ from ros_pad.contact import Foot
 from ros_pad.control import MorphologyController
 from ros_pad.control import flat
 from ros_pad.control.stage import DecisionStage
-from ros_pad.estimation import DOUBTS
+from ros_pad.estimation import doubt as doubts
 from ros_pad.records import ESTIMATE
 from ros_pad.records import PRESSURE
 from ros_pad.records import Block
+
+CODES = {row.kind: code for code, row in reversed([*enumerate(doubts.TABLE)])}
 
 
 class Watched(MorphologyController):
@@ -26,7 +28,7 @@ class Watched(MorphologyController):
         return super().update(leg, load, wet_probability, position, friction)
 
     def observe(self, leg, time, pressure, doubt=0.0):
-        self.observed.append((leg, round(time, 9), pressure, DOUBTS[int(doubt)]))
+        self.observed.append((leg, round(time, 9), pressure, doubts.kind(doubt)))
         super().observe(leg, time, pressure, doubt)
 
 
@@ -42,7 +44,7 @@ class Stage(DecisionStage):
         rows = ESTIMATE.rows(2)
         rows[leg - 1]['load'], rows[leg - 1]['wetness'] = load, wetness
         rows[leg - 1]['friction'] = friction
-        rows[leg - 1]['doubt'] = math.nan if doubt is None else DOUBTS.index(doubt)
+        rows[leg - 1]['doubt'] = math.nan if doubt is None else CODES[doubt]
         if position:
             rows[leg - 1]['position'] = position
         command = self.decide(Block.of(round(time * 1e9), rows))

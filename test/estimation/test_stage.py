@@ -107,12 +107,15 @@ def test_forces_of_refused_samples_count():
 
 
 @pytest.mark.parametrize('last', [math.nan, math.inf, -math.inf])
-def test_no_estimate_is_made_of_a_force_that_is_not_finite(last):
+def test_an_estimate_of_a_force_that_is_not_finite_has_no_load(last):
     watched = Watched()
     watched.sample(4)
     watched.sample(20, last)
     watched.sample(24)
-    assert watched.shown('load') == [(4, 6.0), (24, 6.0)]
+    watched.sample(40)
+    loads = watched.shown('load')
+    assert [at for at, _ in loads] == [4, 20, 40]
+    assert math.isnan(loads[1][1]) and loads[0][1] == loads[2][1] == 6.0
 
 
 def test_the_last_position_since_the_last_estimate_is_shown():

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -9,12 +8,14 @@ from ros_pad.control import MorphologyController
 from ros_pad.control import adaptive
 from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
+from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop as loop_module
 from ros_pad.trials import run
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
+from studies.closed_loop import loops
 
 PATCHES = Scene.load('hexapod_patches')
 SERIES = (
@@ -295,26 +296,24 @@ def watched(policy, seed, cycles=20):
     scene = short(cycles)
     loop = ClosedLoop(scene, policy, seed, 'L1')
     log = TrialLog(scene, policy, seed, 'L1')
-    rows, ends, last = [], [], {}
-    for _ in range(round(scene.duration / 0.004)):
-        loop.tick(log)
-        for index, foot in enumerate(loop.robot.feet):
-            estimate = loop.estimators[index].estimate
-            # Before the robot walks the ground is unobservable.
-            if estimate.standing and foot.force[2] > 0.0 and estimate.time > scene.settle + 0.3:
-                ratio = math.hypot(*foot.force[:2]) / foot.force[2]
-                truth = foot.grip / foot.force[2]
-                rows.append((
-                    truth, estimate.friction_mean, estimate.friction_sd,
-                    estimate.margin + ratio, loop.pressures[index] > 1000.0,
-                ))  # fmt: skip
-                unsure = rows[-1][-1] or bool(estimate.doubt)
-                last[index] = (estimate.wet_probability > 0.5, foot.wet, unsure)
-            elif not estimate.standing and index in last:
-                believed, wet, unsure = last.pop(index)
-                if not unsure:
-                    ends.append((believed, wet))
-    return np.array(rows, dtype=float), np.array(ends)
+    true = np.array([
+        [(*foot.force, foot.grip, foot.wet) for foot in loop.robot.feet]
+        for _ in loops.samples(loop, scene, log)
+    ])  # fmt: skip
+    x, y, load, grip, wet = np.moveaxis(true, 2, 0)
+    tuning, expected = tuning_for(scene), scene.expected_load
+    stage = EstimationStage(scene.foot, expected, tuning, scene.legs, loop.period_ns)
+    stamps, told = loops.estimated(stage, log.records)
+    domed = loops.pressures(log.records, stamps) > 1000.0
+    stands = log.records.sample.rows['force'][..., 2] > tuning.load_gate * expected
+    # Before the robot walks the ground is unobservable.
+    walks = (1e-9 * stamps > scene.settle + 0.3)[:, None]
+    use = stands & walks & (load > 0.0)
+    quantile = told['margin'][use] + np.hypot(x, y)[use] / load[use]
+    columns = grip[use] / load[use], told['friction'][use], told['friction_sd'][use], quantile
+    last = stands[:-1] & ~stands[1:] & use[:-1] & ~domed[:-1] & (told['doubt'][:-1] == 0.0)
+    ends = np.stack([told['wetness'][:-1][last] > 0.5, wet[:-1][last] > 0.5], axis=1)
+    return np.stack([*columns, domed[use]], axis=1), ends
 
 
 @pytest.mark.slow
@@ -325,7 +324,8 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
     This is the best case: the estimator has the exact contact model of the foot, and at L1 feet
     neither scuff nor push one another.
     """
-    _, before = ClosedLoop(short(1), policy, 0, 'L1').estimators[0].ground.friction
+    loop = ClosedLoop(short(1), policy, 0, 'L1')
+    _, before = loop.pipeline.estimation.estimator.grounds.filters[0].friction
     walks = [watched(policy, seed) for seed in (0, 1, 2)]
     for rows, _ in walks:
         truth, mean, sd, *_ = rows.T

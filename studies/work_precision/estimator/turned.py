@@ -181,25 +181,30 @@ def _begins(stands: Flags, period: float) -> list[float]:
     ]
 
 
+def misread(rows: np.ndarray, fault: str) -> np.ndarray:
+    """Return rows of samples as they are read with a fault."""
+    forces, positions = (np.transpose(each) for each in FAULTS[fault][:2])
+    rows = rows.copy()
+    rows['force'] = rows['force'] @ forces
+    rows['position'] = rows['position'] @ positions
+    rows['velocity'] = rows['velocity'] @ positions[:2, :2]
+    return rows
+
+
 def stances_until(walk: Walk, fault: str) -> list[tuple[int | None, bool]]:
     """Return for each foot the stances until its axes are in doubt, None if they never are.
 
     Beside them, whether the doubt names the fault in the end.
     """
-    forces, positions, words = FAULTS[fault]
-    stamps, given = walk.records.sample
-    rows = given.copy()
-    rows['force'] = given['force'] @ np.transpose(forces)
-    rows['position'] = given['position'] @ np.transpose(positions)
-    rows['velocity'] = given['velocity'] @ np.transpose(positions)[:2, :2]
-    records = walk.records._replace(sample=Block(stamps, rows))
+    stamps, rows = walk.records.sample
+    records = walk.records._replace(sample=Block(stamps, misread(rows, fault)))
     estimate = loops.estimated(EstimationStage(*walk.settings), records)
     found: list[tuple[int | None, bool]] = []
     of_feet = zip(*_doubts(estimate.rows), strict=True)
     for begun, doubts in zip(walk.touch_downs, of_feet, strict=True):
         times = (1e-9 * estimate.stamps[[bool(each) for each in doubts]]).tolist()
         count = sum(at <= times[0] for at in begun) if times else None
-        found.append((count, words in doubts[-1]))
+        found.append((count, FAULTS[fault][2] in doubts[-1]))
     return found
 
 

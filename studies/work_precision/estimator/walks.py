@@ -116,14 +116,14 @@ def record(
         if not loop.robot.verdict
     ]  # fmt: skip
     truth, records = np.array(true, dtype=np.float64), log.records
-    stamps, taken = (each[: len(truth)] for each in records.sample)
+    stamps, taken = records.sample.stamps[: len(truth)], records.sample.rows[: len(truth)]
     return Recording(
         name=f'{scene.name}, {policy}, {seed}, {level}',
         period=loop.period_ns * 1e-9,
         foot=scene.foot,
         expected_load=scene.expected_load,
         settings=(scene.foot, scene.expected_load, tuning_for(scene)),
-        stamps=1e-9 * stamps,
+        stamps=np.multiply(1e-9, stamps, dtype=np.float64),
         force=taken['force'],
         position=taken['position'],
         noise=taken['position'] - truth[..., :3],

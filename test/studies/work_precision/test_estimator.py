@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ros_pad.estimation import FootEstimator
+from ros_pad.records import SAMPLE
 from ros_pad.simulation import Scene
 from ros_pad.trials.node_settings import tuning_for
 from studies.work_precision.estimator import chart
@@ -452,9 +453,11 @@ def test_the_docs_have_the_tables_of_the_file():
     ],
 )
 def test_faults_of_axes(fault, force, position):
-    forces, positions, _ = turned.FAULTS[fault]
-    assert turned._turned(forces, (1.0, 2.0, 3.0)) == force
-    assert turned._turned(positions, (1.0, 2.0, 3.0)) == position
+    rows = SAMPLE.rows(1)
+    rows['force'] = rows['position'] = (1.0, 2.0, 3.0)
+    read = turned.misread(rows, fault)
+    assert tuple(read['force'][0]) == force
+    assert tuple(read['position'][0]) == position
 
 
 def test_feet_are_counted_by_the_stance_in_which_their_axes_were_found():
