@@ -324,6 +324,8 @@ class BagReader:
                         raise BagError(f'{file}: a message on {topic}: {error}') from error
                     times = batch.log_times[mine].astype(np.int64)
                     found.setdefault(topic, []).append((times, block))
+        if progress:
+            progress(1.0)
         return {
             topic: (
                 wires[topic].legs,

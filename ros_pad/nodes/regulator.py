@@ -322,19 +322,23 @@ class RegulatorNode(LifecycleNode):
 
     def _on_command(self, block: Block) -> None:
         self._mismatch = ''
+        if not self.channels:  # the devices are closed
+            return
         now_ns = self.messages.now_ns()
         if not self.messages.simulated or self.messages.follows_clock:
             self.supervision.command(block, now_ns, self._elapsed(now_ns))
             return
-        if abs(block.last_ns - now_ns) <= TICK_PERIOD_NS:
+        clock_ns = now_ns
+        if 0 < self.tick_ns - clock_ns <= TICK_PERIOD_NS:
+            now_ns = self.tick_ns  # an earlier record came before /clock: time does not go back
+        if abs(block.last_ns - clock_ns) <= TICK_PERIOD_NS:
             # The record may come before the message of /clock of its moment.
             now_ns = max(now_ns, block.last_ns)
             self.messages.advance(block.last_ns)
         self._supervise(now_ns)
-        if self.channels:
-            answer = self.supervision.read(block.last_ns, now_ns)
-            self.supervision.command(block, now_ns, now_ns)
-            self._send(answer)  # who waits for it finds the command carried out
+        answer = self.supervision.read(block.last_ns, now_ns)
+        self.supervision.command(block, now_ns, now_ns)
+        self._send(answer)  # who waits for it finds the command carried out
 
     def _last_tick(self) -> float:
         """Return the time of the last tick, s; this is the clock of simulated regulators."""

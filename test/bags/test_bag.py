@@ -11,6 +11,7 @@ import textwrap
 import time
 import warnings
 
+import numpy as np
 import pytest
 import yaml
 
@@ -42,8 +43,13 @@ from ros_pad.bags import metadata
 from ros_pad.bags import storage
 from ros_pad.bags.definitions import message_definition
 from ros_pad.bags.definitions import type_hash
+from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
+from ros_pad.records import ESTIMATE
+from ros_pad.records import PRESSURE
+from ros_pad.records import SAMPLE
+from ros_pad.records import Block
 
 QOS = """
 - history: keep_last
@@ -581,6 +587,47 @@ def test_a_killed_bag_has_the_same_values(recorded, tmp_path):
     read = list(reader.values(PATHS))
     assert len(read) > 100 and read == expected_values(written[: reader.message_count])
     assert len(reader.tables(PATHS)['/Bool'][0]) == reader.counts['/Bool']
+
+
+def bag_of_records(folder, count=50, odd=None):
+    """Write estimates of legs 3 and 1 and pressures in turn; return the blocks written."""
+    written = {'/feet/estimate': [], '/feet/pressure': []}
+    wires = {f'/feet/{kind.name}': Wire(kind, (3, 1)) for kind in (ESTIMATE, PRESSURE)}
+    with BagWriter(folder) as writer:
+        for topic in wires:
+            writer.add_topic(topic, 'sensor_msgs/msg/JointState')
+        for number in range(count):
+            for topic, wire in wires.items():
+                rows = wire.kind.rows(1, 2)
+                rows['detail'] = number
+                block = Block(np.array([10**9 + number]), rows)
+                data = odd if odd and number == 7 else wire.encode(block)
+                writer.write(topic, data, 20_000_000 * number)
+                written[topic].append(block)
+    return written
+
+
+@pytest.mark.parametrize('size', [1, 5000, 1 << 23])
+def test_records_are_those_written_in_their_order(tmp_path, monkeypatch, size):
+    monkeypatch.setattr('ros_pad.bags.storage._BATCH_SIZE', size)
+    written = bag_of_records(tmp_path / 'trial')
+    shares = []
+    kinds = {'/feet/estimate': ESTIMATE, '/feet/pressure': PRESSURE, '/feet/sample': SAMPLE}
+    found = BagReader(tmp_path / 'trial').records(kinds, shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert set(found) == set(written)
+    for topic, (legs, times, block) in found.items():
+        assert legs == (3, 1)
+        assert times.tolist() == [20_000_000 * number for number in range(50)]
+        assert block.stamps.tolist() == [10**9 + number for number in range(50)]
+        assert block.rows.tobytes() == b''.join(each.rows.tobytes() for each in written[topic])
+
+
+@pytest.mark.parametrize('odd', [b'', b'\0\1\0\0', b'\7' * 50])
+def test_a_record_that_is_none_is_an_error(tmp_path, odd):
+    bag_of_records(tmp_path / 'trial', odd=odd or b'x')
+    with pytest.raises(BagError, match='a message on /feet/estimate: '):
+        BagReader(tmp_path / 'trial').records({'/feet/estimate': ESTIMATE})
 
 
 @pytest.mark.parametrize('kind', ['short', 'big_endian_xml', 'field'])

@@ -33,7 +33,7 @@ class Driver(Node):
     def __init__(self, context):
         super().__init__('driver', context=context)
         self.out = {
-            (topic, leg): self.create_publisher(topic.message, topic.name(leg), 10)
+            (topic.pattern, leg): self.create_publisher(topic.message, topic.name(leg), 10)
             for topic in (WRENCH, POSITION, PRESSURE)
             for leg in LEGS
         }
@@ -52,7 +52,7 @@ class Driver(Node):
     def regulate(self, leg, message):
         self.commanded[leg] = message.fluid_pressure
         message.header.frame_id = f'leg_{leg}_valve'
-        self.out[PRESSURE, leg].publish(message)  # an ideal device
+        self.out[PRESSURE.pattern, leg].publish(message)  # an ideal device
 
     def sense(self):
         """Publish what the sensors of a standing robot read."""
@@ -61,8 +61,8 @@ class Driver(Node):
         jitter = 1e-6 * math.sin(self.count)
         for leg in LEGS:
             force = (0.1 * LOAD + jitter, 0.0, LOAD + jitter)
-            self.out[WRENCH, leg].publish(wrench(now_ns, force, frame=f'leg_{leg}_foot'))
-            self.out[POSITION, leg].publish(position(now_ns, (jitter, 0.0, 0.0)))
+            self.out[WRENCH.pattern, leg].publish(wrench(now_ns, force, frame=f'leg_{leg}_foot'))
+            self.out[POSITION.pattern, leg].publish(position(now_ns, (jitter, 0.0, 0.0)))
 
 
 def test_a_driver_by_leg_walks_with_merge_and_views(context, executor, until):

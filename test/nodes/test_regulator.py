@@ -197,6 +197,17 @@ def test_records_that_come_twice_or_late_do_no_harm(robot):
     assert robot.gauge(1) > 59e3 and robot.gauge(2) > 39e3
 
 
+def test_records_ahead_of_the_clock_and_late_ones_vent_nothing(robot):
+    """Simulated time seems to go back where a record came before /clock."""
+    robot.start()
+    robot.hold(0.5, 60e3, 40e3)
+    for ahead_ms in (80, 40, 150, 0, 80):
+        stamp_ns = robot.bench.now_ns + ahead_ms * MS
+        robot.bench.give(topics.COMMAND, command(stamp_ns, (60e3, 40e3)))
+        assert robot.device(1).read().setpoint == 60e3
+    assert [robot.counts(leg) for leg in (1, 2)] == [(30, 0)] * 2
+
+
 @pytest.mark.parametrize('missing', [NONE, -5.0, 1e6, math.inf])
 def test_a_row_that_is_missing_or_invalid_concerns_its_leg_only(robot, missing):
     robot.start()
@@ -291,6 +302,7 @@ def test_the_life_of_the_node(robot, context, executor):
 
     assert robot.state() == State.PRIMARY_STATE_UNCONFIGURED
     assert not node.channels
+    robot.send(60e3, NONE)  # nobody hears it
     assert transit('CONFIGURE') == State.PRIMARY_STATE_INACTIVE
     robot.hold(0.2, 60e3, NONE)
     assert (robot.counts(), robot.gauge()) == ((0, 0), 0.0)
