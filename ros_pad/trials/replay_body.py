@@ -7,14 +7,15 @@ import heapq
 import json
 import math
 import operator
+from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.fields import field_of
 from ros_pad.bags.topics import FORCE
 from ros_pad.bags.topics import IMU
 from ros_pad.bags.topics import JOINT_STATES
@@ -161,13 +162,21 @@ def _play(
 
 def _messages(
     bag: BagReader, force: str, imu: str, joints: str
-) -> Iterator[tuple[int, str, Sequence[Any]]]:
+) -> Iterator[tuple[int, str, Iterable[Any]]]:
     """Yield log time, ns, topic and values of all messages, which begin with the stamp."""
-    paths = {
-        imu: (*STAMP, *IMU.values),
-        joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
-    }
-    messages = ((log_ns, topic, values) for topic, values, log_ns in bag.values(paths))
+
+    def values(topic: str, message: Any) -> Iterator[Any]:
+        """Yield the values of a message, beginning with its stamp."""
+        yield from (message.header.stamp.sec, message.header.stamp.nanosec)
+        if topic == joints:
+            yield from (message.name, message.position, message.velocity, message.effort)
+        else:
+            yield from (field_of(message, path) for path in IMU.values)
+
+    messages = (
+        (log_ns, topic, values(topic, message))
+        for topic, message, log_ns in bag.messages({imu, joints})
+    )
     _, times, (stamps, rows) = bag.records({force: SAMPLES})[force]
     forces = (
         (log_ns, force, (0, stamp_ns, *each))

@@ -11,12 +11,10 @@ from rosbags.typesys import get_typestore
 from ros_pad.bags import topics
 from ros_pad.bags.codec import MessageType
 from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.fields import field_of
 from ros_pad.bags.topics import FRAME
 from ros_pad.bags.topics import STAMP
 from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
-from ros_pad.errors import UnknownEncoding
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]
@@ -41,17 +39,14 @@ def test_the_documentation_has_every_topic_with_type_and_unit():
     assert not documented
 
 
-@pytest.mark.parametrize('topic', TRIAL.values(), ids=TRIAL)
+@pytest.mark.parametrize('topic', TRIAL, ids=[each.kind for each in TRIAL])
 def test_each_type_has_the_values_of_its_topic(topic):
     store = get_typestore(Stores.ROS2_JAZZY)
     definition, _ = store.generate_msgdef(topic.type_name, ros_version=2)
     message_type = MessageType(topic.type_name, definition)
     paths = (*topic.values, *((*STAMP, FRAME) if topic.frame else ()))
     blank = message_type.blank()
-    try:
-        values = FieldReader(message_type, paths)(message_type.encode(blank))
-    except UnknownEncoding:  # more than one text: bags are decoded
-        values = [field_of(blank, path) for path in paths]
+    values = FieldReader(message_type, paths)(message_type.encode(blank))
     assert [isinstance(each, str) for each in values] == [
         path == FRAME or topic.text for path in paths
     ]
@@ -59,7 +54,8 @@ def test_each_type_has_the_values_of_its_topic(topic):
 
 def test_nodes_have_the_classes_of_the_table():
     of_nodes = pytest.importorskip('ros_pad.nodes.topics')
-    every = (*of_nodes.LEG_TOPICS, *of_nodes.COMMON_TOPICS)
+    of_legs = [of_nodes.of_leg(each) for each in topics.OF_LEGS]
+    every = (*of_legs, *of_nodes.COMMON_TOPICS, of_nodes.FEET_MARKERS)
     assert {topic.schema for topic in every} == set(TOPICS)
     for topic in every:
         package = topic.message.__module__.partition('.')[0]
