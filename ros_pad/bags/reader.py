@@ -146,7 +146,7 @@ class BagReader:
 
     def _files_of_folder(self) -> list[pathlib.Path]:
         """Return the MCAP files of the folder, and store its custom data."""
-        information = metadata.read(self.path, topics=False)
+        information = metadata.read(self.path)
         try:
             storage = information['storage_identifier']
             compression = str(information.get('compression_mode', ''))
