@@ -283,13 +283,13 @@ def _layout(message_type: MessageType, data: bytes | None = None) -> list[_Field
         found.append(field)
         return field
 
-    def size_of(path: str) -> int:
+    def size_of(path: str, what: str) -> int:
         place = put(path + _SIZE, 'I', 4).place
         if data is None:
             return 0
         size = int.from_bytes(data[place : place + 4], ('big', 'little')[data[1]])
         if size > len(data):
-            raise BadMessage(f'{len(data)} bytes are too few for {path} of size {size}')
+            raise BadMessage(f'{len(data)} bytes are too few for a {what} of {size} bytes')
         return size
 
     def walk(kind: Nodetype, inner: Any, path: str) -> None:
@@ -298,10 +298,10 @@ def _layout(message_type: MessageType, data: bytes | None = None) -> list[_Field
                 walk(of_field, inside, f'{path}.{field}' if path else field)
         elif kind != Nodetype.BASE:
             (element_kind, element), length = inner
-            for place in range(size_of(path) if kind == Nodetype.SEQUENCE else length):
+            for place in range(size_of(path, 'list') if kind == Nodetype.SEQUENCE else length):
                 walk(element_kind, element, f'{path}[{place}]')
         elif inner[0] == 'string':
-            put(path, f'{size_of(path)}s')
+            put(path, f'{size_of(path, "text")}s')
         elif inner[0] in _FORMATS:
             form = _FORMATS[inner[0]]
             put(path, form, struct.calcsize(form))

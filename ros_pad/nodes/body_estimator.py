@@ -24,8 +24,6 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import OK
-from ros_pad.nodes.diagnostics import WARN
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.listening import message_class
 from ros_pad.nodes.messages import Messages
@@ -343,7 +341,7 @@ class BodyEstimatorNode(Node):
         waits = stage.doubt is None
         doubt = stage.doubt or self._lasting
         text = 'no sample yet' if waits else doubt or 'the motion is known'
-        level = WARN if waits or doubt else OK
+        level = Diagnostics.WARN if waits or doubt else Diagnostics.OK
         values = {
             'samples': stage.samples,
             'forces': stage.force_source or 'none',

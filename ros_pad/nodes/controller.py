@@ -36,9 +36,6 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import ERROR
-from ros_pad.nodes.diagnostics import OK
-from ros_pad.nodes.diagnostics import WARN
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import EXPECTED_LOAD
@@ -242,7 +239,7 @@ class ControllerNode(Node):
         for leg in self._legs:
             morphology, monitor = controller.morphology(leg), controller.monitor(leg)
             fault, remark = controller.fault(leg), controller.remark(leg)
-            level = ERROR if fault else WARN if remark else OK
+            level = Diagnostics.ERROR if fault else Diagnostics.WARN if remark else Diagnostics.OK
             text = '; '.join(filter(None, (fault, remark))) or morphology
             values = {
                 'pressure (Pa gauge)': f'{monitor.pressure:.0f}',

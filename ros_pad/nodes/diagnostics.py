@@ -18,8 +18,6 @@ from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import LATE
 from ros_pad.pace import Pace
 
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-
 OLDEST = 0.1
 """Age of the last sample, s, from which a node that needs samples counts as late."""
 
@@ -32,19 +30,26 @@ class Diagnostics:
     node : Node
     messages : Messages
         Its publishers and subscriptions.
+
+    Attributes
+    ----------
+    reported : object
+        What was found when it told of it last.
     """
+
+    OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
     def __init__(self, node: Node, messages: Messages) -> None:
         self._name, self._messages = node.get_name(), messages
         self._publish = messages.output(topics.DIAGNOSTICS)
         self._pace = Pace(1_000_000_000)
-        self._reported: Any = None
+        self.reported: Any = None
         self._since_ns, self._counted = messages.now_ns(), 0
 
     def due(self, now_ns: int, found: Any = None) -> bool:
         """Return whether to tell of it: once a second, and as soon as what was found changes."""
-        due = self._pace.due(now_ns) or found != self._reported
-        self._reported = found
+        due = self._pace.due(now_ns) or found != self.reported
+        self.reported = found
         return due
 
     def status(
@@ -76,7 +81,7 @@ class Diagnostics:
             'age of the last sample (s)': f'{age:.3f}',
         }
         text = f'{LATE}, or clocks differ: {text}' if late else text
-        return self.status('rate', WARN if late else OK, text, values)
+        return self.status('rate', self.WARN if late else self.OK, text, values)
 
     def send(self, now_ns: int, statuses: Sequence[DiagnosticStatus]) -> None:
         """Publish these, and which messages were refused."""

@@ -25,8 +25,6 @@ from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import ERROR
-from ros_pad.nodes.diagnostics import OK
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import EXPECTED_LOAD
@@ -145,9 +143,9 @@ class EstimatorNode(Node):
 
     def _idle(self, now_ns: int) -> None:
         """Tick without samples: the controller has to know of a foot whose sensors are silent."""
-        before = self._reported
+        before = self._diagnostics.reported
         self._tick(now_ns)
-        if self._reported != before:
+        if self._diagnostics.reported != before:
             self._send(self.stage.estimate(now_ns))
 
     def _tick(self, now_ns: int) -> None:
@@ -178,7 +176,7 @@ class EstimatorNode(Node):
                 'force noise': noise.force.text('N'),
                 'samples': self.stage.used[index],
             }
-            level = OK if sound[index] else ERROR
+            level = Diagnostics.OK if sound[index] else Diagnostics.ERROR
             text = doubts.text(row['doubt'], *row['detail']) or 'the ground is observable'
             name = f'leg {leg} sensing'
             found.append(self._diagnostics.status(name, level, text, values, f'foot {leg}'))
@@ -191,7 +189,9 @@ class EstimatorNode(Node):
             low, high = scale.interval
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'
-        return self._diagnostics.status('friction of the floor', OK, text, values, 'feet')
+        return self._diagnostics.status(
+            'friction of the floor', Diagnostics.OK, text, values, 'feet'
+        )
 
 
 def main(args: list[str] | None = None) -> int:

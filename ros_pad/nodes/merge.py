@@ -24,7 +24,6 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.joining import WAIT_NS
 from ros_pad.joining import Joiner
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import ERROR
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.messages import Messages
@@ -126,7 +125,9 @@ class MergeNode(Node):
         statuses = []
         if self.refused:
             text = 'others publish records too: those of this node are refused'
-            statuses.append(self._diagnostics.status('records', ERROR, text, self.refused))
+            statuses.append(
+                self._diagnostics.status('records', Diagnostics.ERROR, text, self.refused)
+            )
         if statuses or self.messages.refusals.counts:
             self._diagnostics.send(now_ns, statuses)
 

@@ -38,7 +38,6 @@ from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import WARN
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.messages import Messages
@@ -241,7 +240,7 @@ class RecorderNode(Node):
     def _diagnose(self) -> None:
         """Tell on ``/diagnostics`` how many messages were lost."""
         text = f'{LATE}: {self._told} messages lost so far'
-        status = self._diagnostics.status('lost messages', WARN, text, self.lost)
+        status = self._diagnostics.status('lost messages', Diagnostics.WARN, text, self.lost)
         self._diagnostics.send(self._messages.now_ns(), [status])
 
     def _look_for_nodes(self) -> None:

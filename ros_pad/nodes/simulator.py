@@ -21,8 +21,6 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
-from ros_pad.nodes.diagnostics import OK
-from ros_pad.nodes.diagnostics import WARN
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import WalkMarkers
@@ -250,7 +248,9 @@ class SimulatorNode(Node):
             'reached rate (Hz)': f'{rate.reached:.1f}',
             'speed (times real time)': f'{rate.speed:.3f}',
         }
-        status = self._diagnostics.status('rate', WARN if late else OK, text, values)
+        status = self._diagnostics.status(
+            'rate', Diagnostics.WARN if late else Diagnostics.OK, text, values
+        )
         now_ns = self.time_ns if self._simulated else self.messages.now_ns()
         self._diagnostics.send(now_ns, [status])
 

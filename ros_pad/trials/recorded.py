@@ -43,15 +43,11 @@ from ros_pad.pace import part
 from ros_pad.records import KINDS
 from ros_pad.records import Block
 from ros_pad.records import Kind
-from ros_pad.simulation.scene import FloorPlan
-from ros_pad.trials.label import AMBIENT_PRESSURE
-from ros_pad.trials.label import KEY
-from ros_pad.trials.label import LOST
+from ros_pad.trials import label
 from ros_pad.trials.series import Records
 from ros_pad.trials.series import by_row
 from ros_pad.trials.series import held
 from ros_pad.trials.series import series
-from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 from ros_pad.trials.trial import heading
 
@@ -269,31 +265,22 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
 
 def _described(bag: BagReader) -> dict[str, Any]:
     """Return the fields of a trial that follow from the custom data of a bag."""
-    try:
-        noted = json.loads(bag.custom_data.get(KEY, '{}'))
-        source = str(noted.get('scene') or '')
-        seed = int(noted.get('seed') or 0)
-        plan = FloorPlan(**noted['floor']) if noted.get('floor') else None
-        ambient = float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default))
-        return {
-            'scene': pathlib.PurePath(source).stem,
-            'policy': str(noted.get('policy') or ''),
-            'fidelity': str(noted.get('fidelity') or ''),
-            'seed': seed,
-            'floor': partial(plan.build, seed) if plan else None,
-            'metrics': Metrics(**noted['metrics']) if noted.get('metrics') else None,
-            'settings': (noted.get('settings') or {})
-            | {
-                'ambient_pressure': ambient,
-                'lost': dict(json.loads(bag.custom_data.get(LOST, '{}'))),
-                'repaired': REPAIR in bag.custom_data,
-            },
-            'real_time_factor': noted.get('real_time_factor'),
-        }
-    except (AttributeError, TypeError, ValueError) as error:
-        raise BagError(
-            f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
-        ) from error
+    about = label.read(bag)
+    settings = {
+        'ambient_pressure': about.ambient_pressure,
+        'lost': dict(json.loads(bag.custom_data.get(label.LOST, '{}'))),
+        'repaired': REPAIR in bag.custom_data,
+    }
+    return {
+        'scene': pathlib.PurePath(about.scene).stem,
+        'policy': about.policy,
+        'fidelity': about.fidelity,
+        'seed': about.seed,
+        'floor': partial(about.floor.build, about.seed) if about.floor else None,
+        'metrics': about.metrics,
+        'settings': about.settings | settings,
+        'real_time_factor': about.real_time_factor,
+    }
 
 
 class Wanted(NamedTuple):
