@@ -47,6 +47,7 @@ from ros_pad.sensing.stage import SET_BACK_NS
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import robot_of
 from ros_pad.sensing.stage import sample_of
 from ros_pad.sensing.stage import twist_of
 
@@ -152,10 +153,8 @@ class BodyEstimatorNode(Node):
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def _load(self, values: dict[str, Any]) -> Robot:
-        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
-        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
         try:
-            robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
+            robot = robot_of(values)
         except (ConfigError, InvalidInput) as error:
             raise ConfigError(
                 f'node {self.get_name()}: parameter robot = {values["robot"]!r} is not allowed:'

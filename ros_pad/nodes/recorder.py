@@ -138,8 +138,8 @@ class RecorderNode(Node):
             raise
         self._intake = Intake(self)
         self._told = 0  # lost messages in the last message on /diagnostics
-        self._messages = Messages(self)
-        self._diagnostics = Diagnostics(self, self._messages)
+        messages = Messages(self)
+        self._diagnostics, self._refusals = Diagnostics(self, messages), messages.refusals
         self._failed = False  # whether writing has failed
         self._writers: dict[str, _Write] = {}  # by full name of the topic
         for name, topic in recorded.items():
@@ -241,7 +241,7 @@ class RecorderNode(Node):
         """Tell on ``/diagnostics`` how many messages were lost."""
         text = f'{LATE}: {self._told} messages lost so far'
         status = self._diagnostics.status('lost messages', Diagnostics.WARN, text, self.lost)
-        self._diagnostics.send(self._messages.now_ns(), [status])
+        self._diagnostics.send(self.get_clock().now().nanoseconds, [status])
 
     def _look_for_nodes(self) -> None:
         """Request the parameters of every node of the robot when its services are there.
@@ -356,7 +356,7 @@ class RecorderNode(Node):
         try:
             records = split(data)
         except BadMessage as error:
-            self._messages.refusals(name, error)
+            self._refusals(name, error)
             records = [(at_ns, data)]  # it is kept all the same
         last_ns = records[-1][0]
         for stamp_ns, record in records:

@@ -37,6 +37,7 @@ from ros_pad.sensing import SensingStage
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import robot_of
 from ros_pad.sensing.stage import sample_of
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Stream
@@ -109,9 +110,7 @@ def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Com
 def _parts(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
     """Return the robot and the estimator that recorded parameters describe."""
     try:
-        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
-        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
-        robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
+        robot = robot_of(values)
         return robot, estimator_of(robot, values)
     except (KeyError, InvalidInput) as error:
         raise BagError(
