@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read and write single fields of messages, several times faster than whole messages.
 
-Where the fields are in the bytes follows from the definition of the message type. A reader knows
-messages that have fields of fixed size and at most one text, as most messages with a header are.
-A writer knows every message, because texts and lengths of lists stay the same in what it writes.
+Where the fields are in the bytes follows from the definition of the message type, and from the
+sizes of texts and lists, which are mostly the same in message after message.
 
 Source: OMG, Common Object Request Broker Architecture, part 2, section 9.3 (CDR). A message starts
 with four bytes of encapsulation, of which the second gives the byte order; after them each number
@@ -12,15 +11,12 @@ is at a multiple of its size.
 
 from __future__ import annotations
 
-import functools
 import operator
 import struct
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -36,13 +32,45 @@ _FORMATS = {
     'float64': 'd',
 }  # fmt: skip
 _ORDERS = '><'  # by the byte-order flag of a message
-_SIZES = tuple(struct.Struct(order + 'I') for order in _ORDERS)
-_SIZE, _COUNT = '#', '[#]'  # ends of the paths of the size of a text and of the length of a list
-_MOST_PLANS = 64  # sizes of the text that are remembered
-_SHORT = 64  # bytes, of texts that are remembered
+_SIZE = '#'  # end of the path of the size of a text or list
 
-_Field = tuple[str, str]  # path, such as twist.covariance[7], and format for struct
-_Piece = bytes | tuple[int, str]  # constant bytes, or which value, and its format for struct
+
+class _Field(NamedTuple):
+    """A number or text of a message: its path, format for struct, and place in the bytes."""
+
+    path: str
+    form: str
+    place: int
+
+    @property
+    def end(self) -> int:
+        """Place of the next byte."""
+        return self.place + struct.calcsize('<' + self.form)
+
+
+class _Plan:
+    """Where the wanted fields are in messages whose texts and lists have certain sizes."""
+
+    def __init__(self, order: str, fields: Sequence[_Field], paths: Sequence[str]) -> None:
+        known = {field.path: field for field in fields}
+        missing = [path for path in paths if path not in known]
+        if missing:
+            raise BadMessage(f'it has no {missing[0]}')
+        self.wanted = [known[path] for path in paths]
+        self.order, self.end = order, fields[-1].end if fields else _ENCAPSULATION
+        sizes = [field for field in fields if field.path.endswith(_SIZE)]
+        self.fixed = [slice(0, 2), *(slice(field.place, field.end) for field in sizes)]
+        form, end, in_order = order, 0, sorted(self.wanted, key=operator.attrgetter('place'))
+        for field in in_order:
+            form += f'{field.place - end}x{field.form}'
+            end = field.end
+        self.unpack = struct.Struct(form).unpack_from
+        # struct returns fields in the order of the message.
+        self.places = [in_order.index(field) for field in self.wanted]
+
+    def like(self, message: bytes) -> list[bytes]:
+        """Return the bytes of a message that must be the same in all of this plan."""
+        return [message[each] for each in self.fixed]
 
 
 class FieldReader:
@@ -53,30 +81,26 @@ class FieldReader:
     message_type : MessageType
         Type of the messages.
     paths : sequence of str
-        Fields, such as ``header.stamp.sec``, ``wrench.force.x`` or ``twist.covariance[7]``.
+        Fields, such as ``header.stamp.sec``, ``wrench.force.x`` or ``twist.covariance[7]``; no
+        elements of lists whose length is variable.
 
     Raises
     ------
     UnknownEncoding
-        When the type has a list of variable length, or more than one text.
+        When a field has a type that is not read.
     ValueError
         When the type has no such field, or a path is given twice.
     """
 
     def __init__(self, message_type: MessageType, paths: Sequence[str]) -> None:
         self.paths = tuple(paths)
-        self._fields = list(_fields(message_type, message_type.blank()))
-        texts = [place for place, (_, form) in enumerate(self._fields) if form.endswith('s')]
-        if len(texts) > 1 or any(path.endswith(_COUNT) for path, _ in self._fields):
-            raise UnknownEncoding(f'{message_type.name} has a list, or more than one text')
-        self._wanted = _chosen(self._fields, paths)
-        self._text = texts[0] if texts else None
-        self._size_at = _places(self._fields)[self._text - 1] if self._text is not None else 0
-        self._text_at = self._wanted.index(self._text) if self._text in self._wanted else None
-        self._plans: dict[tuple[int, int], Callable[[bytes], tuple[Any, ...]]] = {}
-        # struct returns fields in the order of the message.
-        in_order = sorted(self._wanted)
-        self._pick = _picker([in_order.index(place) for place in self._wanted])
+        self._type = message_type
+        forms = {field.path: field.form for field in _layout(message_type)}
+        self._texts = [place for place, path in enumerate(paths) if _form(forms, path)[-1] == 's']
+        if len(set(paths)) < len(paths):
+            raise ValueError(f'{paths} has a path twice')
+        self._plan: _Plan | None = None
+        self._like: list[bytes] = []  # of the last message
 
     def __call__(self, data: bytes) -> tuple[Any, ...]:
         """Return the fields of a message, in the order of the paths.
@@ -88,43 +112,26 @@ class FieldReader:
         UnknownEncoding
             When the encapsulation is not plain CDR.
         """
-        try:
-            order = data[1]
-            if data[0] or order > 1:
-                raise UnknownEncoding(f'encapsulation {data[:2].hex()} is not 0000 or 0001')
-            size = _SIZES[order].unpack_from(data, self._size_at)[0] if self._size_at else 0
-            unpack = self._plans.get((order, size))
-            if unpack is None:
-                unpack = self._plan(order, size, len(data))
-            values = self._pick(unpack(data))
-        except (IndexError, struct.error):
-            raise BadMessage(f'{len(data)} bytes are too few') from None
-        return values if self._text_at is None else self._decoded(values, self._text_at)
+        plan = self._plan
+        if plan is None or plan.like(data) != self._like:
+            plan = self._planned(data)
+        if len(data) < plan.end:
+            raise BadMessage(f'{len(data)} bytes are too few')
+        found = plan.unpack(data)
+        values = [found[place] for place in plan.places]
+        for place in self._texts:
+            values[place] = _text(values[place])
+        return tuple(values)
 
-    def _plan(self, order: int, size: int, available: int) -> Callable[[bytes], tuple[Any, ...]]:
-        """Return a function that unpacks messages with a text of this size, bytes."""
-        if size > available:
-            raise BadMessage(f'{available} bytes are too few for a text of {size} bytes')
-        fields = self._sized(size)
-        form = _format(fields, _places(fields), self._wanted)
-        plan = struct.Struct(_ORDERS[order] + form).unpack_from
-        if len(self._plans) == _MOST_PLANS:
-            self._plans.clear()  # texts of many sizes must not keep out the usual one
-        self._plans[order, size] = plan
+    def _planned(self, data: bytes) -> _Plan:
+        """Return where the fields are in messages like this one, and remember it."""
+        if len(data) < _ENCAPSULATION:
+            raise BadMessage(f'{len(data)} bytes are too few')
+        if data[0] or data[1] > 1:
+            raise UnknownEncoding(f'encapsulation {data[:2].hex()} is not 0000 or 0001')
+        plan = _Plan(_ORDERS[data[1]], _layout(self._type, data), self.paths)
+        self._plan, self._like = plan, plan.like(data)
         return plan
-
-    def _sized(self, size: int) -> list[_Field]:
-        """Return the fields of messages whose text has this size, bytes."""
-        fields = list(self._fields)
-        if self._text is not None:
-            fields[self._text] = fields[self._text][0], f'{size}s'
-        return fields
-
-    @staticmethod
-    def _decoded(values: tuple[Any, ...], place: int) -> tuple[Any, ...]:
-        data = values[place]
-        text = (_short_text if len(data) < _SHORT else _text)(data)
-        return *values[:place], text, *values[place + 1 :]
 
     def table(self, messages: Sequence[bytes]) -> np.ndarray:
         """Return numbers of many messages as an array.
@@ -146,73 +153,25 @@ class FieldReader:
         ValueError
             When a path is that of a text.
         """
-        if self._text_at is not None:
-            raise ValueError(f'{self.paths[self._text_at]} is a text, and a table has numbers')
+        for place in self._texts:
+            raise ValueError(f'{self.paths[place]} is a text, and a table has numbers')
         table = np.empty((len(messages), len(self.paths)))
-        sizes = np.array([len(each) for each in messages], dtype=np.int64)
-        rows = self.rows(b''.join(messages), np.cumsum(sizes) - sizes, sizes)
-        for column, path in enumerate(self.paths):
-            table[:, column] = rows[path]
+        if not messages:
+            return table
+        self(messages[0])
+        plan, size = self._plan, len(messages[0])
+        assert plan
+        if all(len(each) == size for each in messages):
+            data = b''.join(messages)
+            octets = np.frombuffer(data, np.uint8).reshape(-1, size)
+            if all((octets[:, each] == octets[0, each]).all() for each in plan.fixed):
+                for column, field in enumerate(plan.wanted):
+                    form = np.dtype(plan.order + field.form)
+                    strides = (size,)
+                    table[:, column] = np.ndarray(len(table), form, data, field.place, strides)
+                return table
+        table[:] = [self(each) for each in messages]
         return table
-
-    def rows(self, data: bytes, starts: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Return the fields of many messages as a structured array.
-
-        Parameters
-        ----------
-        data : bytes
-            Bytes with the messages in them.
-        starts, sizes : ndarray of int
-            First byte in `data` and number of bytes of each message.
-
-        Returns
-        -------
-        numpy.ndarray
-            Has a row for each message, in which the fields have their paths as names.
-
-        Raises
-        ------
-        BadMessage, UnknownEncoding
-            As for a single message.
-        """
-        if len(starts) and self._text_at is None:
-            first = data[starts[0] : starts[0] + sizes[0]]
-            self(first)  # refuses wrong bytes
-            if np.all(sizes == sizes[0]):
-                record = self._record(first)
-                found = items(data, f'V{record.itemsize}')[starts]
-                if self._alike(found):
-                    return found.view(record)
-        ends = (starts + sizes).tolist()
-        found = [self(data[s:e]) for s, e in zip(starts.tolist(), ends, strict=True)]
-        forms = (self._fields[place][1] for place in self._wanted)
-        return np.array(
-            found,
-            [(p, 'O' if f.endswith('s') else f) for p, f in zip(self.paths, forms, strict=True)],
-        )
-
-    def _alike(self, messages: np.ndarray) -> bool:
-        """Return whether messages have the same encapsulation, and texts of the same size."""
-        table = messages.view(np.uint8).reshape(len(messages), -1)
-        places = [slice(at, at + _ENCAPSULATION) for at in (0, self._size_at)]
-        return all(bool(np.all(table[:, at] == table[0, at])) for at in places)
-
-    def _record(self, message: bytes) -> np.dtype[np.void]:
-        """Return the layout of messages that are like this one."""
-        order, at = message[1], self._size_at
-        fields = self._sized(_SIZES[order].unpack_from(message, at)[0] if at else 0)
-        places = _places(fields)
-        formats = [np.dtype(_ORDERS[order] + fields[place][1]) for place in self._wanted]
-        offsets = [places[place] for place in self._wanted]
-        ends = [offset + form.itemsize for offset, form in zip(offsets, formats, strict=True)]
-        return np.dtype(
-            {
-                'names': list(self.paths),
-                'formats': formats,
-                'offsets': offsets,
-                'itemsize': max([at + _ENCAPSULATION, *ends]),  # up to the last field
-            }
-        )
 
 
 class FieldWriter:
@@ -227,11 +186,6 @@ class FieldWriter:
     constants : mapping of str to object
         Other fields that are not zero or empty, such as ``{'header.frame_id': 'world'}``; a list
         keeps its length.
-
-    Attributes
-    ----------
-    size : int
-        Number of bytes that it writes.
 
     Raises
     ------
@@ -254,37 +208,26 @@ class FieldWriter:
             if isinstance(before, np.ndarray):
                 value = np.asarray(value, before.dtype)
             setattr(target, name, value)
-        fields = list(_fields(message_type, message))
-        wanted = _chosen(fields, paths)
-        for path, form in map(fields.__getitem__, wanted):
-            if form.endswith('s'):
-                raise ValueError(f'{path} is a text: only numbers may differ')
         template = message_type.encode(message)
-        places = _places(fields)
+        fields = {field.path: field for field in _layout(message_type, template)}
+        for path in paths:
+            if _form(fields, path)[1].endswith('s'):
+                raise ValueError(f'{path} is a text: only numbers may differ')
+        if len(set(paths)) < len(paths):
+            raise ValueError(f'{paths} has a path twice')
         # Numbers that differ, and the bytes between them, in the order of the message.
-        pieces: list[_Piece] = []
-        end = 0
-        for place in sorted(wanted):
-            pieces += [template[end : places[place]], (wanted.index(place), fields[place][1])]
-            end = places[place] + struct.calcsize(fields[place][1])
-        self._compile([*pieces, template[end:]])
-
-    def _compile(self, pieces: Sequence[_Piece]) -> None:
-        self._pieces = [piece for piece in pieces if piece != b'']
-        self._between = tuple(piece for piece in self._pieces if isinstance(piece, bytes))
-        self._count = len(self._pieces) - len(self._between)
-        form, order, constants = '<', [], self._count
-        for piece in self._pieces:
-            if isinstance(piece, tuple):
-                form += piece[1]
-                order.append(piece[0])
-            else:
-                form += f'{len(piece)}s'
-                order.append(constants)
-                constants += 1
-        self._pick = _picker(order)
-        packing = struct.Struct(form)
-        self._pack, self.size = packing.pack, packing.size
+        form, order, end = f'<{_ENCAPSULATION}s', [len(paths)], _ENCAPSULATION
+        self._constants: tuple[bytes, ...] = (template[:end],)
+        for path in sorted(paths, key=lambda path: fields[path].place):
+            field = fields[path]
+            form += f'{field.place - end}s{field.form}'
+            order += [len(paths) + len(self._constants), paths.index(path)]
+            self._constants += (template[end : field.place],)
+            end = field.end
+        self._pack = struct.Struct(f'{form}{len(template) - end}s').pack
+        self._pick = operator.itemgetter(*order, len(paths) + len(self._constants))
+        self._constants += (template[end:],)
+        self._count = len(paths)
 
     def __call__(self, *values: float) -> bytes:
         """Return the bytes of a message, little-endian, with values in the order of the paths.
@@ -294,7 +237,9 @@ class FieldWriter:
         struct.error, OverflowError
             When a value does not fit its field.
         """
-        return self._pack(*self._pick(values + self._between))
+        if len(values) != self._count:
+            raise struct.error(f'{len(values)} values are given, {self._count} are needed')
+        return self._pack(*self._pick(values + self._constants))
 
 
 def _text(data: bytes) -> str:
@@ -304,7 +249,11 @@ def _text(data: bytes) -> str:
         raise BadMessage(f'text {data[:20]!r} is not UTF-8: {error.reason}') from None
 
 
-_short_text = functools.lru_cache(maxsize=256)(_text)  # names of frames come again and again
+def _form(known: Mapping[str, Any], path: str) -> Any:
+    """Return what is known of a path."""
+    if path not in known:
+        raise ValueError(f'{path!r} is no number or text of the messages')
+    return known[path]
 
 
 def field_of(message: Any, path: str) -> Any:
@@ -314,84 +263,53 @@ def field_of(message: Any, path: str) -> Any:
     return value[int(place)] if place else value
 
 
-def items(data: bytes, form: str, first: int = 0) -> np.ndarray:
-    """Return a view of bytes in which the index of an item is the place where it begins.
+def _layout(message_type: MessageType, data: bytes | None = None) -> list[_Field]:
+    """Return the numbers and texts of a message, in the order of its bytes.
 
-    Parameters
-    ----------
-    data : bytes
-        Any bytes.
-    form : str
-        NumPy type of an item.
-    first : int
-        Place of the item with index 0.
+    Without a message, all texts and lists are empty.
+
+    Raises
+    ------
+    BadMessage
+        When there are too few bytes.
     """
-    count = max(0, len(data) - first - np.dtype(form).itemsize + 1)
-    return np.ndarray((count,), form, data, first if count else 0, (1,))
+    found: list[_Field] = []
 
+    def put(path: str, form: str, step: int = 1) -> _Field:
+        end = found[-1].end - _ENCAPSULATION if found else 0
+        field = _Field(path, form, _ENCAPSULATION + end + -end % step)
+        if data is not None and field.end > len(data):
+            raise BadMessage(f'{len(data)} bytes are too few for {path} of {field.end}')
+        found.append(field)
+        return field
 
-def _fields(message_type: MessageType, message: Any) -> Iterator[_Field]:
-    """Yield path and format of each number and text of a message, in the order of its bytes."""
+    def size_of(path: str, what: str) -> int:
+        place = put(path + _SIZE, 'I', 4).place
+        if data is None:
+            return 0
+        size = int.from_bytes(data[place : place + 4], ('big', 'little')[data[1]])
+        if size > len(data):
+            raise BadMessage(f'{len(data)} bytes are too few for a {what} of {size} bytes')
+        return size
 
-    def inside(name: str, message: Any, path: str) -> Iterator[_Field]:
-        for field, (kind, inner) in message_type.fields(name):
-            yield from one(kind, inner, getattr(message, field), f'{path}{field}')
-
-    def one(kind: Nodetype, inner: Any, value: Any, path: str) -> Iterator[_Field]:
+    def walk(kind: Nodetype, inner: Any, path: str) -> None:
         if kind == Nodetype.NAME:
-            yield from inside(inner, value, f'{path}.')
+            for field, (of_field, inside) in message_type.fields(inner):
+                walk(of_field, inside, f'{path}.{field}' if path else field)
         elif kind != Nodetype.BASE:
-            (element_kind, element), _ = inner
-            if kind == Nodetype.SEQUENCE:
-                yield path + _COUNT, 'I'
-            for place, each in enumerate(value):
-                yield from one(element_kind, element, each, f'{path}[{place}]')
+            (element_kind, element), length = inner
+            for place in range(size_of(path, 'list') if kind == Nodetype.SEQUENCE else length):
+                walk(element_kind, element, f'{path}[{place}]')
         elif inner[0] == 'string':
-            yield path + _SIZE, 'I'
-            yield path, f'{len(value.encode()) + 1}s'
+            put(path, f'{size_of(path, "text")}s')
         elif inner[0] in _FORMATS:
-            yield path, _FORMATS[inner[0]]
+            form = _FORMATS[inner[0]]
+            put(path, form, struct.calcsize(form))
         else:
             raise UnknownEncoding(f'{message_type.name}: type {inner[0]} of {path}')
 
-    return inside(message_type.name, message, '')
+    walk(Nodetype.NAME, message_type.name, '')
+    return found
 
 
-def _chosen(fields: Sequence[_Field], paths: Sequence[str]) -> list[int]:
-    """Return the number of the field of each path."""
-    if len(set(paths)) < len(paths):
-        raise ValueError(f'{paths} has a path twice')
-    known = [path for path, _ in fields]
-    return [known.index(path) for path in paths]
-
-
-def _places(fields: Sequence[_Field]) -> list[int]:
-    """Return the place of each field in the bytes of a message."""
-    places, end = [], 0
-    for _, form in fields:
-        size = struct.calcsize('<' + form)
-        step = 1 if form.endswith('s') else size
-        start = -(-end // step) * step
-        places.append(_ENCAPSULATION + start)
-        end = start + size
-    return places
-
-
-def _format(fields: Sequence[_Field], places: Sequence[int], wanted: Collection[int]) -> str:
-    """Return the format of a whole message, for struct, with only the wanted fields in it."""
-    form, end = '', 0
-    for number, ((_, each), start) in enumerate(zip(fields, places, strict=True)):
-        size = struct.calcsize('<' + each)
-        form += f'{start - end}x' + (each if number in wanted else f'{size}x')
-        end = start + size
-    return form
-
-
-def _picker(order: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
-    """Return a function that puts the items of a tuple into an order."""
-    if len(order) > 1 and list(order) != sorted(order):
-        return operator.itemgetter(*order)
-    return tuple  # a tuple is returned as it is
-
-
-__all__ = ['FieldReader', 'FieldWriter', 'field_of', 'items']
+__all__ = ['FieldReader', 'FieldWriter', 'field_of']

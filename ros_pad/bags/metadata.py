@@ -20,7 +20,6 @@ from ros_pad.configuration import instance
 from ros_pad.errors import BagError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import reason
-from ros_pad.yaml_text import SAFE_LOADER
 from ros_pad.yaml_text import read_yaml
 
 _NAME = 'metadata.yaml'
@@ -99,15 +98,13 @@ def write(
     _replace(file.parent, information)
 
 
-def read(folder: pathlib.Path, topics: bool = True) -> dict[str, Any]:
+def read(folder: pathlib.Path) -> dict[str, Any]:
     """Return the metadata of a bag, without its root key.
 
     Parameters
     ----------
     folder : path
         Folder of the bag.
-    topics : bool
-        False leaves out the entries of the topics, with their QoS by far the longest part.
 
     Raises
     ------
@@ -118,11 +115,7 @@ def read(folder: pathlib.Path, topics: bool = True) -> dict[str, Any]:
     if not path.is_file():
         raise BagError(f'{folder}: is not a bag, or an incomplete one: it has no {_NAME}')
     try:
-        text = path.read_text(encoding='utf-8')
-        with contextlib.suppress(yaml.YAMLError):  # an alias may refer to what is left out
-            if not topics:
-                return dict(read_yaml(text, _WithoutTopics)[_ROOT])
-        return dict(read_yaml(text)[_ROOT])
+        return dict(read_yaml(path.read_text(encoding='utf-8'))[_ROOT])
     except Exception as error:  # invalid YAML or content can raise any exception
         raise BagError(f'{path}: is not the metadata of a bag: {reason(error)}') from error
 
@@ -188,29 +181,6 @@ def _replace(folder: pathlib.Path, information: Mapping[str, Any]) -> None:
         with contextlib.suppress(OSError):
             new.unlink()
         raise
-
-
-# The loader of libyaml composes in C; the composer of PyYAML can leave something out.
-_LOADERS = (yaml.composer.Composer, SAFE_LOADER) if yaml.__with_libyaml__ else (SAFE_LOADER,)
-
-
-class _WithoutTopics(*_LOADERS):  # type: ignore[misc]
-    """A safe loader that leaves out the entries of the topics."""
-
-    def __init__(self, text: str) -> None:
-        SAFE_LOADER.__init__(self, text)
-        yaml.composer.Composer.__init__(self)
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if not isinstance(index, yaml.ScalarNode) or index.value != _TOPICS:
-            return super().compose_node(parent, index)
-        depth = 0
-        while True:
-            event = self.get_event()
-            depth += isinstance(event, yaml.CollectionStartEvent)
-            depth -= isinstance(event, yaml.CollectionEndEvent)
-            if not depth:
-                return yaml.SequenceNode('tag:yaml.org,2002:seq', [])
 
 
 class _NoAliasDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]

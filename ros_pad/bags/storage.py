@@ -3,49 +3,41 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-import os
 import pathlib
 import struct
 from collections import Counter
 from collections.abc import Collection
+from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 from typing import IO
 from typing import Any
+from typing import TypeAlias
 
-import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
 from mcap.records import Channel
 from mcap.records import Chunk
 from mcap.records import Message
 from mcap.records import Schema
-from mcap.records import Statistics
 from mcap.stream_reader import StreamReader
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
-from ros_pad.bags.fields import items
 from ros_pad.errors import BagError
 from ros_pad.pace import Progress
 from ros_pad.pace import part
 
-_MESSAGE_HEADER = struct.Struct('<BQHIQQ')
-_FIELDS = ('opcode', 'length', 'channel', 'sequence', 'log_time', 'publish_time')
-_HEADER = np.dtype(list(zip(_FIELDS, ('u1', '<u8', '<u2', '<u4', '<u8', '<u8'), strict=True)))
-_RECORD_HEADER = struct.Struct('<BQ')  # opcode, length
+_MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log and publish time
 _RECORD_HEADER_SIZE = 9
-_FOOTER = struct.Struct('<BQQ')  # opcode, length, place of the summary
-_TAIL_SIZE = 37  # bytes, from the footer to the end
-_CHUNK_INDEX = struct.Struct('<QQQQI')  # times, place and length of the chunk, bytes of offsets
-_OFFSET = np.dtype([('channel', '<u2'), ('offset', '<u8')])
-_LENGTH, _LENGTH_AT = '<u4', 1  # type and place in a record; no chunk has records over 4 GiB
-_BATCH_SIZE = 8 * 1024 * 1024  # bytes
-_FEW = 32  # pieces that are followed one by one; more are followed side by side
+_BATCH_SIZE = 8 * 1024 * 1024  # bytes from one report of progress to the next
+
+RawMessage: TypeAlias = tuple[int, int, bytes]
+"""Channel id, log time, ns, and bytes of a message."""
 
 
 class _Undefined(Exception):
@@ -120,49 +112,21 @@ def scan(path: pathlib.Path, progress: Progress | None = None) -> Contents:
 
 def _from_summary(stream: IO[bytes]) -> Contents | None:
     """Return the contents of a closed file; None if it has no summary."""
-    stream.seek(-_TAIL_SIZE, os.SEEK_END)
-    opcode, _, start = _FOOTER.unpack(stream.read(_FOOTER.size))
-    if opcode != Opcode.FOOTER or not start:
+    stream.seek(0)
+    summary = SeekingReader(stream).get_summary()
+    if summary is None or summary.statistics is None:
         return None
-    stream.seek(start)
-    contents = Contents(finished=True)
-    counts = None
-    for record in StreamReader(io.BytesIO(_without_chunks(stream.read(), contents)), True).records:
-        if isinstance(record, Schema):
-            contents.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            contents.channels[record.id] = record
-        elif isinstance(record, Statistics):
-            counts = record.channel_message_counts
-            contents.start, contents.end = record.message_start_time, record.message_end_time
-    if counts is None:
-        return None
-    if not contents.channels.keys() >= counts.keys():
+    counts, channels = summary.statistics.channel_message_counts, summary.channels
+    if not channels.keys() >= counts.keys():
         raise _Undefined
+    contents = Contents(True, summary.schemas, channels)
+    contents.start = summary.statistics.message_start_time
+    contents.end = summary.statistics.message_end_time
+    for each in summary.chunk_indexes:
+        contents.chunks.append((each.chunk_start_offset, set(each.message_index_offsets)))
     for channel_id, count in counts.items():
-        contents.counts[contents.channels[channel_id].topic] += count
+        contents.counts[channels[channel_id].topic] += count
     return contents
-
-
-def _without_chunks(summary: bytes, contents: Contents) -> bytes:
-    """Return a summary without its chunk indexes, of which the contents take what they need.
-
-    With all channels in each of thousands of chunks, the mcap package would take longer for them
-    than the messages take.
-    """
-    rest, place = b'', 0
-    while place + _RECORD_HEADER_SIZE <= len(summary):
-        opcode, length = _RECORD_HEADER.unpack_from(summary, place)
-        body, place = place + _RECORD_HEADER_SIZE, place + _RECORD_HEADER_SIZE + length
-        if opcode != Opcode.CHUNK_INDEX:
-            rest += summary[body - _RECORD_HEADER_SIZE : place]
-            continue
-        _, _, start, _, size = _CHUNK_INDEX.unpack_from(summary, body)
-        offsets = np.frombuffer(
-            summary, _OFFSET, size // _OFFSET.itemsize, body + _CHUNK_INDEX.size
-        )
-        contents.chunks.append((start, set(offsets['channel'].tolist())))
-    return rest + summary[place:]
 
 
 def _from_records(path: pathlib.Path, progress: Progress | None) -> Contents:
@@ -201,85 +165,37 @@ def _readable_records(path: pathlib.Path, contents: Contents) -> Iterator[tuple[
             return
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Messages of a file, in the order in which they were written.
-
-    Attributes
-    ----------
-    data : bytes
-        The messages, and records between them.
-    channels, log_times, starts, sizes : ndarray of int
-        Channel id, log time, ns, first byte in `data` and number of bytes of each message.
-    """
-
-    data: bytes
-    channels: np.ndarray
-    log_times: np.ndarray
-    starts: np.ndarray
-    sizes: np.ndarray
-
-
 def raw_messages(
     path: pathlib.Path,
     contents: Contents,
     wanted: Collection[int],
     progress: Progress | None = None,
-) -> Iterator[tuple[int, int, bytes]]:
-    """Yield channel id, log time in ns and CDR bytes of the messages on the wanted channels.
+) -> Iterator[RawMessage]:
+    """Yield the messages on the wanted channels, in the order in which they were written.
 
     Raises
     ------
     BagError
         When a chunk is damaged.
     """
-    for batch in batches(path, contents, wanted, progress):
-        ends = batch.starts + batch.sizes
-        columns = (batch.channels, batch.log_times, batch.starts, ends)
-        for channel, log_time, start, end in zip(
-            *(each.tolist() for each in columns), strict=True
-        ):
-            yield channel, log_time, batch.data[start:end]
-
-
-def batches(
-    path: pathlib.Path,
-    contents: Contents,
-    wanted: Collection[int],
-    progress: Progress | None = None,
-) -> Iterator[Batch]:
-    """Yield the messages on the wanted channels, some megabytes at a time.
-
-    Raises
-    ------
-    BagError
-        When a chunk is damaged.
-    """
-    pieces: list[bytes] = []
     size = 0
-    for share, piece in _pieces(path, contents, wanted):
-        pieces.append(piece)
-        size += len(piece)
-        if size >= _BATCH_SIZE:
-            yield _batch(path, pieces, wanted)
-            if progress:
-                progress(share)
-            pieces, size = [], 0
-    if pieces:
-        yield _batch(path, pieces, wanted)
+    for share, length, messages in _pieces(path, contents, wanted):
+        yield from messages
+        size += length
+        if progress and size >= _BATCH_SIZE:
+            progress(share)
+            size = 0
 
 
 def _pieces(
     path: pathlib.Path, contents: Contents, wanted: Collection[int]
-) -> Iterator[tuple[float, bytes]]:
-    """Yield bytes with whole records in them, chunks or single messages, with the share read."""
+) -> Iterator[tuple[float, int, Iterable[RawMessage]]]:
+    """Yield share that is read, bytes, and messages of each chunk, or of each single message."""
     if not contents.chunks:
         for share, record in _readable_records(path, contents):
             if isinstance(record, Message) and record.channel_id in wanted:
-                length = _HEADER.itemsize - _RECORD_HEADER_SIZE + len(record.data)
-                times = record.log_time, record.publish_time
-                header = Opcode.MESSAGE, length, record.channel_id, record.sequence, *times
-                yield share, _MESSAGE_HEADER.pack(*header) + record.data
+                message = record.channel_id, record.log_time, record.data
+                yield share, len(record.data), [message]
         return
     with path.open('rb') as stream:
         chunks = sorted(contents.chunks, key=lambda chunk: chunk[0])
@@ -293,54 +209,20 @@ def _pieces(
                 records, size = get_chunk_data_stream(chunk, validate_crc=True)
             except Exception as error:  # each decompressor raises another exception type
                 raise BagError(f'{path}: is damaged at byte {start}: {error}') from error
-            yield number / len(chunks), records.read(size)
+            yield number / len(chunks), size, _messages(path, records.read(size), wanted)
 
 
-def _batch(path: pathlib.Path, pieces: Sequence[bytes], wanted: Collection[int]) -> Batch:
-    """Return the wanted messages in some pieces."""
-    data = b''.join(pieces)
-    ends = np.cumsum([len(each) for each in pieces])
-    try:
-        places = _places(data, np.concatenate([[0], ends[:-1]]), ends)
-    except ValueError as error:
-        raise BagError(f'{path}: is damaged: {error}') from None
-    headers = items(data, f'V{_HEADER.itemsize}')[places].view(_HEADER)
-    mine = (headers['opcode'] == Opcode.MESSAGE) & np.isin(headers['channel'], list(wanted))
-    headers, places = headers[mine], places[mine]
-    return Batch(
-        data,
-        headers['channel'],
-        headers['log_time'],
-        places + _HEADER.itemsize,
-        headers['length'].astype(np.int64) - (_HEADER.itemsize - _RECORD_HEADER_SIZE),
-    )
+def _messages(path: pathlib.Path, data: bytes, wanted: Collection[int]) -> Iterator[RawMessage]:
+    """Yield the wanted messages in a chunk, ten times as fast as the mcap package."""
+    unpack, size, place = _MESSAGE.unpack_from, _MESSAGE.size, 0
+    while place + size <= len(data):
+        opcode, length, channel, _, log_time, _ = unpack(data, place)
+        end = place + _RECORD_HEADER_SIZE + length
+        if opcode == Opcode.MESSAGE and channel in wanted:
+            yield channel, log_time, data[place + size : end]
+        place = end
+    if place > len(data):
+        raise BagError(f'{path}: is damaged: a record is longer than its chunk')
 
 
-def _places(data: bytes, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return the places of all records in pieces of data, in order.
-
-    Pieces are followed side by side, which takes a quarter of the time of one after the other.
-    The last record of a piece is left out if it is too short for a message.
-    """
-    found = []
-    lengths = items(data, _LENGTH, _LENGTH_AT)
-    too_long = False
-    while len(starts) > _FEW:
-        more = starts + _HEADER.itemsize <= ends
-        if not more.all():
-            too_long |= bool(np.any(starts > ends))
-            starts, ends = starts[more], ends[more]
-        found.append(starts)
-        starts = starts + lengths[starts] + _RECORD_HEADER_SIZE
-    rest = []
-    for place, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        while place + _HEADER.itemsize <= end:
-            rest.append(place)
-            place += int(lengths[place]) + _RECORD_HEADER_SIZE
-        too_long |= place > end
-    if too_long:
-        raise ValueError('a record is longer than its chunk')
-    return np.sort(np.concatenate([*found, np.array(rest, dtype=np.int64)]))
-
-
-__all__ = ['Batch', 'Contents', 'batches', 'raw_messages', 'scan']
+__all__ = ['Contents', 'RawMessage', 'raw_messages', 'scan']

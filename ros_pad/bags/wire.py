@@ -19,7 +19,6 @@ import numpy as np
 
 from ros_pad.bags.codec import MessageType
 from ros_pad.bags.codec import message_type
-from ros_pad.bags.fields import items
 from ros_pad.errors import BadMessage
 from ros_pad.records import TIME
 from ros_pad.records import Block
@@ -160,28 +159,20 @@ class Wire:
             for stamp_ns, row in zip(stamps, values, strict=True)
         ]
 
-    def table(self, data: bytes, starts: np.ndarray, sizes: np.ndarray) -> Block:
+    def table(self, messages: Sequence[bytes]) -> Block:
         """Return the block of all records in many messages in the order of the messages.
-
-        Parameters
-        ----------
-        data : bytes
-            Bytes with the messages in them.
-        starts, sizes : array of int
-            First byte in `data` and number of bytes of each message.
 
         Raises
         ------
         BadMessage
             As for a single message.
         """
-        ends = (starts + sizes).tolist()
-        if len(starts):
-            self._values(data[starts[0] : ends[0]])  # of which the others have the names
+        if messages:
+            self._values(messages[0])  # of which the others have the names
             layout = self._last
             size = layout.start + 8 * len(layout.names) + len(_NOTHING)
-            if np.all(sizes == size):
-                octets = items(data, f'V{size}')[starts].view(np.uint8).reshape(-1, size)
+            if all(len(each) == size for each in messages):
+                octets = np.frombuffer(b''.join(messages), np.uint8).reshape(-1, size)
                 names = layout.head + _COUNT.pack(len(layout.names))
                 head = octets[:, _HEAD.size : _HEAD.size + len(names)]
                 if (octets[:, :4] == np.frombuffer(_ENCAPSULATION, np.uint8)).all() and (
@@ -193,8 +184,7 @@ class Wire:
                         stamps[:, 0] * 1_000_000_000 + stamps[:, 1].astype(np.uint32),
                         self._rows(numbers),
                     )
-        blocks = [self.decode(data[a:b]) for a, b in zip(starts.tolist(), ends, strict=True)]
-        return Block.joined(self.kind, blocks, len(self.legs))
+        return Block.joined(self.kind, [self.decode(each) for each in messages], len(self.legs))
 
     def _rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows of a table of numbers with their time."""

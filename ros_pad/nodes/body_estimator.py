@@ -13,9 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -26,13 +24,13 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.listening import message_class
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import rate_status
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
@@ -49,6 +47,7 @@ from ros_pad.sensing.stage import SET_BACK_NS
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import robot_of
 from ros_pad.sensing.stage import sample_of
 from ros_pad.sensing.stage import twist_of
 
@@ -85,9 +84,6 @@ PARAMETERS = (
     ),
     Parameter('base_frame', 'base_link', 'Frame of the base, the child of odom.'),
 )
-
-OLDEST = 0.1
-"""Age of the last sample, s, from which the body estimator counts as late."""
 
 _SOURCES = {
     'feet': 'measured at the feet',
@@ -152,18 +148,13 @@ class BodyEstimatorNode(Node):
             self._follow(self._mapping)
         else:
             self._subscribe(values['legs'])
-        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
-        self._diagnostics_pace = Pace(1_000_000_000)
-        self._reported: str | None = None
-        self._since_ns, self._counted = self.messages.now_ns(), 0
+        self._diagnostics = Diagnostics(self, self.messages)
         self._health_pace = Pace(TICK_PERIOD_NS)
         self.messages.on_tick(TICK_PERIOD_NS * 1e-9, self._tick)
 
     def _load(self, values: dict[str, Any]) -> Robot:
-        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
-        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
         try:
-            robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
+            robot = robot_of(values)
         except (ConfigError, InvalidInput) as error:
             raise ConfigError(
                 f'node {self.get_name()}: parameter robot = {values["robot"]!r} is not allowed:'
@@ -336,13 +327,12 @@ class BodyEstimatorNode(Node):
             return
         self.stage.tick(now_ns)
         kind = (self.stage.doubt or '').partition(':')[0]
-        if self._diagnostics_pace.due(now_ns) or kind != self._reported:
-            self._reported = kind
-            array = DiagnosticArray(status=[self._status(), *self.messages.refusals.statuses()])
+        if self._diagnostics.due(now_ns, kind):
+            statuses = [self._status()]
             if not self.messages.simulated:
-                array.status.append(self._rate_status(now_ns))
-            set_stamp(array.header.stamp, now_ns)
-            self._diagnostics(array)
+                stage = self.stage
+                statuses.append(self._diagnostics.rate(now_ns, stage.samples, stage.last_ns))
+            self._diagnostics.send(now_ns, statuses)
 
     def _status(self) -> DiagnosticStatus:
         """Return the doubt and the sources of the estimate, for ``/diagnostics``."""
@@ -350,28 +340,13 @@ class BodyEstimatorNode(Node):
         waits = stage.doubt is None
         doubt = stage.doubt or self._lasting
         text = 'no sample yet' if waits else doubt or 'the motion is known'
-        return DiagnosticStatus(
-            name=f'{self.get_name()}: sensing',
-            hardware_id=self._robot.name,
-            level=DiagnosticStatus.WARN if waits or doubt else DiagnosticStatus.OK,
-            message=text,
-            values=[
-                KeyValue(key='samples', value=str(stage.samples)),
-                KeyValue(key='forces', value=stage.force_source or 'none'),
-                KeyValue(
-                    key='joint velocities',
-                    value='from positions' if stage.differentiates else 'measured',
-                ),
-            ],
-        )
-
-    def _rate_status(self, now_ns: int) -> DiagnosticStatus:
-        """Return rate and age of the samples, for ``/diagnostics``."""
-        elapsed = max(1, now_ns - self._since_ns) * 1e-9
-        rate = (self.stage.samples - self._counted) / elapsed
-        self._since_ns, self._counted = now_ns, self.stage.samples
-        age = (now_ns - self.stage.last_ns) * 1e-9
-        return rate_status(self.get_name(), rate, age, OLDEST)
+        level = Diagnostics.WARN if waits or doubt else Diagnostics.OK
+        values = {
+            'samples': stage.samples,
+            'forces': stage.force_source or 'none',
+            'joint velocities': 'from positions' if stage.differentiates else 'measured',
+        }
+        return self._diagnostics.status('sensing', level, text, values, self._robot.name)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -16,7 +16,6 @@ import json
 import os
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -342,27 +341,17 @@ class ComposedTrial:
             self.executor.shutdown()
 
 
-def _interruptible(trial: ComposedTrial) -> AbstractContextManager[None]:
-    """Let the first Ctrl-C or SIGTERM stop the walk; further ones disturb nothing."""
-    return STOP.during(partial(setattr, trial, 'stopped', True))
-
-
 def _walked(
-    scene: Scene,
-    policy: str,
-    seed: int,
-    bag: str | os.PathLike[str],
-    context: rclpy.Context,
-    level: str,
+    make: Callable[[], ComposedTrial],
+    describe: Callable[..., dict[str, str]],
     progress: Progress | None,
-    sensing: str,
-    tuning: Tuning | None,
 ) -> tuple[ComposedTrial, float]:
-    """Walk a scene and close its nodes; return them, and the wall time of the walk, s."""
+    """Walk and close the nodes; return them, and the wall time of the walk, s."""
     with STOP.during():  # no signal leaves half a trial
-        trial = ComposedTrial(scene, policy, seed, bag, context, level, sensing, tuning)
+        trial = make()
         started = time.perf_counter()
-        with _interruptible(trial):
+        # The first Ctrl-C or SIGTERM stops the walk; further ones disturb nothing.
+        with STOP.during(partial(setattr, trial, 'stopped', True)):
             try:
                 trial.walk(progress)
             except BaseException:
@@ -370,8 +359,7 @@ def _walked(
                     trial.close()
                 raise
             wall = time.perf_counter() - started
-            about = label(scene, policy, seed, level, interrupted=trial.stopped, sensing=sensing)
-            trial.recorder.describe(about)
+            trial.recorder.describe(describe(interrupted=trial.stopped))
             trial.close()
     return trial, wall
 
@@ -414,26 +402,24 @@ def run(
         scene = Scene.load(scene)
     policy = policy or scene.policy
     level = levels.level(scene, fidelity, policy, sensing == 'joints')
+    describe = partial(label, scene, policy, seed, level, sensing=sensing)
     context = rclpy.Context()
+    make = partial(ComposedTrial, scene, policy, seed, bag, context, level, sensing, tuning)
     # rclpy's own signal handlers would stop the nodes before the pads are vented.
     try:
         rclpy.init(context=context, args=[], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise PadError(f'ROS 2 does not start: {error}: pad doctor finds the cause') from error
     try:
-        trial, wall = _walked(scene, policy, seed, bag, context, level, progress, sensing, tuning)
+        trial, wall = _walked(make, describe, progress)
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    controller, stopped, shared = (
-        trial.walked,
-        trial.stopped,
-        trial.estimator.stage.estimator.grounds.shared,
-    )
+    controller, shared = trial.walked, trial.estimator.stage.estimator.grounds.shared
+    describe = partial(describe, interrupted=trial.stopped)
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
     gc.collect()
-    describe = partial(label, scene, policy, seed, level, interrupted=stopped, sensing=sensing)
     result = recorded.load(bag)
     result.floor = floor
     result.metrics = summarise(scene, result, robot, controller)

@@ -11,9 +11,6 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.msg import ParameterValue
@@ -39,6 +36,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.errors import LimitError
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -47,7 +45,6 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.records import Block
@@ -161,10 +158,8 @@ class ControllerNode(Node):
         self._send = messages.record_output(topics.COMMAND, legs)
         messages.receive_record(topics.ESTIMATE, legs, self._on_estimate)
         messages.receive_record(topics.PRESSURE, legs, self.stage.pressure)
-        self._diagnostics = messages.output(topics.DIAGNOSTICS)
-        self._reported_faults: list[str] = []
+        self._diagnostics = Diagnostics(self, messages)
         self._tick_pace = Pace(TICK_PERIOD_NS)
-        self._diagnostics_pace = Pace(1_000_000_000)
         regulator = f'{self.get_namespace().rstrip("/")}/regulator'
         self.create_subscription(
             ParameterEvent,
@@ -236,44 +231,29 @@ class ControllerNode(Node):
         if command:
             self._send(command)
         faults = [self.controller.fault(leg) for leg in self._legs]
-        if self._diagnostics_pace.due(now_ns) or faults != self._reported_faults:
-            self._reported_faults = faults
+        if self._diagnostics.due(now_ns, faults):
             self._diagnose(now_ns)
 
     def _diagnose(self, now_ns: int) -> None:
-        array = DiagnosticArray()
-        set_stamp(array.header.stamp, now_ns)
-        controller = self.controller
+        controller, statuses = self.controller, []
         for leg in self._legs:
             morphology, monitor = controller.morphology(leg), controller.monitor(leg)
             fault, remark = controller.fault(leg), controller.remark(leg)
-            status = DiagnosticStatus(
-                name=f'{self.get_name()}: leg {leg} pad',
-                hardware_id=f'leg {leg}',
-                level=DiagnosticStatus.OK,
-                message=morphology,
-            )
-            if remark:
-                status.level, status.message = DiagnosticStatus.WARN, remark
-            if fault:
-                status.level = DiagnosticStatus.ERROR
-                status.message = '; '.join(filter(None, (fault, remark)))
-            status.values = [
-                KeyValue(key='pressure (Pa gauge)', value=f'{monitor.pressure:.0f}'),
-                KeyValue(key='set-point (Pa gauge)', value=f'{controller.setpoint(leg):.0f}'),
-                KeyValue(key='shape', value=morphology),
-                KeyValue(key='time to fill (s)', value=f'{monitor.fill_time:.2f}'),
-                KeyValue(key='time to vent (s)', value=f'{monitor.vent_time:.2f}'),
-                KeyValue(key='steps decided ahead', value=str(controller.lead(leg))),
-                KeyValue(
-                    key='touch-downs with too little pressure',
-                    value=str(controller.underpressure[leg]),
-                ),
-                KeyValue(key='flat feet pay', value=str(controller.friction.flat_pays)),
-            ]
-            array.status.append(status)
-        array.status.extend(self.messages.refusals.statuses())
-        self._diagnostics(array)
+            level = Diagnostics.ERROR if fault else Diagnostics.WARN if remark else Diagnostics.OK
+            text = '; '.join(filter(None, (fault, remark))) or morphology
+            values = {
+                'pressure (Pa gauge)': f'{monitor.pressure:.0f}',
+                'set-point (Pa gauge)': f'{controller.setpoint(leg):.0f}',
+                'shape': morphology,
+                'time to fill (s)': f'{monitor.fill_time:.2f}',
+                'time to vent (s)': f'{monitor.vent_time:.2f}',
+                'steps decided ahead': controller.lead(leg),
+                'touch-downs with too little pressure': controller.underpressure[leg],
+                'flat feet pay': controller.friction.flat_pays,
+            }
+            name, part = f'leg {leg} pad', f'leg {leg}'
+            statuses.append(self._diagnostics.status(name, level, text, values, part))
+        self._diagnostics.send(now_ns, statuses)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -12,9 +12,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
 
 from ros_pad.contact.resistance import Foot
@@ -27,6 +25,7 @@ from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import EXPECTED_LOAD
 from ros_pad.nodes.parameters import FOOT
@@ -34,8 +33,6 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.refusals import rate_status
-from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.records import Block
@@ -56,11 +53,6 @@ PARAMETERS = (
 
 KEEP_PERIOD_NS = 10_000_000_000
 """Time between two savings of what was learnt, ns."""
-
-OLDEST = 0.1
-"""Age of the last sample, s, from which the estimator counts as late."""
-
-_LEVELS = {True: DiagnosticStatus.OK, False: DiagnosticStatus.ERROR}
 
 
 class EstimatorNode(Node):
@@ -96,11 +88,8 @@ class EstimatorNode(Node):
         )
         self._kept = learnt.settings_of(self.stage.estimator.grounds.shared)
         self._send = messages.record_output(topics.ESTIMATE, self._legs)
-        self._diagnostics = messages.output(topics.DIAGNOSTICS)
-        self._diagnostics_pace = Pace(1_000_000_000)
+        self._diagnostics = Diagnostics(self, messages)
         self._keep_pace = Pace(KEEP_PERIOD_NS)
-        self._reported: list[bool] = []
-        self._since_ns, self._counted = messages.now_ns(), 0
         self._health_pace = Pace(TICK_PERIOD_NS)
         messages.receive_record(topics.SAMPLE, self._legs, self._on_samples)
         messages.receive_record(topics.PRESSURE, self._legs, self._on_pressure)
@@ -154,9 +143,9 @@ class EstimatorNode(Node):
 
     def _idle(self, now_ns: int) -> None:
         """Tick without samples: the controller has to know of a foot whose sensors are silent."""
-        before = self._reported
+        before = self._diagnostics.reported
         self._tick(now_ns)
-        if self._reported != before:
+        if self._diagnostics.reported != before:
             self._send(self.stage.estimate(now_ns))
 
     def _tick(self, now_ns: int) -> None:
@@ -167,15 +156,12 @@ class EstimatorNode(Node):
             self.keep_learnt()
         rows = self.stage.estimate(now_ns).rows[0]
         sound = [not doubts.is_fault(code) for code in rows['doubt'].tolist()]
-        if self._diagnostics_pace.due(now_ns) or sound != self._reported:
-            self._reported = sound
-            array = DiagnosticArray(status=self._statuses(rows, sound))
-            array.status.append(self._learnt_status())
-            array.status.extend(self.messages.refusals.statuses())
+        if self._diagnostics.due(now_ns, sound):
+            statuses = [*self._statuses(rows, sound), self._learnt_status()]
             if not self.messages.simulated:
-                array.status.append(self._rate(now_ns))
-            set_stamp(array.header.stamp, now_ns)
-            self._diagnostics(array)
+                stage = self.stage
+                statuses.append(self._diagnostics.rate(now_ns, stage.samples, stage.last_ns))
+            self._diagnostics.send(now_ns, statuses)
 
     def _statuses(self, rows: np.ndarray, sound: list[bool]) -> list[DiagnosticStatus]:
         """Return the health of the sensors of each leg, and its estimate, for ``/diagnostics``."""
@@ -188,42 +174,24 @@ class EstimatorNode(Node):
                 'friction sd': f'{row["friction_sd"]:.3f}',
                 'position noise': noise.position.text('m'),
                 'force noise': noise.force.text('N'),
-                'samples': str(self.stage.used[index]),
+                'samples': self.stage.used[index],
             }
-            found.append(
-                DiagnosticStatus(
-                    name=f'{self.get_name()}: leg {leg} sensing',
-                    hardware_id=f'foot {leg}',
-                    level=_LEVELS[sound[index]],
-                    message=doubts.text(row['doubt'], *row['detail'])
-                    or 'the ground is observable',
-                    values=[KeyValue(key=key, value=value) for key, value in values.items()],
-                )
-            )
+            level = Diagnostics.OK if sound[index] else Diagnostics.ERROR
+            text = doubts.text(row['doubt'], *row['detail']) or 'the ground is observable'
+            name = f'leg {leg} sensing'
+            found.append(self._diagnostics.status(name, level, text, values, f'foot {leg}'))
         return found
 
     def _learnt_status(self) -> DiagnosticStatus:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
-        values = []
+        values = {}
         for name, scale in self.stage.estimator.grounds.shared.scales.items():
             low, high = scale.interval
-            text = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
-            values.append(KeyValue(key=name, value=text))
-        return DiagnosticStatus(
-            name=f'{self.get_name()}: friction of the floor',
-            hardware_id='feet',
-            level=DiagnosticStatus.OK,
-            message='friction over that of the contact model, with the interval of 95 %',
-            values=values,
+            values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
+        text = 'friction over that of the contact model, with the interval of 95 %'
+        return self._diagnostics.status(
+            'friction of the floor', Diagnostics.OK, text, values, 'feet'
         )
-
-    def _rate(self, now_ns: int) -> DiagnosticStatus:
-        """Return rate and age of the samples, for ``/diagnostics``."""
-        elapsed = max(1, now_ns - self._since_ns) * 1e-9
-        rate = (self.stage.samples - self._counted) / elapsed
-        self._since_ns, self._counted = now_ns, self.stage.samples
-        age = (now_ns - self.stage.last_ns) * 1e-9
-        return rate_status(self.get_name(), rate, age, OLDEST)
 
 
 def main(args: list[str] | None = None) -> int:

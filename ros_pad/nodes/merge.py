@@ -14,9 +14,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
 
 from ros_pad.bags import topics as schemas
@@ -27,6 +24,7 @@ from ros_pad.estimation.tuning import SOURCES
 from ros_pad.joining import WAIT_NS
 from ros_pad.joining import Joiner
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import AMBIENT_PRESSURE
@@ -34,8 +32,6 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp
-from ros_pad.pace import Pace
 from ros_pad.records import COMMAND
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE
@@ -95,8 +91,7 @@ class MergeNode(Node):
                     (FRAME, *STAMP, *schema.values),
                     leg,
                 )
-        self._diagnostics = messages.output(topics.DIAGNOSTICS)
-        self._pace = Pace(1_000_000_000)
+        self._diagnostics = Diagnostics(self, messages)
         messages.follows_clock = True
         messages.on_tick(WAIT_NS * 1e-9, self._tick)
 
@@ -123,23 +118,18 @@ class MergeNode(Node):
     def _tick(self, now_ns: int) -> None:
         for record in self._records.values():
             record.expire(now_ns)
-        if self._pace.due(now_ns):
+        if self._diagnostics.due(now_ns):
             self._diagnose(now_ns)
 
     def _diagnose(self, now_ns: int) -> None:
-        array = DiagnosticArray(status=self.messages.refusals.statuses())
+        statuses = []
         if self.refused:
-            array.status.append(
-                DiagnosticStatus(
-                    name=f'{self.get_name()}: records',
-                    level=DiagnosticStatus.ERROR,
-                    message='others publish records too: those of this node are refused',
-                    values=[KeyValue(key=key, value=str(n)) for key, n in self.refused.items()],
-                )
+            text = 'others publish records too: those of this node are refused'
+            statuses.append(
+                self._diagnostics.status('records', Diagnostics.ERROR, text, self.refused)
             )
-        if array.status:
-            set_stamp(array.header.stamp, now_ns)
-            self._diagnostics(array)
+        if statuses or self.messages.refusals.counts:
+            self._diagnostics.send(now_ns, statuses)
 
 
 class _Record:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from rclpy.clock import Clock as NodeClock
@@ -31,8 +32,6 @@ from ros_pad.nodes.stamps import clock_of
 from ros_pad.nodes.topics import Topic
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.records import Block
-
-Read = Callable[[bytes], tuple[Any, ...]]
 
 
 class Messages:
@@ -133,21 +132,17 @@ class Messages:
         name = self._node.resolve_topic_name(topic.name(leg))
         read = FieldReader(topic.message_type, paths) if paths else None
 
+        def values_of(data: bytes) -> tuple[Any, ...]:
+            if read:
+                with suppress(UnknownEncoding):  # only the middleware knows it
+                    return read(data)
+            message = deserialize_message(data, topic.message)
+            return tuple(field_of(message, path) for path in paths) if paths else (message,)
+
         def take(data: bytes) -> None:
             try:
-                values = read(data) if read else (deserialize_message(data, topic.message),)
-            except UnknownEncoding:  # only the middleware knows it
-                take_whole(data)
+                values = values_of(data)
             except Exception as error:  # rclpy raises various ones
-                self.refusals(name, error)
-            else:
-                callback(*values)
-
-        def take_whole(data: bytes) -> None:
-            try:
-                message = deserialize_message(data, topic.message)
-                values = tuple(field_of(message, path) for path in paths)
-            except Exception as error:
                 self.refusals(name, error)
             else:
                 callback(*values)

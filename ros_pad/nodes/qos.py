@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from enum import IntEnum
 
 import yaml
 from rclpy.duration import Duration
@@ -76,20 +77,6 @@ def recording(offered: Sequence[QoSProfile], measured: bool = False) -> QoSProfi
     )
 
 
-_HISTORY = {HistoryPolicy.KEEP_LAST: 'keep_last', HistoryPolicy.KEEP_ALL: 'keep_all'}
-_RELIABILITY = {
-    ReliabilityPolicy.RELIABLE: 'reliable',
-    ReliabilityPolicy.BEST_EFFORT: 'best_effort',
-}
-_DURABILITY = {
-    DurabilityPolicy.TRANSIENT_LOCAL: 'transient_local',
-    DurabilityPolicy.VOLATILE: 'volatile',
-}
-_LIVELINESS = {
-    LivelinessPolicy.SYSTEM_DEFAULT: 'automatic',
-    LivelinessPolicy.AUTOMATIC: 'automatic',
-    LivelinessPolicy.MANUAL_BY_TOPIC: 'manual_by_topic',
-}
 _INFINITE_NS = 2**63 - 1  # RMW_DURATION_INFINITE
 
 
@@ -109,19 +96,27 @@ def mismatches(offered: QoSProfile, asked: QoSProfile) -> list[Mismatch]:
     reports mismatches that do not exist.
     """
     found = []
-    for policy, words, strict in (
-        ('reliability', _RELIABILITY, ReliabilityPolicy.RELIABLE),
-        ('durability', _DURABILITY, DurabilityPolicy.TRANSIENT_LOCAL),
-        ('liveliness', _LIVELINESS, LivelinessPolicy.MANUAL_BY_TOPIC),
+    for policy, strict in (
+        ('reliability', ReliabilityPolicy.RELIABLE),
+        ('durability', DurabilityPolicy.TRANSIENT_LOCAL),
+        ('liveliness', LivelinessPolicy.MANUAL_BY_TOPIC),
     ):
         given, wanted = getattr(offered, policy), getattr(asked, policy)
         if wanted == strict and given != strict:
-            found.append(Mismatch(policy, words.get(given, 'unknown'), words[wanted]))
+            found.append(Mismatch(policy, _word(given), _word(wanted)))
     for policy in ('deadline', 'liveliness_lease_duration'):
         given_ns, wanted_ns = (_bound(getattr(each, policy)) for each in (offered, asked))
         if given_ns > wanted_ns:
             found.append(Mismatch(policy, _seconds(given_ns), _seconds(wanted_ns)))
     return found
+
+
+def _word(policy: IntEnum) -> str:
+    """Return a policy as bags have it, ``unknown`` where it is left to the middleware."""
+    if policy == LivelinessPolicy.SYSTEM_DEFAULT and isinstance(policy, LivelinessPolicy):
+        return 'automatic'
+    word = policy.name.lower()
+    return 'unknown' if word in ('system_default', 'best_available') else word
 
 
 def _bound(duration: Duration) -> int:
@@ -147,13 +142,13 @@ def offered_profiles(*profiles: QoSProfile) -> str:
     return yaml.safe_dump(
         [
             {
-                'history': _HISTORY.get(profile.history, 'unknown'),
+                'history': _word(profile.history),
                 'depth': profile.depth,
-                'reliability': _RELIABILITY.get(profile.reliability, 'unknown'),
-                'durability': _DURABILITY.get(profile.durability, 'unknown'),
+                'reliability': _word(profile.reliability),
+                'durability': _word(profile.durability),
                 'deadline': duration(profile.deadline),
                 'lifespan': duration(profile.lifespan),
-                'liveliness': _LIVELINESS.get(profile.liveliness, 'automatic'),
+                'liveliness': _word(profile.liveliness).replace('unknown', 'automatic'),
                 'liveliness_lease_duration': duration(profile.liveliness_lease_duration),
                 'avoid_ros_namespace_conventions': profile.avoid_ros_namespace_conventions,
             }

@@ -17,9 +17,6 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import ListParameters
@@ -41,6 +38,7 @@ from ros_pad.errors import BadMessage
 from ros_pad.errors import BagError
 from ros_pad.nodes import qos
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import LEGS
@@ -141,7 +139,7 @@ class RecorderNode(Node):
         self._intake = Intake(self)
         self._told = 0  # lost messages in the last message on /diagnostics
         messages = Messages(self)
-        self._diagnostics, self._refusals = messages.output(topics.DIAGNOSTICS), messages.refusals
+        self._diagnostics, self._refusals = Diagnostics(self, messages), messages.refusals
         self._failed = False  # whether writing has failed
         self._writers: dict[str, _Write] = {}  # by full name of the topic
         for name, topic in recorded.items():
@@ -241,15 +239,9 @@ class RecorderNode(Node):
 
     def _diagnose(self) -> None:
         """Tell on ``/diagnostics`` how many messages were lost."""
-        status = DiagnosticStatus(
-            name=f'{self.get_name()}: lost messages',
-            level=DiagnosticStatus.WARN,
-            message=f'{LATE}: {self._told} messages lost so far',
-            values=[KeyValue(key=topic, value=str(n)) for topic, n in self.lost.items()],
-        )
-        array = DiagnosticArray(status=[status, *self._refusals.statuses()])
-        array.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics(array)
+        text = f'{LATE}: {self._told} messages lost so far'
+        status = self._diagnostics.status('lost messages', Diagnostics.WARN, text, self.lost)
+        self._diagnostics.send(self.get_clock().now().nanoseconds, [status])
 
     def _look_for_nodes(self) -> None:
         """Request the parameters of every node of the robot when its services are there.

@@ -10,31 +10,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
 
-from ros_pad.pace import LATE
-
-
-def rate_status(name: str, rate: float, age: float, oldest: float) -> DiagnosticStatus:
-    """Return rate and age of the samples of a node for ``/diagnostics``.
-
-    Parameters
-    ----------
-    name : str
-        Name of the node.
-    rate, age, oldest : float
-        Samples a second, Hz; age of the last one, s, and from which on it is late, s.
-    """
-    late = rate > 0.0 and not -oldest < age < oldest
-    text = f'samples are {age:.3g} s old' if late else f'{rate:.0f} samples a second'
-    return DiagnosticStatus(
-        name=f'{name}: rate',
-        level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
-        message=f'{LATE}, or clocks differ: {text}' if late else text,
-        values=[
-            KeyValue(key='samples a second (Hz)', value=f'{rate:.1f}'),
-            KeyValue(key='age of the last sample (s)', value=f'{age:.3f}'),
-        ],
-    )
-
 
 class Refusals:
     """Count the messages that a node cannot read.

@@ -9,9 +9,7 @@ from array import array
 from dataclasses import fields
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import LifecycleState
@@ -25,6 +23,7 @@ from ros_pad.control import COMMAND_TIMEOUT
 from ros_pad.errors import ConfigError
 from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.parameters import BACKEND_OPTIONS
 from ros_pad.nodes.parameters import FOOT
@@ -32,7 +31,6 @@ from ros_pad.nodes.parameters import LEGS
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import TICK_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.records import Block
@@ -129,16 +127,14 @@ class RegulatorNode(LifecycleNode):
         self._check_parameters()
         self.supervision = Supervision(())
         self._pace = Pace(round(1e9 / self._values['publish_rate']))
-        self._diagnostics_pace = Pace(1_000_000_000)
         self._check_pace = Pace(_CHECK_PERIOD_NS)
-        self._problems: list[str] = []  # problems in the last message on /diagnostics
         self._mismatch = ''  # warning of a mismatch of QoS
         self.tick_ns = 0
         self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why the last configuration failed
         self.messages = Messages(self)
-        self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
+        self._diagnostics = Diagnostics(self, self.messages)
         legs = self._values['legs']
         self._send = self.messages.record_output(topics.PRESSURE, legs)
         self.messages.receive_record(topics.COMMAND, legs, self._on_command, self._mismatched)
@@ -368,20 +364,15 @@ class RegulatorNode(LifecycleNode):
         # Filled and vented are both healthy, so a change between them is not reported at once.
         problems = [health.message if health.level else '' for health in (*found, supply)]
         refused = any(each.answers.due for each in channels)
-        if not (self._diagnostics_pace.due(now_ns) or problems != self._problems or refused):
+        if not (self._diagnostics.due(now_ns, problems) or refused):
             return
-        self._problems = problems
-        array = DiagnosticArray()
-        set_stamp(array.header.stamp, now_ns)
-        for channel, health in zip(channels, found, strict=True):
-            name = f'leg {channel.leg} regulator'
-            status = self._status(name, str(channel.leg), channel.answers.report(health))
-            status.values = [KeyValue(key=k, value=v) for k, v in channel.figures().items()]
-            array.status.append(status)
+        statuses = [
+            self._status(f'leg {leg} regulator', str(leg), channel.answers.report(health), channel)
+            for (leg, channel), health in zip(self.channels.items(), found, strict=True)
+        ]
         if channels:
-            array.status.append(self._status('supply', 'supply', supply))
-        array.status.extend(self.messages.refusals.statuses())
-        self._diagnostics(array)
+            statuses.append(self._status('supply', 'supply', supply))
+        self._diagnostics.send(now_ns, statuses)
 
     def _health(self, channel: SupervisedChannel) -> Health:
         """Return the health of a channel; without set-points it names a mismatch of QoS."""
@@ -390,12 +381,15 @@ class RegulatorNode(LifecycleNode):
             return health._replace(message=f'{health.message}; {self._mismatch}')
         return health
 
-    def _status(self, name: str, part: str, health: Health) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            name=f'{self.get_name()}: {name}',
-            hardware_id=f'{self._values["backend"]} {part}',
-            level=bytes([health.level]),
-            message=health.message,
+    def _status(
+        self, name: str, part: str, health: Health, channel: SupervisedChannel | None = None
+    ) -> DiagnosticStatus:
+        return self._diagnostics.status(
+            name,
+            bytes([health.level]),
+            health.message,
+            channel.figures() if channel else None,
+            f'{self._values["backend"]} {part}',
         )
 
 

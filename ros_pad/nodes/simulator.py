@@ -11,9 +11,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
@@ -24,6 +21,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
+from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.markers import ARRAY
 from ros_pad.nodes.markers import WalkMarkers
 from ros_pad.nodes.messages import Messages
@@ -32,7 +30,6 @@ from ros_pad.nodes.parameters import SEED
 from ros_pad.nodes.parameters import Parameter
 from ros_pad.nodes.parameters import declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp
 from ros_pad.nodes.stamps import split
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import LATE
@@ -167,7 +164,7 @@ class SimulatorNode(Node):
         if values['free_running']:
             choice = fidelity.choose(self.scene, level)
             self.get_logger().info(f'{self.scene.name} on {choice.level}: {choice.note}')
-            self._diagnostics = self.messages.output(topics.DIAGNOSTICS)
+            self._diagnostics = Diagnostics(self, self.messages)
             self._real_time: RealTime | None = None
             self._report_ns = 0  # time of the next message on /diagnostics
             # The timer cannot follow the clock that this node publishes.
@@ -246,19 +243,16 @@ class SimulatorNode(Node):
         if late:
             text = f'{LATE}: {text}: choose a lower rate, L1, or a faster computer'
             self.get_logger().warning(text, throttle_duration_sec=10.0)
-        status = DiagnosticStatus(
-            name=f'{self.get_name()}: rate',
-            level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
-            message=text,
-            values=[
-                KeyValue(key='wanted rate (Hz)', value=f'{rate.wanted:.1f}'),
-                KeyValue(key='reached rate (Hz)', value=f'{rate.reached:.1f}'),
-                KeyValue(key='speed (times real time)', value=f'{rate.speed:.3f}'),
-            ],
+        values = {
+            'wanted rate (Hz)': f'{rate.wanted:.1f}',
+            'reached rate (Hz)': f'{rate.reached:.1f}',
+            'speed (times real time)': f'{rate.speed:.3f}',
+        }
+        status = self._diagnostics.status(
+            'rate', Diagnostics.WARN if late else Diagnostics.OK, text, values
         )
-        array = DiagnosticArray(status=[status, *self.messages.refusals.statuses()])
-        set_stamp(array.header.stamp, self.time_ns if self._simulated else self.messages.now_ns())
-        self._diagnostics(array)
+        now_ns = self.time_ns if self._simulated else self.messages.now_ns()
+        self._diagnostics.send(now_ns, [status])
 
     def step(self, end_ns: int) -> bool:
         """Advance the robot to the next control moment, and publish what its sensors read.

@@ -119,6 +119,19 @@ _LATEST_NS = 50_000_000  # readings of joints wait no longer than this for the I
 _WAITING = 50  # readings of joints that wait for the IMU, and readings of the IMU that are kept
 
 
+def robot_of(values: Mapping[str, Any]) -> Robot:
+    """Return the robot that the parameters of a body estimator describe.
+
+    Raises
+    ------
+    ConfigError, InvalidInput
+        When there is no such robot, or its file is not valid.
+    """
+    feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
+    radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
+    return Robot.load(values['robot'], feet, values['imu_link'], radius)
+
+
 def estimator_of(robot: Robot, values: Mapping[str, Any]) -> BodyEstimator:
     """Return the estimator of a robot with the values of all :data:`SETTINGS`, by name.
 

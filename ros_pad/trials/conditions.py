@@ -12,6 +12,7 @@ from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.label import AMBIENT_PRESSURE
 from ros_pad.trials.label import described
+from ros_pad.trials.label import marks
 from ros_pad.trials.trial import Trial
 
 # Units of the values of a scene and a foot, by name; a value that is not listed has no unit.
@@ -115,14 +116,8 @@ def _shipped(trial: Trial) -> tuple[Mapping[str, Any], str]:
     except ConfigError:
         return {}, 'only the name of the scene is on record'
     recorded = trial.settings
-    known = {
-        'foot': scene.foot.source,
-        'expected_load': scene.expected_load,
-        'stride_m': scene.stride,
-        'cycle_s': scene.gait.cycle,
-        'settle_s': scene.settle,
-    }
-    if any(name in recorded and recorded[name] != each for name, each in known.items()):
+    known = marks(scene).items()
+    if any(name in recorded and recorded[name] != each for name, each in known):
         return {}, 'only the name of the scene is on record; the shipped scene has changed since'
     values = described(scene)
     # The command line may have set the cycles.

@@ -15,11 +15,16 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
 from typing import Any
+from typing import NamedTuple
 
 import ros_pad
+from ros_pad.bags import BagReader
 from ros_pad.configuration import Setting
+from ros_pad.errors import BagError
+from ros_pad.estimation.tuning import EXPECTED_LOAD
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.pneumatics import ATMOSPHERE
+from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terms import terms
 from ros_pad.trials.trial import Metrics
@@ -98,6 +103,70 @@ def label(
     }
 
 
+class About(NamedTuple):
+    """What the custom data of a bag say of its trial, and defaults for what they do not say.
+
+    Attributes
+    ----------
+    known : bool
+        Whether they say anything.
+    scene, policy, fidelity : str
+        Empty where they are not known.
+    seed : int
+    floor : FloorPlan or None
+    ambient_pressure : float
+        Absolute, Pa.
+    metrics : Metrics or None
+    settings : dict
+        See :func:`settings`.
+    expected_load : float
+        Of the settings, N.
+    real_time_factor : float or None
+    """
+
+    known: bool
+    scene: str
+    policy: str
+    fidelity: str
+    seed: int
+    floor: FloorPlan | None
+    ambient_pressure: float
+    metrics: Metrics | None
+    settings: dict[str, Any]
+    expected_load: float
+    real_time_factor: float | None
+
+
+def read(bag: BagReader) -> About:
+    """Return what a bag says of its trial.
+
+    Raises
+    ------
+    BagError
+        When its custom data are not those of ros_pad.
+    """
+    try:
+        noted = json.loads(bag.custom_data.get(KEY, '{}'))
+        recorded = dict(noted.get('settings') or {})
+        return About(
+            bool(noted),
+            str(noted.get('scene') or ''),
+            str(noted.get('policy') or ''),
+            str(noted.get('fidelity') or ''),
+            int(noted.get('seed') or 0),
+            FloorPlan(**noted['floor']) if noted.get('floor') else None,
+            float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default)),
+            Metrics(**noted['metrics']) if noted.get('metrics') else None,
+            recorded,
+            float(recorded.get('expected_load', EXPECTED_LOAD.default)),
+            noted.get('real_time_factor'),
+        )
+    except (AttributeError, TypeError, ValueError) as error:
+        raise BagError(
+            f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
+        ) from error
+
+
 @functools.cache
 def made_with() -> dict[str, str]:
     """Return the versions of ros_pad and of the libraries that its numbers depend on.
@@ -141,12 +210,7 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
     """Return what pages and replays show of a trial's settings: scene, level and versions."""
     choice = levels.choose(scene, fidelity, policy)
     known = [asdict(each) for each in terms(scene, choice.level, policy)]
-    return {
-        'foot': scene.foot.source,
-        'expected_load': scene.expected_load,
-        'stride_m': scene.stride,
-        'cycle_s': scene.gait.cycle,
-        'settle_s': scene.settle,
+    return marks(scene) | {
         'sensing': sensing,
         'faults': [str(fault) for fault in scene.faults],
         # JSON has no infinity.
@@ -158,6 +222,17 @@ def settings(scene: Scene, policy: str, fidelity: str, sensing: str = 'markers')
         'versions': {name: each for name, each in made_with().items() if name != 'git'},
         'git': made_with().get('git'),
         'conditions': described(scene),
+    }
+
+
+def marks(scene: Scene) -> dict[str, Any]:
+    """Return the settings by which a scene is recognised."""
+    return {
+        'foot': scene.foot.source,
+        'expected_load': scene.expected_load,
+        'stride_m': scene.stride,
+        'cycle_s': scene.gait.cycle,
+        'settle_s': scene.settle,
     }
 
 

@@ -40,12 +40,11 @@ from ros_pad.estimation.tuning import EXPECTED_LOAD
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.estimation.tuning import attribute
 from ros_pad.sensing.stage import SETTINGS as BODY_SETTINGS
-from ros_pad.simulation.scene import FloorPlan
 from ros_pad.simulation.scene import LeggedBody
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
+from ros_pad.trials import label
 from ros_pad.trials.label import AMBIENT_PRESSURE
-from ros_pad.trials.label import KEY
 from ros_pad.trials.label import PARAMETERS
 
 if TYPE_CHECKING:
@@ -190,7 +189,8 @@ class NodeSettings:
         ConfigError
             When the foot of the bag is not found.
         """
-        label, settings = _of_label(bag)
+        about = label.read(bag)
+        settings = _of_label(about)
         parameters = _parameters(bag)
         if parameters:
             try:
@@ -200,7 +200,7 @@ class NodeSettings:
                     f'{bag.path}: in the custom data {PARAMETERS!r} a parameter of the estimator'
                     f' or controller is missing or not valid: {reason(error)}'
                 ) from error
-        if not label:
+        if not about.known:
             assumed = (
                 'the bag lacks the settings of its nodes: foot large37, policy adaptive,'
                 f' expected_load {settings.expected_load:g} N and the default noise are assumed'
@@ -325,31 +325,18 @@ class NodeSettings:
         )
 
 
-def _of_label(bag: BagReader) -> tuple[dict[str, Any], NodeSettings]:
-    """Return the description of the trial in a bag, and the settings that follow from it."""
-    try:
-        label = json.loads(bag.custom_data.get(KEY, '{}'))
-        recorded = label.get('settings') or {}
-        load = float(recorded.get('expected_load', EXPECTED_LOAD.default))
-        ambient = float(label.get('ambient_pressure', AMBIENT_PRESSURE.default))
-        policy = str(label.get('policy') or 'adaptive')
-        source, seed = str(label.get('scene') or ''), int(label.get('seed') or 0)
-        floor = FloorPlan(**label['floor']).build(seed) if label.get('floor') else None
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise BagError(
-            f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
-        ) from error
-    settings = NodeSettings(
-        Foot.load(recorded.get('foot', 'large37')),
-        load,
+def _of_label(about: label.About) -> NodeSettings:
+    """Return the settings that follow from the description of the trial in a bag."""
+    return NodeSettings(
+        Foot.load(about.settings.get('foot', 'large37')),
+        about.expected_load,
         Tuning(),
-        policy,
-        ambient_pressure=ambient,
-        floor=floor,
-        scene=source,
-        seed=seed,
+        about.policy or 'adaptive',
+        ambient_pressure=about.ambient_pressure,
+        floor=about.floor.build(about.seed) if about.floor else None,
+        scene=about.scene,
+        seed=about.seed,
     )
-    return label, settings
 
 
 def _parameters(bag: BagReader) -> tuple[dict[str, Any], dict[str, Any]] | None:

@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager
 from contextlib import contextmanager
 from contextlib import suppress
+from functools import partial
 from typing import TypeAlias
 
 from ros_pad import workers
@@ -24,6 +25,7 @@ from ros_pad.pace import Progress
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials.trial import Metrics
+from ros_pad.trials.trial import Trial
 
 SHORTEST = 15.0
 """Duration of a scene, s, from which processes are worth their start."""
@@ -44,19 +46,11 @@ def _share(reached: MutableSequence[float]) -> None:
     os.nice(NICENESS)
 
 
-def _walk(
-    scene: Scene,
-    policy: str,
-    seed: int,
-    level: str,
-    sensing: str,
-    tuning: Tuning | None,
-    place: int,
-) -> Metrics | None:
+def _walk(run: Callable[..., Trial], policy: str, place: int) -> Metrics | None:
     def progress(seconds: float) -> None:
         _reached[place] = seconds
 
-    return loop.run(scene, policy, seed, level, progress, tuning, sensing=sensing).metrics
+    return run(policy=policy, progress=progress).metrics
 
 
 class Others:
@@ -71,7 +65,10 @@ class Others:
         sensing: str = 'markers',
         tuning: Tuning | None = None,
     ) -> None:
-        self._given = scene, seed, level, sensing, tuning
+        self._duration = scene.duration
+        self._run = partial(
+            loop.run, scene, seed=seed, fidelity=level, tuning=tuning, sensing=sensing
+        )
         self._policies = policies
         self._left: deque[str] = deque()  # not begun
         self._reached: MutableSequence[float] = []
@@ -81,7 +78,7 @@ class Others:
     def beside(self) -> Iterator[Others]:
         """Walk in other processes as far as there are cores, until the block ends."""
         free = min(workers.cores() - 1, len(self._policies))
-        if free < 1 or self._given[0].duration < SHORTEST:
+        if free < 1 or self._duration < SHORTEST:
             yield self
             return
         # Without a lock, which a killed process might keep.
@@ -99,10 +96,9 @@ class Others:
             policy = self._left.popleft()
         except IndexError:
             return
-        scene, seed, level, sensing, tuning = self._given
         place = self._policies.index(policy)
         with suppress(RuntimeError):  # the executor has ended, or its processes were killed
-            walk = executor.submit(_walk, scene, policy, seed, level, sensing, tuning, place)
+            walk = executor.submit(_walk, self._run, policy, place)
             self._walks[policy] = walk
             walk.add_done_callback(lambda _: self._begin(executor))
 
@@ -130,13 +126,12 @@ class Others:
         return {policy: each for policy in self._policies if (each := found[policy]) is not None}
 
     def _here(self, policy: str, bar: Bar) -> Metrics | None:
-        scene, seed, level, sensing, tuning = self._given
-        with bar(_text(policy), scene.duration) as progress:
-            return loop.run(scene, policy, seed, level, progress, tuning, sensing=sensing).metrics
+        with bar(_text(policy), self._duration) as progress:
+            return self._run(policy=policy, progress=progress).metrics
 
     def _awaited(self, policy: str, place: int, bar: Bar) -> Metrics | None:
         walk = self._walks[policy]
-        with bar(_text(policy), self._given[0].duration) as progress:
+        with bar(_text(policy), self._duration) as progress:
             while not walk.done():
                 progress(self._reached[place])
                 time.sleep(_POLL)

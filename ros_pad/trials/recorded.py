@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.reader import Table
 from ros_pad.bags.recovery import KEY as REPAIR
 from ros_pad.bags.topics import BODY_POSE
 from ros_pad.bags.topics import DIAGNOSTICS
@@ -42,19 +43,17 @@ from ros_pad.pace import part
 from ros_pad.records import KINDS
 from ros_pad.records import Block
 from ros_pad.records import Kind
-from ros_pad.simulation.scene import FloorPlan
-from ros_pad.trials.label import AMBIENT_PRESSURE
-from ros_pad.trials.label import KEY
-from ros_pad.trials.label import LOST
+from ros_pad.trials import label
 from ros_pad.trials.series import Records
 from ros_pad.trials.series import by_row
 from ros_pad.trials.series import held
 from ros_pad.trials.series import series
-from ros_pad.trials.trial import Metrics
 from ros_pad.trials.trial import Trial
 from ros_pad.trials.trial import heading
 
 _OF_LEG = re.compile(r'(?P<namespace>.*?/)leg_(?P<leg>\d+)/(?P<kind>\w+)')
+POSES = (BODY_POSE, ODOM)
+
 _KNOWN = {topic.pattern: topic for topic in TRIAL}
 # A log time after 2001 is a date, an earlier one is simulated time.
 _FIRST_DATE_NS = 10**18
@@ -99,13 +98,13 @@ def load(
     first = 0.4 if bag.problem else 0.0  # a bag without damage is opened at once
     trial = _described(bag)
     ambient = trial['settings']['ambient_pressure']
-    legs, records, _ = read_records(bag, wanted, ambient, part(progress, first, 0.8))
+    legs, records, _, tables = read_records(bag, wanted, ambient, part(progress, first, 0.8))
     found = series(records)
     fast_ns = found.pop('time')
     slow_ns = found.pop('slow_time')
     odom = np.zeros((0, 3))
-    body = _poses(bag, wanted, BODY_POSE, fast_ns)
-    if (estimated := _poses(bag, wanted, ODOM, fast_ns)) is not None:
+    body = _poses(tables, BODY_POSE, fast_ns)
+    if (estimated := _poses(tables, ODOM, fast_ns)) is not None:
         odom = estimated
         body = odom if body is None else body
     zero_ns = 0
@@ -134,14 +133,11 @@ def load(
     return read
 
 
-def _poses(
-    bag: BagReader, wanted: Mapping[str, Wanted], topic: Topic, grid: np.ndarray
-) -> np.ndarray | None:
+def _poses(tables: Mapping[Topic, Table], topic: Topic, grid: np.ndarray) -> np.ndarray | None:
     """Return x and y, m, and heading, rad, at times, ns, (n, 3); None if they are not recorded."""
-    name = next((name for name, each in wanted.items() if each.topic is topic), None)
-    if name is None:
+    if topic not in tables:
         return None
-    stamps, values = _stamped(*bag.tables({name: (*STAMP, *topic.values)})[name])
+    stamps, values = _stamped(*tables[topic])
     poses = np.column_stack([values[:, :2], by_row(heading, values[:, -4:])])
     return held(stamps, poses, grid)
 
@@ -160,7 +156,7 @@ def read_records(
     wanted: Mapping[str, Wanted],
     ambient: float,
     progress: Progress | None = None,
-) -> tuple[tuple[int, ...], Records, dict[str, np.ndarray]]:
+) -> tuple[tuple[int, ...], Records, dict[str, np.ndarray], dict[Topic, Table]]:
     """Return the records of a robot in a bag, also those that its drivers published by leg.
 
     Parameters
@@ -181,34 +177,38 @@ def read_records(
         In the order of their stamps.
     log_times : dict of array
         Log time of each of them, ns, by kind.
+    tables : dict of Table
+        What was recorded of the poses of the body, :data:`POSES`.
 
     Raises
     ------
     BagError
         When a message cannot be read, or records of two kinds have other legs.
     """
-    kinds = {name: each.topic.record for name, each in wanted.items() if each.leg is None}
-    found = bag.records({n: kind for n, kind in kinds.items() if kind}, part(progress, 0.0, 0.5))
-    blocks: dict[str, list[tuple[tuple[int, ...], np.ndarray, Block]]] = {}
-    for name, read in found.items():
-        kind = kinds[name]
-        assert kind
-        blocks.setdefault(kind.name, []).append(read)
+    kinds = {
+        name: each.topic.record
+        for name, each in wanted.items()
+        if each.leg is None and each.topic.record
+    }
     paths = {
         name: (*(STAMP if each.topic.frame else ()), *each.topic.values)
         for name, each in wanted.items()
-        if each.leg is not None and each.topic.columns
+        if each.topic.columns or each.topic in POSES
     }
-    for name, table in bag.tables(paths, part(progress, 0.5, 1.0)).items():
-        kind = wanted[name].topic.record
-        assert kind
-        blocks.setdefault(kind.name, []).append(_of_leg(wanted[name], *table, ambient))
+    found, tables = bag.read(kinds, paths, progress)
+    blocks: dict[str, list[tuple[tuple[int, ...], np.ndarray, Block]]] = {}
+    for name, read in found.items():
+        blocks.setdefault(kinds[name].name, []).append(read)
+    for name, table in tables.items():
+        if kind := wanted[name].topic.record:
+            blocks.setdefault(kind.name, []).append(_of_leg(wanted[name], *table, ambient))
     legs = tuple(sorted({leg for parts in blocks.values() for part in parts for leg in part[0]}))
     joined = {kind.name: _joined(kind, legs, blocks.get(kind.name, ())) for kind in KINDS}
     return (
         legs,
         Records(*(block for block, _ in joined.values())),
         {name: times for name, (_, times) in joined.items()},
+        {wanted[name].topic: table for name, table in tables.items()},
     )
 
 
@@ -265,31 +265,22 @@ def late(bag: BagReader, progress: Progress | None = None) -> list[str]:
 
 def _described(bag: BagReader) -> dict[str, Any]:
     """Return the fields of a trial that follow from the custom data of a bag."""
-    try:
-        noted = json.loads(bag.custom_data.get(KEY, '{}'))
-        source = str(noted.get('scene') or '')
-        seed = int(noted.get('seed') or 0)
-        plan = FloorPlan(**noted['floor']) if noted.get('floor') else None
-        ambient = float(noted.get('ambient_pressure', AMBIENT_PRESSURE.default))
-        return {
-            'scene': pathlib.PurePath(source).stem,
-            'policy': str(noted.get('policy') or ''),
-            'fidelity': str(noted.get('fidelity') or ''),
-            'seed': seed,
-            'floor': partial(plan.build, seed) if plan else None,
-            'metrics': Metrics(**noted['metrics']) if noted.get('metrics') else None,
-            'settings': (noted.get('settings') or {})
-            | {
-                'ambient_pressure': ambient,
-                'lost': dict(json.loads(bag.custom_data.get(LOST, '{}'))),
-                'repaired': REPAIR in bag.custom_data,
-            },
-            'real_time_factor': noted.get('real_time_factor'),
-        }
-    except (AttributeError, TypeError, ValueError) as error:
-        raise BagError(
-            f'{bag.path}: custom data {KEY!r} does not describe a trial of ros_pad: {error}'
-        ) from error
+    about = label.read(bag)
+    settings = {
+        'ambient_pressure': about.ambient_pressure,
+        'lost': dict(json.loads(bag.custom_data.get(label.LOST, '{}'))),
+        'repaired': REPAIR in bag.custom_data,
+    }
+    return {
+        'scene': pathlib.PurePath(about.scene).stem,
+        'policy': about.policy,
+        'fidelity': about.fidelity,
+        'seed': about.seed,
+        'floor': partial(about.floor.build, about.seed) if about.floor else None,
+        'metrics': about.metrics,
+        'settings': about.settings | settings,
+        'real_time_factor': about.real_time_factor,
+    }
 
 
 class Wanted(NamedTuple):

@@ -7,14 +7,15 @@ import heapq
 import json
 import math
 import operator
+from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ros_pad.bags import BagReader
+from ros_pad.bags.fields import field_of
 from ros_pad.bags.topics import FORCE
 from ros_pad.bags.topics import IMU
 from ros_pad.bags.topics import JOINT_STATES
@@ -36,6 +37,7 @@ from ros_pad.sensing import SensingStage
 from ros_pad.sensing.stage import SETTINGS
 from ros_pad.sensing.stage import JointOrder
 from ros_pad.sensing.stage import estimator_of
+from ros_pad.sensing.stage import robot_of
 from ros_pad.sensing.stage import sample_of
 from ros_pad.trials.comparison import Comparison
 from ros_pad.trials.comparison import Stream
@@ -108,9 +110,7 @@ def compare_body(bag: BagReader, wanted: Mapping[str, Wanted]) -> tuple[list[Com
 def _parts(bag: BagReader, values: Mapping[str, Any]) -> tuple[Robot, BodyEstimator]:
     """Return the robot and the estimator that recorded parameters describe."""
     try:
-        feet = [each.strip() for each in values['feet'].split(',') if each.strip()]
-        radius = values['foot_radius'] if values['foot_radius'] >= 0.0 else None
-        robot = Robot.load(values['robot'], feet, values['imu_link'], radius)
+        robot = robot_of(values)
         return robot, estimator_of(robot, values)
     except (KeyError, InvalidInput) as error:
         raise BagError(
@@ -161,13 +161,21 @@ def _play(
 
 def _messages(
     bag: BagReader, force: str, imu: str, joints: str
-) -> Iterator[tuple[int, str, Sequence[Any]]]:
+) -> Iterator[tuple[int, str, Iterable[Any]]]:
     """Yield log time, ns, topic and values of all messages, which begin with the stamp."""
-    paths = {
-        imu: (*STAMP, *IMU.values),
-        joints: (*STAMP, 'name', 'position', 'velocity', 'effort'),
-    }
-    messages = ((log_ns, topic, values) for topic, values, log_ns in bag.values(paths))
+
+    def values(topic: str, message: Any) -> Iterator[Any]:
+        """Yield the values of a message, beginning with its stamp."""
+        yield from (message.header.stamp.sec, message.header.stamp.nanosec)
+        if topic == joints:
+            yield from (message.name, message.position, message.velocity, message.effort)
+        else:
+            yield from (field_of(message, path) for path in IMU.values)
+
+    messages = (
+        (log_ns, topic, values(topic, message))
+        for topic, message, log_ns in bag.messages({imu, joints})
+    )
     _, times, (stamps, rows) = bag.records({force: SAMPLES})[force]
     forces = (
         (log_ns, force, (0, stamp_ns, *each))

@@ -89,7 +89,7 @@ def read(
     BagError
         When there is no wrench of any leg, or a message cannot be read.
     """
-    known, records, times = read_records(bag, wanted, settings.ambient_pressure, progress)
+    known, records, times, _ = read_records(bag, wanted, settings.ambient_pressure, progress)
     topics = {
         each.topic.record.name: name
         for name, each in wanted.items()

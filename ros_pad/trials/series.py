@@ -75,7 +75,8 @@ def series(records: Records) -> dict[str, Any]:
     def of(block: Block, name: str, grid: np.ndarray = slow) -> np.ndarray:
         return held(block.stamps, block.rows[name], grid)
 
-    code = of(estimate, 'doubt')
+    codes, places = np.unique(of(estimate, 'doubt'), return_inverse=True)
+    kinds = np.array([_kind_of(code) for code in codes.tolist()], int)
     return {
         'time': fast,
         'force': of(sample, 'force', fast),
@@ -89,7 +90,7 @@ def series(records: Records) -> dict[str, Any]:
         'slip_speed': by_row(math.hypot, of(estimate, 'slip')),
         'slipping': of(estimate, 'slipping') == 1.0,
         'dome': of(command, 'dome') == 1.0,
-        'doubt': np.vectorize(_kind_of, otypes=[int])(code),
+        'doubt': kinds[places],
     }
 
 
