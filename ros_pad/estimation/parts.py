@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import Posterior
@@ -168,18 +169,31 @@ class Window:
         Its beginning, s.
     first : bool
         Whether it is the first one of its stance.
+    count : int
+        Number of samples.
     sums : tuple of float
-        Number of samples, and sums of normal force, tangential force, friction used by turning, N,
+        Sums of normal force, tangential force, friction used by turning, N,
         slip speed, and standard deviation of that, m/s.
     peak : float
         Largest normal force of the stance, N.
     """
 
-    __slots__ = ('first', 'peak', 'start', 'sums')
+    __slots__ = ('count', 'first', 'peak', 'start', 'sums')
 
     def __init__(self, start: float, first: bool = True, peak: float = 0.0) -> None:
         self.start, self.first, self.peak = start, first, peak
-        self.sums = (0.0,) * 6
+        self.count, self.sums = 0, (0.0,) * 5
+
+    def add(self, samples: Sequence[tuple[float, ...]]) -> None:
+        """Add samples, each with the numbers of the sums."""
+        loads, pulls, turnings, speeds, noises = self.sums
+        for load, pull, turning, speed, noise in samples:
+            loads, pulls, turnings = loads + load, pulls + pull, turnings + turning
+            speeds, noises = speeds + speed, noises + noise
+            if load > self.peak:
+                self.peak = load
+        self.count += len(samples)
+        self.sums = loads, pulls, turnings, speeds, noises
 
 
 class Stance:

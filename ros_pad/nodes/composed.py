@@ -428,7 +428,7 @@ def run(
     controller, stopped, shared = (
         trial.walked,
         trial.stopped,
-        trial.estimator.stage.estimator.grounds.shared,
+        trial.estimator.stage.estimator.shared,
     )
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial
