@@ -171,7 +171,7 @@ class Window:
         Whether it is the first one of its stance.
     count : int
         Number of samples.
-    sums : tuple of float
+    sums : sequence of float
         Sums of normal force, tangential force, friction used by turning, N,
         slip speed, and standard deviation of that, m/s.
     peak : float
@@ -182,18 +182,14 @@ class Window:
 
     def __init__(self, start: float, first: bool = True, peak: float = 0.0) -> None:
         self.start, self.first, self.peak = start, first, peak
-        self.count, self.sums = 0, (0.0,) * 5
+        self.count = 0
+        self.sums: Sequence[float] = (0.0,) * 5
 
     def add(self, samples: Sequence[tuple[float, ...]]) -> None:
         """Add samples, each with the numbers of the sums."""
-        loads, pulls, turnings, speeds, noises = self.sums
-        for load, pull, turning, speed, noise in samples:
-            loads, pulls, turnings = loads + load, pulls + pull, turnings + turning
-            speeds, noises = speeds + speed, noises + noise
-            if load > self.peak:
-                self.peak = load
+        self.sums = [*map(sum, zip(self.sums, *samples, strict=True))]
         self.count += len(samples)
-        self.sums = loads, pulls, turnings, speeds, noises
+        self.peak = max(self.peak, max(samples)[0])
 
 
 class Stance:

@@ -61,11 +61,13 @@ class Input:
         That no sample has been used for long; None if one has.
     missing : int
         Code of the doubt that follows from silence.
+    used : int
+        Number of samples used so far.
     """
 
     __slots__ = (
         '_joints', '_moments', '_position', '_seen_ns', '_silent_ns', 'load', 'missing', 'place',
-        'silence', 'time',
+        'silence', 'time', 'used',
     )  # fmt: skip
 
     def __init__(self, tuning: Tuning) -> None:
@@ -73,15 +75,17 @@ class Input:
         self._position: Sequence[float] = ()  # last one, m
         self._seen_ns = 0  # stamp of the sample with which that was first used
         self.clear()
-        self.use(-math.inf)
+        self.used = 0
+        self.use(-math.inf, 0)
 
     def clear(self) -> None:
         """Begin anew after an estimate."""
         self.place: tuple[float, ...] = (math.nan, math.nan)
         self.load = math.nan
 
-    def use(self, time: float) -> None:
-        """Take note that a sample of a time, s, is used."""
+    def use(self, time: float, count: int) -> None:
+        """Take note that samples up to a time, s, are used."""
+        self.used += count
         self.time, self.missing = time, doubt.NO_WRENCH
         self._silent_ns: int | None = None  # since when, as far as it was noticed
         self.silence: Doubt | None = None
@@ -101,7 +105,7 @@ class Input:
         load = max(each[2] for each in samples)
         if not load <= self.load:
             self.load = load
-        self.use(stamp_ns * 1e-9)
+        self.use(stamp_ns * 1e-9, len(samples))
 
     def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample to use of the numbers of a row; None if something is missing.
@@ -138,7 +142,7 @@ class Input:
         if new and not wrong:
             self._position, self._seen_ns = position, stamp_ns
         refuse(time, self.time, wrong)
-        self.use(time)
+        self.use(time, 1)
         return found
 
     def _miss(self, code: int) -> None:
@@ -175,8 +179,6 @@ class EstimationStage:
         Estimator of the feet.
     samples : int
         Number of moments used so far, in which at least one foot had a sample that could be used.
-    used : array of int (feet,)
-        Number of samples used so far, by foot.
     last_ns : int
         Time stamp of the last moment used, ns; 0 before the first one.
     """
@@ -194,7 +196,6 @@ class EstimationStage:
         self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
         self._inputs = [Input(tuning) for _ in legs]
         self._pressures = [0.0] * len(legs)
-        self.used: npt.NDArray[np.int64] = np.zeros(len(legs), np.int64)
         self.samples = self.last_ns = 0
 
     def pressure(self, rows: np.ndarray) -> None:
@@ -236,11 +237,15 @@ class EstimationStage:
                 for place, mine in enumerate(rows)
             ]
         self.estimator.update(times, samples, self._pressures, quiet)
-        self.used += [sum(map(bool, mine)) for mine in samples]
         for stamp_ns, *moment in zip(stamps, *samples, strict=True):
             if any(moment):
                 self.samples += 1
                 self.last_ns = stamp_ns
+
+    @property
+    def used(self) -> npt.NDArray[np.int64]:
+        """Number of samples used so far, by foot."""
+        return np.array([each.used for each in self._inputs])
 
     def _ordinary(self, stamps: list[int], values: Array) -> bool:
         """Return whether all samples can be used."""
