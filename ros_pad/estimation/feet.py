@@ -80,9 +80,19 @@ class FeetEstimator:
         self.tracks = [Track(Ground(foot, load, tuning, model), axes) for _ in range(count)]
 
     def quiet(self, times: Sequence[float], values: Array) -> list[list[bool]] | None:
-        """Return for each foot whether all its readings change, and none of them leaps.
+        """Find the samples of each foot in which all readings change, and none of them leaps.
 
-        The values are those of samples, feet and numbers; the times, s, advance. None: unknown.
+        Parameters
+        ----------
+        times : sequence of float
+            Times, s, that advance.
+        values : array (samples, feet, numbers)
+            Complete samples.
+
+        Returns
+        -------
+        list of list of bool, or None
+            Whether they are such; None if this is unknown, because samples are missing.
         """
         gaps = map(sub, times, (min(each.time for each in self.tracks), *times))
         if max(gaps) > LONGEST_GAP:
@@ -90,7 +100,8 @@ class FeetEstimator:
         readings = values[:, :, READINGS]
         last = np.array([[each.sensing.last for each in self.tracks]])
         moves = np.abs(readings - np.concatenate((last, readings[:-1])))
-        quiet = moves.all(axis=2) & (moves[:, :, 3:].max(axis=2) <= 0.5 * LEAP_DISTANCE)
+        # Forces leap as they like.
+        quiet = ((moves > 0.0) & (moves <= FARTHEST)).all(axis=2)
         found: list[list[bool]] = quiet.T.tolist()
         return found
 
@@ -129,6 +140,9 @@ class FeetEstimator:
                 track.update(times[part], samples[place][part], pressures[place], calm)
             first = end
 
+
+FARTHEST = np.array(3 * [math.inf] + 3 * [0.5 * LEAP_DISTANCE])
+"""Largest changes of force and position in samples in which nothing leaps."""
 
 LARGEST_FORCE, LARGEST_POSITION = 1e5, 1e6
 """Largest size of a force, N, and moment, N m, and of a position, m."""

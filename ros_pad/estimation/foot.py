@@ -161,7 +161,18 @@ class FootEstimator:
 
     @classmethod
     def of(cls, feet: FeetEstimator) -> list[FootEstimator]:
-        """Return an estimator for each foot of a robot, which learn together."""
+        """Return an estimator for each foot of a robot, which learn together.
+
+        Parameters
+        ----------
+        feet : FeetEstimator
+            The estimator of all feet.
+
+        Returns
+        -------
+        list of FootEstimator
+            They share its state.
+        """
         found = []
         for place in range(len(feet.tracks)):
             found.append(cls.__new__(cls))

@@ -136,12 +136,11 @@ class Ground:
         ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
         self._history.add(time, ground.posterior)
         self.quantile = ground.quantile(MARGIN_SHARE)
-        self.belief = wet, mean, sd = ground.wet_probability, *ground.friction
-        evidence = doubt.StanceEvidence(
-            stance.dome_share, ground.log_odds, window.peak, stance.peak_ratio,
-            stance.peak_turning, wet, mean, sd,
+        self.belief = ground.wet_probability, *ground.friction
+        self.doubt = doubt.of_ground(
+            stance, ground.log_odds, self.belief, window.peak, self.expected_load,
+            ground.expected.medians.flat_wet,
         )  # fmt: skip
-        self.doubt = doubt.of_ground(evidence, ground.expected.medians, self.expected_load)
 
     def _share_on_domes(self, pressure: float) -> float:
         return self.foot.dome_load(self.expected_load, pressure) / self.expected_load

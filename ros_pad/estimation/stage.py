@@ -98,14 +98,13 @@ class Input:
         if silence > SILENCE:
             self.silence = Doubt(self.missing, silence)
 
-    def note(self, stamp_ns: int, samples: Sequence[Sample]) -> None:
-        """Take note of successive samples that are all used, the last one at a time, ns."""
-        self._position, self._seen_ns = samples[-1][4:7], stamp_ns
-        self.place = samples[-1][4], samples[-1][5]
-        load = max(each[2] for each in samples)
+    def note(self, stamp_ns: int, position: Sequence[float], load: float, count: int) -> None:
+        """Take note of so many samples that are all used: the last position, and most load."""
+        self._position, self._seen_ns = position, stamp_ns
+        self.place = position[0], position[1]
         if not load <= self.load:
             self.load = load
-        self.use(stamp_ns * 1e-9, len(samples))
+        self.use(stamp_ns * 1e-9, count)
 
     def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample to use of the numbers of a row; None if something is missing.
@@ -229,8 +228,9 @@ class EstimationStage:
         samples: Sequence[Sequence[Sample | None]] = rows
         if self._ordinary(stamps, values):
             quiet = self.estimator.quiet(times, values)
-            for each, mine in zip(self._inputs, rows, strict=True):
-                each.note(stamps[-1], mine)
+            loads = values[:, :, 2].max(axis=0).tolist()
+            for each, mine, load in zip(self._inputs, rows, loads, strict=True):
+                each.note(stamps[-1], mine[-1][4:7], load, len(stamps))
         else:
             samples = [
                 [self._take(place, *each) for each in zip(stamps, mine, strict=True)]

@@ -24,7 +24,6 @@ from ros_pad.estimation.parts import Window
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.estimation.watch import Moment
 from ros_pad.estimation.watch import Watch
 
 Sample = Sequence[float]
@@ -272,7 +271,7 @@ class Track:
         was = watch.axes.doubt.code
         force = sample[0] - offset.x, sample[1] - offset.y, sample[2] - offset.z
         known = (offset.x, offset.y) if offset.known else None
-        if watch.end_block(Moment(time, sample[6], force, known, self.gate.stands, speed_sd)):
+        if watch.end_block(time, sample[6], force, known, self.gate.stands, speed_sd):
             self.sensing.set_noise(watch.noise.force.white, watch.noise.position.white)
             self._set_noise()
         if watch.axes.doubt.code and not was:
@@ -363,9 +362,10 @@ class Track:
         (tuning, joints, moments, shear, softness, lever), slip = self._setup, self.slip
         offset, smoothing, own, sx, sy = self.offset, tuning.smoothing, slip.noise, slip.x, slip.y
         noise, turning, before, tests, felt = own, 0.0, self.time, [], []
+        ox, oy, oz = offset.x, offset.y, offset.z
         for time, sample in zip(times, samples, strict=True):
             fx, fy, fz, moment, x, y, z, vx, vy, xx, yy, _ = sample
-            fx, fy, fz, dt = fx - offset.x, fy - offset.y, fz - offset.z, time - before
+            fx, fy, fz, dt = fx - ox, fy - oy, fz - oz, time - before
             if not 0.0 < dt < math.inf:
                 dt = 0.1 * smoothing
             # The marker is above the soft pad: subtract the pad's shear to get the contact.
