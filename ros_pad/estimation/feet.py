@@ -87,7 +87,7 @@ class FeetEstimator:
         times : sequence of float
             Times, s, that advance.
         values : array (samples, feet, numbers)
-            Complete samples.
+            Complete samples, N, m and m/s.
 
         Returns
         -------

@@ -154,11 +154,6 @@ class Slip:
         self.alarm = alarm
         self.x = self.y = self.noise = self.contact_noise = self.sd = 0.0
 
-    def begin(self, x: float, y: float) -> None:
-        """Begin a stance at a position, m."""
-        self.x, self.y = x, y
-        self.alarm.reset()
-
 
 class Window:
     """Sums of the samples of a stance since the last update of the filter.

@@ -293,7 +293,9 @@ class Track:
         x, y = sample[4] + fx * setup.shear, sample[5] + fy * setup.shear
         self.watch.look(time)
         self.gate.touch_down(sample[6])
-        self.slip.begin(*((fx * setup.softness, fy * setup.softness) if setup.joints else (x, y)))
+        shear = fx * setup.softness, fy * setup.softness
+        self.slip.x, self.slip.y = shear if setup.joints else (x, y)
+        self.slip.alarm.reset()
         self.ground.touch_down(time, x, y, pressure)
         self._window = Window(time)
 
