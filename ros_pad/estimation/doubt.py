@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ros_pad.estimation.scales import FrictionPrior
+from ros_pad.estimation.parts import Stance
 
 CONCLUSIVE = 1.0
 """Change of the log odds of wet ground, up or down, above which a stance is conclusive."""
@@ -146,53 +146,41 @@ def text(code: float, a: float = 0.0, b: float = 0.0) -> str:
     return f'{row.kind}: {details}'
 
 
-class StanceEvidence(NamedTuple):
-    """Evidence of a stance so far.
-
-    Attributes
-    ----------
-    dome_share : float
-        Share of the expected load that domes carry, 0 to 1.
-    log_odds : float
-        Change of the log odds of wet ground by this stance.
-    peak_load : float
-        Largest normal force, N.
-    peak_ratio : float
-        Largest T/N of a window.
-    turning_ratio : float
-        Largest part of the friction that turning about the vertical has used, as T/N; 0 where the
-        yaw moment is not measured.
-    wet_probability, friction_mean, friction_sd : float
-        Present estimate: probability of wet ground, 0 to 1, mean and standard deviation of μ.
-    """
-
-    dome_share: float
-    log_odds: float
-    peak_load: float
-    peak_ratio: float
-    turning_ratio: float
-    wet_probability: float
-    friction_mean: float
-    friction_sd: float
-
-
-def of_ground(stance: StanceEvidence, prior: FrictionPrior, expected_load: float) -> Doubt:
+def of_ground(
+    stance: Stance,
+    log_odds: float,
+    belief: tuple[float, float, float],
+    load: float,
+    expected_load: float,
+    wet_friction: float,
+) -> Doubt:
     """Return why the ground is unobservable in a stance; no doubt if it is observable.
 
-    The expected load is in N; the friction is what feet expect of new ground.
+    Parameters
+    ----------
+    stance : Stance
+        Its evidence so far.
+    log_odds : float
+        Change of the log odds of wet ground by it.
+    belief : tuple of float
+        Present probability of wet ground, 0 to 1, and mean and standard deviation of friction.
+    load, expected_load : float
+        Largest normal force, and the expected one, N.
+    wet_friction : float
+        Friction that feet expect of wet ground.
     """
     if stance.dome_share > ALL_DOMED:
         return Doubt(ALL_DOME)
     if stance.dome_share > DOMED:
         return Doubt(HALF, 100.0 * stance.dome_share)
-    if abs(stance.log_odds) >= CONCLUSIVE:
+    if abs(log_odds) >= CONCLUSIVE:
         return Doubt()
-    if stance.peak_load < LIGHT * expected_load:
-        return Doubt(FAINT, stance.peak_load, expected_load)
-    if stance.turning_ratio > stance.peak_ratio:
-        return Doubt(TURNING, stance.turning_ratio, stance.peak_ratio)
-    if stance.peak_ratio < PULLED * prior.flat_wet:
-        return Doubt(NOT_PULLED, stance.peak_ratio, prior.flat_wet)
-    if not 1.0 - SURE < stance.wet_probability < SURE:
+    if load < LIGHT * expected_load:
+        return Doubt(FAINT, load, expected_load)
+    if stance.peak_turning > stance.peak_ratio:
+        return Doubt(TURNING, stance.peak_turning, stance.peak_ratio)
+    if stance.peak_ratio < PULLED * wet_friction:
+        return Doubt(NOT_PULLED, stance.peak_ratio, wet_friction)
+    if not 1.0 - SURE < belief[0] < SURE:
         return Doubt()
-    return Doubt(UNDECIDED, stance.friction_mean, stance.friction_sd)
+    return Doubt(UNDECIDED, *belief[1:])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from operator import sub
 
 import numpy as np
 
@@ -19,35 +19,18 @@ from ros_pad.configuration import number
 from ros_pad.configuration import shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.axes import BLOCK
-from ros_pad.estimation.axes import Axes
 from ros_pad.estimation.axes import SharedAxes
-from ros_pad.estimation.ground import Grounds
+from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation.ground import Ground
 from ros_pad.estimation.ground import shared_friction
-from ros_pad.estimation.noise import SensorNoise
-from ros_pad.estimation.parts import Gate
-from ros_pad.estimation.parts import Offset
-from ros_pad.estimation.parts import Slip
 from ros_pad.estimation.scales import DELAY
 from ros_pad.estimation.sensing import LEAP_DISTANCE
 from ros_pad.estimation.sensing import READINGS
-from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.track import Sample
-from ros_pad.estimation.track import Setup
 from ros_pad.estimation.track import Track
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.estimation.watch import Watch
 from ros_pad.records import Array
-
-AIRBORNE_LOAD = 0.3
-"""Share of the expected load above which a foot at that height may stand on higher ground. Smaller
-readings there are the offset of the sensor."""
-
-BODY_CORRELATION = 0.15
-"""Time over which errors of a measured velocity of the contact are the same, s: that of the body,
-which is common to all feet, lasts for about a stance."""
 
 
 class FeetEstimator:
@@ -70,10 +53,10 @@ class FeetEstimator:
     ----------
     tuning : Tuning
         As given.
-    grounds : Grounds
-        What each foot knows of the ground, with the friction that all learn together.
+    shared : FrictionScales
+        What the feet learn of friction together.
     tracks : list of Track
-        What each foot does.
+        What each foot does, and knows of the ground.
 
     Raises
     ------
@@ -90,71 +73,43 @@ class FeetEstimator:
         instance('tuning', tuning, Tuning)
         integer('count', count, 1)
         load = number('expected_load', expected_load, 'N', above=True)
-        self.grounds = Grounds(foot, load, tuning, shared_friction(foot, load, tuning), count)
-        setup, axes = Setup.of(foot, tuning), SharedAxes()
-        self.tracks = [self._track(place, load, setup, axes) for place in range(count)]
-
-    def _track(self, place: int, load: float, setup: Setup, shared: SharedAxes) -> Track:
-        tuning = self.tuning
-        # An estimated position never stops, and its noise is not that of a marker.
-        marker = 0.0 if setup.joints else tuning.position_noise
-        memory = BODY_CORRELATION if setup.joints else BLOCK
-        axes = Axes(load, setup.softness, memory, shared)
-        memory = BODY_CORRELATION if setup.joints else tuning.smoothing
-        return Track(
-            place,
-            setup,
-            self.grounds,
-            Sensing(tuning.force_noise, marker, tuning.force_range or math.inf),
-            Watch(SensorNoise(marker, tuning.force_noise, load), axes),
-            Gate(tuning.load_gate * load, AIRBORNE_LOAD * load),
-            Offset(load),
-            Slip(SlipAlarm(memory, threshold=tuning.alarm_threshold)),
+        self.shared, axes = shared_friction(foot, load, tuning), SharedAxes()
+        model = GroundModel(
+            self.shared, tuning.wet_prior, tuning.patch_length, rim_speed=tuning.rim_speed(foot)
         )
+        self.tracks = [Track(Ground(foot, load, tuning, model), axes) for _ in range(count)]
 
-    def update_all(
-        self, times: Sequence[float], values: Array, pressures: Sequence[float]
-    ) -> None:
-        """Process samples of all feet, with new positions, at times that advance.
+    def quiet(self, times: Sequence[float], values: Array) -> list[list[bool]] | None:
+        """Find the samples of each foot in which all readings change, and none of them leaps.
 
         Parameters
         ----------
         times : sequence of float
-            Times, s.
-        values : array (times, feet, 11)
-            Numbers of SAMPLE rows in their units (no unit of their own); none is missing.
-        pressures : sequence of float
-            Gauge pressure in the pads of each foot, Pa.
+            Times, s, that advance.
+        values : array (samples, feet, numbers)
+            Complete samples, N, m and m/s.
+
+        Returns
+        -------
+        list of list of bool, or None
+            Whether they are such; None if this is unknown, because samples are missing.
         """
-        gaps = [time - before for before, time in pairwise((self.tracks[0].time, *times))]
-        quiet = None
-        if max(gaps) <= LONGEST_GAP and self._in_step:
-            quiet = self._quiet(values)
-        samples = values.transpose(1, 0, 2).tolist()
-        self.update(times, samples, pressures, quiet=quiet)
-
-    @property
-    def _in_step(self) -> bool:
-        """Whether all feet have had their last sample at the same time."""
-        return len({each.time for each in self.tracks}) == 1
-
-    def _quiet(self, values: Array) -> list[list[bool]]:
-        """Return for each foot whether all its readings change, and none of them leaps."""
-        last = np.array([[each.sensing.last for each in self.tracks]])
+        gaps = map(sub, times, (min(each.time for each in self.tracks), *times))
+        if max(gaps) > LONGEST_GAP:
+            return None
         readings = values[:, :, READINGS]
+        last = np.array([[each.sensing.last for each in self.tracks]])
         moves = np.abs(readings - np.concatenate((last, readings[:-1])))
-        if moves.all() and moves[:, :, 3:].max() <= 0.5 * LEAP_DISTANCE:
-            return [[True] * len(values)] * len(self.tracks)
-        found = moves.all(axis=2) & (moves[:, :, 3:] <= 0.5 * LEAP_DISTANCE).all(axis=2)
-        quiet: list[list[bool]] = found.T.tolist()
-        return quiet
+        # Forces leap as they like.
+        quiet = ((moves > 0.0) & (moves <= FARTHEST)).all(axis=2)
+        found: list[list[bool]] = quiet.T.tolist()
+        return found
 
     def update(
         self,
         times: Sequence[float],
         samples: Sequence[Sequence[Sample | None]],
         pressures: Sequence[float],
-        ages: Sequence[Sequence[float]] | None = None,
         quiet: Sequence[Sequence[bool]] | None = None,
     ) -> None:
         """Process the samples of some times; a clock may have been set back in between.
@@ -167,11 +122,9 @@ class FeetEstimator:
             For each foot a sample at each time, None where it has none.
         pressures : sequence of float
             Gauge pressure in the pads of each foot, Pa.
-        ages : sequence of sequence of float or None
-            For each foot the ages of its positions, s; None: all are new.
         quiet : sequence of sequence of bool or None
             For each foot the samples in which nothing but landing and lifting can happen, see
-            :meth:`update_all`; None: unknown.
+            :meth:`quiet`; None: unknown.
         """
         for track in self.tracks:
             track.fresh = False
@@ -181,19 +134,56 @@ class FeetEstimator:
             # In a shorter time feet cannot hear of each other.
             while end < count and abs(times[end] - times[first]) < 0.9 * DELAY:
                 end += 1
-            whole = end - first == count
+            part = slice(first, end)
             for place, track in enumerate(self.tracks):
-                mine, part = samples[place], slice(first, end)
-                old = ages[place][part] if ages else None
                 calm = quiet[place][part] if quiet else None
-                track.update(
-                    times[part], mine if whole else mine[part], pressures[place], old, calm
-                )
+                track.update(times[part], samples[place][part], pressures[place], calm)
             first = end
 
 
-def late(time: float, last: float) -> None:
-    """Refuse a time, s, that is hardly before the last one, s: no clock was set back so little."""
+FARTHEST = np.array(3 * [math.inf] + 3 * [0.5 * LEAP_DISTANCE])
+"""Largest changes of force and position in samples in which nothing leaps."""
+
+LARGEST_FORCE, LARGEST_POSITION = 1e5, 1e6
+"""Largest size of a force, N, and moment, N m, and of a position, m."""
+
+NUMBERS = (
+    *((f'force {axis}', -LARGEST_FORCE, LARGEST_FORCE, 'N') for axis in 'xyz'),
+    ('moment', -LARGEST_FORCE, LARGEST_FORCE, 'N m'),
+    *((f'position {axis}', -LARGEST_POSITION, LARGEST_POSITION, 'm') for axis in 'xyz'),
+    *((f'velocity {axis}', -1e6, 1e6, 'm/s') for axis in 'xy'),
+    *((f'variance {axis}', 0.0, math.inf, 'm²/s²') for axis in 'xy'),
+    ('age of the position', 0.0, 1e12, 's'),
+    ('pressure', -1e7, 1e7, 'Pa'),
+    ('deviation', 0.0, 1e6, 'm/s'),
+)
+"""Names, limits and units of the numbers of a sample, and of what comes with it. A larger value,
+though finite, would spoil sums and means for ever."""
+
+
+def wrong_numbers(time: float, numbers: Sequence[float]) -> list[str]:
+    """Return what is outside its limits of a time, s, and :data:`NUMBERS`, or the first of them.
+
+    The moment may be NaN.
+    """
+    wrong = [
+        f'{name} = {shown(value)} {unit}'
+        for (name, low, high, unit), value in zip(NUMBERS, numbers, strict=False)
+        if not (low <= value <= high or (name == 'moment' and value != value))
+    ]
+    return wrong if abs(time) < math.inf else [*wrong, f'time = {shown(time)} s']
+
+
+def refuse(time: float, last: float, wrong: Sequence[str]) -> None:
+    """Refuse a sample of a time, s, with wrong numbers, or hardly before the last one, s.
+
+    No clock is set back by so little.
+    """
+    if wrong:
+        raise InvalidInput(
+            f'sample at {shown(time)} s: {", ".join(wrong)}: must be finite, and not larger than'
+            ' a sensor can show'
+        )
     if last - LONGEST_GAP < time <= last:
         raise InvalidInput(
             f'time = {shown(time)} s is not allowed: it must be later than that of the last'

@@ -7,12 +7,12 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ros_pad.configuration import shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.feet import late
+from ros_pad.estimation.feet import refuse
+from ros_pad.estimation.feet import wrong_numbers
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.tuning import Tuning
@@ -166,12 +166,12 @@ class FootEstimator:
         Parameters
         ----------
         feet : FeetEstimator
-            Estimator of all feet.
+            The estimator of all feet.
 
         Returns
         -------
         list of FootEstimator
-            Fronts of this one estimator.
+            They share its state.
         """
         found = []
         for place in range(len(feet.tracks)):
@@ -224,31 +224,37 @@ class FootEstimator:
             does not advance, or the motion is missing or has a deviation below 0.
         """
         tuning, track = self.feet.tuning, self.feet.tracks[self._place]
-        motion = motion if tuning.source == 'joints' else None
-        moment = moment if tuning.moment_noise > 0.0 else None
-        if tuning.source == 'joints' and motion is None:
+        velocity, sd, why = (0.0, 0.0), 0.0, ''
+        if tuning.source == 'joints':
+            if motion is None:
+                raise InvalidInput(
+                    f'sample at {time!r} s: motion = None is not allowed: with source joints the'
+                    ' velocity of the contact is needed'
+                )
+            velocity, sd, why = motion
+        yaw = math.nan if moment is None or not tuning.moment_noise else moment
+        try:
+            (fx, fy, fz), (x, y, z) = force, position
+            age = 0.0 if position_time is None else abs(time - position_time)
+            variance = math.inf if why else sd**2
+            sample = fx, fy, fz, yaw, x, y, z, *velocity, variance, variance, age
+            wrong = wrong_numbers(time, (*sample, pressure, sd))
+        except (TypeError, ValueError) as error:
             raise InvalidInput(
-                f'sample at {time!r} s: motion = None is not allowed: with source joints the'
-                ' velocity of the contact is needed'
-            )
-        _check(time, force, position, pressure, moment, position_time, motion)
-        late(time, track.time)
-        yaw = math.nan if moment is None else moment
-        variance = 0.0
-        if motion:
-            variance = math.inf if motion.doubt else motion.sd**2
-        velocity = motion.velocity if motion else (0.0, 0.0)
-        age = 0.0 if position_time is None else abs(time - position_time)
-        sample = *force, yaw, *position, *velocity, variance, variance
+                f'sample at {time!r} s: force = {force!r}, position = {position!r}, pressure ='
+                f' {pressure!r}, moment = {moment!r}: three numbers each are needed for force and'
+                ' position, one number each for time, pressure and moment'
+            ) from error
+        refuse(time, track.time, wrong)
         track.fresh = False
-        track.update((time,), (sample,), pressure, (age,) if age else None, None)
+        track.update((time,), (sample,), pressure, None)
         self.estimate = self._estimate()
         return self.estimate
 
     @property
     def ground(self) -> GroundFilter:
         """Posterior of wet ground and friction."""
-        return self.feet.grounds.filters[self._place]
+        return self.feet.tracks[self._place].ground.filter
 
     @property
     def noise(self) -> SensorNoise:
@@ -256,81 +262,10 @@ class FootEstimator:
         return self.feet.tracks[self._place].watch.noise
 
     def _estimate(self) -> Estimate:
-        place, grounds = self._place, self.feet.grounds
-        track = self.feet.tracks[place]
-        now = track.standing
+        track = self.feet.tracks[self._place]
+        now, ground = track.standing, track.ground
         return Estimate(
             track.time, track.gate.stands, now.slipping, now.slip_velocity, now.slip_speed,
-            track.slip.sd, *grounds.beliefs[place], track.margin, track.fresh,
-            doubt.text(*grounds.doubts[place]), track.sound,
+            track.slip.sd, *ground.belief, track.margin, track.fresh, doubt.text(*ground.doubt),
+            track.sound,
         )  # fmt: skip
-
-
-def _check(
-    time: float,
-    force: Sequence[float],
-    position: Sequence[float],
-    pressure: float,
-    moment: float | None,
-    position_time: float | None,
-    motion: ContactMotion | None,
-) -> None:
-    """Raise `InvalidInput` unless a sample has all its numbers, and all are finite."""
-    try:
-        (fx, fy, fz), (x, y, z) = force, position
-        age = 0.0 if position_time is None else abs(time - position_time)
-        yaw = 0.0 if moment is None else moment
-        finite = math.isfinite(time + fx + fy + fz + x + y + z + pressure + yaw + age)
-    except (TypeError, ValueError) as error:
-        raise _not_numbers(time, force, position, pressure, moment) from error
-    if not finite:
-        raise _not_finite(time, force, position, pressure, moment, position_time)
-    if motion:
-        _check_motion(time, motion)
-
-
-def _check_motion(time: float, motion: ContactMotion) -> None:
-    """Raise `InvalidInput` unless a motion of the contact is made of finite numbers."""
-    (x, y), sd, _ = motion
-    if not math.isfinite(x + y + sd) or sd < 0.0:
-        raise InvalidInput(
-            f'sample at {time!r} s: velocity = ({x!r}, {y!r}) m/s with a deviation of {sd!r} m/s'
-            ' is not allowed: finite numbers are needed, and a deviation from 0'
-        )
-
-
-def _not_numbers(
-    time: float, force: object, position: object, pressure: float, moment: float | None
-) -> InvalidInput:
-    """Return the error of a sample that does not consist of numbers."""
-    return InvalidInput(
-        f'sample at {time!r} s: force = {force!r}, position = {position!r}, pressure ='
-        f' {pressure!r}, moment = {moment!r}: three numbers each are needed for force and'
-        ' position, one number each for time, pressure and moment'
-    )
-
-
-def _not_finite(
-    time: float,
-    force: Sequence[float],
-    position: Sequence[float],
-    pressure: float,
-    moment: float | None,
-    position_time: float | None,
-) -> InvalidInput:
-    """Return the error that names the values of a sample that are not finite."""
-    values = [('time', time, 's'), ('pressure', pressure, 'Pa')]
-    values += [(f'force {axis}', value, 'N') for axis, value in zip('xyz', force, strict=True)]
-    values += [
-        (f'position {axis}', value, 'm') for axis, value in zip('xyz', position, strict=True)
-    ]
-    if moment is not None:
-        values.append(('moment', moment, 'N m'))
-    if position_time is not None:
-        values.append(('position_time', position_time, 's'))
-    wrong = [
-        f'{name} = {shown(value)} {unit}'
-        for name, value, unit in values
-        if not math.isfinite(value)
-    ]
-    return InvalidInput(f'sample at {shown(time)} s: {", ".join(wrong)}: must be finite')

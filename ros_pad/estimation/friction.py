@@ -120,16 +120,37 @@ class Evidence(NamedTuple):
 
 
 class GroundModel:
-    """What is assumed of the ground below all feet; parameters as for :class:`GroundFilter`."""
+    """What is assumed of the ground below all feet.
+
+    Parameters
+    ----------
+    shared : FrictionScales
+        Expected friction, which the feet learn together.
+    wet_prior : float
+        Prior probability of wet ground, in (0, 1).
+    patch_length : float
+        Distance over which wet and dry ground are assumed to change, m, above 0.
+    temper : float
+        Weight of a sample, in (0, 1]: successive samples are not independent.
+    rim_speed : float
+        Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
+        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
+        its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
+        and Cutkosky 1996); s is not measured.
+    model_error : float
+        Standard deviation of T/N as a measure of friction, > 0, in addition to
+        :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
+        reduce it.
+    """
 
     def __init__(
         self,
         shared: FrictionScales,
-        wet_prior: float,
-        patch_length: float,
-        temper: float,
-        rim_speed: float,
-        model_error: float,
+        wet_prior: float = Tuning.wet_prior,
+        patch_length: float = Tuning.patch_length,
+        temper: float = 0.5,
+        rim_speed: float = 0.0,
+        model_error: float = MODEL_ERROR,
     ) -> None:
         self.shared = shared
         self.grounds = np.array([[1.0 - wet_prior], [wet_prior]])
@@ -183,30 +204,15 @@ class GroundFilter:
 
     Parameters
     ----------
-    shared : FrictionScales
-        Expected friction, which the foot learns together with others.
-    wet_prior : float
-        Prior probability of wet ground, in (0, 1).
-    patch_length : float
-        Distance over which wet and dry ground are assumed to change, m, above 0.
-    temper : float
-        Weight of a sample, in (0, 1]: successive samples are not independent.
-    rim_speed : float
-        Root mean square of the speed with which feet scrub as they turn about the vertical, m/s,
-        0 or more: 2/3 of the sole's radius times the turning rate. A foot that slips at v while
-        its rim scrubs at s shows only v/hypot(v, s) of its friction (elliptic limit surface, Howe
-        and Cutkosky 1996); s is not measured.
-    model_error : float
-        Standard deviation of T/N as a measure of friction, > 0, in addition to
-        :data:`MODEL_SQUARE` times its square. It is the same in every sample: averaging does not
-        reduce it.
-    model : GroundModel or None
-        All of these but the first, as several feet share them.
+    model : GroundModel
+        What is assumed.
 
     Attributes
     ----------
-    shared, model
-        As given, or made of the other parameters.
+    model : GroundModel
+        As given.
+    shared : FrictionScales
+        Expected friction, which the foot learns together with others.
     expected : Expected
         Friction of new ground by what the feet have learnt up to this stance.
     wet_probability : float
@@ -223,27 +229,16 @@ class GroundFilter:
         '_wet_before', 'expected', 'log_odds', 'model', 'scales', 'shared', 'wet_probability',
     )  # fmt: skip
 
-    def __init__(
-        self,
-        shared: FrictionScales,
-        wet_prior: float = Tuning.wet_prior,
-        patch_length: float = Tuning.patch_length,
-        temper: float = 0.5,
-        rim_speed: float = 0.0,
-        model_error: float = MODEL_ERROR,
-        model: GroundModel | None = None,
-    ) -> None:
-        self.model = model or GroundModel(
-            shared, wet_prior, patch_length, temper, rim_speed, model_error
-        )
-        self.shared, self._foot = shared, shared.join()
+    def __init__(self, model: GroundModel) -> None:
+        self.model, self.shared = model, model.shared
+        self._foot = self.shared.join()
         self._dome = False
         self.scales = (1.0, 1.0)
         self.log_odds = 0.0
         self._travelled = 0.0  # of the foot so far, m
         self._counted = {False: -math.inf, True: -math.inf}  # at the last evidence, by morphology
-        self.expected = shared.expected(0.0)
-        self.wet_probability = wet_prior
+        self.expected = self.shared.expected(0.0)
+        self.wet_probability = 0.5
         self._normalise(self.model.grounds * self.expected.flat)
         self._begin()
 

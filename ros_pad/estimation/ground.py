@@ -9,7 +9,6 @@ from ros_pad.contact.resistance import THICK_FILM
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.friction import MODEL_ERROR
 from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.friction import GroundModel
@@ -30,102 +29,83 @@ MARGIN_SHARE = 0.05
 """Quantile of friction from which the friction margin is computed."""
 
 
-class Grounds:
-    """What each foot knows of the ground.
+class Ground:
+    """What a foot knows of the ground.
 
     Parameters
     ----------
     foot : Foot
-        All feet are of this kind.
+        The foot.
     expected_load : float
         Normal force in stance, N.
     tuning : Tuning
         Settings for sensors and ground.
-    shared : FrictionScales
-        What the feet learn of friction together.
-    feet : int
-        Number of feet.
+    model : GroundModel
+        What is assumed of the ground below all feet.
 
     Attributes
     ----------
-    shared : FrictionScales
+    foot, expected_load, tuning
         As given.
-    filters : list of GroundFilter
-        Posterior of each foot.
-    beliefs : list of tuple
-        Probability of wet ground, and mean and standard deviation of friction, of each foot.
-    doubts : list of Doubt
-        Why the ground below each foot is unobservable.
-    quantiles : list of float
-        Friction of each foot that is exceeded with a probability of 1 - :data:`MARGIN_SHARE`.
+    filter : GroundFilter
+        Posterior.
+    belief : tuple of float
+        Probability of wet ground, and mean and standard deviation of friction.
+    doubt : Doubt
+        Why the ground is unobservable.
+    quantile : float
+        Friction that is exceeded with a probability of 1 - :data:`MARGIN_SHARE`.
     """
 
     def __init__(
-        self, foot: Foot, expected_load: float, tuning: Tuning, shared: FrictionScales, feet: int
+        self, foot: Foot, expected_load: float, tuning: Tuning, model: GroundModel
     ) -> None:
-        self._foot, self._expected_load, self._tuning = foot, expected_load, tuning
-        self.shared = shared
-        model = GroundModel(
-            shared, tuning.wet_prior, tuning.patch_length, 0.5, tuning.rim_speed(foot), MODEL_ERROR
-        )
-        self.filters = [GroundFilter(shared, model=model) for _ in range(feet)]
-        self.paths = [Path() for _ in range(feet)]
-        self.histories = [History(HINDSIGHT) for _ in range(feet)]
-        self._stances = [Stance() for _ in range(feet)]
-        self.beliefs = [(tuning.wet_prior, *each.friction) for each in self.filters]
-        self.quantiles = [each.quantile(MARGIN_SHARE) for each in self.filters]
-        self.doubts = [Doubt(doubt.NOT_YET)] * feet
+        self.foot, self.expected_load, self.tuning = foot, expected_load, tuning
+        self.filter = GroundFilter(model)
+        self._path, self._history, self._stance = Path(), History(HINDSIGHT), Stance()
+        self.belief = (tuning.wet_prior, *self.filter.friction)
+        self.quantile = self.filter.quantile(MARGIN_SHARE)
+        self.doubt = Doubt(doubt.NOT_YET)
 
-    def touch_down(self, foot: int, time: float, x: float, y: float, pressure: float) -> None:
-        """Begin a stance of a foot at a time, s, and place, m, with a pressure, Pa."""
-        ground, stance = self.filters[foot], Stance(self._share_on_domes(pressure))
-        self._stances[foot] = stance
-        ground.touch_down(
-            self.paths[foot].touch_down(time, x, y), stance.dome_share > doubt.DOMED, time
-        )
-        self.histories[foot].add(time, ground.posterior)
-        self.quantiles[foot] = ground.quantile(MARGIN_SHARE)
+    def touch_down(self, time: float, x: float, y: float, pressure: float) -> None:
+        """Begin a stance at a time, s, and place, m, with a pressure, Pa."""
+        self._stance = Stance(self._share_on_domes(pressure))
+        distance = self._path.touch_down(time, x, y)
+        self.filter.touch_down(distance, self._stance.dome_share > doubt.DOMED, time)
+        self._history.add(time, self.filter.posterior)
+        self.quantile = self.filter.quantile(MARGIN_SHARE)
 
-    def lose(
-        self, foot: int, dt: float, place: tuple[float, float] | None, since: float, why: Doubt
-    ) -> bool:
-        """Undo what a foot has felt since a time, s, as its sensors are in doubt, and fade.
+    def lose(self, dt: float, place: tuple[float, float] | None, since: float, why: Doubt) -> bool:
+        """Undo what the foot has felt since a time, s, as its sensors are in doubt, and fade.
 
         The sample is dt seconds after the last one, at a place, m, None if that is unknown.
         Return whether the posterior has changed.
         """
-        ground, path = self.filters[foot], self.paths[foot]
-        posterior = self.histories[foot].undo(since)
+        ground, path = self.filter, self._path
+        posterior = self._history.undo(since)
         if posterior is not None:
             ground.posterior = posterior
         distance = path.seen(*place) if place else path.unseen(dt)
         if distance:
             ground.fade(distance)
         changed = posterior is not None or distance > 0.0
-        friction = ground.friction if changed else self.beliefs[foot][1:]
-        self.beliefs[foot], self.doubts[foot] = (ground.wet_probability, *friction), why
+        friction = ground.friction if changed else self.belief[1:]
+        self.belief, self.doubt = (ground.wet_probability, *friction), why
         return changed
 
-    def doubt(self, foot: int) -> bool:
-        """Take the motion of a foot for unknown; return whether it was known."""
-        known = self.doubts[foot].code != doubt.MOTION
-        self.doubts[foot] = Doubt(doubt.MOTION)
-        return known
+    def set_back(self) -> None:
+        """Forget times, because the clock has been set back."""
+        self._path.restart()
+        self._history.clear()
 
-    def set_back(self, foot: int) -> None:
-        """Forget the times of a foot, because the clock has been set back."""
-        self.paths[foot].restart()
-        self.histories[foot].clear()
-
-    def forget(self, foot: int, time: float) -> None:
-        """Forget what a foot has learnt in wrong axes until a time, s."""
-        self.histories[foot].clear()
-        self.filters[foot].forget(time)
-        self.beliefs[foot] = self.beliefs[foot][0], *self.filters[foot].friction
+    def forget(self, time: float) -> None:
+        """Forget what the foot has learnt in wrong axes until a time, s."""
+        self._history.clear()
+        self.filter.forget(time)
+        self.belief = self.belief[0], *self.filter.friction
 
     def end_window(
         self,
-        foot: int,
         time: float,
         window: Window,
         place: tuple[float, float],
@@ -133,12 +113,10 @@ class Grounds:
         noises: tuple[float, float, float],
         turning_known: bool,
     ) -> None:
-        """Use a window of a foot that ends at a time, s.
+        """Use a window that ends at a time, s.
 
         Parameters
         ----------
-        foot : int
-            Place of the foot.
         time : float
             Time, s.
         window : Window
@@ -153,38 +131,31 @@ class Grounds:
         turning_known : bool
             Whether the torque about z was measured.
         """
-        self._follow_pressure(foot, time, pressure)
-        evidence = self._evidence(foot, time - window.start, window, place, noises, turning_known)
-        self.filters[foot].update(evidence)
-        self._use(foot, time, window.peak)
-
-    def _use(self, foot: int, time: float, peak_load: float) -> None:
-        """Use the updated filter of a foot."""
-        ground, stance = self.filters[foot], self._stances[foot]
-        self.histories[foot].add(time, ground.posterior)
-        self.quantiles[foot] = ground.quantile(MARGIN_SHARE)
-        self.beliefs[foot] = wet, mean, sd = ground.wet_probability, *ground.friction
-        evidence = doubt.StanceEvidence(
-            stance.dome_share, ground.log_odds, peak_load, stance.peak_ratio,
-            stance.peak_turning, wet, mean, sd,
+        ground, stance = self.filter, self._stance
+        self._follow_pressure(time, pressure)
+        ground.update(self._evidence(time - window.start, window, place, noises, turning_known))
+        self._history.add(time, ground.posterior)
+        self.quantile = ground.quantile(MARGIN_SHARE)
+        self.belief = ground.wet_probability, *ground.friction
+        self.doubt = doubt.of_ground(
+            stance, ground.log_odds, self.belief, window.peak, self.expected_load,
+            ground.expected.medians.flat_wet,
         )  # fmt: skip
-        self.doubts[foot] = doubt.of_ground(evidence, ground.expected.medians, self._expected_load)
 
     def _share_on_domes(self, pressure: float) -> float:
-        return self._foot.dome_load(self._expected_load, pressure) / self._expected_load
+        return self.foot.dome_load(self.expected_load, pressure) / self.expected_load
 
-    def _follow_pressure(self, foot: int, time: float, pressure: float) -> None:
-        """Begin a new stance at the same place when a foot changes its morphology under load."""
-        stance = self._stances[foot]
+    def _follow_pressure(self, time: float, pressure: float) -> None:
+        """Begin a new stance at the same place when the foot changes its shape under load."""
+        stance = self._stance
         before, stance.dome_share = stance.dome_share, self._share_on_domes(pressure)
         dome = stance.dome_share > doubt.DOMED
         if (before > doubt.DOMED) != dome:
-            self.filters[foot].touch_down(0.0, dome, time)
+            self.filter.touch_down(0.0, dome, time)
             stance.counted = None
 
     def _evidence(
         self,
-        foot: int,
         duration: float,
         window: Window,
         place: tuple[float, float],
@@ -192,13 +163,13 @@ class Grounds:
         turning_known: bool,
     ) -> Evidence:
         """Return what a window shows."""
-        count, load, pull, turning, speed, speed_noise = window.sums
-        (force_noise, offset_sd, contact_noise), tuning = noises, self._tuning
-        stance = self._stances[foot]
+        count, (load, pull, turning, speed, speed_noise) = window.count, window.sums
+        (force_noise, offset_sd, contact_noise), tuning = noises, self.tuning
+        stance = self._stance
         pull, turning, load = pull / load, turning / load, load / count
         ratio = math.hypot(pull, turning)
         if turning > 0.0:
-            share = turning / ratio / self._foot.turning_radius
+            share = turning / ratio / self.foot.turning_radius
             force_noise = math.hypot(force_noise, share * tuning.moment_noise)
         sensors = math.hypot(force_noise / math.sqrt(count), offset_sd) / load
         noise = math.hypot(tuning.ratio_noise, sensors * math.sqrt(1.0 + ratio**2))
@@ -228,7 +199,7 @@ class Grounds:
         """
         if dome_share > doubt.DOMED:
             return 1.0, 1.0
-        kernel, prior = self._foot.resistance_of, self.shared.prior
+        kernel, prior = self.foot.resistance_of, self.filter.shared.prior
         dry = kernel(0.0, load, 0.0, 0.0, 0.0) / load
         wet = kernel(0.0, load, 0.0, 0.0, THICK_FILM) / load
         # Friction that is zero at one load is zero at all.

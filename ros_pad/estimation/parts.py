@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import Posterior
@@ -153,11 +154,6 @@ class Slip:
         self.alarm = alarm
         self.x = self.y = self.noise = self.contact_noise = self.sd = 0.0
 
-    def begin(self, x: float, y: float) -> None:
-        """Begin a stance at a position, m."""
-        self.x, self.y = x, y
-        self.alarm.reset()
-
 
 class Window:
     """Sums of the samples of a stance since the last update of the filter.
@@ -168,18 +164,27 @@ class Window:
         Its beginning, s.
     first : bool
         Whether it is the first one of its stance.
-    sums : tuple of float
-        Number of samples, and sums of normal force, tangential force, friction used by turning, N,
+    count : int
+        Number of samples.
+    sums : sequence of float
+        Sums of normal force, tangential force, friction used by turning, N,
         slip speed, and standard deviation of that, m/s.
     peak : float
         Largest normal force of the stance, N.
     """
 
-    __slots__ = ('first', 'peak', 'start', 'sums')
+    __slots__ = ('count', 'first', 'peak', 'start', 'sums')
 
     def __init__(self, start: float, first: bool = True, peak: float = 0.0) -> None:
         self.start, self.first, self.peak = start, first, peak
-        self.sums = (0.0,) * 6
+        self.count = 0
+        self.sums: Sequence[float] = (0.0,) * 5
+
+    def add(self, samples: Sequence[tuple[float, ...]]) -> None:
+        """Add samples, each with the numbers of the sums."""
+        self.sums = [*map(sum, zip(self.sums, *samples, strict=True))]
+        self.count += len(samples)
+        self.peak = max(self.peak, max(samples)[0])
 
 
 class Stance:

@@ -57,6 +57,12 @@ class Repeats:
 
     Attributes
     ----------
+    noises : sequence of float
+        As given; none may change to or from 0.
+    changed : float or None
+        Time at which all values changed last, s; None if not all did.
+    since : list of float
+        Otherwise, time since which each value has not changed, s.
     last : sequence of float
         Last values.
     fine : bool
@@ -64,34 +70,22 @@ class Repeats:
         all of them change.
     """
 
-    __slots__ = ('_changed', '_counts', '_noises', '_since', '_steps', 'fine', 'last')
+    __slots__ = ('_counts', '_steps', 'changed', 'fine', 'last', 'noises', 'since')
 
     def __init__(self, noises: Sequence[float]) -> None:
-        self._noises = noises
+        self.noises = noises
         self._steps = [math.inf] * len(noises)  # smallest change so far
         self.fine = False
         self.last: Sequence[float] = (math.nan,) * len(noises)
-        self._changed: float | None = 0.0  # time at which all changed last; None if not all did
-        self._since: list[float] = []
+        self.changed: float | None = 0.0
+        self.since: list[float] = []
         self._counts: list[int] = []
-
-    def set_noises(self, noises: Sequence[float]) -> None:
-        """Change the standard deviations, none of them to or from 0."""
-        self._noises = noises
-
-    def since(self, place: int) -> float:
-        """Return the time since which the value with an index has not changed, s."""
-        return self._since[place]
-
-    def skip(self, time: float, values: Sequence[float]) -> None:
-        """Take note of values of a time, s, after which all have changed."""
-        self.last, self._changed = values, time
 
     def update(self, time: float, values: Sequence[float]) -> Sequence[int]:
         """Process the values of a time, s; return the indices of those that have stopped."""
         last, self.last = self.last, values
         if self.fine and not any(map(eq, values, last)):
-            self._changed = time
+            self.changed = time
             return ()
         return self._compare(time, last, values)
 
@@ -100,11 +94,11 @@ class Repeats:
     ) -> Sequence[int]:
         """Process values of which some may be those of the time before."""
         stopped: list[int] = []
-        if self._changed is not None:
-            self._since, self._counts = [self._changed] * len(values), [1] * len(values)
-            self._changed = None
-        since, counts = self._since, self._counts
-        for place, (value, noise) in enumerate(zip(values, self._noises, strict=True)):
+        if self.changed is not None:
+            self.since, self._counts = [self.changed] * len(values), [1] * len(values)
+            self.changed = None
+        since, counts = self.since, self._counts
+        for place, (value, noise) in enumerate(zip(values, self.noises, strict=True)):
             if value != last[place]:
                 self._steps[place] = min(self._steps[place], abs(value - last[place]))
                 since[place] = time
@@ -117,7 +111,7 @@ class Repeats:
                     stopped.append(place)
         self.fine = all(
             step <= 2.0 * noise or not noise
-            for step, noise in zip(self._steps, self._noises, strict=True)
+            for step, noise in zip(self._steps, self.noises, strict=True)
         )
         return stopped
 
@@ -167,7 +161,7 @@ class Sensing:
 
     def skip(self, time: float, readings: Sequence[float]) -> None:
         """Take note of the last one of such samples, with force, N, and position, m."""
-        self._repeats.skip(time, readings)
+        self._repeats.last, self._repeats.changed = readings, time
         self._seen, self._dead, self.marker_valid, self._skipped = time, False, True, True
 
     def set_noise(self, force_noise: float, position_noise: float) -> None:
@@ -176,10 +170,9 @@ class Sensing:
         One that has noise, but repeats itself, is at the least taken to have hardly any.
         """
         new = (force_noise,) * 3 + (position_noise,) * 3
-        self._noises = [
+        self._noises = self._repeats.noises = [
             max(a, LEAST) if b else 0.0 for a, b in zip(new, self._noises, strict=True)
         ]
-        self._repeats.set_noises(self._noises)
 
     def update(
         self, time: float, readings: Sequence[float], age: float, standing: bool, air: float
@@ -230,7 +223,7 @@ class Sensing:
             self._dead = False
             return None
         if len(stopped) == 3:
-            self.since = max(map(self._repeats.since, stopped))
+            self.since = max(self._repeats.since[place] for place in stopped)
             if any(force):
                 return Doubt(doubt.STILL, force[2])
             grounded = time - max(self._grounded, self.since)
@@ -246,7 +239,7 @@ class Sensing:
                 return Doubt(doubt.RANGE, place, force[place])
             # An axis that a sensor does not have always reads zero.
             if place in stopped and force[place]:
-                self.since = self._repeats.since(place)
+                self.since = self._repeats.since[place]
                 return Doubt(doubt.STUCK, place, force[place])
         return None
 
@@ -257,7 +250,7 @@ class Sensing:
             self.since = time - age
             return Doubt(doubt.LOST, age)
         if len(stopped) == 3:
-            self.since = max(map(self._repeats.since, stopped))
+            self.since = max(self._repeats.since[place] for place in stopped)
             return Doubt(doubt.MARKER_STILL)
         if leap > LEAP_DISTANCE and leap > LEAP * duration:
             self.since = time

@@ -18,13 +18,17 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
+from ros_pad.estimation.feet import LARGEST_FORCE
+from ros_pad.estimation.feet import LARGEST_POSITION
 from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.feet import late
+from ros_pad.estimation.feet import refuse
+from ros_pad.estimation.feet import wrong_numbers
 from ros_pad.estimation.track import Sample
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.pace import Pace
 from ros_pad.records import ESTIMATE
+from ros_pad.records import SAMPLE
 from ros_pad.records import Array
 from ros_pad.records import Block
 
@@ -34,13 +38,6 @@ PUBLISH_RATE = Setting(
 
 SILENCE = 0.4
 """Time without a sample after which the sensors of a foot count as faulty, s."""
-
-LARGEST_FORCE = 1e5
-LARGEST_POSITION = 1e6
-LARGEST_PRESSURE = 1e7
-LARGEST_MOMENT = 1e5
-"""Largest sizes of sensor values: force, N, position, m, gauge pressure, Pa, and moment, N m. A
-larger value, though finite, would spoil sums and means for ever."""
 
 
 class Input:
@@ -53,48 +50,61 @@ class Input:
 
     Attributes
     ----------
-    position : tuple of float or None
-        Last position, m.
-    first_ns : int
-        Stamp of the sample with which that was first used, ns.
+    time : float
+        Time of the last sample used, s.
     place : tuple of float
         Last position x and y since the last estimate, m; NaN if none has come.
     load : float
         Largest normal force since the last estimate, N, also of refused samples; NaN if there is
         none.
-    silent_ns : int or None
-        Time since which no sample has been used, ns, as far as it was noticed.
+    silence : Doubt or None
+        That no sample has been used for long; None if one has.
     missing : int
-        Code of the doubt that follows from a longer silence.
+        Code of the doubt that follows from silence.
+    used : int
+        Number of samples used so far.
     """
 
     __slots__ = (
-        '_joints', '_moments', 'first_ns', 'load', 'missing', 'place', 'position', 'silent_ns',
+        '_joints', '_moments', '_position', '_seen_ns', '_silent_ns', 'load', 'missing', 'place',
+        'silence', 'time', 'used',
     )  # fmt: skip
 
     def __init__(self, tuning: Tuning) -> None:
         self._joints, self._moments = tuning.source == 'joints', tuning.moment_noise > 0.0
-        self.position: tuple[float, ...] | None = None
-        self.first_ns = 0
-        self.silent_ns: int | None = None
-        self.missing = doubt.NO_WRENCH
+        self._position: Sequence[float] = ()  # last one, m
+        self._seen_ns = 0  # stamp of the sample with which that was first used
         self.clear()
+        self.used = 0
+        self.use(-math.inf, 0)
 
     def clear(self) -> None:
         """Begin anew after an estimate."""
         self.place: tuple[float, ...] = (math.nan, math.nan)
         self.load = math.nan
 
-    def note(self, stamp_ns: int, position: Sequence[float], load: float) -> None:
-        """Take note of samples that may all be used: the last position, and the largest load."""
-        self.position, self.first_ns, self.place = tuple(position), stamp_ns, tuple(position[:2])
+    def use(self, time: float, count: int) -> None:
+        """Take note that samples up to a time, s, are used."""
+        self.used += count
+        self.time, self.missing = time, doubt.NO_WRENCH
+        self._silent_ns: int | None = None  # since when, as far as it was noticed
+        self.silence: Doubt | None = None
+
+    def tick(self, now_ns: int) -> None:
+        """Check at a time, ns, for how long nothing has been used."""
+        if self._silent_ns is None:
+            self._silent_ns = now_ns
+        silence = (now_ns - self._silent_ns) * 1e-9
+        if silence > SILENCE:
+            self.silence = Doubt(self.missing, silence)
+
+    def note(self, stamp_ns: int, position: Sequence[float], load: float, count: int) -> None:
+        """Take note of so many samples that are all used: the last position, and most load."""
+        self._position, self._seen_ns = position, stamp_ns
+        self.place = position[0], position[1]
         if not load <= self.load:
             self.load = load
-        self.used()
-
-    def used(self) -> None:
-        """Take note that a sample has been used."""
-        self.silent_ns, self.missing = None, doubt.NO_WRENCH
+        self.use(stamp_ns * 1e-9, count)
 
     def take(self, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample to use of the numbers of a row; None if something is missing.
@@ -102,9 +112,9 @@ class Input:
         Raises
         ------
         InvalidInput
-            When a number is too large or infinite.
+            When a number is too large or infinite, or the time does not advance.
         """
-        fx, fy, fz, moment, *position, vx, vy, variance_x, variance_y = sample
+        time, (fx, fy, fz, moment, *position, vx, vy, xx, yy, age) = stamp_ns * 1e-9, sample
         new = all(map(math.isfinite, position))
         if new and max(map(abs, position)) <= LARGEST_POSITION:
             self.place = position[0], position[1]
@@ -114,27 +124,25 @@ class Input:
             return None
         if self._joints:
             self._miss(doubt.NO_VELOCITY)
-            if not new or math.isnan(variance_x + variance_y):
+            if math.inf in (xx, yy):
+                vx, vy, xx, yy = 0.0, 0.0, math.inf, math.inf
+            if not new or math.isnan(xx + yy) or math.isnan(vx + vy):
                 return None
-            if math.inf in (variance_x, variance_y):
-                vx = vy = 0.0
-                variance_x = variance_y = math.inf
-            elif math.isnan(vx + vy):
-                return None
-            _check_velocity(vx, vy, variance_x, variance_y)
-        elif not new and self.position is None:
-            self._miss(doubt.NO_POSITION)
-            return None
+        else:
+            vx = vy = xx = yy = 0.0
         if not new:
-            assert self.position
-            position = [*self.position]
+            self._miss(doubt.NO_POSITION)
+            if not self._position:
+                return None
+            position, age = [*self._position], abs(time - self._seen_ns * 1e-9)
         moment = moment if self._moments else math.nan
-        _check_size('force', (fx, fy, fz), LARGEST_FORCE, 'N')
-        _check_size('position', position, LARGEST_POSITION, 'm')
-        _check_size('moment', () if math.isnan(moment) else (moment,), LARGEST_MOMENT, 'N m')
-        if new:
-            self.position, self.first_ns = tuple(position), stamp_ns
-        return fx, fy, fz, moment, *position, vx, vy, variance_x, variance_y
+        found = fx, fy, fz, moment, *position, vx, vy, xx, yy, age
+        wrong = wrong_numbers(time, found)
+        if new and not wrong:
+            self._position, self._seen_ns = position, stamp_ns
+        refuse(time, self.time, wrong)
+        self.use(time, 1)
+        return found
 
     def _miss(self, code: int) -> None:
         if self.missing != doubt.REFUSED:
@@ -170,8 +178,6 @@ class EstimationStage:
         Estimator of the feet.
     samples : int
         Number of moments used so far, in which at least one foot had a sample that could be used.
-    used : array of int (feet,)
-        Number of samples used so far, by foot.
     last_ns : int
         Time stamp of the last moment used, ns; 0 before the first one.
     """
@@ -189,138 +195,106 @@ class EstimationStage:
         self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
         self._inputs = [Input(tuning) for _ in legs]
         self._pressures = [0.0] * len(legs)
-        self._silences: dict[int, Doubt] = {}  # doubts of feet that are silent
-        self.used: npt.NDArray[np.int64] = np.zeros(len(legs), np.int64)
         self.samples = self.last_ns = 0
 
     def pressure(self, rows: np.ndarray) -> None:
         """Store gauge pressures of the pads, rows of PRESSURE; not NaN and beyond 1e7 Pa."""
         for place, gauge in enumerate(rows['pressure'].tolist()):
-            if abs(gauge) <= LARGEST_PRESSURE:
+            if abs(gauge) <= 1e7:
                 self._pressures[place] = gauge
 
     def process(self, block: Block) -> list[Block]:
         """Process samples; return the estimates that are due in them."""
-        values = np.ascontiguousarray(block.rows).view(float).reshape(*block.rows.shape, -1)
-        stamps = block.stamps.tolist()
-        ordinary, found, first = self._ordinary(stamps, values), [], 0
-        for row, stamp_ns in enumerate(stamps):
-            if not ordinary:
-                self._use_some(stamp_ns, values[row])
+        numbers = np.ascontiguousarray(block.rows).view(float).reshape(*block.rows.shape, -1)
+        values = np.zeros((*block.rows.shape, len(SAMPLE.columns) + 1))
+        values[:, :, :-1] = numbers
+        stamps, found, first = block.stamps.tolist(), [], 0
+        for end, stamp_ns in enumerate(stamps, 1):
+            due = self._pace.due(stamp_ns)
+            if due or end == len(stamps):
+                self._use(stamps[first:end], values[first:end])
+                first = end
             # Who waits for an estimate receives one, also of feet without samples.
-            if not self._pace.due(stamp_ns):
-                continue
-            if ordinary:
-                self._use(stamps[first : row + 1], values[first : row + 1])
-                first = row + 1
-            found.append(self.estimate(stamp_ns))
-            for each in self._inputs:
-                each.clear()
-        if ordinary and first < len(stamps):
-            self._use(stamps[first:], values[first:])
+            if due:
+                found.append(self.estimate(stamp_ns))
+                for each in self._inputs:
+                    each.clear()
         return found
+
+    def _use(self, stamps: list[int], values: Array) -> None:
+        """Use all samples that can be used."""
+        times, quiet = [each * 1e-9 for each in stamps], None
+        rows: list[list[Sample]] = values.transpose(1, 0, 2).tolist()
+        samples: Sequence[Sequence[Sample | None]] = rows
+        if self._ordinary(stamps, values):
+            quiet = self.estimator.quiet(times, values)
+            loads = values[:, :, 2].max(axis=0).tolist()
+            for each, mine, load in zip(self._inputs, rows, loads, strict=True):
+                each.note(stamps[-1], mine[-1][4:7], load, len(stamps))
+        else:
+            samples = [
+                [self._take(place, *each) for each in zip(stamps, mine, strict=True)]
+                for place, mine in enumerate(rows)
+            ]
+        self.estimator.update(times, samples, self._pressures, quiet)
+        for stamp_ns, *moment in zip(stamps, *samples, strict=True):
+            if any(moment):
+                self.samples += 1
+                self.last_ns = stamp_ns
+
+    @property
+    def used(self) -> npt.NDArray[np.int64]:
+        """Number of samples used so far, by foot."""
+        return np.array([each.used for each in self._inputs])
 
     def _ordinary(self, stamps: list[int], values: Array) -> bool:
         """Return whether all samples can be used."""
-        last = max(each.time for each in self.estimator.tracks)
-        if not stamps or stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
+        last = max(each.time for each in self._inputs)
+        if stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
             return False
         # Not a number is not within limits either.
         forces, places = np.abs(values[:, :, :3]).max(), np.abs(values[:, :, 4:7]).max()
         if not (forces <= LARGEST_FORCE and places <= LARGEST_POSITION):
             return False
         tuning = self.estimator.tuning
-        if tuning.moment_noise > 0.0 and (np.abs(values[:, :, 3]) > LARGEST_MOMENT).any():
+        if tuning.moment_noise > 0.0 and (np.abs(values[:, :, 3]) > LARGEST_FORCE).any():
             return False
         # A variance that is infinite, whatever the velocity, is for the check of single samples.
         return tuning.source != 'joints' or bool(
             np.isfinite(values[:, :, 7:]).all() and (values[:, :, 9:] >= 0.0).all()
         )
 
-    def _use(self, stamps: list[int], values: Array) -> None:
-        """Use samples of all feet."""
-        self.estimator.update_all([each * 1e-9 for each in stamps], values, self._pressures)
-        loads = values[:, :, 2].max(axis=0).tolist()
-        for each, mine, load in zip(self._inputs, values[-1, :, 4:7].tolist(), loads, strict=True):
-            each.note(stamps[-1], mine, load)
-        self._silences.clear()
-        self._count(stamps[-1], len(stamps), np.ones(len(self._legs), np.int64))
-
-    def _use_some(self, stamp_ns: int, values: Array) -> None:
-        """Use those samples of a moment that can be used."""
-        time, samples = stamp_ns * 1e-9, []
-        for place, sample in enumerate(values.tolist()):
-            found = None
-            try:
-                found = self._inputs[place].take(stamp_ns, sample)
-                if found:
-                    late(time, self.estimator.tracks[place].time)
-            except InvalidInput as error:
-                found, self._inputs[place].missing = None, doubt.REFUSED
-                if self._reject:
-                    self._reject(self._legs[place], error)
-            if found:
-                self._inputs[place].used()
-                self._silences.pop(place, None)
-            samples.append((found,))
-        used = np.array([bool(each) for (each,) in samples], np.int64)
-        if not used.any():
-            return
-        ages = [(abs(time - each.first_ns * 1e-9),) for each in self._inputs]
-        self.estimator.update(
-            (time,), samples, self._pressures, ages if any(age for (age,) in ages) else None
-        )
-        self._count(stamp_ns, 1, used)
-
-    def _count(self, stamp_ns: int, moments: int, used: npt.NDArray[np.int64]) -> None:
-        self.samples += moments
-        self.used += moments * used
-        self.last_ns = stamp_ns
+    def _take(self, place: int, stamp_ns: int, sample: Sample) -> Sample | None:
+        """Return the sample of a foot to use, if there is one."""
+        try:
+            return self._inputs[place].take(stamp_ns, sample)
+        except InvalidInput as error:
+            self._inputs[place].missing = doubt.REFUSED
+            if self._reject:
+                self._reject(self._legs[place], error)
+            return None
 
     def tick(self, now_ns: int) -> None:
         """Check at a time, ns, whether samples are missing; call it every `TICK_PERIOD_NS`."""
-        for place, each in enumerate(self._inputs):
-            if each.silent_ns is None:
-                each.silent_ns = now_ns
-            silence = (now_ns - each.silent_ns) * 1e-9
-            if silence > SILENCE:
-                self._silences[place] = Doubt(each.missing, silence)
+        for each in self._inputs:
+            each.tick(now_ns)
 
     @property
     def doubts(self) -> list[Doubt]:
         """Why the ground below each foot is unobservable."""
-        known = self.estimator.grounds.doubts
-        return [self._silences.get(place, each) for place, each in enumerate(known)]
+        return [
+            each.silence or track.ground.doubt
+            for each, track in zip(self._inputs, self.estimator.tracks, strict=True)
+        ]
 
     def estimate(self, stamp_ns: int) -> Block:
         """Return the present estimates as a record of a time, ns."""
-        table, estimator = [], self.estimator
-        for each, track, belief, why in zip(
-            self._inputs, estimator.tracks, estimator.grounds.beliefs, self.doubts, strict=True
-        ):
-            now = track.standing
+        table = []
+        for each, track in zip(self._inputs, self.estimator.tracks, strict=True):
+            now, ground = track.standing, track.ground
             table.append((
                 *each.place, each.load, *now.slip_velocity, now.slip_speed, track.slip.sd,
-                now.slipping, *belief, track.margin, *why,
+                now.slipping, *ground.belief, track.margin, *(each.silence or ground.doubt),
             ))  # fmt: skip
         rows = np.array(table, float).view(ESTIMATE.dtype)[:, 0]
         return Block.of(stamp_ns, rows)
-
-
-def _check_size(name: str, values: Sequence[float], largest: float, unit: str) -> None:
-    """Refuse numbers that are larger than ``largest`` in size, or no numbers."""
-    for value in values:
-        if not abs(value) <= largest:
-            raise InvalidInput(
-                f'{name} = {value!r} {unit} is not allowed: a number from {-largest:g} to'
-                f' {largest:g} {unit} is needed'
-            )
-
-
-def _check_velocity(x: float, y: float, variance_x: float, variance_y: float) -> None:
-    """Refuse a velocity of the contact that is infinite, or has a variance below 0."""
-    if not (math.isfinite(x + y) and variance_x >= 0.0 and variance_y >= 0.0):
-        raise InvalidInput(
-            f'velocity = ({x!r}, {y!r}) m/s with variances of {variance_x!r} and {variance_y!r}'
-            ' m²/s² is not allowed: finite numbers are needed, and variances from 0'
-        )

@@ -9,11 +9,14 @@ from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
 
-from ros_pad.contact.resistance import Foot
 from ros_pad.estimation import doubt
+from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.axes import BLOCK
+from ros_pad.estimation.axes import Axes
+from ros_pad.estimation.axes import SharedAxes
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.ground import Grounds
+from ros_pad.estimation.ground import Ground
+from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.parts import Gate
 from ros_pad.estimation.parts import Offset
 from ros_pad.estimation.parts import Slip
@@ -21,19 +24,26 @@ from ros_pad.estimation.parts import Window
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.estimation.watch import Moment
 from ros_pad.estimation.watch import Watch
 
 Sample = Sequence[float]
 """Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m,
-velocity, m/s, and its variances, m²/s²."""
+velocity, m/s, and its variances, m²/s²; last the age of the position, s."""
+
+AIRBORNE_LOAD = 0.3
+"""Share of the expected load above which a foot at that height may stand on higher ground. Smaller
+readings there are the offset of the sensor."""
+
+BODY_CORRELATION = 0.15
+"""Time over which errors of a measured velocity of the contact are the same, s: that of the body,
+which is common to all feet, lasts for about a stance."""
 
 Samples = Sequence[Any]
 """Samples, None where there is none."""
 
 
 class Setup(NamedTuple):
-    """What is the same for all feet.
+    """What does not change.
 
     Attributes
     ----------
@@ -54,13 +64,6 @@ class Setup(NamedTuple):
     shear: float
     softness: float
     lever: float
-
-    @classmethod
-    def of(cls, foot: Foot, tuning: Tuning) -> Setup:
-        """Return what is the same for all feet of a kind."""
-        joints, shear = tuning.source == 'joints', 1.0 / foot.shear_stiffness
-        softness = shear if tuning.pads_shear or not joints else 0.0
-        return cls(tuning, joints, tuning.moment_noise > 0.0, shear, softness, foot.turning_radius)
 
 
 class Standing(NamedTuple):
@@ -105,19 +108,17 @@ class Track:
 
     Parameters
     ----------
-    place : int
-        Its place among the feet.
-    setup : Setup
-        What is the same for all feet.
-    grounds : Grounds
-        What the feet know of the ground.
-    sensing, watch, gate, offset, slip
-        Stages of this foot.
+    ground : Ground
+        What the foot knows of the ground.
+    shared : SharedAxes
+        What all feet show of their axes.
 
     Attributes
     ----------
-    sensing, watch, gate, offset, slip
+    ground : Ground
         As given.
+    sensing, watch, gate, offset, slip
+        Stages of this foot.
     time : float
         Time of the last sample, s.
     sound : bool
@@ -130,31 +131,32 @@ class Track:
     """
 
     __slots__ = (
-        '_grounds', '_place', '_setup', '_slid', '_window', 'fresh', 'gate', 'last', 'offset',
-        'sensing', 'slip', 'sound', 'time', 'watch',
+        '_setup', '_slid', '_window', 'fresh', 'gate', 'ground', 'last', 'offset', 'sensing',
+        'slip', 'sound', 'time', 'watch',
     )  # fmt: skip
 
-    def __init__(
-        self,
-        place: int,
-        setup: Setup,
-        grounds: Grounds,
-        sensing: Sensing,
-        watch: Watch,
-        gate: Gate,
-        offset: Offset,
-        slip: Slip,
-    ) -> None:
-        self._place, self._setup, self._grounds = place, setup, grounds
-        self.sensing, self.watch, self.gate = sensing, watch, gate
-        self.offset, self.slip = offset, slip
+    def __init__(self, ground: Ground, shared: SharedAxes) -> None:
+        foot, load, tuning = ground.foot, ground.expected_load, ground.tuning
+        joints, shear = tuning.source == 'joints', 1.0 / foot.shear_stiffness
+        softness = shear if tuning.pads_shear or not joints else 0.0
+        moments = tuning.moment_noise > 0.0
+        self._setup = Setup(tuning, joints, moments, shear, softness, foot.turning_radius)
+        # An estimated position never stops, and its noise is not that of a marker.
+        marker = 0.0 if joints else tuning.position_noise
+        self.sensing = Sensing(tuning.force_noise, marker, tuning.force_range or math.inf)
+        axes = Axes(load, softness, BODY_CORRELATION if joints else BLOCK, shared)
+        self.watch = Watch(SensorNoise(marker, tuning.force_noise, load), axes)
+        self.gate = Gate(tuning.load_gate * load, AIRBORNE_LOAD * load)
+        memory = BODY_CORRELATION if joints else tuning.smoothing
+        self.slip = Slip(SlipAlarm(memory, threshold=tuning.alarm_threshold))
+        self.ground, self.offset = ground, Offset(load)
         self._slid = (0.0, 0.0)  # with joints, the sum of the measured velocities, m
         self._window = Window(0.0)
         self.time = -math.inf
         self.sound, self.fresh = True, True
         self.last: Standing | None = Standing()
         self._set_noise()
-        slip.sd = slip.noise
+        self.slip.sd = self.slip.noise
 
     @property
     def standing(self) -> Standing:
@@ -164,7 +166,7 @@ class Track:
     @property
     def margin(self) -> float:
         """Friction margin; NaN from a fault of the sensors until the foot stands again."""
-        return self._grounds.quantiles[self._place] - self.last.ratio if self.last else math.nan
+        return self.ground.quantile - self.last.ratio if self.last else math.nan
 
     def _set_noise(self) -> None:
         """Use the noise that the sensors have shown until now."""
@@ -178,46 +180,53 @@ class Track:
         times: Sequence[float],
         samples: Samples,
         pressure: float,
-        ages: Sequence[float] | None,
         quiet: Sequence[bool] | None,
     ) -> None:
-        """Process samples at some times, s, with a pressure, Pa, and ages of positions, s.
+        """Process samples at some times, s, with a pressure, Pa.
 
         In quiet samples nothing but landing and lifting can happen, while the sensors are sound.
         """
         row, count = 0, len(times)
         while row < count:
-            done = end = row
+            end = row
             if quiet and quiet[row] and self.sound and self.sensing.calm:
                 end = quiet.index(False, row) if False in quiet[row:] else count
                 end = bisect_left(times, self.watch.end, row, end)
-            if end > row and self.gate.stands:
-                done = self._stand(times, samples, row, end, pressure)
-            elif end > row:
-                done = self._fly(times, samples, row, end)
-            if done == row:
-                done += 1
-                if samples[row] is not None:
-                    old = ages[row] if ages else 0.0
-                    self._take_and_stand(times, samples, row, old, pressure)
-            row = done
+            if self.gate.stands:
+                end = self._stands_until(times, samples, row, end)
+                if end > row:
+                    self._skip(times, samples, row, end)
+                    self._stand(times[row:end], samples[row:end], pressure)
+            else:
+                end = self._fly(times, samples, row, end)
+            if end == row:
+                end += 1
+                if samples[row]:
+                    self._process(times[row], samples[row], pressure)
+            row = end
 
-    def _take_and_stand(
-        self, times: Sequence[float], samples: Samples, row: int, age: float, pressure: float
-    ) -> None:
+    def _process(self, time: float, sample: Sample, pressure: float) -> None:
         """Process a sample with anything that may happen in it."""
-        if not self._take(times[row], samples[row], age, pressure):
+        if not self._take(time, sample, pressure):
             return
-        if self._setup.joints and max(samples[row][9:]) == math.inf:
-            self._in_doubt(times[row], samples[row])
-        else:
-            self._stand(times, samples, row, row + 1, pressure, taken=True)
+        if not self._setup.joints or max(sample[9:11]) < math.inf:
+            self._stand((time,), (sample,), pressure)
+            return
+        # While the motion of the body is in doubt, there is no alarm, and nothing is learnt.
+        peak, self._window = self._window.peak, Window(time)
+        self._stand((time,), (sample,), pressure)
+        self._window = Window(time, True, peak)
+        self.slip.alarm.reset()
+        assert self.last
+        self.last = self.last._replace(slip_speed=0.0, turning=0.0, slipping=False)
+        self.fresh |= self.ground.doubt.code != doubt.MOTION
+        self.ground.doubt = Doubt(doubt.MOTION)
 
-    def _take(self, time: float, sample: Sample, age: float, pressure: float) -> bool:
+    def _take(self, time: float, sample: Sample, pressure: float) -> bool:
         """Process a sample up to whether the foot stands, which is returned."""
         setup, gate, offset = self._setup, self.gate, self.offset
-        fx, fy, fz, moment, x, y, z, vx, vy, *variances = sample
-        variance = max(variances) if setup.joints else 0.0
+        fx, fy, fz, moment, x, y, z, vx, vy, xx, yy, age = sample
+        variance = max(xx, yy) if setup.joints else 0.0
         dt = time - self.time
         if dt <= 0.0:
             dt = self._set_back()
@@ -243,7 +252,7 @@ class Track:
         if self.watch.axes.doubt.code:
             return self._lose(time, dt, x, y, self.watch.axes.doubt)
         if not self.sound:
-            self._grounds.doubts[self._place] = Doubt(doubt.NOT_AGAIN)
+            self.ground.doubt = Doubt(doubt.NOT_AGAIN)
         if gate.update(load):
             if not stood or dt > LONGEST_GAP:
                 self._touch_down(time, sample, pressure)
@@ -262,17 +271,17 @@ class Track:
         was = watch.axes.doubt.code
         force = sample[0] - offset.x, sample[1] - offset.y, sample[2] - offset.z
         known = (offset.x, offset.y) if offset.known else None
-        if watch.end_block(Moment(time, sample[6], force, known, self.gate.stands, speed_sd)):
+        if watch.end_block(time, sample[6], force, known, self.gate.stands, speed_sd):
             self.sensing.set_noise(watch.noise.force.white, watch.noise.position.white)
             self._set_noise()
         if watch.axes.doubt.code and not was:
             watch.looks = True
-            self._grounds.forget(self._place, time)
+            self.ground.forget(time)
 
     def _set_back(self) -> float:
         """Begin a new stance, because the clock has been set back; return the infinite gap, s."""
         self.gate.stands, self.time = False, -math.inf
-        self._grounds.set_back(self._place)
+        self.ground.set_back()
         self.sensing.restart()
         self.watch.restart()
         return math.inf
@@ -284,8 +293,10 @@ class Track:
         x, y = sample[4] + fx * setup.shear, sample[5] + fy * setup.shear
         self.watch.look(time)
         self.gate.touch_down(sample[6])
-        self.slip.begin(*((fx * setup.softness, fy * setup.softness) if setup.joints else (x, y)))
-        self._grounds.touch_down(self._place, time, x, y, pressure)
+        shear = fx * setup.softness, fy * setup.softness
+        self.slip.x, self.slip.y = shear if setup.joints else (x, y)
+        self.slip.alarm.reset()
+        self.ground.touch_down(time, x, y, pressure)
         self._window = Window(time)
 
     def _lose(self, time: float, dt: float, x: float, y: float, why: Doubt) -> bool:
@@ -294,9 +305,7 @@ class Track:
         gate.stands = False
         if not seen:
             gate.height = math.inf
-        changed = self._grounds.lose(
-            self._place, dt, (x, y) if seen else None, self.sensing.since, why
-        )
+        changed = self.ground.lose(dt, (x, y) if seen else None, self.sensing.since, why)
         self.fresh |= changed or self.sound
         self.sound, self.last, self.slip.sd, self.time = False, None, math.inf, time
         return False
@@ -314,9 +323,10 @@ class Track:
             before, row = times[row], row + 1
         if row > first:
             self._skip(times, samples, first, row)
+            self.time = before
             self.slip.sd = self.slip.noise
             if self._setup.joints:
-                self.slip.sd = math.hypot(math.sqrt(max(samples[row - 1][9:])), self.slip.noise)
+                self.slip.sd = math.hypot(math.sqrt(max(samples[row - 1][9:11])), self.slip.noise)
         return row
 
     def _skip(self, times: Sequence[float], samples: Samples, first: int, end: int) -> None:
@@ -334,36 +344,30 @@ class Track:
             self.watch.note(noted)
         fx, fy, fz, _, x, y, z, *_ = samples[end - 1]
         self.sensing.skip(times[end - 1], (fx, fy, fz, x, y, z))
-        self.time = times[end - 1]
 
-    def _stand(
-        self,
-        times: Sequence[float],
-        samples: Samples,
-        first: int,
-        end: int,
-        pressure: float,
-        taken: bool = False,
-    ) -> int:
-        """Process ordinary samples of a standing foot, or the one that has been taken.
+    def _stands_until(self, times: Sequence[float], samples: Samples, first: int, end: int) -> int:
+        """Return the end of the samples in which a foot is sure to stand, and a window lasts."""
+        end = min(end, bisect_left(times, self._due, first, end) + 1)
+        firm, top, oz = self.gate.firm, self.gate.top, self.offset.z
+        for row in range(first, end):
+            if samples[row][2] - oz < firm or samples[row][6] > top:
+                return row
+        return end
 
-        Stop where the foot may lift off, or a window ends; return the next one.
-        """
+    @property
+    def _due(self) -> float:
+        """End of the window, s."""
+        return self._setup.tuning.filter_period + (self._window.start - 1e-9)
+
+    def _stand(self, times: Sequence[float], samples: Samples, pressure: float) -> None:
+        """Process samples of a standing foot, of which the last may end a window."""
         (tuning, joints, moments, shear, softness, lever), slip = self._setup, self.slip
-        offset, window, gate = self.offset, self._window, self.gate
-        ox, oy, oz, sx, sy, top, firm = (
-            offset.x, offset.y, offset.z, slip.x, slip.y, gate.top, gate.firm,
-        )  # fmt: skip
-        count, loads, pulls, turnings, speeds, noises = window.sums
-        smoothing, own, peak, due = tuning.smoothing, slip.noise, window.peak, tuning.filter_period
-        noise, turning, known, before, tests, row = own, 0.0, False, self.time, [], first
-        due += window.start - 1e-9
-        while row < end:
-            fx, fy, fz, moment, x, y, z, vx, vy, xx, yy = samples[row]
-            time = times[row]
+        offset, smoothing, own, sx, sy = self.offset, tuning.smoothing, slip.noise, slip.x, slip.y
+        noise, turning, before, tests, felt = own, 0.0, self.time, [], []
+        ox, oy, oz = offset.x, offset.y, offset.z
+        for time, sample in zip(times, samples, strict=True):
+            fx, fy, fz, moment, x, y, z, vx, vy, xx, yy, _ = sample
             fx, fy, fz, dt = fx - ox, fy - oy, fz - oz, time - before
-            if (fz < firm or z > top) and not taken:
-                break
             if not 0.0 < dt < math.inf:
                 dt = 0.1 * smoothing
             # The marker is above the soft pad: subtract the pad's shear to get the contact.
@@ -380,53 +384,18 @@ class Track:
             # A foot gives way against its tangential force; the rest of its speed is only noise.
             speed = -(vx * fx + vy * fy) / pull if pull > 0.0 else 0.0
             if moments:
-                known = moment == moment
-                turning = abs(moment - offset.moment) / lever if known else 0.0
-                turnings += turning
+                turning = abs(moment - offset.moment) / lever if moment == moment else 0.0
             tests.append((speed, noise, dt))
-            count, loads, pulls, speeds = count + 1.0, loads + fz, pulls + pull, speeds + speed
-            noises += noise
-            if fz > peak:
-                peak = fz
-            if fz >= gate.least:
-                gate.height = z
-            before, standing, row = time, (speed, fx, fy, fz, turning), row + 1
-            if time >= due:
-                break
-        if row == first:
-            return row
-        slip.x, slip.y, slip.sd = sx, sy, noise
-        window.sums, window.peak = (count, loads, pulls, turnings, speeds, noises), peak
-        self.last = Standing(*standing, slip.alarm.update(tests))
-        if not taken:
-            self._skip(times, samples, first, row)
-        self.time = before
-        if before >= due:
-            self._end_window(before, (place_x, place_y), pressure, known)
-        return row
-
-    def _end_window(
-        self, time: float, place: tuple[float, float], pressure: float, known: bool
-    ) -> None:
-        """Use the samples of a window that ends, and begin another one."""
-        noises = self.watch.noise.force.noise, self.offset.sd, self.slip.contact_noise
-        self._grounds.end_window(self._place, time, self._window, place, pressure, noises, known)
-        self._window = Window(time, False, self._window.peak)
-        self.fresh = True
-
-    def _in_doubt(self, time: float, sample: Sample) -> None:
-        """Stop alarm and learning of a standing foot while the motion of the body is in doubt."""
-        slip, offset, setup, smoothing = (
-            self.slip, self.offset, self._setup, self._setup.tuning.smoothing,
-        )  # fmt: skip
-        fx, fy, fz = sample[0] - offset.x, sample[1] - offset.y, sample[2] - offset.z
-        dt = time - self.time
-        share = dt / (smoothing + dt) if 0.0 < dt < math.inf else 0.1 / 1.1
-        slip.x += share * (fx * setup.softness - slip.x)
-        slip.y += share * (fy * setup.softness - slip.y)
-        slip.alarm.reset()
+            felt.append((fz, pull, turning, speed, noise))
+            before = time
+        slip.x, slip.y, slip.sd, self.time = sx, sy, noise, before
+        self._window.add(felt)
         if fz >= self.gate.least:
-            self.gate.height = sample[6]
-        self._window = Window(time, True, self._window.peak)
-        self.last, slip.sd, self.time = Standing(0.0, fx, fy, fz), math.inf, time
-        self.fresh |= self._grounds.doubt(self._place)
+            self.gate.height = z
+        self.last = Standing(speed, fx, fy, fz, turning, slip.alarm.update(tests))
+        if before >= self._due:
+            place, known = (place_x, place_y), moments and moment == moment
+            noises = self.watch.noise.force.noise, offset.sd, slip.contact_noise
+            self.ground.end_window(before, self._window, place, pressure, noises, known)
+            self._window = Window(before, False, self._window.peak)
+            self.fresh = True

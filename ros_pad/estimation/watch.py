@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from ros_pad.estimation.axes import BLOCK
 from ros_pad.estimation.axes import LONGEST
@@ -19,33 +18,6 @@ LONGEST_GAP = 0.15
 EAGER, PAUSE = 10, 8
 """Stances in which noise is measured and axes are checked at first, and of how many one is later.
 Stances are counted anew each second."""
-
-
-class Moment(NamedTuple):
-    """A foot at the end of a block.
-
-    Attributes
-    ----------
-    time : float
-        Time, s.
-    height : float
-        Height of its position, m.
-    force : tuple of float
-        Force without offset, N.
-    offset : tuple of float or None
-        Offset of the horizontal force, N; None if it is not known.
-    stands : bool
-        Whether it stood until now.
-    speed_sd : float or None
-        With joints, standard deviation of the velocity, m/s; infinite if it must not be used.
-    """
-
-    time: float
-    height: float
-    force: Vector
-    offset: tuple[float, float] | None
-    stands: bool
-    speed_sd: float | None
 
 
 class Watch:
@@ -79,10 +51,9 @@ class Watch:
         """Forget the last readings, and the height of the last stance."""
         self.axes.restart()
         self.end = -math.inf
-        self._block: list[
-            tuple[float, ...]
-        ] = []  # readings since the last block, and two before them
-        self._earlier = 0  # how many are before them
+        # Readings since the last block, and two before them; how many are before them.
+        self._block: list[tuple[float, ...]] = []
+        self._earlier = 0
 
     def look(self, time: float) -> None:
         """Decide whether to look at the readings of a stance, or of a second of a long one.
@@ -99,41 +70,52 @@ class Watch:
         """Take note of readings: time, s, position x and y, m, and force, N."""
         self._block.extend(readings)
 
-    def end_block(self, now: Moment) -> bool:
-        """Look at the readings of a block that ends now; return whether noise was measured."""
+    def end_block(
+        self,
+        time: float,
+        height: float,
+        force: Vector,
+        offset: tuple[float, float] | None,
+        stands: bool,
+        speed_sd: float | None,
+    ) -> bool:
+        """Look at the readings of a block that ends now; return whether noise was measured.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        height : float
+            Height of the position, m.
+        force : tuple of float
+            Force without offset, N.
+        offset : tuple of float or None
+            Offset of the horizontal force, N; None if it is not known.
+        stands : bool
+            Whether the foot stood until now.
+        speed_sd : float or None
+            With joints, standard deviation of the velocity, m/s; infinite if it must not be used.
+        """
         block, earlier = self._block, self._earlier
-        duration = now.time - self.end + BLOCK
+        duration = time - self.end + BLOCK
         self._block, self._earlier = block[-2:], min(2, len(block))
-        self.end = now.time + BLOCK - 1e-9
-        if duration > BLOCK + LONGEST_GAP or now.speed_sd == math.inf:
+        self.end = time + BLOCK - 1e-9
+        if duration > BLOCK + LONGEST_GAP or speed_sd == math.inf:
             self.axes.restart()
             return False
-        loaded = self.axes.update(now.time, duration, now.height, now.force)
-        measured = False
-        if self.looks and len(block) > earlier:
-            measured = self._look_at(block, earlier, duration, now, loaded)
-        if now.stands and now.time > self._look_end:
-            self.look(now.time)
-        return measured
-
-    def _look_at(
-        self,
-        block: list[tuple[float, ...]],
-        earlier: int,
-        duration: float,
-        now: Moment,
-        loaded: bool,
-    ) -> bool:
-        """Measure noise and compare motions in a block, which follows on ``earlier`` readings."""
-        columns = [*zip(*block, strict=True)]
-        count = len(block) - earlier
-        means = [sum(each[earlier:]) / count for each in columns[1:]]
-        measured = now.stands and self.noise.add(columns, means, count)
-        if loaded and now.offset:
-            x, y, fx, fy, _ = means
-            sd = self.noise.position.noise * math.sqrt(2.0 / count)
-            if now.speed_sd is not None:
-                sd = now.speed_sd * BLOCK
-            dx, dy = now.offset
-            self.axes.compare(columns[0][-1], duration, x, y, fx - dx, fy - dy, sd)
+        loaded = self.axes.update(time, duration, height, force)
+        measured, count = False, len(block) - earlier
+        if self.looks and count:
+            columns = [*zip(*block, strict=True)]
+            means = [sum(each[earlier:]) / count for each in columns[1:]]
+            measured = stands and self.noise.add(columns, means, count)
+            if loaded and offset:
+                x, y, fx, fy, _ = means
+                sd = self.noise.position.noise * math.sqrt(2.0 / count)
+                if speed_sd is not None:
+                    sd = speed_sd * BLOCK
+                dx, dy = offset
+                self.axes.compare(columns[0][-1], duration, x, y, fx - dx, fy - dy, sd)
+        if stands and time > self._look_end:
+            self.look(time)
         return measured

@@ -415,7 +415,7 @@ def run(
     finally:
         rclpy.shutdown(context=context)
     robot, floor = trial.simulator.robot, trial.simulator.floor
-    controller, shared = trial.walked, trial.estimator.stage.estimator.grounds.shared
+    controller, shared = trial.walked, trial.estimator.stage.estimator.shared
     describe = partial(describe, interrupted=trial.stopped)
     # Reference cycles keep lifecycle nodes on the graph until garbage collection.
     del trial

@@ -86,7 +86,7 @@ class EstimatorNode(Node):
             round(1e9 / values['publish_rate']),
             self._warn,
         )
-        self._kept = learnt.settings_of(self.stage.estimator.grounds.shared)
+        self._kept = learnt.settings_of(self.stage.estimator.shared)
         self._send = messages.record_output(topics.ESTIMATE, self._legs)
         self._diagnostics = Diagnostics(self, messages)
         self._keep_pace = Pace(KEEP_PERIOD_NS)
@@ -127,7 +127,7 @@ class EstimatorNode(Node):
         """Write what feet have learnt of friction, if it is new and there is a file for it."""
         if (
             not self._learnt
-            or (settings := learnt.settings_of(self.stage.estimator.grounds.shared)) == self._kept
+            or (settings := learnt.settings_of(self.stage.estimator.shared)) == self._kept
         ):
             return
         try:
@@ -185,7 +185,7 @@ class EstimatorNode(Node):
     def _learnt_status(self) -> DiagnosticStatus:
         """Return the scales of friction with their intervals, for ``/diagnostics``."""
         values = {}
-        for name, scale in self.stage.estimator.grounds.shared.scales.items():
+        for name, scale in self.stage.estimator.shared.scales.items():
             low, high = scale.interval
             values[name] = f'{scale.scale:.2f} ({low:.2f} to {high:.2f})'
         text = 'friction over that of the contact model, with the interval of 95 %'

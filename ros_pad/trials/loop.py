@@ -378,5 +378,5 @@ def run(
         loop.close()
     wall = time.perf_counter() - started
     trial = log.finish(loop.robot, loop.controller, loop.floor, loop.robot.time / wall)
-    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.estimator.grounds.shared)
+    trial.settings['learnt'] = settings_of(loop.pipeline.estimation.estimator.shared)
     return trial

@@ -284,7 +284,7 @@ def walk(setup: Setup, policy: str, seed: int) -> tuple[float, str | None]:
     period_ns = round(setup.control_period * 1e9)
     estimation = EstimationStage(configured.foot, load, tuning, configured.legs, period_ns)
     # All feet have one model of the ground.
-    estimation.estimator.grounds.filters[0].model.temper = setup.ground['temper']
+    estimation.estimator.tracks[0].ground.filter.model.temper = setup.ground['temper']
     choose = policy_named(policy, loop.floor.wet)
     if policy == 'adaptive':
         choose = adaptive(**setup.adaptive)

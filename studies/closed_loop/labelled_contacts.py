@@ -35,6 +35,7 @@ from ros_pad.estimation.alarm import SLOW_SLIP
 from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
 from studies import command
@@ -371,7 +372,7 @@ def margin(recording: Recording) -> np.ndarray:
     The slip speed is not measured: the filter gets zero with a standard deviation of 1 m/s. Each
     stance is on new ground, and T/N that does not change has no weight, as in FootEstimator.
     """
-    ground = GroundFilter(FrictionScales(PRIOR, learns=False))
+    ground = GroundFilter(GroundModel(FrictionScales(PRIOR, learns=False)))
     noise = Tuning().ratio_noise
     window = round(Tuning().filter_period / recording.period)
     quantile = np.zeros(len(recording.label))

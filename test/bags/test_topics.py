@@ -20,7 +20,6 @@ from ros_pad.bags.topics import TRIAL
 from ros_pad.bags.topics import Topic
 from ros_pad.bags.topics import from_record
 from ros_pad.bags.topics import to_record
-from ros_pad.errors import UnknownEncoding
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]

@@ -134,14 +134,16 @@ class FeetEstimatorOf:
 
     def run(self, stamps, rows):
         values = np.ascontiguousarray(rows).view(float).reshape(*rows.shape, -1)
+        values = np.pad(values, ((0, 0), (0, 0), (0, 1)))  # all positions are new
         found = []
         for begin in range(0, len(stamps), 10):
             part = slice(begin, begin + 10)
             times = [each * 1e-9 for each in stamps[part].tolist()]
-            self.feet.update_all(times, values[part], [0.0] * rows.shape[1])
+            quiet = self.feet.quiet(times, values[part])
+            samples = values[part].transpose(1, 0, 2).tolist()
+            self.feet.update(times, samples, [0.0] * rows.shape[1], quiet)
             found.append([
-                (*belief, track.margin, track.slip.sd)
-                for belief, track in zip(self.feet.grounds.beliefs, self.feet.tracks, strict=True)
+                (*track.ground.belief, track.margin, track.slip.sd) for track in self.feet.tracks
             ])  # fmt: skip
         return np.array(found)
 

@@ -12,6 +12,7 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.friction import GRID
 from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.scales import EDGES
 from ros_pad.estimation.scales import FrictionPrior
 from ros_pad.estimation.scales import FrictionScales
@@ -29,7 +30,7 @@ def exact(monkeypatch):
 
 
 def flat(**options):
-    ground = GroundFilter(FrictionScales(PRIOR), **options)
+    ground = GroundFilter(GroundModel(FrictionScales(PRIOR), **options))
     ground.touch_down(0.0, dome=False)
     return ground
 
@@ -55,7 +56,7 @@ def test_the_prior_is_the_contact_model_of_the_foot():
 
 
 def test_nothing_felt_is_the_prior(exact):
-    ground = GroundFilter(FrictionScales(PRIOR), wet_prior=0.3, model_error=EXACT)
+    ground = GroundFilter(GroundModel(FrictionScales(PRIOR), wet_prior=0.3, model_error=EXACT))
     dry, wet, *_ = FrictionScales(PRIOR).expected(0.0).rows
     marginal = 0.7 * dry + 0.3 * wet
     mean = marginal @ GRID
@@ -236,7 +237,7 @@ def test_it_is_never_certain():
 def test_forgetting_under_domes_follows_a_film_that_drains():
     """A dome slips at 0.2, then sticks at 0.4: within half a second the estimate follows. A film
     that drains in 0.05 s may do so at any moment, so after the slips it is not sure of 0.2."""
-    ground = GroundFilter(FrictionScales(PRIOR))
+    ground = GroundFilter(GroundModel(FrictionScales(PRIOR)))
     ground.touch_down(0.0, dome=True)
     slip(ground, 0.2, 5)
     assert ground.friction[0] < 0.41 - 0.1
@@ -319,7 +320,7 @@ def test_a_foot_that_has_forgotten_learns_again_like_a_new_one():
             slip(ground, friction)
 
     shared, other = FrictionScales(PRIOR), FrictionScales(PRIOR)
-    ground, new = (GroundFilter(each, wet_prior=0.1) for each in (shared, other))
+    ground, new = (GroundFilter(GroundModel(each, wet_prior=0.1)) for each in (shared, other))
     walk(ground, 0.0, 0.3)
     ground.forget(5.1)
     assert ground.friction == pytest.approx(new.friction)

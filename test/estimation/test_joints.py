@@ -140,9 +140,9 @@ def test_the_link_above_soft_pads_moves_while_the_contact_sticks(shears, slips):
     ('motion', 'named'),
     [
         (None, 'motion = None'),
-        (ContactMotion((math.nan, 0.0), 0.01), 'velocity = \\(nan, 0.0\\) m/s'),
-        (ContactMotion((0.0, 0.0), math.inf), 'deviation of inf m/s'),
-        (ContactMotion((0.0, 0.0), -0.01), 'deviation of -0.01 m/s'),
+        (ContactMotion((math.nan, 0.0), 0.01), 'velocity x = nan m/s'),
+        (ContactMotion((0.0, 0.0), math.inf), 'deviation = inf m/s'),
+        (ContactMotion((0.0, 0.0), -0.01), 'deviation = -0.01 m/s'),
     ],
 )
 def test_a_bad_motion_is_refused(motion, named):

@@ -8,6 +8,7 @@ from scipy import stats
 
 from ros_pad.estimation.friction import Evidence
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.scales import CLASSES
 from ros_pad.estimation.scales import GRID
 from ros_pad.estimation.scales import Felt
@@ -205,8 +206,8 @@ def test_without_learning_the_expectation_stays():
 def test_feet_learn_from_one_another():
     """One foot slips at 0.5 on dry ground; another one, that has felt nothing, expects it."""
     shared = FrictionScales(PRIOR)
-    feet = [GroundFilter(shared, wet_prior=0.1) for _ in range(2)]
-    alone = GroundFilter(FrictionScales(PRIOR), wet_prior=0.1)
+    feet = [GroundFilter(GroundModel(shared, wet_prior=0.1)) for _ in range(2)]
+    alone = GroundFilter(GroundModel(FrictionScales(PRIOR), wet_prior=0.1))
     for step in range(12):
         feet[0].touch_down(1.0, False, float(step))
         for _ in range(8):

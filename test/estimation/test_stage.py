@@ -8,7 +8,7 @@ from ros_pad.contact import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation import doubt
-from ros_pad.estimation.stage import LARGEST_FORCE
+from ros_pad.estimation.feet import LARGEST_FORCE
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.records import PRESSURE
 from ros_pad.records import SAMPLE

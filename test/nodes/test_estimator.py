@@ -341,7 +341,7 @@ def test_what_is_learnt_is_kept_and_reported(context, tmp_path):
     assert path.read_text() == 'foot: large37\n' + given  # nothing was learnt
     node = made()
     slips = -0.5 * (np.log(GRID / 0.6) / 0.05) ** 2
-    shared = node.stage.estimator.grounds.shared
+    shared = node.stage.estimator.shared
     for step in range(9):
         shared.add(Felt(step, 0, False, 1e-6, np.array([slips, slips]), 1.0))
     shared.expected(10.0)

@@ -45,6 +45,7 @@ from scipy import ndimage
 from ros_pad.estimation import FeetEstimator
 from ros_pad.estimation import FootEstimator
 from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.ground import shared_friction
 from ros_pad.estimation.scales import SCALE_SD
 from ros_pad.estimation.scales import SPREADS
@@ -280,7 +281,7 @@ def _without_measurement(walk: Recording, condition: Condition) -> dict[str, lis
         found[name] = []
         for ground in range(4):
             wet = Tuning.wet_prior if name == PRIOR else (1e-9, 1.0 - 1e-9)[ground % 2]
-            found[name].append(GroundFilter(shared, wet_prior=wet))
+            found[name].append(GroundFilter(GroundModel(shared, wet_prior=wet)))
             found[name][-1].touch_down(0.0, ground >= 2)
             found[name][-1].fade(math.inf)  # films have drained
     return found
