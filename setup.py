@@ -7,8 +7,7 @@ import re
 import xml.etree.ElementTree
 from glob import glob
 
-from setuptools import find_packages
-from setuptools import setup
+from setuptools import find_packages, setup
 
 # Of the source, also where colcon runs a link to this file in its own folder.
 ROOT = pathlib.Path(os.path.realpath(__file__)).parent

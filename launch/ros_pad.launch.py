@@ -5,10 +5,8 @@
 in ``params_file``: backend and ceiling of the regulators, foot, load, policy.
 """
 
-from launch import LaunchContext
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.actions import OpaqueFunction
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros.actions import Node

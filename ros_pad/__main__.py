@@ -7,8 +7,7 @@ from __future__ import annotations
 import io
 import sys
 
-from ros_pad.signals import INTERRUPTED
-from ros_pad.signals import STOP
+from ros_pad.signals import INTERRUPTED, STOP
 
 
 def main() -> int:

@@ -14,11 +14,8 @@ from collections.abc import Sequence
 from functools import partial
 
 import ros_pad
-from ros_pad.commands.command import Help
-from ros_pad.commands.command import exit_status
-from ros_pad.signals import STOP
-from ros_pad.signals import end
-from ros_pad.signals import interrupt
+from ros_pad.commands.command import Help, exit_status
+from ros_pad.signals import STOP, end, interrupt
 
 COMMANDS = {
     'run': 'walk a scene in closed loop: bag, report, comparison of policies',

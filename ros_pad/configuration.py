@@ -15,19 +15,15 @@ import os
 import pathlib
 import reprlib
 import sys
-from collections.abc import Iterator
-from collections.abc import Sequence
-from contextlib import contextmanager
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import reason
+from ros_pad.errors import ConfigError, InvalidInput, reason
 
 _REQUIRED: Any = object()
 

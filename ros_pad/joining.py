@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.records import Block, Kind
 
 WAIT_NS = 10_000_000
 """Time for which a record waits for its missing pieces, ns."""

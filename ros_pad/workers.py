@@ -7,12 +7,9 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 

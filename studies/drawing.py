@@ -5,13 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
+from ros_pad.reports.style import BLACK, BLUE, GREEN, PALE, PAPER_STYLE, VERMILION
 from ros_pad.reports.style import STYLE as PAGE_STYLE
-from ros_pad.reports.style import VERMILION
 
 __all__ = [
     'BLACK',

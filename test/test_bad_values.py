@@ -8,20 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ros_pad import capillary
-from ros_pad import contact
-from ros_pad import control
-from ros_pad import estimation
-from ros_pad import robots
-from ros_pad import sensing
-from ros_pad import simulation
-from ros_pad import trials
+from ros_pad import capillary, contact, control, estimation, robots, sensing, simulation, trials
 from ros_pad.bags import BagWriter
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import WATER
+from ros_pad.contact import LARGE_PAD, WATER
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation import Hose
-from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation import Hose, RegulatorModel
 from ros_pad.trials.sweep import Sweep
 
 FOOT = contact.Foot.load('large19')

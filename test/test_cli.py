@@ -15,8 +15,7 @@ import time
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
 from ros_pad.commands.command import INTERRUPTED
 from ros_pad.errors import BagError

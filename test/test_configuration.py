@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from ros_pad import configuration
-from ros_pad.configuration import Setting
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.configuration import text
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Setting, Table, choice, integer, number, quantity, text
+from ros_pad.errors import ConfigError, InvalidInput
 
 
 def table(text, tmp_path):

@@ -17,8 +17,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from studies.__main__ import STUDIES
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent

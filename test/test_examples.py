@@ -17,16 +17,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 from scipy.optimize import brentq
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import WATER
-from ros_pad.contact import Foot
-from ros_pad.contact import press
+from ros_pad.contact import LARGE_PAD, WATER, Foot, press
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))

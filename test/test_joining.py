@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.joining import Joiner
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
+from ros_pad.records import PRESSURE, SAMPLE
 
 MS = 1_000_000
 NAN = (math.nan,) * 3

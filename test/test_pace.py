@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros_pad.errors import InvalidInput
-from ros_pad.pace import Pace
-from ros_pad.pace import RealTime
+from ros_pad.pace import Pace, RealTime
 
 
 def test_first_stamp_of_each_period():

@@ -9,9 +9,7 @@ import pytest
 
 from ros_pad.control import faults
 from ros_pad.estimation import doubt
-from ros_pad.records import KINDS
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import KINDS, SAMPLE, Block
 
 PAGE = pathlib.Path(__file__).resolve().parents[1] / 'docs' / 'topics.md'
 

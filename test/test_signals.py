@@ -7,8 +7,7 @@ import threading
 
 import pytest
 
-from ros_pad.signals import STOP
-from ros_pad.signals import interrupt
+from ros_pad.signals import STOP, interrupt
 
 BEGIN = """
 import atexit, os, signal, sys, time

@@ -12,8 +12,7 @@ import sys
 import pytest
 import yaml
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.regulators import emulate
 from ros_pad.robots import Robot
 from ros_pad.sensing import Mapping

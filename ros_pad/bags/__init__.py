@@ -8,8 +8,7 @@ where the nodes use ``/clock``, else the time of day.
 
 from ros_pad.bags.metadata import annotate
 from ros_pad.bags.reader import BagReader
-from ros_pad.bags.recovery import Repair
-from ros_pad.bags.recovery import repair
+from ros_pad.bags.recovery import Repair, repair
 from ros_pad.bags.writer import BagWriter
 
 __all__ = ['BagReader', 'BagWriter', 'Repair', 'annotate', 'repair']

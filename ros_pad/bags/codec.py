@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores
-from rosbags.typesys import get_types_from_msg
-from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 _ENCAPSULATION_SIZE = 4
 _LONGEST_ARRAY = 65536

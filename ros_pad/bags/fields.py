@@ -13,17 +13,14 @@ from __future__ import annotations
 
 import operator
 import struct
-from collections.abc import Mapping
-from collections.abc import Sequence
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
 
 from ros_pad.bags.codec import MessageType
-from ros_pad.errors import BadMessage
-from ros_pad.errors import UnknownEncoding
+from ros_pad.errors import BadMessage, UnknownEncoding
 
 _ENCAPSULATION = 4  # bytes
 _FORMATS = {

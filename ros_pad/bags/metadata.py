@@ -7,19 +7,15 @@ import contextlib
 import functools
 import os
 import pathlib
-from collections.abc import Iterable
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import yaml
-from mcap.records import Channel
-from mcap.records import Schema
+from mcap.records import Channel, Schema
 
 from ros_pad.bags.storage import Contents
 from ros_pad.configuration import instance
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import reason
+from ros_pad.errors import BagError, InvalidInput, reason
 from ros_pad.yaml_text import read_yaml
 
 _NAME = 'metadata.yaml'

@@ -7,33 +7,20 @@ import itertools
 import os
 import pathlib
 import warnings
-from collections.abc import Collection
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
-from typing import Any
-from typing import TypeAlias
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from mcap.records import Channel
 
 from ros_pad.bags import metadata
-from ros_pad.bags.codec import MessageType
-from ros_pad.bags.codec import message_type
+from ros_pad.bags.codec import MessageType, message_type
 from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.storage import Contents
-from ros_pad.bags.storage import RawMessage
-from ros_pad.bags.storage import raw_messages
-from ros_pad.bags.storage import scan
-from ros_pad.bags.storage import shares
-from ros_pad.bags.wire import Wire
-from ros_pad.bags.wire import legs_of
-from ros_pad.errors import BadMessage
-from ros_pad.errors import BagError
-from ros_pad.errors import reason
+from ros_pad.bags.storage import Contents, RawMessage, raw_messages, scan, shares
+from ros_pad.bags.wire import Wire, legs_of
+from ros_pad.errors import BadMessage, BagError, reason
 from ros_pad.pace import Progress
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.records import Block, Kind
 
 Table: TypeAlias = tuple[np.ndarray, np.ndarray]
 """Log times, int64, ns, and a row of numbers for each message."""

@@ -11,26 +11,17 @@ import pathlib
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from mcap.records import Channel
-from mcap.records import Chunk
-from mcap.records import Footer
-from mcap.records import McapRecord
-from mcap.records import Message
-from mcap.records import Schema
-from mcap.stream_reader import StreamReader
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 
 from ros_pad.bags import metadata
 from ros_pad.bags.storage import shares
 from ros_pad.bags.writer import BagWriter
 from ros_pad.errors import BagError
-from ros_pad.pace import Progress
-from ros_pad.pace import part
+from ros_pad.pace import Progress, part
 
 KEY = 'ros_pad_repair'
 """Key of the custom data in which a repaired bag lists what was lost."""

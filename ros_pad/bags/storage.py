@@ -7,30 +7,19 @@ import itertools
 import pathlib
 import struct
 from collections import Counter
-from collections.abc import Collection
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from typing import IO
-from typing import Any
-from typing import TypeAlias
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import IO, Any, TypeAlias
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel
-from mcap.records import Chunk
-from mcap.records import Message
-from mcap.records import Schema
-from mcap.stream_reader import StreamReader
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ros_pad.errors import BagError
-from ros_pad.pace import Progress
-from ros_pad.pace import part
+from ros_pad.pace import Progress, part
 
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log and publish time
 _RECORD_HEADER_SIZE = 9

@@ -17,12 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.bags.codec import MessageType
-from ros_pad.bags.codec import message_type
+from ros_pad.bags.codec import MessageType, message_type
 from ros_pad.errors import BadMessage
-from ros_pad.records import TIME
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.records import TIME, Block, Kind
 
 TYPE = 'sensor_msgs/msg/JointState'
 

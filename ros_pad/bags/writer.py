@@ -8,24 +8,17 @@ import os
 import pathlib
 import time
 from collections.abc import Mapping
-from concurrent.futures import Future
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
-from typing import IO
-from typing import Any
+from typing import IO, Any
 
-from mcap.records import Channel
-from mcap.records import Schema
-from mcap.writer import CompressionType
-from mcap.writer import Writer
+from mcap.records import Channel, Schema
+from mcap.writer import CompressionType, Writer
 
 from ros_pad.bags import metadata
-from ros_pad.bags.definitions import message_definition
-from ros_pad.bags.definitions import type_hash
-from ros_pad.bags.storage import Contents
-from ros_pad.bags.storage import scan
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
+from ros_pad.bags.definitions import message_definition, type_hash
+from ros_pad.bags.storage import Contents, scan
+from ros_pad.errors import BagError, InvalidInput
 
 CHUNK_SIZE = 192 * 1024
 """Size of a chunk of messages, bytes; a killed writer may lose its last chunk."""

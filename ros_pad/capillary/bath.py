@@ -23,15 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import instance, number, quantity
 from ros_pad.contact.fibre import outer_surface
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.errors import InvalidInput, NoSurface
 
 # Upper bound of the height of a bath's surface, in capillary lengths.
 HIGHEST = 2.0
@@ -401,8 +397,7 @@ def contact(wall: Wall, angle: float, length: float) -> tuple[float, float, str]
     turns = np.flatnonzero(np.diff(signs))
     if not turns.size:
         return end, _held(wall, end, length, slope(end)), 'rim'
-    from scipy.optimize import brentq
-    from scipy.optimize import newton
+    from scipy.optimize import brentq, newton
 
     first = int(turns[0])
     low, high = places[first - 1] if first else wall.floor, places[first]

@@ -21,24 +21,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ros_pad.capillary.bath import Wall
-from ros_pad.capillary.bath import bath_height
-from ros_pad.capillary.bath import contact
+from ros_pad.capillary.bath import Wall, bath_height, contact
 from ros_pad.configuration import number
 from ros_pad.contact.dome import press
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import need_stiffness
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.contact.pad import Array, Pad, need_stiffness
+from ros_pad.errors import InvalidInput, NoSurface
 
 STEEPEST = math.pi - 0.02  # inclination at which the integration of the wet wall stops, rad
 

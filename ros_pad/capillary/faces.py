@@ -5,22 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from dataclasses import replace
-from typing import Any
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad.capillary.bath import Wall
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import broadcast
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.configuration import instance, number, quantity
+from ros_pad.contact.pad import Array, broadcast
+from ros_pad.errors import InvalidInput, MeshError
 
 Integers: TypeAlias = npt.NDArray[np.int64]
 

@@ -27,23 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.capillary.mesh import Indices
-from ros_pad.capillary.mesh import Mesh
-from ros_pad.capillary.sections import Layers
-from ros_pad.capillary.sections import Walls
-from ros_pad.capillary.sections import centre
-from ros_pad.capillary.sections import layered
-from ros_pad.capillary.sections import walls
-from ros_pad.configuration import choice
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.meniscus import hysteresis_force
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.capillary.mesh import Indices, Mesh
+from ros_pad.capillary.sections import Layers, Walls, centre, layered, walls
+from ros_pad.configuration import choice, integer, number
+from ros_pad.contact.meniscus import GRAVITY, Liquid, hysteresis_force
+from ros_pad.contact.pad import Array, Floats
+from ros_pad.errors import InvalidInput, MeshError
 
 BALANCES = ('energy', 'force', 'thesis')
 AGREEMENT = 0.15  # allowed relative difference between the heights of a balance and of ``energy``

@@ -8,23 +8,13 @@ import math
 
 import numpy as np
 
-from ros_pad.capillary.bath import BathMeniscus
-from ros_pad.capillary.bath import Wall
-from ros_pad.capillary.bath import bath_meniscus
-from ros_pad.capillary.faces import KNOTS
-from ros_pad.capillary.faces import Face
-from ros_pad.capillary.faces import Integers
-from ros_pad.capillary.surface import Line
-from ros_pad.capillary.surface import LiquidSurface
-from ros_pad.capillary.surface import minimise
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
+from ros_pad.capillary.bath import BathMeniscus, Wall, bath_meniscus
+from ros_pad.capillary.faces import KNOTS, Face, Integers
+from ros_pad.capillary.surface import Line, LiquidSurface, minimise
+from ros_pad.configuration import instance, integer, number
+from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.errors import InvalidInput, NoSurface
 
 
 def spanned(
@@ -321,8 +311,7 @@ def _film_place(
     lean = np.arctan2(np.gradient(heights), np.gradient(radii))
     level = float(np.interp(math.pi - liquid.angle, np.maximum.accumulate(lean), heights))
     if gravity > 0.0:
-        from scipy.special import k0e
-        from scipy.special import k1e
+        from scipy.special import k0e, k1e
 
         # Its meniscus is that of small slopes, with the height of steep ones for wide pads.
         length = math.sqrt(liquid.surface_tension / (liquid.density * gravity))

@@ -18,13 +18,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ros_pad.capillary.crossings import Indices
-from ros_pad.capillary.crossings import first_overlap
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
+from ros_pad.capillary.crossings import Indices, first_overlap
+from ros_pad.configuration import integer, number
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.errors import InvalidInput, MeshError
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.msh')
 LARGEST = 0.5  # m: a larger pad is probably given in millimetres

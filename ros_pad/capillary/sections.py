@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.capillary.mesh import Indices
-from ros_pad.capillary.mesh import Mesh
+from ros_pad.capillary.mesh import Indices, Mesh
 from ros_pad.contact.pad import Array
 from ros_pad.errors import MeshError
 

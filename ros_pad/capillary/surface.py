@@ -20,23 +20,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.capillary.faces import KNOTS
-from ros_pad.capillary.faces import Face
-from ros_pad.capillary.faces import Integers
-from ros_pad.capillary.faces import boundary_edges
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
+from ros_pad.capillary.faces import KNOTS, Face, Integers, boundary_edges
+from ros_pad.configuration import instance, integer, number
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.errors import InvalidInput, NoSurface
 
 # Quality (1: equilateral) below which a triangle means that a neck has pinched off.
 THINNEST = 0.01
@@ -620,8 +613,7 @@ class Rails:
         edges: shares spread over the surface average the errors of the mesh, and the forces on all
         faces add up to the weight.
         """
-        from scipy.sparse import coo_matrix
-        from scipy.sparse import diags
+        from scipy.sparse import coo_matrix, diags
         from scipy.sparse.linalg import factorized
 
         count, edges = len(self.base), _edges(self.triangles)
@@ -665,8 +657,7 @@ class _LineRails:
     """The rails of one line: positions and wetting integrals as splines in arc length."""
 
     def __init__(self, line: Line, size: float) -> None:
-        from scipy.interpolate import CubicHermiteSpline
-        from scipy.interpolate import CubicSpline
+        from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
         self.line, self.unknowns = line, np.empty(0, dtype=np.int64)
         self.cosine = 0.0 if line.angle is None else math.cos(line.angle)

@@ -13,14 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.bags import BagReader
-from ros_pad.bags import recovery
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.bags import BagReader, recovery
+from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.commands.progress import bar
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import BagError, InvalidInput
 from ros_pad.pace import part
 from ros_pad.trials import label as labels
 from ros_pad.trials.recorded import late

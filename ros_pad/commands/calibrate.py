@@ -11,23 +11,14 @@ import pathlib
 from dataclasses import asdict
 from typing import Any
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import refuse
-from ros_pad.contact import Foot
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact.calibrate import FITS
-from ros_pad.contact.calibrate import Calibration
-from ros_pad.contact.calibrate import calibrate
-from ros_pad.contact.calibrate import foot_file
+from ros_pad.contact import Foot, Material, Pad
+from ros_pad.contact.calibrate import FITS, Calibration, calibrate, foot_file
 from ros_pad.contact.measurements import Measurements
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import ConfigError, InvalidInput, PadError
 
 
 def add(commands: Commands) -> None:

@@ -8,11 +8,9 @@ import json
 import pathlib
 import subprocess
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
+from ros_pad.commands.command import Commands, add_command
 from ros_pad.commands.folder import new_folder
-from ros_pad.commands.study import checkout_of
-from ros_pad.commands.study import run_study
+from ros_pad.commands.study import checkout_of, run_study
 
 CHARTS = ('capillary', 'contact', 'estimator', 'meniscus', 'stability', 'walk')
 

@@ -9,16 +9,11 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeAlias
 
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
-from ros_pad.errors import reason
+from ros_pad.errors import BagError, ConfigError, InvalidInput, PadError, reason
 from ros_pad.signals import INTERRUPTED
 
 WIDEST = 98  # largest width of the help in columns, also on a wider terminal

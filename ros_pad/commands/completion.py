@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from ros_pad import configuration

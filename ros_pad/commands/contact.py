@@ -9,18 +9,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad import contact
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.configuration import number
-from ros_pad.contact.dome import ADHESION_SIGNS
-from ros_pad.contact.dome import MODELS
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact.dome import ADHESION_SIGNS, MODELS
+from ros_pad.contact.limits import criteria, largest_pressure
 from ros_pad.contact.resistance import RUBBER_SETTINGS
 from ros_pad.contact.thickness import HIGHEST
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 _TITLES = {
     'free': 'free dome',

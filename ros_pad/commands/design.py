@@ -7,38 +7,21 @@ import argparse
 import json
 import math
 import pathlib
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ros_pad import configuration
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import print_table
-from ros_pad.commands.folder import PICTURES
-from ros_pad.commands.folder import check_pictures
-from ros_pad.commands.folder import refuse_existing
+from ros_pad.commands.command import Commands, add_command, print_table
+from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Design
-from ros_pad.contact import Foot
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact import design
-from ros_pad.contact import pressure_for
-from ros_pad.contact.candidates import Candidate
-from ros_pad.contact.candidates import Span
-from ros_pad.contact.candidates import candidates
-from ros_pad.contact.design import CELL
-from ros_pad.contact.design import READINGS
-from ros_pad.contact.limits import CRITERIA
-from ros_pad.contact.limits import DEFAULT_CRITERION
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import resized
+from ros_pad.contact import LARGE_PAD, Design, Foot, Material, Pad, design, pressure_for
+from ros_pad.contact.candidates import Candidate, Span, candidates
+from ros_pad.contact.design import CELL, READINGS
+from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, criteria, resized
 from ros_pad.errors import InvalidInput
 from ros_pad.pace import Progress
 

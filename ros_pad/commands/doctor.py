@@ -24,19 +24,13 @@ import threading
 import time
 import uuid
 import webbrowser
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import metadata
 
-from ros_pad.commands.command import WIDEST
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.commands.command import WIDEST, Commands, add_command, complain
 from ros_pad.pace import Progress
 
 OLDEST, NEWEST = (3, 11), (3, 13)  # versions of Python with which ros_pad is tested
@@ -319,12 +313,10 @@ def shipped_files() -> Iterator[Finding]:
     wrong = []
     try:
         from ros_pad import configuration
-        from ros_pad.contact import Foot
-        from ros_pad.contact import Material
+        from ros_pad.contact import Foot, Material
         from ros_pad.robots import Robot
         from ros_pad.simulation.fidelity import Promises
-        from ros_pad.simulation.scene import Scene
-        from ros_pad.simulation.scene import is_bench
+        from ros_pad.simulation.scene import Scene, is_bench
 
         def text(kind: str, name: str) -> None:
             configuration.Table.load(configuration.locate(kind, name))

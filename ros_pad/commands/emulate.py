@@ -7,12 +7,9 @@ import argparse
 import inspect
 from typing import Any
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
+from ros_pad.commands.command import Commands, add_command
 from ros_pad.errors import InvalidInput
-from ros_pad.regulators.emulate import EMULATORS
-from ros_pad.regulators.emulate import LINE_FAULTS
-from ros_pad.regulators.emulate import Emulator
+from ros_pad.regulators.emulate import EMULATORS, LINE_FAULTS, Emulator
 from ros_pad.regulators.serial_device import UNITS
 
 

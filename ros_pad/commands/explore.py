@@ -7,8 +7,7 @@ import argparse
 import pathlib
 import socket
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
+from ros_pad.commands.command import Commands, add_command
 from ros_pad.commands.folder import refuse_existing
 from ros_pad.configuration import integer
 from ros_pad.contact import Foot
@@ -51,8 +50,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None and options.out.suffix not in ('.yaml', '.yml'):
         raise InvalidInput(f'--out {options.out}: a name that ends in .yaml is needed')
     foot = Foot.load(options.foot)
-    from ros_pad.reports.explore_page import HOST
-    from ros_pad.reports.explore_page import serve
+    from ros_pad.reports.explore_page import HOST, serve
 
     serve(foot, _port(HOST, options.port), not options.no_browser, options.out)
     return 0

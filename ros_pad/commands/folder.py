@@ -6,8 +6,7 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Sequence
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Endings of the pictures that commands write."""

@@ -8,25 +8,15 @@ import json
 import math
 import pathlib
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
-from ros_pad.commands.command import print_table
-from ros_pad.commands.folder import PICTURES
-from ros_pad.commands.folder import check_pictures
-from ros_pad.commands.folder import refuse_existing
+from ros_pad.commands.command import Commands, add_command, complain, print_table
+from ros_pad.commands.folder import PICTURES, check_pictures, refuse_existing
 from ros_pad.commands.progress import bar
 from ros_pad.commands.sweep import parameters
 from ros_pad.control import POLICIES
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
-from ros_pad.trials import Replay
-from ros_pad.trials import open_bag
-from ros_pad.trials import replay
-from ros_pad.trials import replayed_bag
+from ros_pad.errors import BagError, InvalidInput
+from ros_pad.trials import Replay, open_bag, replay, replayed_bag
 from ros_pad.trials.comparison import Comparison
-from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.node_settings import Value
+from ros_pad.trials.node_settings import NodeSettings, Value
 
 WORDS = {
     'equal': 'equal to the bit',

@@ -9,13 +9,11 @@ import pathlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
+from ros_pad.commands.command import Commands, add_command
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.configuration import refuse
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import BagError, InvalidInput
 from ros_pad.trials import recorded
 from ros_pad.trials import sweep as sweeps
 
@@ -80,8 +78,7 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidInput('PATH (folder of a bag or sweep) or --thesis is needed')
     if not options.path.exists():
         raise BagError(f'{options.path}: no such bag or sweep')
-    from ros_pad.reports import report
-    from ros_pad.reports import sweep_page
+    from ros_pad.reports import report, sweep_page
 
     if sweeps.is_sweep(options.path):
         page = page_for(options, options.path / 'report.html')

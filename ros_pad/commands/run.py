@@ -14,28 +14,20 @@ from collections.abc import Iterator
 from typing import Any
 
 from ros_pad.bags import annotate
-from ros_pad.commands.command import INTERRUPTED
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.commands.command import INTERRUPTED, Commands, add_command, complain
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.commands.study import run_study
 from ros_pad.contact import Foot
 from ros_pad.control import POLICIES
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.robot import check_reach
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import is_bench
-from ros_pad.trials import Trial
+from ros_pad.simulation.scene import Scene, is_bench
+from ros_pad.trials import Trial, learnt, loop
 from ros_pad.trials import label as labels
-from ros_pad.trials import learnt
-from ros_pad.trials import loop
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.others import Others
 from ros_pad.trials.trial import fault_lines

@@ -8,11 +8,9 @@ import json
 from typing import Any
 
 from ros_pad import configuration
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
+from ros_pad.commands.command import Commands, add_command
 from ros_pad.simulation import fidelity as levels
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import is_bench
+from ros_pad.simulation.scene import Scene, is_bench
 
 
 def add(commands: Commands) -> None:

@@ -14,15 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.commands.command import INTERRUPTED
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
-from ros_pad.commands.command import print_table
+from ros_pad.commands.command import INTERRUPTED, Commands, add_command, complain, print_table
 from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import fidelity as levels
 from ros_pad.trials import sweep as sweeps
 

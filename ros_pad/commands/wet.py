@@ -13,23 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wet
-from ros_pad.capillary import WetPattern
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
+from ros_pad.capillary import Mesh, Wet, WetPattern, wet, wet_pattern
 from ros_pad.capillary.layers import BALANCES
-from ros_pad.commands.command import Commands
-from ros_pad.commands.command import add_command
-from ros_pad.commands.command import complain
+from ros_pad.commands.command import Commands, add_command, complain
 from ros_pad.commands.folder import check_pictures
 from ros_pad.commands.progress import bar
 from ros_pad.configuration import number
-from ros_pad.contact import THESIS_LIQUID
-from ros_pad.contact import WATER
-from ros_pad.contact import Liquid
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.contact import THESIS_LIQUID, WATER, Liquid
+from ros_pad.errors import InvalidInput, MeshError
 
 LIQUIDS = {'water': WATER, 'thesis': THESIS_LIQUID}
 # Of each shape: function that makes it, sizes that it needs, sizes that it allows.
@@ -388,8 +379,7 @@ def _draw(
     found: Wet | WetPattern,
     rows: list[tuple[str, str]],
 ) -> None:
-    from ros_pad.reports import wetted
-    from ros_pad.reports import wetted_page
+    from ros_pad.reports import wetted, wetted_page
 
     with bar('drawing', 2.0, 'files', delay=1.0) as progress:
         if options.figure is not None:

@@ -25,19 +25,14 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoBridge
+from ros_pad.configuration import choice, number, quantity
+from ros_pad.contact.pad import Array, Floats
+from ros_pad.errors import InvalidInput, NoBridge
 
 # Allowed filling angles, rad. Outside, the liquid hardly touches the sphere, or covers it.
 SMALLEST_FILLING, LARGEST_FILLING = 1e-4, math.pi - 1e-3
@@ -498,8 +493,7 @@ def _heights(place: Floats, theta: float, plane: float, beta: Floats, order: int
 
 def _place_of_filling(theta: float, plane: float, gap: float, beta: float) -> float:
     """Return the smallest place at which the meridian is high enough to reach the sphere."""
-    from scipy.optimize import brentq
-    from scipy.optimize import minimize_scalar
+    from scipy.optimize import brentq, minimize_scalar
 
     aim = (gap + 2.0 * math.sin(0.5 * beta) ** 2) / math.sin(beta)
     heights = _heights(_PLACES, theta, plane, beta, 96)

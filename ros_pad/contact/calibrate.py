@@ -15,47 +15,29 @@ import functools
 import json
 import math
 import pathlib
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.contact.dome import BURST
-from ros_pad.contact.dome import inflate
-from ros_pad.contact.dome import largest_tension
-from ros_pad.contact.dome import press
-from ros_pad.contact.film import WATER_VISCOSITY
-from ros_pad.contact.film import Film
+from ros_pad.configuration import choice, number
+from ros_pad.contact.dome import BURST, inflate, largest_tension, press
+from ros_pad.contact.film import WATER_VISCOSITY, Film
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.laws import Comparison
-from ros_pad.contact.laws import Law
-from ros_pad.contact.laws import compare
-from ros_pad.contact.laws import rubber_laws
-from ros_pad.contact.laws import stiffness_law
-from ros_pad.contact.laws import two_constants_law
-from ros_pad.contact.laws import with_constant
-from ros_pad.contact.limits import DEFAULT_CRITERION
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.material import FACTORS
-from ros_pad.contact.material import Material
-from ros_pad.contact.measurements import Friction
-from ros_pad.contact.measurements import Measurements
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import MeasuredLimit
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.resistance import FOOT_SETTINGS
-from ros_pad.contact.resistance import LIMIT_SETTINGS
-from ros_pad.contact.resistance import PAD_SETTINGS
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.laws import (
+    Comparison,
+    Law,
+    compare,
+    rubber_laws,
+    stiffness_law,
+    two_constants_law,
+    with_constant,
+)
+from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, force_limit, largest_pressure
+from ros_pad.contact.material import FACTORS, Material
+from ros_pad.contact.measurements import Friction, Measurements
+from ros_pad.contact.pad import LARGE_PAD, Array, MeasuredLimit, Pad
+from ros_pad.contact.resistance import FOOT_SETTINGS, LIMIT_SETTINGS, PAD_SETTINGS, Foot
 from ros_pad.errors import InvalidInput
 
 CONFIDENCE = 0.95

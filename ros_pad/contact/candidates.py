@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,14 +20,10 @@ from ros_pad.configuration import number
 from ros_pad.contact.design import pads_for
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.laws import highest_dome
-from ros_pad.contact.laws import pressure_for_height
-from ros_pad.contact.laws import with_constant
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.limits import pressure_for
+from ros_pad.contact.laws import highest_dome, pressure_for_height, with_constant
+from ros_pad.contact.limits import force_limit, pressure_for
 from ros_pad.contact.material import Material
-from ros_pad.contact.pad import MeasuredLimit
-from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import MeasuredLimit, Pad
 from ros_pad.errors import NoEquilibrium
 from ros_pad.pace import Progress
 

@@ -16,27 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import choice, instance, integer, number, quantity
 from ros_pad.contact.dome import inflate
-from ros_pad.contact.limits import DEFAULT_CRITERION
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.limits import pressure_for
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import need_stiffness
-from ros_pad.contact.pad import plain
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact.limits import DEFAULT_CRITERION, force_limit, largest_pressure, pressure_for
+from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.contact.pad import LARGE_PAD, Array, Floats, Pad, broadcast, need_stiffness, plain
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 READINGS = ('corrected', 'thesis')
 

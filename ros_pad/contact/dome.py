@@ -14,23 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
-from typing import NamedTuple
-from typing import NoReturn
-from typing import TypeAlias
+from typing import Any, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.configuration import quantity
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import broadcast
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.configuration import choice, instance, quantity
+from ros_pad.contact.pad import Array, Floats, Pad, broadcast
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 # Sign of the adhesion term: the program in the appendix of the thesis adds this term, the text
 # (3.43) subtracts it.

@@ -10,14 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import choice, number, quantity
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import plain
+from ros_pad.contact.pad import Array, Floats, broadcast, plain
 
 # Radii over capillary length: range in which the exact method is checked, and upper end of the
 # range of the asymptote.
@@ -126,8 +121,7 @@ def outer_surface(radius: float, slope: float, tolerance: float = 1e-12, points:
     """
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
-    from scipy.special import k0e
-    from scipy.special import k1e
+    from scipy.special import k0e, k1e
 
     outer = 1e-6 * slope  # at this slope the surface is linear, with an error of 1e-12
 

@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import plain
+from ros_pad.configuration import number, quantity
+from ros_pad.contact.pad import broadcast, plain
 
 if TYPE_CHECKING:
     from ros_pad.contact.resistance import Foot

@@ -28,29 +28,26 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_pad.contact.dome import FLATTENED
-from ros_pad.contact.dome import NO_CONTACT
-from ros_pad.contact.dome import NO_INFLATION
-from ros_pad.contact.dome import OK
-from ros_pad.contact.dome import OUT_OF_RANGE
-from ros_pad.contact.dome import STATUS
-from ros_pad.contact.dome import Codes
-from ros_pad.contact.dome import Inflated
-from ros_pad.contact.dome import words
+from ros_pad.contact.dome import (
+    FLATTENED,
+    NO_CONTACT,
+    NO_INFLATION,
+    OK,
+    OUT_OF_RANGE,
+    STATUS,
+    Codes,
+    Inflated,
+    words,
+)
 from ros_pad.contact.material import tensions
 from ros_pad.contact.membrane import cap_through
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.thickness import HIGHEST
-from ros_pad.contact.thickness import thickened
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact.pad import Array, Floats, Pad
+from ros_pad.contact.thickness import HIGHEST, thickened
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 Law = tuple[str, tuple[float, ...]]
 

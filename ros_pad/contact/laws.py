@@ -23,15 +23,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import Array, Pad
 from ros_pad.errors import InvalidInput
 
 SIGNIFICANCE = 0.05

@@ -31,24 +31,17 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.configuration import quantity
-from ros_pad.contact.dome import BURST
-from ros_pad.contact.dome import flattening_force
-from ros_pad.contact.dome import inflate
-from ros_pad.contact.dome import largest_tension
-from ros_pad.contact.dome import press
-from ros_pad.contact.dome import signed_adhesion
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import MeasuredLimit
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import plain
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.configuration import choice, instance, quantity
+from ros_pad.contact.dome import (
+    BURST,
+    flattening_force,
+    inflate,
+    largest_tension,
+    press,
+    signed_adhesion,
+)
+from ros_pad.contact.pad import LARGE_PAD, Array, Floats, MeasuredLimit, Pad, broadcast, plain
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 CRITERIA = ('thickness', 'wall', 'flattening', 'max_depth', 'measured')
 DEFAULT_CRITERION = 'thickness'

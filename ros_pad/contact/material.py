@@ -15,9 +15,7 @@ The energy W is per volume of the undeformed body, which keeps its volume: Î»1 Î
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,14 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad import configuration
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.configuration import shown
-from ros_pad.configuration import text
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Table, choice, number, quantity, shown, text
+from ros_pad.errors import ConfigError, InvalidInput
 
 LAWS = {
     'yeoh': ('C1', 'C2', 'C3'),

@@ -29,8 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.contact.pad import Array
-from ros_pad.errors import ConfigError
-from ros_pad.errors import reason
+from ros_pad.errors import ConfigError, reason
 
 # Factors to SI, usual unit first, and largest plausible value in SI.
 _UNITS = {

@@ -45,19 +45,19 @@ import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import quantity
-from ros_pad.contact.dome import BURST
-from ros_pad.contact.dome import FLATTENED
-from ros_pad.contact.dome import FOLD_ZONE
-from ros_pad.contact.dome import NO_CONTACT
-from ros_pad.contact.dome import NO_INFLATION
-from ros_pad.contact.dome import OK
-from ros_pad.contact.dome import STATUS
-from ros_pad.contact.dome import Pressed
-from ros_pad.contact.dome import free_height
-from ros_pad.contact.dome import words
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import broadcast
+from ros_pad.contact.dome import (
+    BURST,
+    FLATTENED,
+    FOLD_ZONE,
+    NO_CONTACT,
+    NO_INFLATION,
+    OK,
+    STATUS,
+    Pressed,
+    free_height,
+    words,
+)
+from ros_pad.contact.pad import Array, Pad, broadcast
 from ros_pad.errors import NoEquilibrium
 
 # Slightly below the cusp at P = 5.14267, b² = 0.71433, where the root cannot be resolved.
@@ -123,8 +123,7 @@ def press_membrane(pad: Pad, pressure: npt.ArrayLike, force: npt.ArrayLike) -> P
     r, k = pad.radius, pad.stiffness
     rows, why = p.ravel(), _WHY
     if pad.material is not None:
-        from ros_pad.contact.hyperelastic import press_rubber
-        from ros_pad.contact.hyperelastic import refusal
+        from ros_pad.contact.hyperelastic import press_rubber, refusal
 
         lengths, code = press_rubber(pad, rows, load.ravel())
         why = _WHY | refusal(pad)
@@ -192,8 +191,7 @@ def _wall(t: Array, share: Array, rest: Array) -> tuple[Array, Array, Array]:
     The integrals are Carlson's R_F and R_D, valid up to psi = 90°. Above 90° the integral is twice
     the integral to 90° minus the integral to 180° - psi, because sin psi is symmetric.
     """
-    from scipy.special import elliprd
-    from scipy.special import elliprf
+    from scipy.special import elliprd, elliprf
 
     b2 = np.maximum(share, 1e-90)  # a smaller contact is a point within rounding
     square = 1.0 + t * t

@@ -9,13 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import choice, number, quantity
 from ros_pad.contact.dome import Pressed
-from ros_pad.contact.pad import Floats
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import plain
+from ros_pad.contact.pad import Floats, broadcast, plain
 from ros_pad.errors import InvalidInput
 
 GRAVITY = 9.81  # m/s², as in the thesis' appendix

@@ -5,14 +5,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, number
 from ros_pad.contact.material import Material
 from ros_pad.contact.thickness import check_edge
 from ros_pad.errors import InvalidInput

@@ -21,9 +21,7 @@ import functools
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -31,28 +29,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ros_pad import configuration
-from ros_pad.configuration import Setting
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import Setting, Table, choice, instance, integer, number, quantity
 from ros_pad.contact.dome import inflate
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.limits import CRITERIA
-from ros_pad.contact.limits import DEFAULT_CRITERION
-from ros_pad.contact.limits import check_criterion
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.material import Material
-from ros_pad.contact.material import factor_in
-from ros_pad.contact.pad import MeasuredLimit
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import broadcast
-from ros_pad.contact.pad import plain
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact.limits import CRITERIA, DEFAULT_CRITERION, check_criterion, force_limit
+from ros_pad.contact.material import Material, factor_in
+from ros_pad.contact.pad import MeasuredLimit, Pad, broadcast, plain
+from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
 
 THICK_FILM = 1.0e-3
 """Thickness of a liquid film that does not drain under a flat sole within a stance, m."""

@@ -26,14 +26,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import instance, integer, number, quantity
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.pad import Array
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.errors import InvalidInput, NoSurface
 
 TRAPPED = 4.0 / math.pi * (4.0 / 3.0 - 1.0)
 """Mean depth of the dimple that uniform pressure p presses into a half-space, in units of p a/E*:
@@ -190,8 +186,7 @@ class HalfSpace:
         array, shape (n, rings)
             Deflection over :attr:`compliance`, no unit.
         """
-        from scipy.special import ellipe
-        from scipy.special import ellipkm1
+        from scipy.special import ellipe, ellipkm1
 
         # Johnson, Contact Mechanics (1985), 3.4.2: uniform pressure on a disc.
         reach, r = np.broadcast_arrays(edges, at[:, None])
@@ -488,8 +483,7 @@ def dry_share(middle: float, critical_film: float, exponent: float = 2.0) -> flo
     exponent : float
         m, above 0.
     """
-    from scipy.special import gamma
-    from scipy.special import gammainc
+    from scipy.special import gamma, gammainc
 
     deep = number('middle', middle, 'm') / number('critical_film', critical_film, 'm', above=True)
     power = 1.0 / number('exponent', exponent, '', above=True)

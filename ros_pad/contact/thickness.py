@@ -29,8 +29,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
+from ros_pad.configuration import choice, number
 from ros_pad.errors import InvalidInput
 
 if TYPE_CHECKING:

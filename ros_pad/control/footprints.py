@@ -10,8 +10,7 @@ import math
 from collections import deque
 
 from ros_pad.configuration import number
-from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import expected_friction
+from ros_pad.contact.resistance import Foot, expected_friction
 from ros_pad.estimation import Tuning
 
 DRY = 0.35

@@ -13,9 +13,7 @@ import statistics
 from collections import deque
 
 from ros_pad.configuration import number
-from ros_pad.control.faults import Fault
-from ros_pad.control.faults import Kind
-from ros_pad.control.faults import joined
+from ros_pad.control.faults import Fault, Kind, joined
 
 TOLERANCE = 0.03
 """Share of the ceiling by which a reading may differ from the set-point: 2.7 kPa of 90 kPa. It is

@@ -9,36 +9,21 @@ becomes flat, or keeps its morphology; the other feet are not affected.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from ros_pad.configuration import Setting
+from ros_pad.configuration import Setting, instance, number
 from ros_pad.configuration import choice as one_of
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.contact.resistance import Foot
-from ros_pad.control.faults import Fault
-from ros_pad.control.faults import Kind
-from ros_pad.control.faults import joined
-from ros_pad.control.footprints import Footprints
-from ros_pad.control.footprints import FrictionFelt
-from ros_pad.control.monitor import PadMonitor
-from ros_pad.control.monitor import RunningMedian
-from ros_pad.control.policies import DOME
-from ros_pad.control.policies import FLAT
-from ros_pad.control.policies import Choice
-from ros_pad.control.policies import LiftOff
-from ros_pad.control.policies import Policy
+from ros_pad.control.faults import Fault, Kind, joined
+from ros_pad.control.footprints import Footprints, FrictionFelt
+from ros_pad.control.monitor import PadMonitor, RunningMedian
+from ros_pad.control.policies import DOME, FLAT, Choice, LiftOff, Policy
 from ros_pad.control.pressure import dome_pressure
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
-from ros_pad.estimation.load_gate import LIFT_OFF_SHARE
-from ros_pad.estimation.load_gate import TOUCH_DOWN
-from ros_pad.estimation.load_gate import LoadGate
+from ros_pad.errors import InvalidInput, LimitError
+from ros_pad.estimation.load_gate import LIFT_OFF_SHARE, TOUCH_DOWN, LoadGate
 
 COMMAND_TIMEOUT = Setting(
     'command_timeout', 0.5, 'A pad is vented when it has received no set-point for this long.',

@@ -4,15 +4,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ros_pad.configuration import Setting
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
+from ros_pad.configuration import Setting, choice, number
 from ros_pad.errors import InvalidInput
 
 FLAT = 'flat'

@@ -5,12 +5,10 @@ from __future__ import annotations
 
 import math
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, number
 from ros_pad.contact.limits import pressure_for
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import LimitError
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import LimitError, NoEquilibrium
 
 RESOLUTION = 10.0  # Pa; regulators resolve it, and adding an ambient pressure rounds nothing off
 

@@ -7,8 +7,7 @@ The controller node, the loop without ROS and replay use the same class.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +18,7 @@ from ros_pad.control.policies import DOME
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.records import COMMAND
-from ros_pad.records import Block
+from ros_pad.records import COMMAND, Block
 
 OLD = 0.2
 """Age above which the last position of a foot is not used, s."""

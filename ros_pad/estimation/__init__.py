@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimate slip, wetness, friction and friction margin of feet from their forces and motions."""
 
-from ros_pad.estimation.doubt import FAULTS
-from ros_pad.estimation.doubt import KINDS
+from ros_pad.estimation.doubt import FAULTS, KINDS
 from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.foot import ContactMotion
-from ros_pad.estimation.foot import Estimate
-from ros_pad.estimation.foot import FootEstimator
-from ros_pad.estimation.tuning import SETTINGS
-from ros_pad.estimation.tuning import Tuning
+from ros_pad.estimation.foot import ContactMotion, Estimate, FootEstimator
+from ros_pad.estimation.tuning import SETTINGS, Tuning
 
 DOUBTS = KINDS
 """Kinds of doubt, which are the texts before the colon; the first one, empty, is no doubt."""

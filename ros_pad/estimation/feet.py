@@ -13,21 +13,15 @@ from operator import sub
 
 import numpy as np
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import shown
+from ros_pad.configuration import instance, integer, number, shown
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.axes import SharedAxes
 from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.ground import Ground
-from ros_pad.estimation.ground import shared_friction
+from ros_pad.estimation.ground import Ground, shared_friction
 from ros_pad.estimation.scales import DELAY
-from ros_pad.estimation.sensing import LEAP_DISTANCE
-from ros_pad.estimation.sensing import READINGS
-from ros_pad.estimation.track import Sample
-from ros_pad.estimation.track import Track
+from ros_pad.estimation.sensing import LEAP_DISTANCE, READINGS
+from ros_pad.estimation.track import Sample, Track
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP
 from ros_pad.records import Array

@@ -10,9 +10,7 @@ from typing import NamedTuple
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
-from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.feet import refuse
-from ros_pad.estimation.feet import wrong_numbers
+from ros_pad.estimation.feet import FeetEstimator, refuse, wrong_numbers
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.noise import SensorNoise
 from ros_pad.estimation.tuning import Tuning

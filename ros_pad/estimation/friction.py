@@ -14,16 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy import special
 
-from ros_pad.estimation.scales import EDGES
-from ros_pad.estimation.scales import GRID
-from ros_pad.estimation.scales import Felt
-from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.scales import EDGES, GRID, Felt, FrictionScales
 from ros_pad.estimation.tuning import Tuning
 
 # Products by dot take half the time of those by @; one with ones, a fraction of that of a sum.

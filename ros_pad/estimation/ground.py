@@ -5,19 +5,12 @@ from __future__ import annotations
 
 import math
 
-from ros_pad.contact.resistance import THICK_FILM
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import THICK_FILM, Foot
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.friction import Evidence
-from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.parts import History
-from ros_pad.estimation.parts import Path
-from ros_pad.estimation.parts import Stance
-from ros_pad.estimation.parts import Window
-from ros_pad.estimation.scales import FrictionPrior
-from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
+from ros_pad.estimation.parts import History, Path, Stance, Window
+from ros_pad.estimation.scales import FrictionPrior, FrictionScales
 from ros_pad.estimation.sensing import DEAD
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.estimation.watch import LONGEST_GAP

@@ -9,14 +9,11 @@ much of it is correlated in time, as in filtered or repeated readings; they are 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
-from bisect import insort
+from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Sequence
-from itertools import compress
-from itertools import pairwise
-from operator import mul
-from operator import sub
+from itertools import compress, pairwise
+from operator import mul, sub
 
 PRIOR_WINDOWS = 5
 """Windows of 40 ms that the configured noise is worth."""

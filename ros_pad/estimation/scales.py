@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import expected_friction
+from ros_pad.contact.resistance import Foot, expected_friction
 
 EDGES = np.geomspace(0.025, 2.5, 97)
 GRID = np.sqrt(EDGES[:-1] * EDGES[1:])

@@ -7,8 +7,7 @@ The estimator node, the loop without ROS and replay use the same class.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,19 +17,17 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.estimation.doubt import Doubt
-from ros_pad.estimation.feet import LARGEST_FORCE
-from ros_pad.estimation.feet import LARGEST_POSITION
-from ros_pad.estimation.feet import FeetEstimator
-from ros_pad.estimation.feet import refuse
-from ros_pad.estimation.feet import wrong_numbers
+from ros_pad.estimation.feet import (
+    LARGEST_FORCE,
+    LARGEST_POSITION,
+    FeetEstimator,
+    refuse,
+    wrong_numbers,
+)
 from ros_pad.estimation.track import Sample
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import Pace
-from ros_pad.records import ESTIMATE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Array
-from ros_pad.records import Block
+from ros_pad.pace import CONTROL_PERIOD_NS, Pace
+from ros_pad.records import ESTIMATE, SAMPLE, Array, Block
 
 PUBLISH_RATE = Setting(
     'publish_rate', 1e9 / CONTROL_PERIOD_NS, 'Estimates a second.', 'Hz', 5.0, 1000.0

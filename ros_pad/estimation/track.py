@@ -6,25 +6,18 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ros_pad.estimation import doubt
 from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.axes import BLOCK
-from ros_pad.estimation.axes import Axes
-from ros_pad.estimation.axes import SharedAxes
+from ros_pad.estimation.axes import BLOCK, Axes, SharedAxes
 from ros_pad.estimation.doubt import Doubt
 from ros_pad.estimation.ground import Ground
 from ros_pad.estimation.noise import SensorNoise
-from ros_pad.estimation.parts import Gate
-from ros_pad.estimation.parts import Offset
-from ros_pad.estimation.parts import Slip
-from ros_pad.estimation.parts import Window
+from ros_pad.estimation.parts import Gate, Offset, Slip, Window
 from ros_pad.estimation.sensing import Sensing
 from ros_pad.estimation.tuning import Tuning
-from ros_pad.estimation.watch import LONGEST_GAP
-from ros_pad.estimation.watch import Watch
+from ros_pad.estimation.watch import LONGEST_GAP, Watch
 
 Sample = Sequence[float]
 """Numbers of a row of :data:`ros_pad.records.SAMPLE`: force, N, moment, N m, position, m,

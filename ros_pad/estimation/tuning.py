@@ -4,20 +4,14 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ros_pad.configuration import Setting
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.alarm import THRESHOLD
 from ros_pad.estimation.load_gate import CONTACT_SHARE
-from ros_pad.estimation.scales import CLASSES
-from ros_pad.estimation.scales import SCALE_RANGE
-from ros_pad.estimation.scales import SCALE_SD
-from ros_pad.estimation.scales import SCALE_SD_RANGE
-from ros_pad.estimation.scales import Scale
+from ros_pad.estimation.scales import CLASSES, SCALE_RANGE, SCALE_SD, SCALE_SD_RANGE, Scale
 
 EXPECTED_LOAD = Setting(
     'expected_load', 6.83, 'Normal force on a foot in stance: a third of the weight in a tripod.',

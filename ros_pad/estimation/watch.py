@@ -6,10 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from ros_pad.estimation.axes import BLOCK
-from ros_pad.estimation.axes import LONGEST
-from ros_pad.estimation.axes import Axes
-from ros_pad.estimation.axes import Vector
+from ros_pad.estimation.axes import BLOCK, LONGEST, Axes, Vector
 from ros_pad.estimation.noise import SensorNoise
 
 LONGEST_GAP = 0.15

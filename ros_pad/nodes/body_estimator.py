@@ -20,36 +20,28 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from ros_pad.bags.topics import STAMP
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.nodes import qos, topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.listening import message_class
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import LEGS, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.stamps import set_stamp
-from ros_pad.nodes.stamps import split
-from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.nodes.stamps import nanoseconds, set_stamp, split
+from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace
+from ros_pad.records import SAMPLE, Block
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimate
-from ros_pad.sensing import SensingStage
+from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.mapping import Mapping
-from ros_pad.sensing.stage import SET_BACK_NS
-from ros_pad.sensing.stage import SETTINGS
-from ros_pad.sensing.stage import JointOrder
-from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import robot_of
-from ros_pad.sensing.stage import sample_of
-from ros_pad.sensing.stage import twist_of
+from ros_pad.sensing.stage import (
+    SET_BACK_NS,
+    SETTINGS,
+    JointOrder,
+    estimator_of,
+    robot_of,
+    sample_of,
+    twist_of,
+)
 
 PARAMETERS = (
     LEGS,

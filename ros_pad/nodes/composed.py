@@ -30,30 +30,24 @@ from rclpy.task import Future
 from ros_pad.bags import annotate
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import PadError
-from ros_pad.estimation import SETTINGS
-from ros_pad.estimation import Tuning
+from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes.body_estimator import BodyEstimatorNode
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
-from ros_pad.nodes.parameters import BACKEND_OPTIONS
-from ros_pad.nodes.parameters import values_of
+from ros_pad.nodes.parameters import BACKEND_OPTIONS, values_of
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.simulator import SimulatorNode
-from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import Progress
+from ros_pad.pace import CONTROL_PERIOD_NS, Progress
 from ros_pad.signals import STOP
 from ros_pad.simulation import fidelity as levels
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.label import PARAMETERS
-from ros_pad.trials.label import label
+from ros_pad.trials.label import PARAMETERS, label
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.metrics import summarise
-from ros_pad.trials.node_settings import body_settings_for
-from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.node_settings import body_settings_for, tuning_for
 from ros_pad.trials.trial import Trial
 
 PATIENCE = 30.0

@@ -5,48 +5,36 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.msg import ParameterEvent, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
 
-from ros_pad.control import COMMAND_TIMEOUT
-from ros_pad.control import POLICIES
-from ros_pad.control import MorphologyController
-from ros_pad.control import first_morphologies
-from ros_pad.control import policy_named
-from ros_pad.control.morphology import LIFT_OFF
-from ros_pad.control.morphology import MARGIN
-from ros_pad.control.policies import PREFIX
+from ros_pad.control import (
+    COMMAND_TIMEOUT,
+    POLICIES,
+    MorphologyController,
+    first_morphologies,
+    policy_named,
+)
+from ros_pad.control.morphology import LIFT_OFF, MARGIN
+from ros_pad.control.policies import PREFIX, IsWet, Policy
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.control.policies import IsWet
-from ros_pad.control.policies import Policy
 from ros_pad.control.stage import DecisionStage
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
+from ros_pad.errors import ConfigError, InvalidInput, LimitError
 from ros_pad.nodes import topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import EXPECTED_LOAD
-from ros_pad.nodes.parameters import FOOT
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import SEED
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, SEED, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
+from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
 from ros_pad.simulation.scene import Scene
 

@@ -3,20 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ros_pad.nodes import topics
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.stamps import set_stamp
-from ros_pad.pace import LATE
-from ros_pad.pace import Pace
+from ros_pad.pace import LATE, Pace
 
 OLDEST = 0.1
 """Age of the last sample, s, from which a node that needs samples counts as late."""

@@ -16,25 +16,17 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
-from ros_pad.estimation import SETTINGS
-from ros_pad.estimation import Tuning
+from ros_pad.errors import InvalidInput, PadError
+from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation import doubt as doubts
-from ros_pad.estimation.stage import PUBLISH_RATE
-from ros_pad.estimation.stage import EstimationStage
+from ros_pad.estimation.stage import PUBLISH_RATE, EstimationStage
 from ros_pad.estimation.tuning import attribute
 from ros_pad.nodes import topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import EXPECTED_LOAD
-from ros_pad.nodes.parameters import FOOT
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import EXPECTED_LOAD, FOOT, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
+from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
 from ros_pad.trials import learnt
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,8 @@ import numpy as np
 from ros_pad.bags.codec import message_type
 from ros_pad.bags.definitions import message_definition
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.robot import FootState, SimulatedRobot
+from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
 
 ARRAY = message_type(

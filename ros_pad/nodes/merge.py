@@ -17,25 +17,17 @@ import numpy as np
 from rclpy.node import Node
 
 from ros_pad.bags import topics as schemas
-from ros_pad.bags.topics import FRAME
-from ros_pad.bags.topics import STAMP
+from ros_pad.bags.topics import FRAME, STAMP
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.joining import WAIT_NS
-from ros_pad.joining import Joiner
+from ros_pad.joining import WAIT_NS, Joiner
 from ros_pad.nodes import topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.records import COMMAND
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import COMMAND, PRESSURE, SAMPLE, Block
 
 PARAMETERS = (
     LEGS,

@@ -7,25 +7,19 @@ numbers differ: rclpy takes several times as long to convert whole messages.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from ros_pad.bags import topics as schemas
-from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.fields import FieldWriter
-from ros_pad.bags.fields import field_of
+from ros_pad.bags.fields import FieldReader, FieldWriter, field_of
 from ros_pad.bags.wire import Wire
-from ros_pad.errors import BadMessage
-from ros_pad.errors import UnknownEncoding
+from ros_pad.errors import BadMessage, UnknownEncoding
 from ros_pad.nodes import topics
 from ros_pad.nodes.refusals import Refusals
 from ros_pad.nodes.stamps import clock_of

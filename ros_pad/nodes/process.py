@@ -13,9 +13,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.signals import STOP
 
 REACTION = 0.1

@@ -9,42 +9,30 @@ import json
 import struct
 import sys
 import time
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import GetParameters
-from rcl_interfaces.srv import ListParameters
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.client import Client
-from rclpy.clock import Clock
-from rclpy.clock import ClockType
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
-from rclpy.qos import qos_profile_parameter_events
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from ros_pad.bags import BagWriter
 from ros_pad.bags.wire import Wire
 from ros_pad.bags.writer import FLUSH_PERIOD
-from ros_pad.errors import BadMessage
-from ros_pad.errors import BagError
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.errors import BadMessage, BagError
+from ros_pad.nodes import qos, topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.intake import Intake
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
-from ros_pad.nodes.parameters import plain
+from ros_pad.nodes.parameters import LEGS, Parameter, declare, plain
 from ros_pad.nodes.process import run
 from ros_pad.pace import LATE
 from ros_pad.trials import label

@@ -11,9 +11,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.lifecycle import LifecycleNode
-from rclpy.lifecycle import LifecycleState
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
@@ -25,29 +23,23 @@ from ros_pad.estimation.stage import PUBLISH_RATE
 from ros_pad.nodes import topics
 from ros_pad.nodes.diagnostics import Diagnostics
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import BACKEND_OPTIONS
-from ros_pad.nodes.parameters import FOOT
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import BACKEND_OPTIONS, FOOT, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
+from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
-from ros_pad.regulators import BACKENDS
-from ros_pad.regulators import create
+from ros_pad.regulators import BACKENDS, create
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.supervision import Supervision
-from ros_pad.regulators.supervision import supply_health
-from ros_pad.regulators.supervisor import CEILING_TOLERANCE
-from ros_pad.regulators.supervisor import ON_FAULT
-from ros_pad.regulators.supervisor import SLEW_LIMIT
-from ros_pad.regulators.supervisor import Health
-from ros_pad.regulators.supervisor import Level
-from ros_pad.regulators.supervisor import SupervisedChannel
-from ros_pad.regulators.supervisor import SupervisorSettings
-from ros_pad.simulation.faults import faults_of
-from ros_pad.simulation.faults import parsed
+from ros_pad.regulators.supervision import Supervision, supply_health
+from ros_pad.regulators.supervisor import (
+    CEILING_TOLERANCE,
+    ON_FAULT,
+    SLEW_LIMIT,
+    Health,
+    Level,
+    SupervisedChannel,
+    SupervisorSettings,
+)
+from ros_pad.simulation.faults import faults_of, parsed
 from ros_pad.simulation.scene import Scene
 
 

@@ -17,32 +17,21 @@ from rclpy.node import Node
 
 from ros_pad.bags.topics import STAMP
 from ros_pad.contact import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.tuning import SOURCES
 from ros_pad.nodes import topics
 from ros_pad.nodes.diagnostics import Diagnostics
-from ros_pad.nodes.markers import ARRAY
-from ros_pad.nodes.markers import WalkMarkers
+from ros_pad.nodes.markers import ARRAY, WalkMarkers
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import SCENE
-from ros_pad.nodes.parameters import SEED
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import SCENE, SEED, Parameter, declare
 from ros_pad.nodes.process import run
 from ros_pad.nodes.stamps import split
-from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import LATE
-from ros_pad.pace import Pace
-from ros_pad.pace import Rate
-from ros_pad.pace import RealTime
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.pace import CONTROL_PERIOD_NS, LATE, Pace, Rate, RealTime
+from ros_pad.records import SAMPLE, Block
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.sensors import BodySensors
-from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.sensors import BodySensors, Sensors
 from ros_pad.simulation.terms import with_terms
 
 PARAMETERS = (

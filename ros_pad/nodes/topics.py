@@ -9,35 +9,25 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import PoseStamped
-from geometry_msgs.msg import TwistWithCovarianceStamped
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistWithCovarianceStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import FluidPressure
-from sensor_msgs.msg import Imu
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool
-from std_msgs.msg import Float64
-from std_msgs.msg import String
+from sensor_msgs.msg import FluidPressure, Imu, JointState
+from std_msgs.msg import Bool, Float64, String
 from visualization_msgs.msg import MarkerArray
 
 from ros_pad.bags import topics as schemas
-from ros_pad.bags.codec import MessageType
-from ros_pad.bags.codec import message_type
+from ros_pad.bags.codec import MessageType, message_type
 from ros_pad.bags.definitions import message_definition
 from ros_pad.errors import ConfigError
 from ros_pad.nodes import qos

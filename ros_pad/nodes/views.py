@@ -20,20 +20,14 @@ from std_msgs.msg import String
 
 from ros_pad.bags import topics as schemas
 from ros_pad.bags.topics import STAMP
-from ros_pad.control.policies import DOME
-from ros_pad.control.policies import FLAT
+from ros_pad.control.policies import DOME, FLAT
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import topics
-from ros_pad.nodes.markers import ARRAY
-from ros_pad.nodes.markers import marker_of_foot
+from ros_pad.nodes.markers import ARRAY, marker_of_foot
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE, LEGS, Parameter, declare
 from ros_pad.nodes.process import run
-from ros_pad.nodes.stamps import set_stamp
-from ros_pad.nodes.stamps import split
+from ros_pad.nodes.stamps import set_stamp, split
 from ros_pad.pace import Pace
 from ros_pad.records import Block
 

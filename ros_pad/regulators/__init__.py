@@ -5,15 +5,12 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.regulators.alicat import AlicatRegulator
-from ros_pad.regulators.protocol import Reading
-from ros_pad.regulators.protocol import Regulator
+from ros_pad.regulators.protocol import Reading, Regulator
 from ros_pad.regulators.serial_text import SerialTextRegulator
 from ros_pad.regulators.simulated import SimulatedRegulator
 from ros_pad.regulators.smc_itv import SmcItvRegulator

@@ -7,14 +7,10 @@ import math
 import re
 
 from ros_pad.configuration import choice
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame
-from ros_pad.regulators.serial_device import SerialRegulator
-from ros_pad.regulators.serial_device import unit
-from ros_pad.regulators.transport import Query
-from ros_pad.regulators.transport import SerialLine
+from ros_pad.regulators.serial_device import Frame, SerialRegulator, unit
+from ros_pad.regulators.transport import Query, SerialLine
 
 STATUS = {
     'ADC': 'ADC (analogue converter failed)',

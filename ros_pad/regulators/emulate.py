@@ -14,8 +14,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ros_pad.configuration import number
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
+from ros_pad.errors import InvalidInput, TransportError
 from ros_pad.regulators.serial_device import unit
 
 LINE_FAULTS = ('silence', 'half_line', 'garbage', 'unplugged')

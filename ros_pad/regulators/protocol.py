@@ -5,12 +5,9 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import NamedTuple
-from typing import Protocol
-from typing import runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
+from ros_pad.errors import InvalidInput, LimitError
 
 CEILING = 90e3
 """Highest set-point of a regulator unless its options give another one, gauge Pa."""

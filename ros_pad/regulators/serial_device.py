@@ -6,31 +6,29 @@ from __future__ import annotations
 import math
 import threading
 import time
-from abc import ABC
-from abc import abstractmethod
-from dataclasses import dataclass
-from dataclasses import field
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import text
-from ros_pad.errors import ConfigError
-from ros_pad.errors import DeviceError
-from ros_pad.errors import DeviceFault
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
-from ros_pad.errors import ProtocolError
-from ros_pad.errors import TransportError
-from ros_pad.regulators.protocol import Reading
-from ros_pad.regulators.protocol import permitted
-from ros_pad.regulators.transport import FIRST_PAUSE
-from ros_pad.regulators.transport import LONGEST_PAUSE
-from ros_pad.regulators.transport import Bus
-from ros_pad.regulators.transport import PortLost
-from ros_pad.regulators.transport import Query
-from ros_pad.regulators.transport import SerialLine
-from ros_pad.regulators.transport import failure
+from ros_pad.configuration import choice, integer, number, text
+from ros_pad.errors import (
+    ConfigError,
+    DeviceError,
+    DeviceFault,
+    InvalidInput,
+    PadError,
+    ProtocolError,
+    TransportError,
+)
+from ros_pad.regulators.protocol import Reading, permitted
+from ros_pad.regulators.transport import (
+    FIRST_PAUSE,
+    LONGEST_PAUSE,
+    Bus,
+    PortLost,
+    Query,
+    SerialLine,
+    failure,
+)
 
 OPEN_PATIENCE = 1.0
 """Longest time for which ``open`` waits for a device to answer, s."""

@@ -6,15 +6,11 @@ from __future__ import annotations
 import math
 import re
 
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import text
+from ros_pad.configuration import integer, number, text
 from ros_pad.errors import InvalidInput
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame
-from ros_pad.regulators.serial_device import SerialRegulator
-from ros_pad.regulators.transport import Query
-from ros_pad.regulators.transport import SerialLine
+from ros_pad.regulators.serial_device import Frame, SerialRegulator
+from ros_pad.regulators.transport import Query, SerialLine
 
 _VALUE = r'[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?'
 _FIELD = re.compile(r'\{(channel|value(?::(?:\.(\d)f|d))?)\}')

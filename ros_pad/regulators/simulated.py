@@ -7,22 +7,13 @@ import copy
 import math
 import random
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
-from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.protocol import Reading
-from ros_pad.regulators.protocol import permitted
-from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.faults import condition
-from ros_pad.simulation.faults import parsed
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.configuration import integer, number
+from ros_pad.errors import InvalidInput, TransportError
+from ros_pad.regulators.protocol import CEILING, Reading, permitted
+from ros_pad.simulation.faults import Fault, condition, parsed
+from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel
 
 STEP = 0.004
 """Internal time step, s."""

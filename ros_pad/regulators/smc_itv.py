@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from ros_pad.configuration import number
 from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.serial_device import Frame
-from ros_pad.regulators.serial_device import SerialRegulator
-from ros_pad.regulators.transport import Query
-from ros_pad.regulators.transport import SerialLine
+from ros_pad.regulators.serial_device import Frame, SerialRegulator
+from ros_pad.regulators.transport import Query, SerialLine
 
 FULL_COUNT = 1023
 """Setting at full scale: 10 bits."""

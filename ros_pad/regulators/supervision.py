@@ -11,11 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ros_pad.records import PRESSURE
-from ros_pad.records import Block
-from ros_pad.regulators.supervisor import Health
-from ros_pad.regulators.supervisor import Level
-from ros_pad.regulators.supervisor import SupervisedChannel
+from ros_pad.records import PRESSURE, Block
+from ros_pad.regulators.supervisor import Health, Level, SupervisedChannel
 
 _ROW = PRESSURE.dtype
 

@@ -10,22 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
-from typing import NamedTuple
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ros_pad.configuration import Setting
-from ros_pad.control.faults import Fault
-from ros_pad.control.faults import Kind
-from ros_pad.control.faults import joined
+from ros_pad.control.faults import Fault, Kind, joined
 from ros_pad.control.monitor import PadMonitor
 from ros_pad.control.morphology import COMMAND_TIMEOUT
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
-from ros_pad.errors import PadError
-from ros_pad.errors import ProtocolError
-from ros_pad.regulators.protocol import Regulator
-from ros_pad.regulators.protocol import permitted
+from ros_pad.errors import InvalidInput, LimitError, PadError, ProtocolError
+from ros_pad.regulators.protocol import Regulator, permitted
 
 SLEW_LIMIT = Setting(
     'slew_limit', 0.0, 'Largest rate of change of the set-point in force, except for vents; 0: no'

@@ -8,14 +8,9 @@ import math
 import threading
 import time
 from dataclasses import dataclass
-from typing import Any
-from typing import Protocol
+from typing import Any, Protocol
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import DeviceError
-from ros_pad.errors import PadError
-from ros_pad.errors import ProtocolError
-from ros_pad.errors import TransportError
+from ros_pad.errors import ConfigError, DeviceError, PadError, ProtocolError, TransportError
 
 LONGEST_REPLY = 256
 """Longest reply, bytes; a longer one without a terminator is an error."""

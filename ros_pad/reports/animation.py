@@ -16,11 +16,7 @@ from typing import Any
 import numpy as np
 
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WET
+from ros_pad.reports.style import BLACK, BLUE, PALE, VERMILION, WET
 from ros_pad.reports.view import View
 
 RATE = 25.0  # frames a second

@@ -11,18 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact.calibrate import Calibration
-from ros_pad.contact.calibrate import Constant
-from ros_pad.contact.dome import BURST
-from ros_pad.contact.dome import inflate
+from ros_pad.contact.calibrate import Calibration, Constant
+from ros_pad.contact.dome import BURST, inflate
 from ros_pad.contact.laws import with_constant
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Pad
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import STYLE
-from ros_pad.reports.style import VERMILION
+from ros_pad.contact.pad import Array, Pad
+from ros_pad.reports.style import BLACK, BLUE, PALE, STYLE, VERMILION
 
 _SHAPE = ('height', 'depth', 'contact_radius', 'gap')
 _MARKS = {'height': 'o', 'depth': 'v', 'contact_radius': 's', 'gap': '^'}

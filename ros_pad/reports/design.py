@@ -10,19 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ros_pad.contact import Design
-from ros_pad.contact import foot_force
-from ros_pad.contact import rise_height
-from ros_pad.contact.candidates import Candidate
-from ros_pad.contact.candidates import Span
+from ros_pad.contact import Design, foot_force, rise_height
+from ros_pad.contact.candidates import Candidate, Span
 from ros_pad.contact.design import DOME
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import STANCE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WIDE
+from ros_pad.reports.style import BLACK, BLUE, STANCE, VERMILION, WIDE
 
 CLAIMED = (0.3, 0.8)  # mm, best radius as the thesis claims
 

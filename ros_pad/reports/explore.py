@@ -9,53 +9,42 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.capillary.mesh import hexagonal
-from ros_pad.configuration import Setting
-from ros_pad.configuration import quantity
-from ros_pad.contact import THESIS_LIQUID
-from ros_pad.contact import WATER
-from ros_pad.contact import Film
-from ros_pad.contact import Foot
-from ros_pad.contact import Inflated
-from ros_pad.contact import Material
-from ros_pad.contact import Meniscus
-from ros_pad.contact import Pad
-from ros_pad.contact import Pressed
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import meniscus
-from ros_pad.contact import press
+from ros_pad.configuration import Setting, quantity
+from ros_pad.contact import (
+    THESIS_LIQUID,
+    WATER,
+    Film,
+    Foot,
+    Inflated,
+    Material,
+    Meniscus,
+    Pad,
+    Pressed,
+    force_limit,
+    inflate,
+    meniscus,
+    press,
+)
 from ros_pad.contact.candidates import Span
-from ros_pad.contact.limits import DEFAULT_CRITERION
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.contact.pad import Array
-from ros_pad.contact.resistance import DOMED
-from ros_pad.contact.resistance import FOOT_SETTINGS
-from ros_pad.contact.resistance import PAD_SETTINGS
-from ros_pad.contact.resistance import RUBBER_SETTINGS
-from ros_pad.contact.resistance import THICK_FILM
-from ros_pad.contact.squeeze import STIFF
-from ros_pad.contact.squeeze import dome_dimple
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
-from ros_pad.simulation.pneumatics import time_to
+from ros_pad.contact.limits import DEFAULT_CRITERION, criteria, largest_pressure
+from ros_pad.contact.pad import DOME_PRESSURE, Array
+from ros_pad.contact.resistance import (
+    DOMED,
+    FOOT_SETTINGS,
+    PAD_SETTINGS,
+    RUBBER_SETTINGS,
+    THICK_FILM,
+)
+from ros_pad.contact.squeeze import STIFF, dome_dimple
+from ros_pad.errors import ConfigError, InvalidInput, NoEquilibrium
+from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel, time_to
 
 MEASURED = 'measured stiffness'
 """Choice of the material for pads of a measured stiffness, without a material."""

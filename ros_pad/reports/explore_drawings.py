@@ -5,21 +5,15 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from ros_pad.contact.pad import Array
-from ros_pad.reports.explore import STATES
-from ros_pad.reports.explore import Explored
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import STANCE
-from ros_pad.reports.style import VERMILION
+from ros_pad.reports.explore import STATES, Explored
+from ros_pad.reports.style import BLACK, BLUE, PALE, STANCE, VERMILION
 
 WIDTH, HEIGHT = 480.0, 310.0
 NAMES = ('profile', 'sole', 'grip', 'limits')

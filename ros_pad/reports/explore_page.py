@@ -21,15 +21,17 @@ from ros_pad.contact.calibrate import foot_text
 from ros_pad.contact.limits import CRITERIA
 from ros_pad.errors import PadError
 from ros_pad.reports import explore_drawings
-from ros_pad.reports.explore import BAND
-from ros_pad.reports.explore import FIELDS
-from ros_pad.reports.explore import LIQUIDS
-from ros_pad.reports.explore import MEASURED
-from ros_pad.reports.explore import Explored
-from ros_pad.reports.explore import Field
-from ros_pad.reports.explore import Inputs
-from ros_pad.reports.explore import explore
-from ros_pad.reports.explore import rows
+from ros_pad.reports.explore import (
+    BAND,
+    FIELDS,
+    LIQUIDS,
+    MEASURED,
+    Explored,
+    Field,
+    Inputs,
+    explore,
+    rows,
+)
 
 HOST = '127.0.0.1'
 PATIENCE = 0.1
@@ -101,9 +103,7 @@ def serve(foot: Foot, port: int, browser: bool, out: pathlib.Path | None) -> Non
         When NiceGUI is not installed.
     """
     try:
-        from nicegui import app
-        from nicegui import core
-        from nicegui import ui
+        from nicegui import app, core, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
     except ImportError as error:
         raise PadError(f"NiceGUI is missing ({error}): pip install 'ros_pad[explore]'") from error

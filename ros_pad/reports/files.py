@@ -6,20 +6,15 @@ from __future__ import annotations
 import contextlib
 import os
 import pathlib
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import matplotlib
 from matplotlib.figure import Figure
 
 from ros_pad.configuration import refuse
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from ros_pad.pace import Progress
-from ros_pad.reports.style import DPI
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import rendered
+from ros_pad.reports.style import DPI, PAPER_STYLE, Drawn, rendered
 
 _PICTURES = ('.png', '.svg', '.pdf')
 

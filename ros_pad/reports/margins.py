@@ -8,12 +8,7 @@ from matplotlib.figure import Figure
 
 from ros_pad.contact import force_limit
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
+from ros_pad.reports.style import BLACK, GREEN, PALE, VERMILION, WIDE, Drawn
 from ros_pad.reports.view import View
 
 

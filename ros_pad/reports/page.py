@@ -5,14 +5,11 @@ from __future__ import annotations
 
 import base64
 import html
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from matplotlib.figure import Figure
 
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import rendered
+from ros_pad.reports.style import WIDE, Drawn, rendered
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[str]], numbers: range) -> str:

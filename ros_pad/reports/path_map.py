@@ -13,12 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WET
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
+from ros_pad.reports.style import BLACK, PALE, VERMILION, WET, WIDE, Drawn
 from ros_pad.reports.view import View
 
 _ROW_GAP = 0.4  # inches between the rows of a map

@@ -16,24 +16,22 @@ from matplotlib.patches import Patch
 
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.pace import Progress
-from ros_pad.reports import margins
-from ros_pad.reports import path_map
-from ros_pad.reports import reliability
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import COLUMN
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import STANCE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WET
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import legend
-from ros_pad.reports.view import View
-from ros_pad.reports.view import spans
-from ros_pad.reports.view import window_of
+from ros_pad.reports import margins, path_map, reliability
+from ros_pad.reports.style import (
+    BLACK,
+    BLUE,
+    COLUMN,
+    GREEN,
+    PALE,
+    PAPER_STYLE,
+    STANCE,
+    VERMILION,
+    WET,
+    WIDE,
+    Drawn,
+    legend,
+)
+from ros_pad.reports.view import View, spans, window_of
 
 POLICY_NAMES = {
     'flat': 'always flat',

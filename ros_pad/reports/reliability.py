@@ -10,11 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import COLUMN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import legend
+from ros_pad.reports.style import BLUE, COLUMN, PALE, Drawn, legend
 from ros_pad.reports.view import View
 from ros_pad.trials.metrics import stance_ends
 

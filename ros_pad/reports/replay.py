@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WIDE
+from ros_pad.reports.style import VERMILION, WIDE
 from ros_pad.trials.comparison import Track
 from ros_pad.trials.replay import Replay
 

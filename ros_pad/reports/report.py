@@ -6,10 +6,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -18,25 +15,16 @@ import numpy as np
 from ros_pad.configuration import refuse
 from ros_pad.estimation import DOUBTS
 from ros_pad.pace import Progress
-from ros_pad.reports import animation
-from ros_pad.reports import pictures
+from ros_pad.reports import animation, pictures
 from ros_pad.reports.files import save
-from ros_pad.reports.page import heading
-from ros_pad.reports.page import page
-from ros_pad.reports.page import plain_table
-from ros_pad.reports.page import section
-from ros_pad.reports.page import table
-from ros_pad.reports.page import warning
+from ros_pad.reports.page import heading, page, plain_table, section, table, warning
 from ros_pad.reports.pictures import POLICY_NAMES
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.view import View
-from ros_pad.reports.view import view_of
+from ros_pad.reports.style import PAPER_STYLE, Drawn
+from ros_pad.reports.view import View, view_of
 from ros_pad.trials import conditions
 from ros_pad.trials.label import promise
 from ros_pad.trials.metrics import stance_ends
-from ros_pad.trials.trial import Trial
-from ros_pad.trials.trial import fault_lines
+from ros_pad.trials.trial import Trial, fault_lines
 
 _POLICY_TEXTS = (
     'Always flat and always dome never change; adaptive feet decide at each lift-off by their '

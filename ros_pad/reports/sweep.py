@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -16,17 +15,18 @@ from matplotlib.lines import Line2D
 
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import COLUMN
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.trials.sweep import Point
-from ros_pad.trials.sweep import Sweep
+from ros_pad.reports.style import (
+    BLACK,
+    BLUE,
+    COLUMN,
+    GREEN,
+    PALE,
+    PAPER_STYLE,
+    VERMILION,
+    WIDE,
+    Drawn,
+)
+from ros_pad.trials.sweep import Point, Sweep
 
 LOOKS = {
     'adaptive': (GREEN, 'o'),

@@ -16,18 +16,10 @@ from scipy.special import bdtr
 from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.reports.files import save
-from ros_pad.reports.page import heading
-from ros_pad.reports.page import page
-from ros_pad.reports.page import section
-from ros_pad.reports.page import table
-from ros_pad.reports.page import warning
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import Drawn
+from ros_pad.reports.page import heading, page, section, table, warning
+from ros_pad.reports.style import PAPER_STYLE, Drawn
 from ros_pad.reports.sweep import figure
-from ros_pad.trials.sweep import Found
-from ros_pad.trials.sweep import Point
-from ros_pad.trials.sweep import Row
-from ros_pad.trials.sweep import points
+from ros_pad.trials.sweep import Found, Point, Row, points
 
 MOST_ROWS = 1000  # largest number of rows of the table of conditions
 MOST_FAILURES = 50  # largest number of failed or ended trials in a table

@@ -14,19 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wet
-from ros_pad.capillary import WetPattern
-from ros_pad.capillary.sections import layered
-from ros_pad.capillary.sections import walls
+from ros_pad.capillary import Mesh, Wet, WetPattern
+from ros_pad.capillary.sections import layered, walls
 from ros_pad.reports.files import write_picture
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import WET
+from ros_pad.reports.style import BLACK, BLUE, WET
 
 Array = npt.NDArray[Any]
 

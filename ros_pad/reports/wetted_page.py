@@ -12,12 +12,8 @@ from typing import Any
 import numpy as np
 
 from ros_pad.reports.files import save
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import WET
-from ros_pad.reports.wetted import DRY
-from ros_pad.reports.wetted import WETTED
-from ros_pad.reports.wetted import Picture
+from ros_pad.reports.style import BLACK, BLUE, WET
+from ros_pad.reports.wetted import DRY, WETTED, Picture
 
 
 def page(title: str, rows: Sequence[tuple[str, str]], drawn: Picture) -> str:

@@ -10,9 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import skew
+from ros_pad.robots.rotation import Array, cross, skew
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import Setting
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Setting, Table, choice, number, quantity
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.rotation import Array
 
 GAITS = ('tripod', 'trot', 'wave', 'crawl', 'ripple')

@@ -10,11 +10,9 @@ from operator import sub
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.robots.chains import Chains
-from ros_pad.robots.chains import Joint
+from ros_pad.robots.chains import Chains, Joint
 from ros_pad.robots.robot import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
+from ros_pad.robots.rotation import Array, cross
 
 Place = tuple[float, float, float]
 

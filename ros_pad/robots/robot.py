@@ -6,32 +6,20 @@ from __future__ import annotations
 import math
 import os
 import pathlib
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad import configuration
-from ros_pad.configuration import Setting
-from ros_pad.configuration import Table
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
-from ros_pad.configuration import text
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Setting, Table, number, quantity, text
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import urdf
-from ros_pad.robots.chains import Chains
-from ros_pad.robots.chains import Joint
-from ros_pad.robots.chains import Kinematics
+from ros_pad.robots.chains import Chains, Joint, Kinematics
 from ros_pad.robots.gait import Gait
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import transform
+from ros_pad.robots.rotation import Array, from_rpy, transform
 
 LEGS = (3, 8)
 """Fewest and most legs of a robot."""

@@ -7,18 +7,14 @@ import math
 import os
 import pathlib
 import xml.etree.ElementTree as xml
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import reason
+from ros_pad.errors import ConfigError, reason
 from ros_pad.robots.chains import Joint
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import transform
+from ros_pad.robots.rotation import Array, from_rpy, transform
 
 MOVING = ('revolute', 'continuous', 'prismatic')
 LIMITED = ('revolute', 'prismatic')

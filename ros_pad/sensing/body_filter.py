@@ -16,14 +16,9 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dpotrf
-from scipy.linalg.lapack import dtrtri
-from scipy.linalg.lapack import dtrtrs
+from scipy.linalg.lapack import dpotrf, dtrtri, dtrtrs
 
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import rotation
-from ros_pad.robots.rotation import skew
+from ros_pad.robots.rotation import Array, cross, rotation, skew
 
 Flags = npt.NDArray[np.bool_]
 

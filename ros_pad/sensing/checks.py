@@ -10,23 +10,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from ros_pad.configuration import quantity
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.sensing.estimator import DAMPING
-from ros_pad.sensing.estimator import LONGEST_STEP
-from ros_pad.sensing.estimator import WEIGHT
+from ros_pad.robots.rotation import Array, cross
+from ros_pad.sensing.estimator import DAMPING, LONGEST_STEP, WEIGHT
 
 Flags = npt.NDArray[np.bool_]
 

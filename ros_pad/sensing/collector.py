@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections import defaultdict
+from collections import Counter, defaultdict
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,8 @@ import numpy as np
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
-from ros_pad.sensing.checks import Finding
-from ros_pad.sensing.checks import Progress
-from ros_pad.sensing.checks import Recording
-from ros_pad.sensing.checks import examine
-from ros_pad.sensing.checks import unjudged
-from ros_pad.sensing.mapping import Mapping
-from ros_pad.sensing.mapping import Readings
+from ros_pad.sensing.checks import Finding, Progress, Recording, examine, unjudged
+from ros_pad.sensing.mapping import Mapping, Readings
 
 SHORTEST = 1.0
 """Shortest time of readings that are checked, s."""

@@ -4,34 +4,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
-from ros_pad.configuration import quantity
+from ros_pad.configuration import choice, instance, number, quantity
 from ros_pad.errors import InvalidInput
-from ros_pad.robots import Kinematics
-from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import quaternion
-from ros_pad.robots.rotation import rotation
-from ros_pad.robots.rotation import skew
-from ros_pad.sensing.body_filter import GATE
-from ros_pad.sensing.body_filter import GRAVITY
-from ros_pad.sensing.body_filter import BodyFilter
-from ros_pad.sensing.body_filter import Flags
-from ros_pad.sensing.plausibility import Delay
-from ros_pad.sensing.plausibility import Joints
-from ros_pad.sensing.plausibility import Legs
-from ros_pad.sensing.plausibility import Repeats
-from ros_pad.sensing.plausibility import Shift
-from ros_pad.sensing.plausibility import Unloaded
+from ros_pad.robots import Kinematics, Robot
+from ros_pad.robots.rotation import Array, cross, quaternion, rotation, skew
+from ros_pad.sensing.body_filter import GATE, GRAVITY, BodyFilter, Flags
+from ros_pad.sensing.plausibility import Delay, Joints, Legs, Repeats, Shift, Unloaded
 from ros_pad.sensing.slip_window import SlipWindow
 
 WEIGHT = -float(GRAVITY[2])  # m/s²

@@ -10,22 +10,16 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as MappingType
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from typing import Any
-from typing import NamedTuple
-from typing import TypeAlias
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ros_pad import configuration
-from ros_pad.configuration import Table
-from ros_pad.configuration import shown
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Table, shown
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from ros_pad.sensing.stage import SensingStage

@@ -13,8 +13,7 @@ from collections import deque
 import numpy as np
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
+from ros_pad.robots.rotation import Array, cross
 from ros_pad.sensing.body_filter import Flags
 
 EVERY = 4

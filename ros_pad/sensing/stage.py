@@ -7,31 +7,19 @@ The body estimator node, the loop without ROS and replay use the same class.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections import deque
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
-from typing import Any
-from typing import NamedTuple
-from typing import TypeAlias
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.configuration import Setting
-from ros_pad.configuration import choice
-from ros_pad.configuration import quantity
+from ros_pad.configuration import Setting, choice, quantity
 from ros_pad.errors import InvalidInput
 from ros_pad.records import SAMPLE
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import matrix
-from ros_pad.robots.rotation import skew
-from ros_pad.sensing.estimator import UNKNOWN_BIAS
-from ros_pad.sensing.estimator import WEIGHT
-from ros_pad.sensing.estimator import BodyEstimate
-from ros_pad.sensing.estimator import BodyEstimator
+from ros_pad.robots.rotation import Array, matrix, skew
+from ros_pad.sensing.estimator import UNKNOWN_BIAS, WEIGHT, BodyEstimate, BodyEstimator
 
 SAME_NS = 1_000_000
 """Difference of time stamps up to which readings are of one moment, ns: joints 4 ms later than the

@@ -2,9 +2,7 @@
 """Simulated robots on three fidelity levels, floor, sensors, pneumatics, faults, and scenes."""
 
 from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor

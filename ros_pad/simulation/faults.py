@@ -51,19 +51,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ros_pad.configuration import Setting
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
-from ros_pad.configuration import shown
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.configuration import Setting, Table, choice, integer, number, shown
+from ros_pad.errors import ConfigError, InvalidInput
 
 LATEST = 1e9
 """Latest start or end of a fault, s."""

@@ -17,22 +17,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from ros_pad import configuration
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
+from ros_pad.configuration import Table, choice
 from ros_pad.contact import LARGE_PAD
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.margin import features
-from ros_pad.simulation.margin import reserve
+from ros_pad.simulation.margin import features, reserve
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.rail_leg import RailLeg
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import RAIL_LEG
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import RailGait
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, RailGait, Scene
 from ros_pad.simulation.terrain import Floor
 
 FIDELITIES = ('auto', 'L0', 'L1', 'L2')

@@ -20,23 +20,14 @@ from typing import Any
 import numpy as np
 
 from ros_pad.configuration import number
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.rotation import Array
 from ros_pad.signals import children_spared
-from ros_pad.simulation.mujoco_model import RECOMMENDED
-from ros_pad.simulation.mujoco_model import SolverSettings
-from ros_pad.simulation.mujoco_model import mjcf
-from ros_pad.simulation.mujoco_model import tow_step
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Proprioception
-from ros_pad.simulation.robot import Vector
-from ros_pad.simulation.robot import check_reach
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings, mjcf, tow_step
+from ros_pad.simulation.robot import FootState, Proprioception, Vector, check_reach
+from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.servos import Servos
-from ros_pad.simulation.soles import Sled
-from ros_pad.simulation.soles import Soles
+from ros_pad.simulation.soles import Sled, Soles
 from ros_pad.simulation.terrain import Floor
 
 TIPPED = 0.5

@@ -10,18 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ros_pad.contact import inflate
-from ros_pad.contact import pressure_for
-from ros_pad.contact import trapped_film
+from ros_pad.contact import inflate, pressure_for, trapped_film
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.squeeze import DIMPLE
-from ros_pad.contact.squeeze import TRAPPED
-from ros_pad.contact.squeeze import dome_dimple
+from ros_pad.contact.squeeze import DIMPLE, TRAPPED, dome_dimple
 from ros_pad.errors import NoEquilibrium
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import RailGait
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, RailGait, Scene
 
 SOLE_MODULUS = 3.95e5
 """Reduced modulus of a sole whose foot names no material, Pa: of Dragon Skin 10, four times its

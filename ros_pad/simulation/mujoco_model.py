@@ -12,17 +12,12 @@ from html import escape  # xml.sax would import all of urllib
 
 import numpy as np
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
+from ros_pad.configuration import choice, integer, number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import ConfigError
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import quaternion
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import Tow
+from ros_pad.robots.rotation import Array, quaternion
+from ros_pad.simulation.scene import LeggedBody, Scene, Tow
 
 ROLL_SHARE = 0.6  # inertia of the trunk about x, or about y, over that about z, assumed
 

@@ -17,25 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, integer, number
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import NoConvergence
 from ros_pad.records import Array
-from ros_pad.simulation import compiled
-from ros_pad.simulation import planar_step
+from ros_pad.simulation import compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.simulation.planar_step import PlanarModel
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Vector
-from ros_pad.simulation.robot import check_pressures
-from ros_pad.simulation.robot import check_reach
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.terrain import CELL
-from ros_pad.simulation.terrain import WIDTH
-from ros_pad.simulation.terrain import Floor
+from ros_pad.simulation.robot import FootState, Vector, check_pressures, check_reach
+from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.terrain import CELL, WIDTH, Floor
 
 
 class PlanarRobot:

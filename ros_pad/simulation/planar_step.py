@@ -15,14 +15,8 @@ Gait, film and resistance are those of :class:`ros_pad.simulation.gait.WalkingGa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos
-from math import exp
-from math import inf
-from math import pi
-from math import sin
-from math import sqrt
-from typing import Any
-from typing import NamedTuple
+from math import cos, exp, inf, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 # A contact in a step: lever arm x, y, m; velocity x, y, m/s, and yaw rate, rad/s, at which the
 # contact would slide if the body stood still; turning radius, m; cap of its force, N; force over

@@ -9,20 +9,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, number
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation.faults import LEAK_CRITICAL_RATIO
-from ros_pad.simulation.faults import SOUND
-from ros_pad.simulation.faults import Condition
-from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.faults import condition
+from ros_pad.simulation.faults import LEAK_CRITICAL_RATIO, SOUND, Condition, Fault, condition
 
 ATMOSPHERE = 101325.0
 """Ambient pressure, absolute Pa."""

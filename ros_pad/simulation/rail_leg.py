@@ -11,27 +11,19 @@ pressure can change in each step; :func:`walk_many` walks many legs at once at f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.configuration import instance
-from ros_pad.configuration import number
+from ros_pad.configuration import instance, number
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.errors import InvalidInput
 from ros_pad.records import Array
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Vector
-from ros_pad.simulation.robot import check_pressures
-from ros_pad.simulation.robot import contacts_of
-from ros_pad.simulation.scene import RAIL_LEG
-from ros_pad.simulation.scene import RailBody
-from ros_pad.simulation.scene import RailGait
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.robot import FootState, Vector, check_pressures, contacts_of
+from ros_pad.simulation.scene import RAIL_LEG, RailBody, RailGait, Scene
 from ros_pad.simulation.terrain import Floor
 
 

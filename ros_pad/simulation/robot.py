@@ -4,20 +4,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
-from typing import NamedTuple
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, Scene
 
 STEERED = 0.1
 """Error of the heading that legs must be able to steer back from, rad."""

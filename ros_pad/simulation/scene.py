@@ -7,28 +7,20 @@ import dataclasses
 import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
 from ros_pad.contact.film import WATER_VISCOSITY
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.robots import Gait
-from ros_pad.robots import Robot
-from ros_pad.simulation.faults import SENSOR_KINDS
-from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.faults import listed
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.robots import Gait, Robot
+from ros_pad.simulation.faults import SENSOR_KINDS, Fault, listed
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.terrain import FLOORS
-from ros_pad.simulation.terrain import Floor
-from ros_pad.simulation.terrain import patch_lengths
+from ros_pad.simulation.terrain import FLOORS, Floor, patch_lengths
 
 T = TypeVar('T')
 

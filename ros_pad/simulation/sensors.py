@@ -9,15 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.records import SAMPLE
-from ros_pad.records import Array
-from ros_pad.simulation.faults import BODY_KINDS
-from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.faults import sensor_faults_of
-from ros_pad.simulation.robot import Proprioception
-from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import SensorNoise
+from ros_pad.records import SAMPLE, Array
+from ros_pad.simulation.faults import BODY_KINDS, Fault, sensor_faults_of
+from ros_pad.simulation.robot import Proprioception, SimulatedRobot
+from ros_pad.simulation.scene import Scene, SensorNoise
 
 _BLOCK = 1000  # samples drawn at once, because a call of NumPy costs more than the numbers
 

@@ -11,10 +11,8 @@ import numpy as np
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.records import Array
 from ros_pad.robots.inverse import FeetSolver
-from ros_pad.simulation.gait import FootPath
-from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.gait import FootPath, WalkingGait
+from ros_pad.simulation.scene import LeggedBody, Scene
 
 LOST = 0.3
 """Angle between a joint and its set-point, rad, at which the walk ends with a verdict."""

@@ -16,12 +16,9 @@ import numpy as np
 from ros_pad.contact.film import Film
 from ros_pad.records import Array
 from ros_pad.simulation.mujoco_model import POINT
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import check_pressures
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import Tow
-from ros_pad.simulation.terrain import Floor
-from ros_pad.simulation.terrain import Spot
+from ros_pad.simulation.robot import FootState, check_pressures
+from ros_pad.simulation.scene import Scene, Tow
+from ros_pad.simulation.terrain import Floor, Spot
 
 LIGHT = 0.05
 """Load, N, below which the friction coefficient no longer changes with the load."""

@@ -10,28 +10,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from ros_pad.contact import WATER
-from ros_pad.contact import capillary_pull
-from ros_pad.contact import hysteresis_force
+from ros_pad.contact import WATER, capillary_pull, hysteresis_force
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.resistance import THICK_FILM
-from ros_pad.contact.squeeze import STIFF
-from ros_pad.contact.squeeze import dry_share
+from ros_pad.contact.squeeze import STIFF, dry_share
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.margin import Stand
-from ros_pad.simulation.margin import dome_pressure
-from ros_pad.simulation.margin import grounds
-from ros_pad.simulation.margin import mid_stance_grip
-from ros_pad.simulation.margin import stance
+from ros_pad.simulation.margin import Stand, dome_pressure, grounds, mid_stance_grip, stance
 from ros_pad.simulation.pneumatics import ATMOSPHERE
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import RailGait
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, RailGait, Scene
 
 ADVANCING, RECEDING = 2.0944, 1.5708
 """Contact angles of water on the pads, rad, with which the force of contact lines is added."""

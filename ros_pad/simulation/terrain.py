@@ -5,15 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
 import numpy as np
 
-from ros_pad.configuration import integer
-from ros_pad.configuration import number
+from ros_pad.configuration import integer, number
 from ros_pad.errors import InvalidInput
 
 FLOORS = ('dry', 'wet', 'patches', 'drawn')

@@ -3,12 +3,8 @@
 
 from ros_pad.trials.loop import run
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.replay import Outcome
-from ros_pad.trials.replay import Replay
-from ros_pad.trials.replay import open_bag
-from ros_pad.trials.replay import replay
-from ros_pad.trials.trial import Metrics
-from ros_pad.trials.trial import Trial
+from ros_pad.trials.replay import Outcome, Replay, open_bag, replay
+from ros_pad.trials.trial import Metrics, Trial
 
 __all__ = [
     'Metrics',

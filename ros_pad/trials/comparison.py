@@ -5,15 +5,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ros_pad.records import Block
-from ros_pad.records import Field
-from ros_pad.records import Kind
+from ros_pad.records import Block, Field, Kind
 
 ROUNDING = 1e-12
 """Largest difference that counts as rounding, relative to the recorded number (below 1: to 1).

@@ -4,15 +4,12 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ros_pad.errors import ConfigError
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials.label import AMBIENT_PRESSURE
-from ros_pad.trials.label import described
-from ros_pad.trials.label import marks
+from ros_pad.trials.label import AMBIENT_PRESSURE, described, marks
 from ros_pad.trials.trial import Trial
 
 # Units of the values of a scene and a foot, by name; a value that is not listed has no unit.

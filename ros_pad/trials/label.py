@@ -14,8 +14,7 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import ros_pad
 from ros_pad.bags import BagReader
@@ -24,11 +23,9 @@ from ros_pad.errors import BagError
 from ros_pad.estimation.tuning import EXPECTED_LOAD
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.pneumatics import ATMOSPHERE
-from ros_pad.simulation.scene import FloorPlan
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import FloorPlan, Scene
 from ros_pad.simulation.terms import terms
-from ros_pad.trials.trial import Metrics
-from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import Metrics, Trial
 
 KEY = 'ros_pad'
 """Key of the conditions and results of a trial."""

@@ -11,13 +11,8 @@ from typing import Any
 
 from ros_pad.configuration import Table
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import PadError
-from ros_pad.estimation.scales import CLASSES
-from ros_pad.estimation.scales import NEXT_FLOOR
-from ros_pad.estimation.scales import SCALE_SD
-from ros_pad.estimation.scales import SCALE_SD_RANGE
-from ros_pad.estimation.scales import FrictionScales
+from ros_pad.errors import ConfigError, PadError
+from ros_pad.estimation.scales import CLASSES, NEXT_FLOOR, SCALE_SD, SCALE_SD_RANGE, FrictionScales
 from ros_pad.estimation.tuning import SETTINGS
 
 FILE = 'learnt.yaml'

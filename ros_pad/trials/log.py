@@ -8,19 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ros_pad.control import MorphologyController
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
-from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.robot import Vector
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block
+from ros_pad.simulation.robot import SimulatedRobot, Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.label import settings
 from ros_pad.trials.metrics import summarise
-from ros_pad.trials.series import Records
-from ros_pad.trials.series import series
+from ros_pad.trials.series import Records, series
 from ros_pad.trials.trial import Trial
 
 

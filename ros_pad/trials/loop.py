@@ -9,55 +9,39 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
+from ros_pad.configuration import choice, instance
 from ros_pad.contact.resistance import Foot
-from ros_pad.control import MorphologyController
-from ros_pad.control import first_morphologies
-from ros_pad.control import policy_named
+from ros_pad.control import MorphologyController, first_morphologies, policy_named
 from ros_pad.control.stage import DecisionStage
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
+from ros_pad.errors import InvalidInput, TransportError
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.estimation.tuning import SOURCES
-from ros_pad.pace import CONTROL_PERIOD_NS
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
-from ros_pad.pace import Progress
+from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace, Progress
 from ros_pad.pipeline import Pipeline
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
-from ros_pad.regulators import SimulatedRegulator
-from ros_pad.regulators import create
+from ros_pad.records import SAMPLE, Block
+from ros_pad.regulators import SimulatedRegulator, create
 from ros_pad.regulators.supervision import Supervision
 from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
 from ros_pad.regulators.supervisor import SupervisedChannel
-from ros_pad.sensing import BodyEstimate
-from ros_pad.sensing import SensingStage
-from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import sample_of
+from ros_pad.sensing import BodyEstimate, SensingStage
+from ros_pad.sensing.stage import estimator_of, sample_of
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.faults import faults_of
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.robot import Vector
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.sensors import BodySensors
-from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.scene import LeggedBody, Scene
+from ros_pad.simulation.sensors import BodySensors, Sensors
 from ros_pad.simulation.terms import with_terms
 from ros_pad.trials.learnt import settings_of
 from ros_pad.trials.log import TrialLog
-from ros_pad.trials.node_settings import body_settings_for
-from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.trial import Trial
-from ros_pad.trials.trial import heading
+from ros_pad.trials.node_settings import body_settings_for, tuning_for
+from ros_pad.trials.trial import Trial, heading
 
 
 def simulated_regulator(scene: Scene, leg: int, clock: Callable[[], float]) -> SimulatedRegulator:

@@ -8,10 +8,8 @@ import numpy as np
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.control import MorphologyController
 from ros_pad.simulation.robot import SimulatedRobot
-from ros_pad.simulation.scene import RailBody
-from ros_pad.simulation.scene import Scene
-from ros_pad.trials.trial import Metrics
-from ros_pad.trials.trial import Trial
+from ros_pad.simulation.scene import RailBody, Scene
+from ros_pad.trials.trial import Metrics, Trial
 
 LOAD_GATE = 0.3  # share of the expected load above which a foot stands
 

@@ -7,45 +7,25 @@ import difflib
 import json
 import math
 import os
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
-from typing import TYPE_CHECKING
-from typing import Any
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ros_pad.configuration import Setting
-from ros_pad.configuration import choice
+from ros_pad.configuration import Setting, choice
 from ros_pad.contact.resistance import Foot
-from ros_pad.control import COMMAND_TIMEOUT
-from ros_pad.control import MorphologyController
-from ros_pad.control import first_morphologies
-from ros_pad.control import policy_named
-from ros_pad.control.morphology import LIFT_OFF
-from ros_pad.control.morphology import MARGIN
-from ros_pad.control.policies import PREFIX
+from ros_pad.control import COMMAND_TIMEOUT, MorphologyController, first_morphologies, policy_named
+from ros_pad.control.morphology import LIFT_OFF, MARGIN
+from ros_pad.control.policies import PREFIX, Policy
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.control.policies import Policy
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
-from ros_pad.errors import reason
-from ros_pad.estimation import SETTINGS
-from ros_pad.estimation import Tuning
+from ros_pad.errors import BagError, ConfigError, InvalidInput, LimitError, reason
+from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.stage import PUBLISH_RATE
-from ros_pad.estimation.tuning import EXPECTED_LOAD
-from ros_pad.estimation.tuning import SOURCES
-from ros_pad.estimation.tuning import attribute
+from ros_pad.estimation.tuning import EXPECTED_LOAD, SOURCES, attribute
 from ros_pad.sensing.stage import SETTINGS as BODY_SETTINGS
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, Scene
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials import label
-from ros_pad.trials.label import AMBIENT_PRESSURE
-from ros_pad.trials.label import PARAMETERS
+from ros_pad.trials.label import AMBIENT_PRESSURE, PARAMETERS
 
 if TYPE_CHECKING:
     from ros_pad.bags import BagReader

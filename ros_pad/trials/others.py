@@ -6,16 +6,10 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import MutableSequence
-from collections.abc import Sequence
-from concurrent.futures import Executor
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator, MutableSequence, Sequence
+from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager
-from contextlib import contextmanager
-from contextlib import suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from typing import TypeAlias
 
@@ -24,8 +18,7 @@ from ros_pad.estimation.tuning import Tuning
 from ros_pad.pace import Progress
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
-from ros_pad.trials.trial import Metrics
-from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import Metrics, Trial
 
 SHORTEST = 15.0
 """Duration of a scene, s, from which processes are worth their start."""

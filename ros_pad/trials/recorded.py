@@ -16,40 +16,22 @@ import json
 import os
 import pathlib
 import re
-from collections.abc import Iterable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.reader import Table
 from ros_pad.bags.recovery import KEY as REPAIR
-from ros_pad.bags.topics import BODY_POSE
-from ros_pad.bags.topics import DIAGNOSTICS
-from ros_pad.bags.topics import ODOM
-from ros_pad.bags.topics import STAMP
-from ros_pad.bags.topics import TRIAL
-from ros_pad.bags.topics import Topic
-from ros_pad.bags.topics import to_record
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
-from ros_pad.pace import LATE
-from ros_pad.pace import Progress
-from ros_pad.pace import part
-from ros_pad.records import KINDS
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.bags.topics import BODY_POSE, DIAGNOSTICS, ODOM, STAMP, TRIAL, Topic, to_record
+from ros_pad.errors import BagError, InvalidInput
+from ros_pad.pace import LATE, Progress, part
+from ros_pad.records import KINDS, Block, Kind
 from ros_pad.trials import label
-from ros_pad.trials.series import Records
-from ros_pad.trials.series import by_row
-from ros_pad.trials.series import held
-from ros_pad.trials.series import series
-from ros_pad.trials.trial import Trial
-from ros_pad.trials.trial import heading
+from ros_pad.trials.series import Records, by_row, held, series
+from ros_pad.trials.trial import Trial, heading
 
 _OF_LEG = re.compile(r'(?P<namespace>.*?/)leg_(?P<leg>\d+)/(?P<kind>\w+)')
 POSES = (BODY_POSE, ODOM)

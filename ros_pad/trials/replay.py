@@ -14,12 +14,8 @@ import json
 import math
 import os
 import pathlib
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import asdict
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -27,18 +23,13 @@ import numpy as np
 from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
 from ros_pad.estimation.load_gate import CONTACT_SHARE
-from ros_pad.pace import Progress
-from ros_pad.pace import part
-from ros_pad.trials.comparison import Comparison
-from ros_pad.trials.comparison import Stream
-from ros_pad.trials.comparison import Track
-from ros_pad.trials.comparison import compare
+from ros_pad.pace import Progress, part
+from ros_pad.trials.comparison import Comparison, Stream, Track, compare
 from ros_pad.trials.label import CHANGES
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.recorded import wanted_topics
 from ros_pad.trials.replay_body import compare_body
-from ros_pad.trials.replay_inputs import Inputs
-from ros_pad.trials.replay_inputs import read
+from ros_pad.trials.replay_inputs import Inputs, read
 from ros_pad.trials.replay_player import Player
 from ros_pad.trials.trial import BOUNCE
 

@@ -7,41 +7,21 @@ import heapq
 import json
 import math
 import operator
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.fields import field_of
-from ros_pad.bags.topics import FORCE
-from ros_pad.bags.topics import IMU
-from ros_pad.bags.topics import JOINT_STATES
-from ros_pad.bags.topics import ODOM
-from ros_pad.bags.topics import SAMPLE
-from ros_pad.bags.topics import STAMP
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import reason
+from ros_pad.bags.topics import FORCE, IMU, JOINT_STATES, ODOM, SAMPLE, STAMP
+from ros_pad.errors import BagError, ConfigError, InvalidInput, reason
 from ros_pad.records import SAMPLE as SAMPLES
-from ros_pad.records import Block
-from ros_pad.records import Field
-from ros_pad.records import Kind
+from ros_pad.records import Block, Field, Kind
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimate
-from ros_pad.sensing import BodyEstimator
-from ros_pad.sensing import SensingStage
-from ros_pad.sensing.stage import SETTINGS
-from ros_pad.sensing.stage import JointOrder
-from ros_pad.sensing.stage import estimator_of
-from ros_pad.sensing.stage import robot_of
-from ros_pad.sensing.stage import sample_of
-from ros_pad.trials.comparison import Comparison
-from ros_pad.trials.comparison import Stream
-from ros_pad.trials.comparison import compare
+from ros_pad.sensing import BodyEstimate, BodyEstimator, SensingStage
+from ros_pad.sensing.stage import SETTINGS, JointOrder, estimator_of, robot_of, sample_of
+from ros_pad.trials.comparison import Comparison, Stream, compare
 from ros_pad.trials.label import PARAMETERS
 from ros_pad.trials.recorded import Wanted
 

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,15 +13,10 @@ from ros_pad.bags import BagReader
 from ros_pad.errors import BagError
 from ros_pad.joining import Joiner
 from ros_pad.pace import Progress
-from ros_pad.records import KINDS
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.records import KINDS, PRESSURE, SAMPLE, Block, Kind
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.recorded import Wanted
-from ros_pad.trials.recorded import read_records
+from ros_pad.trials.recorded import Wanted, read_records
 
 LONGER = 1.6
 """A time between two messages that is longer than their median time by this factor is a gap."""

@@ -12,15 +12,9 @@ import numpy as np
 from ros_pad.control.stage import DecisionStage
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.pace import Pace
-from ros_pad.pace import Progress
+from ros_pad.pace import TICK_PERIOD_NS, Pace, Progress
 from ros_pad.pipeline import Pipeline
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, Block, Kind
 from ros_pad.trials.comparison import Stream
 from ros_pad.trials.node_settings import NodeSettings
 from ros_pad.trials.replay_inputs import Inputs

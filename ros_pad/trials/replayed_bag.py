@@ -13,8 +13,7 @@ import os
 from collections.abc import Iterator
 
 from ros_pad.bags import BagWriter
-from ros_pad.bags.wire import TYPE
-from ros_pad.bags.wire import Wire
+from ros_pad.bags.wire import TYPE, Wire
 from ros_pad.pace import Progress
 from ros_pad.records import Block
 from ros_pad.trials.comparison import Stream

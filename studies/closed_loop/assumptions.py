@@ -19,19 +19,13 @@ from __future__ import annotations
 import inspect
 import math
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from ros_pad.control import MorphologyController
-from ros_pad.control import adaptive
-from ros_pad.control import first_morphologies
-from ros_pad.control import policy_named
+from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
 from ros_pad.control.footprints import Footprints
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.friction import GroundFilter

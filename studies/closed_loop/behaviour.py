@@ -14,8 +14,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ros_pad.errors import PadError

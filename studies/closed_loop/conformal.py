@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import optimize
-from scipy import stats
+from scipy import optimize, stats
 
 from ros_pad.simulation.fidelity import LEAST
 

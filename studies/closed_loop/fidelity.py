@@ -26,27 +26,22 @@ import yaml
 from ros_pad import configuration
 from ros_pad.commands.folder import new_folder
 from ros_pad.reports.files import save
-from ros_pad.simulation.fidelity import FRICTION
-from ros_pad.simulation.fidelity import LEAST
-from ros_pad.simulation.fidelity import STICKING
-from ros_pad.simulation.fidelity import Promises
-from ros_pad.simulation.fidelity import answer
-from ros_pad.simulation.fidelity import choose
-from ros_pad.simulation.fidelity import sticking_distance
+from ros_pad.simulation.fidelity import (
+    FRICTION,
+    LEAST,
+    STICKING,
+    Promises,
+    answer,
+    choose,
+    sticking_distance,
+)
 from ros_pad.simulation.margin import features
-from ros_pad.simulation.scene import RAIL_LEG
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import is_bench
+from ros_pad.simulation.scene import RAIL_LEG, Scene, is_bench
 from ros_pad.simulation.terms import terms
 from studies import command
 from studies.closed_loop import conformal
 from studies.closed_loop.fidelity_chart import figure
-from studies.closed_loop.random_scenes import BASES
-from studies.closed_loop.random_scenes import Walk
-from studies.closed_loop.random_scenes import draw
-from studies.closed_loop.random_scenes import listed
-from studies.closed_loop.random_scenes import ranges
-from studies.closed_loop.random_scenes import walks
+from studies.closed_loop.random_scenes import BASES, Walk, draw, listed, ranges, walks
 from studies.machine import machine
 
 CONFIG = command.ROOT / 'config'

@@ -11,13 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.closed_loop.random_scenes import unlisted
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, STYLE, VERMILION
 
 LOOKS = {
     ('ch3r', 'L1'): (BLUE, 'o'),

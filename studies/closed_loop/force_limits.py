@@ -19,13 +19,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact.limits import CRITERIA
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import largest_pressure
+from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit
+from ros_pad.contact.limits import CRITERIA, criteria, largest_pressure
 from ros_pad.errors import NoEquilibrium
 from ros_pad.simulation import Scene
 from ros_pad.trials.loop import ClosedLoop

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -30,9 +29,7 @@ from ros_pad.trials.series import held
 from ros_pad.trials.trial import heading
 from studies import command
 from studies.closed_loop import loops
-from studies.work_precision.estimator.tally import MOVING
-from studies.work_precision.estimator.tally import Tally
-from studies.work_precision.estimator.tally import count_alarms
+from studies.work_precision.estimator.tally import MOVING, Tally, count_alarms
 
 SCENES = ('hexapod_patches', 'quadruped_patches')
 FIRST_SEED = 401  # earlier ones were used while the code was written and mended

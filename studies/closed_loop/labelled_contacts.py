@@ -15,9 +15,7 @@ import functools
 import json
 import math
 import pathlib
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,30 +23,17 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import optimize
-from scipy import special
+from scipy import optimize, special
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.alarm import SLOW_SLIP
-from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.friction import Evidence
-from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.scales import FrictionPrior
-from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.alarm import SLOW_SLIP, SlipAlarm
+from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
+from ros_pad.estimation.scales import FrictionPrior, FrictionScales
 from studies import command
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
-from studies.samples import auc
-from studies.samples import runs
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
+from studies.samples import auc, runs
 
 SOURCE = 'https://github.com/mrsp/lcd (folder data)'
 STABLE, NONE, SLIP = 0, 1, 2

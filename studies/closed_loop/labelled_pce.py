@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import math
 import pathlib
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,28 +23,27 @@ from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.alarm import THRESHOLD
-from ros_pad.estimation.foot import ContactMotion
-from ros_pad.estimation.foot import FootEstimator
+from ros_pad.estimation.foot import ContactMotion, FootEstimator
 from studies import command
-from studies.closed_loop.labelled_contacts import CUSUM
-from studies.closed_loop.labelled_contacts import NONE
-from studies.closed_loop.labelled_contacts import RANKED
-from studies.closed_loop.labelled_contacts import RATE
-from studies.closed_loop.labelled_contacts import RATIO
-from studies.closed_loop.labelled_contacts import SHAKE
-from studies.closed_loop.labelled_contacts import SLIP
-from studies.closed_loop.labelled_contacts import STABLE
-from studies.closed_loop.labelled_contacts import TWIST
-from studies.closed_loop.labelled_contacts import Recording
-from studies.closed_loop.labelled_contacts import alarm_figures
-from studies.closed_loop.labelled_contacts import auc_interval
-from studies.closed_loop.labelled_contacts import auc_within
-from studies.closed_loop.labelled_contacts import cusum
-from studies.closed_loop.labelled_contacts import features
-from studies.closed_loop.labelled_contacts import operating_threshold
-from studies.samples import auc
-from studies.samples import runs
-from studies.samples import share_interval
+from studies.closed_loop.labelled_contacts import (
+    CUSUM,
+    NONE,
+    RANKED,
+    RATE,
+    RATIO,
+    SHAKE,
+    SLIP,
+    STABLE,
+    TWIST,
+    Recording,
+    alarm_figures,
+    auc_interval,
+    auc_within,
+    cusum,
+    features,
+    operating_threshold,
+)
+from studies.samples import auc, runs, share_interval
 
 SOURCE = 'https://github.com/MichaelMarav/ProbabilisticContactEstimation (folder offline/data)'
 ATLAS = ('ATLAS_01ground_003slip', 'ATLAS_01ground', 'ATLAS_01ground_3steps')

@@ -24,28 +24,21 @@ from matplotlib.figure import Figure
 
 from ros_pad import configuration
 from ros_pad.configuration import refuse
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import film_thickness
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
+from ros_pad.contact import LARGE_PAD, film_thickness, force_limit, inflate
 from ros_pad.contact.resistance import expected_friction
 from ros_pad.control import POLICIES
 from ros_pad.errors import InvalidInput
 from ros_pad.reports import path_map
 from ros_pad.reports.files import save
 from ros_pad.reports.pictures import draw_comparison
-from ros_pad.reports.style import STYLE
-from ros_pad.reports.style import rendered
+from ros_pad.reports.style import STYLE, rendered
 from ros_pad.reports.view import view_of
 from ros_pad.simulation import Scene
-from ros_pad.simulation.margin import mid_stance_grip
-from ros_pad.simulation.margin import reserve
+from ros_pad.simulation.margin import mid_stance_grip, reserve
 from ros_pad.simulation.terms import terms
-from ros_pad.trials import Trial
-from ros_pad.trials import run
+from ros_pad.trials import Trial, run
 from studies import command
-from studies.work_precision.film import STANCE_DOME
-from studies.work_precision.film import dry_dome
+from studies.work_precision.film import STANCE_DOME, dry_dome
 
 SCENE, SEED = 'hexapod_patches', 0
 RISE = 0.03  # s in which the load of a dome in mid-stance comes

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.records import ESTIMATE
-from ros_pad.records import Block
+from ros_pad.records import ESTIMATE, Block
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.series import Records
-from ros_pad.trials.series import held
+from ros_pad.trials.series import Records, held
 
 
 class NoLog(TrialLog):

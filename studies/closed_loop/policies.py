@@ -21,30 +21,21 @@ import os
 import pathlib
 import statistics
 import time
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.control import MorphologyController
-from ros_pad.control import adaptive
-from ros_pad.control import first_morphologies
-from ros_pad.control import policy_named
-from ros_pad.control.policies import IsWet
-from ros_pad.control.policies import Policy
+from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
+from ros_pad.control.policies import IsWet, Policy
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.closed_loop import loops
-from studies.closed_loop import quick_walk
-from studies.closed_loop import rivals
-from studies.closed_loop.policies_figure import BETTER
-from studies.closed_loop.policies_figure import draw
+from studies.closed_loop import loops, quick_walk, rivals
+from studies.closed_loop.policies_figure import BETTER, draw
 
 SCENE = 'hexapod_patches'
 LEVEL = 'L2'

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib import rc_context
@@ -12,10 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import STYLE
+from studies.drawing import BLACK, BLUE, GREEN, STYLE
 
 BETTER = 'better fixed shape'
 _LOOKS = ((BETTER, GREEN, -0.15), ('oracle', BLUE, 0.15))

@@ -15,8 +15,7 @@ import math
 import numpy as np
 
 from ros_pad.contact.resistance import expected_friction
-from ros_pad.control import MorphologyController
-from ros_pad.control import first_morphologies
+from ros_pad.control import MorphologyController, first_morphologies
 from ros_pad.control.policies import Policy
 from ros_pad.simulation import Scene
 from ros_pad.simulation.gait import WalkingGait

@@ -17,9 +17,7 @@ from ros_pad.simulation.fidelity import value_of
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.mujoco_model import SolverSettings
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import RAIL_LEG
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import RAIL_LEG, LeggedBody, Scene
 from ros_pad.simulation.terrain import patch_lengths
 from ros_pad.trials.loop import ClosedLoop
 from studies.closed_loop import loops

@@ -11,11 +11,7 @@ import math
 
 import numpy as np
 
-from ros_pad.control.policies import DOME
-from ros_pad.control.policies import FLAT
-from ros_pad.control.policies import Choice
-from ros_pad.control.policies import LiftOff
-from ros_pad.control.policies import Policy
+from ros_pad.control.policies import DOME, FLAT, Choice, LiftOff, Policy
 
 WET_ABOVE, DRY_BELOW, DWELL = 0.65, 0.35, 2
 """Hysteresis of the rival that counts steps: that of the adaptive policy."""

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -26,8 +25,7 @@ from ros_pad.trials.node_settings import tuning_for
 from studies import command
 from studies.closed_loop import loops
 from studies.samples import auc
-from studies.work_precision.estimator.tally import Tally
-from studies.work_precision.estimator.tally import count_alarms
+from studies.work_precision.estimator.tally import Tally, count_alarms
 from studies.work_precision.estimator.walks import SETTLED
 
 SCENE = 'hexapod_patches'

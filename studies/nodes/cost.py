@@ -29,14 +29,8 @@ from matplotlib.figure import Figure
 
 from ros_pad.errors import PadError
 from studies import command
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.machine import memory
-from studies.machine import processor_time
+from studies.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE
+from studies.machine import memory, processor_time
 
 NODES = {
     **{'estimator': SKY, 'controller': GREEN, 'regulator': ORANGE, 'recorder': BLUE},

@@ -37,15 +37,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import rclpy
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
-from rclpy.logging import LoggingSeverity
-from rclpy.logging import set_logger_level
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_msgs.msg import String

@@ -22,9 +22,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import rclpy
@@ -35,11 +33,9 @@ from ros_pad.bags.wire import Wire
 from ros_pad.commands.progress import bar
 from ros_pad.nodes import topics
 from ros_pad.nodes.messages import Messages
-from ros_pad.records import COMMAND
-from ros_pad.records import Block
+from ros_pad.records import COMMAND, Block
 from studies import command
-from studies.machine import memory
-from studies.machine import processor_time
+from studies.machine import memory, processor_time
 
 TIMEOUT = 0.3  # command_timeout, s
 RATE = 10_000.0  # records a second

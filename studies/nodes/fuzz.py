@@ -22,14 +22,10 @@ import pathlib
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from ros_pad.errors import BadMessage
-from ros_pad.errors import PadError
-from ros_pad.errors import UnknownEncoding
+from ros_pad.errors import BadMessage, PadError, UnknownEncoding
 from studies import command
 
 WATCHED = (
@@ -137,8 +133,7 @@ def _template(data: bytes) -> None:
 
 
 def _fault(data: bytes) -> None:
-    from ros_pad.simulation.faults import Fault
-    from ros_pad.simulation.faults import parsed
+    from ros_pad.simulation.faults import Fault, parsed
 
     for fault in parsed([data.decode('utf-8', 'replace')]):
         if Fault.parse(str(fault)) != fault:
@@ -172,8 +167,7 @@ def _read_metadata(path: pathlib.Path) -> None:
 
 def _bag(chunked: bool = True) -> bytes:
     """Return a small bag without checksums and compression, which random changes would break."""
-    from mcap.writer import CompressionType
-    from mcap.writer import Writer
+    from mcap.writer import CompressionType, Writer
 
     stream = io.BytesIO()
     writer = Writer(
@@ -276,8 +270,7 @@ def _bags() -> Target:
 
 def _fields() -> Target:
     """Return a target that reads messages; the first byte of the data picks the type."""
-    from rosbags.typesys import Stores
-    from rosbags.typesys import get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
     from ros_pad.bags import topics
     from ros_pad.bags.codec import MessageType
@@ -341,8 +334,7 @@ def _records() -> Target:
     """Return a target that reads records of two legs; the first byte picks the kind."""
     import numpy as np
 
-    from ros_pad.records import KINDS
-    from ros_pad.records import Block
+    from ros_pad.records import KINDS, Block
 
     with _watched_imports():
         from ros_pad.bags.wire import Wire

@@ -37,8 +37,7 @@ from rclpy.signals import SignalHandlerOptions
 from ros_pad.bags import BagReader
 from ros_pad.bags.wire import Wire
 from ros_pad.errors import PadError
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.nodes import qos, topics
 from ros_pad.records import Block
 from ros_pad.trials import label
 from studies import command

@@ -32,8 +32,7 @@ from typing import Any
 import numpy as np
 import serial
 
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import create
+from ros_pad.regulators import Regulator, create
 from studies import command
 
 PROMISED = 0.020  # s

@@ -34,9 +34,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from rclpy.node import Node
@@ -47,11 +45,8 @@ from ros_pad.commands.progress import bar
 from ros_pad.contact.pad import DOME_PRESSURE
 from ros_pad.errors import BagError
 from ros_pad.nodes import topics
-from ros_pad.records import COMMAND
-from ros_pad.records import PRESSURE
-from ros_pad.records import Block
-from ros_pad.regulators.emulate import AlicatEmulator
-from ros_pad.regulators.emulate import Emulator
+from ros_pad.records import COMMAND, PRESSURE, Block
+from ros_pad.regulators.emulate import AlicatEmulator, Emulator
 from studies import command
 
 NODES = ('recorder', 'regulator', 'estimator', 'controller', 'simulator')

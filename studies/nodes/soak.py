@@ -23,16 +23,13 @@ import math
 import pathlib
 import random
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
-from typing import Any
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 import rclpy
 from rclpy.experimental import EventsExecutor
-from rclpy.logging import LoggingSeverity
-from rclpy.logging import set_logger_level
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
@@ -46,10 +43,8 @@ from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.nodes.stamps import set_stamp
 from ros_pad.pace import TICK_PERIOD_NS
-from ros_pad.records import COMMAND
-from ros_pad.records import Block
-from ros_pad.regulators import Reading
-from ros_pad.regulators import SimulatedRegulator
+from ros_pad.records import COMMAND, Block
+from ros_pad.regulators import Reading, SimulatedRegulator
 from ros_pad.simulation.faults import Fault
 from studies import command
 from studies.machine import memory

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -12,20 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
-from studies.sensing.stability import AFTER
-from studies.sensing.stability import LIMIT
-from studies.sensing.stability import LONGEST
-from studies.sensing.stability import RATES
-from studies.sensing.stability import TIMED
-from studies.sensing.stability import Curve
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILION
+from studies.sensing.stability import AFTER, LIMIT, LONGEST, RATES, TIMED, Curve
 
 COLOURS = {
     'estimator': BLUE,

@@ -26,24 +26,16 @@ import numpy as np
 from scipy import optimize
 
 from ros_pad.errors import InvalidInput
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import rotation
+from ros_pad.robots.rotation import Array, rotation
 from studies import command
-from studies.samples import Flags
-from studies.samples import runs
+from studies.samples import Flags, runs
 from studies.sensing import recordings
 from studies.sensing.methods import METHODS as RIVALS
-from studies.sensing.methods import Track
-from studies.sensing.methods import estimated
-from studies.sensing.methods import estimator_for
-from studies.sensing.methods import readings
-from studies.sensing.methods import track_of
+from studies.sensing.methods import Track, estimated, estimator_for, readings, track_of
 from studies.sensing.recordings import Recording
 from studies.sensing.rivals import loads_of
-from studies.sensing.study import alarms_of
-from studies.sensing.study import settled
-from studies.sensing.walks import Course
-from studies.sensing.walks import Log
+from studies.sensing.study import alarms_of, settled
+from studies.sensing.walks import Course, Log
 
 FIXED = {
     'fixed size': {'radius_error': 0.0, 'length_error': 0.0},

@@ -10,21 +10,17 @@ import functools
 import heapq
 import pathlib
 import sys
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from mcap.records import Channel
-from mcap.records import Schema
+from mcap.records import Channel, Schema
 
 from ros_pad.bags import BagWriter
 from ros_pad.bags.codec import MessageType
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
-from studies.sensing.walks import Course
-from studies.sensing.walks import Log
-from studies.sensing.walks import walk
+from studies.sensing.walks import Course, Log, walk
 
 RULE = '\n' + '=' * 80 + '\n'
 TIME = 'MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec'

@@ -6,8 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +15,7 @@ from ros_pad.robots.rotation import Array
 from ros_pad.sensing import BodyEstimator
 from studies.samples import Flags
 from studies.sensing import rivals
-from studies.sensing.walks import Course
-from studies.sensing.walks import Log
+from studies.sensing.walks import Course, Log
 
 METHODS = (
     *('estimator', 'no rejection', 'plain filter', 'invariant', 'invariant, χ²'),

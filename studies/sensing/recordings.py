@@ -8,18 +8,13 @@ from __future__ import annotations
 
 import importlib
 import pathlib
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.robots import Chains
-from ros_pad.robots import Robot
-from ros_pad.robots import urdf
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import matrix
+from ros_pad.robots import Chains, Robot, urdf
+from ros_pad.robots.rotation import Array, from_rpy, matrix
 from studies.sensing.walks import Noise
 
 ICUB = 'https://github.com/ami-iit/paper_ramadoss-2022-iros-humanoid-base-estimation'

@@ -12,14 +12,10 @@ from typing import Any
 import numpy as np
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import rotation
-from ros_pad.robots.rotation import skew
+from ros_pad.robots.rotation import Array, cross, rotation, skew
 from ros_pad.sensing.body_filter import GRAVITY
 from studies.samples import Flags
-from studies.sensing.walks import Course
-from studies.sensing.walks import Log
+from studies.sensing.walks import Course, Log
 
 Rows = list[tuple[Any, ...]]
 GATE = 11.3  # 99 % of χ² with 3 degrees of freedom

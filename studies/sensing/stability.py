@@ -11,24 +11,17 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import matrix
+from ros_pad.robots.rotation import Array, cross, matrix
 from ros_pad.sensing.body_filter import GRAVITY
 from studies import command
 from studies.sensing import rivals
-from studies.sensing.methods import Track
-from studies.sensing.methods import track_of
-from studies.sensing.walks import REST
-from studies.sensing.walks import Course
-from studies.sensing.walks import Log
-from studies.sensing.walks import walk
+from studies.sensing.methods import Track, track_of
+from studies.sensing.walks import REST, Course, Log, walk
 
 METHODS = ('estimator', 'no rejection', 'invariant', 'invariant, χ²', 'odometry')
 LIMIT = 0.1  # m/s, error of velocity x y above which a method has diverged: a third of the speed

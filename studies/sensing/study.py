@@ -24,18 +24,10 @@ from ros_pad.estimation.alarm import SlipAlarm
 from ros_pad.robots import Robot
 from ros_pad.robots.rotation import Array
 from studies import command
-from studies.samples import Flags
-from studies.samples import runs
-from studies.sensing import chart
-from studies.sensing import stability
-from studies.sensing.methods import METHODS
-from studies.sensing.methods import Track
-from studies.sensing.methods import track_of
-from studies.sensing.walks import COURSES
-from studies.sensing.walks import RAMP
-from studies.sensing.walks import REST
-from studies.sensing.walks import Log
-from studies.sensing.walks import walk
+from studies.samples import Flags, runs
+from studies.sensing import chart, stability
+from studies.sensing.methods import METHODS, Track, track_of
+from studies.sensing.walks import COURSES, RAMP, REST, Log, walk
 
 CASES = ('dry', 'patches', 'ice', 'hexapod')
 FIRST_SEED = 111  # constants of the estimator were chosen on seeds below 102

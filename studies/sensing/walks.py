@@ -3,22 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import fields
-from typing import Any
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_pad.robots import Gait
-from ros_pad.robots import Robot
-from ros_pad.robots.rotation import Array
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import matrix
-from ros_pad.robots.rotation import quaternion
-from ros_pad.simulation.mujoco_model import at_frame
-from ros_pad.simulation.mujoco_model import words
+from ros_pad.robots import Gait, Robot
+from ros_pad.robots.rotation import Array, from_rpy, matrix, quaternion
+from ros_pad.simulation.mujoco_model import at_frame, words
 
 RATE = 250.0  # samples a second, where a course has no other
 SUBSTEPS = 4  # steps of MuJoCo in each of them

@@ -10,43 +10,33 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_pad.contact.calibrate import stiffness_of
-from ros_pad.contact.design import DESIGN_WATER
-from ros_pad.contact.design import rise_height
-from ros_pad.contact.dome import MODELS
-from ros_pad.contact.dome import inflate
-from ros_pad.contact.dome import press
+from ros_pad.contact.design import DESIGN_WATER, rise_height
+from ros_pad.contact.dome import MODELS, inflate, press
 from ros_pad.contact.film import Film
 from ros_pad.contact.limits import force_limit
 from ros_pad.contact.measurements import Measurements
-from ros_pad.contact.meniscus import THESIS_LIQUID
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import hysteresis_force
-from ros_pad.contact.meniscus import meniscus
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Array
-from ros_pad.contact.pad import Pad
+from ros_pad.contact.meniscus import THESIS_LIQUID, WATER, hysteresis_force, meniscus
+from ros_pad.contact.pad import LARGE_PAD, Array, Pad
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.squeeze import trapped_film
-from ros_pad.errors import ConfigError
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import ConfigError, NoEquilibrium
 from ros_pad.simulation.margin import SOLE_MODULUS
 from ros_pad.simulation.terms import Term as Omission
-from studies.thesis.bench_scene import BenchScene
-from studies.thesis.bench_scene import FootBench
-from studies.thesis.bench_scene import InflationBench
-from studies.thesis.bench_scene import PressBench
-from studies.thesis.bench_scene import TangentialBench
-from studies.thesis.explained import MINIMAL
-from studies.thesis.explained import Claim
+from studies.thesis.bench_scene import (
+    BenchScene,
+    FootBench,
+    InflationBench,
+    PressBench,
+    TangentialBench,
+)
+from studies.thesis.explained import MINIMAL, Claim
 
 FIDELITY = 'analytic'
 

@@ -19,12 +19,9 @@ from ros_pad.commands.folder import new_folder
 from ros_pad.commands.progress import bar
 from ros_pad.contact import Foot
 from ros_pad.reports.files import save
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import rendered
+from ros_pad.reports.style import PAPER_STYLE, rendered
 from studies import command
-from studies.thesis import bench
-from studies.thesis import bench_figures
-from studies.thesis import bench_page
+from studies.thesis import bench, bench_figures, bench_page
 from studies.thesis.bench_scene import BenchScene
 from studies.thesis.explained import counted
 

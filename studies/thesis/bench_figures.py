@@ -8,8 +8,7 @@ it.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
@@ -20,35 +19,32 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ros_pad.contact.pad import Array
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import COLUMN
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import STANCE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import legend
-from studies.thesis.bench import CAPILLARY
-from studies.thesis.bench import CODED
-from studies.thesis.bench import DRY
-from studies.thesis.bench import RISE
-from studies.thesis.bench import TEXT
-from studies.thesis.bench import WET
-from studies.thesis.bench import BenchTrial
-from studies.thesis.bench import Row
-from studies.thesis.bench import shape_name
-from studies.thesis.bench_scene import InflationBench
-from studies.thesis.bench_scene import TangentialBench
-from studies.thesis.foot_bench import DOME
-from studies.thesis.foot_bench import FLAT
-from studies.thesis.foot_bench import LINES
-from studies.thesis.foot_bench import NONE
-from studies.thesis.foot_bench import ROUGH
-from studies.thesis.foot_bench import SMOOTH
-from studies.thesis.foot_bench import SUCTION
+from ros_pad.reports.style import (
+    BLACK,
+    BLUE,
+    COLUMN,
+    GREEN,
+    PALE,
+    PAPER_STYLE,
+    STANCE,
+    VERMILION,
+    WIDE,
+    Drawn,
+    legend,
+)
+from studies.thesis.bench import (
+    CAPILLARY,
+    CODED,
+    DRY,
+    RISE,
+    TEXT,
+    WET,
+    BenchTrial,
+    Row,
+    shape_name,
+)
+from studies.thesis.bench_scene import InflationBench, TangentialBench
+from studies.thesis.foot_bench import DOME, FLAT, LINES, NONE, ROUGH, SMOOTH, SUCTION
 
 PURPLE, ORANGE = '#CC79A7', '#E69F00'
 _COLOURS = (PURPLE, BLUE, GREEN, VERMILION, ORANGE, BLACK)

@@ -5,23 +5,16 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib
 
 import ros_pad
 from ros_pad.reports.files import save
-from ros_pad.reports.page import embedded
-from ros_pad.reports.page import page
-from ros_pad.reports.page import table
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import Drawn
-from studies.thesis.bench import FIDELITY
-from studies.thesis.bench import BenchTrial
-from studies.thesis.bench import Row
-from studies.thesis.explained import Claim
-from studies.thesis.explained import counted
+from ros_pad.reports.page import embedded, page, table
+from ros_pad.reports.style import PAPER_STYLE, Drawn
+from studies.thesis.bench import FIDELITY, BenchTrial, Row
+from studies.thesis.explained import Claim, counted
 
 HEAD = (
     'figure',

@@ -8,23 +8,17 @@ import math
 import os
 import pathlib
 from dataclasses import dataclass
-from typing import ClassVar
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ros_pad import configuration
 from ros_pad.configuration import Table
-from ros_pad.contact.dome import BURST
-from ros_pad.contact.dome import largest_tension
-from ros_pad.contact.dome import signed_adhesion
+from ros_pad.contact.dome import BURST, largest_tension, signed_adhesion
 from ros_pad.contact.film import WATER_VISCOSITY
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.pad import Pad
-from ros_pad.contact.pad import need_stiffness
+from ros_pad.contact.limits import criteria, force_limit
+from ros_pad.contact.pad import Pad, need_stiffness
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import ConfigError
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import foot_of
+from ros_pad.simulation.scene import Scene, foot_of
 
 BENCHES = ('inflation', 'press', 'tangential', 'foot')
 

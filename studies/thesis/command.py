@@ -10,15 +10,11 @@ import pathlib
 from collections.abc import Sequence
 
 from ros_pad.commands.progress import bar
-from ros_pad.commands.report import THESIS
-from ros_pad.commands.report import page_for
-from ros_pad.commands.report import write_all
+from ros_pad.commands.report import THESIS, page_for, write_all
 from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from studies import command
-from studies.thesis import page
-from studies.thesis import statements
-from studies.thesis import verdicts
+from studies.thesis import page, statements, verdicts
 
 
 def main(words: Sequence[str]) -> int:

@@ -10,36 +10,21 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import wet
+from ros_pad.capillary import Mesh, wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.limits import force_limit
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.meniscus import hysteresis_force
-from ros_pad.contact.meniscus import meniscus
+from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid, hysteresis_force, meniscus
 from ros_pad.contact.pad import Array
 from ros_pad.contact.resistance import Foot
 from ros_pad.simulation.terms import Term as Omission
-from studies.thesis.bench import CAPILLARY
-from studies.thesis.bench import DRY
-from studies.thesis.bench import NOT_CODED
-from studies.thesis.bench import WET
-from studies.thesis.bench import BenchTrial
-from studies.thesis.bench import Curve
-from studies.thesis.bench import Row
-from studies.thesis.bench import slip_force
-from studies.thesis.bench_scene import BenchScene
-from studies.thesis.bench_scene import FootBench
-from studies.thesis.explained import MINIMAL
-from studies.thesis.explained import Claim
+from studies.thesis.bench import CAPILLARY, DRY, NOT_CODED, WET, BenchTrial, Curve, Row, slip_force
+from studies.thesis.bench_scene import BenchScene, FootBench
+from studies.thesis.explained import MINIMAL, Claim
 
 FLAT, DOME = 'flat', 'dome'
 SMOOTH, ROUGH = 'smooth', 'rough'

@@ -6,10 +6,8 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable
-from collections.abc import Collection
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Callable, Collection
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -17,41 +15,38 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ros_pad.capillary import BathMeniscus
-from ros_pad.capillary import Face
-from ros_pad.capillary import LiquidSurface
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wall
-from ros_pad.capillary import Wet
-from ros_pad.capillary import WetPattern
-from ros_pad.capillary import bath_meniscus
-from ros_pad.capillary import bath_surface
-from ros_pad.capillary import pattern_surface
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
+from ros_pad.capillary import (
+    BathMeniscus,
+    Face,
+    LiquidSurface,
+    Mesh,
+    Wall,
+    Wet,
+    WetPattern,
+    bath_meniscus,
+    bath_surface,
+    pattern_surface,
+    wet,
+    wet_pattern,
+)
 from ros_pad.contact.dome import press
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Array
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import COLUMN
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WET
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import legend
-from ros_pad.reports.wetted import DRY
-from ros_pad.reports.wetted import WETTED
-from ros_pad.reports.wetted import picture
-from ros_pad.reports.wetted import shaded
-from studies.thesis.explained import Claim
-from studies.thesis.explained import Explained
+from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
+from ros_pad.contact.pad import LARGE_PAD, Array
+from ros_pad.reports.style import (
+    BLACK,
+    BLUE,
+    COLUMN,
+    GREEN,
+    PALE,
+    PAPER_STYLE,
+    VERMILION,
+    WET,
+    WIDE,
+    Drawn,
+    legend,
+)
+from ros_pad.reports.wetted import DRY, WETTED, picture, shaded
+from studies.thesis.explained import Claim, Explained
 
 NUMBERS = (26, 27, 28, 29, 30, 31)
 TENSIONS = (0.0016, 0.002, 0.004)  # N/m of the liquid, thesis

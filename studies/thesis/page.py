@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Collection
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import matplotlib
 
@@ -15,18 +14,12 @@ from ros_pad.configuration import refuse
 from ros_pad.errors import InvalidInput
 from ros_pad.pace import Progress
 from ros_pad.reports.files import save
-from ros_pad.reports.page import embedded
-from ros_pad.reports.page import page
-from ros_pad.reports.page import table
+from ros_pad.reports.page import embedded, page, table
 from ros_pad.reports.style import PAPER_STYLE
-from studies.thesis import bench
+from studies.thesis import bench, liquid, walks
 from studies.thesis import bench_figures as thesis
-from studies.thesis import liquid
-from studies.thesis import walks
 from studies.thesis.bench_page import statements
-from studies.thesis.explained import Claim
-from studies.thesis.explained import Explained
-from studies.thesis.explained import counted
+from studies.thesis.explained import Claim, Explained, counted
 
 _BENCHES = {
     'bench_inflation': (14, 15),

@@ -10,25 +10,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ros_pad.capillary import bath_meniscus
-from ros_pad.contact.design import design_pressure
-from ros_pad.contact.design import foot_force
-from ros_pad.contact.design import pads_in
-from ros_pad.contact.dome import inflate
-from ros_pad.contact.dome import press
+from ros_pad.contact.design import design_pressure, foot_force, pads_in
+from ros_pad.contact.dome import inflate, press
 from ros_pad.contact.film import Film
-from ros_pad.contact.limits import force_limit
-from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.limits import resized
+from ros_pad.contact.limits import force_limit, largest_pressure, resized
 from ros_pad.contact.material import Material
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import capillary_pull
-from ros_pad.contact.meniscus import hysteresis_force
-from ros_pad.contact.meniscus import meniscus
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Pad
+from ros_pad.contact.meniscus import WATER, capillary_pull, hysteresis_force, meniscus
+from ros_pad.contact.pad import LARGE_PAD, Pad
 from ros_pad.contact.resistance import Foot
-from studies.thesis.explained import MINIMAL
-from studies.thesis.explained import Claim
+from studies.thesis.explained import MINIMAL, Claim
 
 PRESSURE = 75e3  # Pa gauge
 FORCES = (0.08, 0.19, 0.285)  # N, as the program of the thesis presses

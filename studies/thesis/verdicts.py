@@ -4,17 +4,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ros_pad.reports.files import save
 from studies import command
 from studies.thesis import walks
 from studies.thesis.bench import DRAWS
-from studies.thesis.explained import Claim
-from studies.thesis.explained import Explained
-from studies.thesis.explained import counted
+from studies.thesis.explained import Claim, Explained, counted
 
 PAGE = command.ROOT / 'docs' / 'thesis.md'
 MARK = '<!-- below: python -m studies thesis --table -->\n'

@@ -6,9 +6,7 @@ The thesis gives no data points of these walks, so they are compared with its te
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import matplotlib
@@ -17,22 +15,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.pace import Progress
-from ros_pad.reports.style import BLACK
-from ros_pad.reports.style import BLUE
-from ros_pad.reports.style import GREEN
-from ros_pad.reports.style import PALE
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import VERMILION
-from ros_pad.reports.style import WET
-from ros_pad.reports.style import WIDE
-from ros_pad.reports.style import Drawn
-from ros_pad.reports.style import legend
+from ros_pad.reports.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    PALE,
+    PAPER_STYLE,
+    VERMILION,
+    WET,
+    WIDE,
+    Drawn,
+    legend,
+)
 from ros_pad.reports.view import view_of
 from ros_pad.trials import loop
 from ros_pad.trials.trial import Trial
-from studies.thesis.explained import MINIMAL
-from studies.thesis.explained import Claim
-from studies.thesis.explained import Explained
+from studies.thesis.explained import MINIMAL, Claim, Explained
 
 # Scene, text, colour and line style of each case, in the thesis' order.
 RAIL: dict[str, tuple[str, str, Any]] = {

@@ -11,31 +11,28 @@ import importlib
 import math
 import statistics
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.integrate import solve_ivp
-from scipy.integrate import trapezoid
+from scipy.integrate import solve_ivp, trapezoid
 from scipy.optimize import brentq
-from scipy.special import k0e
-from scipy.special import k1e
+from scipy.special import k0e, k1e
 
-from ros_pad.capillary import Face
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wall
-from ros_pad.capillary import Wet
-from ros_pad.capillary import WetPattern
-from ros_pad.capillary import bath_meniscus
-from ros_pad.capillary import bath_surface
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import Liquid
+from ros_pad.capillary import (
+    Face,
+    Mesh,
+    Wall,
+    Wet,
+    WetPattern,
+    bath_meniscus,
+    bath_surface,
+    wet,
+    wet_pattern,
+)
+from ros_pad.contact.meniscus import GRAVITY, WATER, Liquid
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -14,14 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.reports.style import legend
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PAPER_STYLE
-from studies.drawing import PURPLE
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, VERMILION
 
 if TYPE_CHECKING:
     from studies.work_precision.capillary import Result

@@ -7,26 +7,19 @@ import math
 import statistics
 import time
 import warnings
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.figure import SubFigure
+from matplotlib.figure import Figure, SubFigure
 
 from ros_pad.contact.pad import Array
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import PALE
-from studies.drawing import VERMILION
+from studies.drawing import BLUE, GREEN, PALE, VERMILION
 
 # Rows of a batch when it is timed, and how long a method for one case is repeated, s.
 BATCH = 100_000

@@ -23,29 +23,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.integrate import quad
-from scipy.interpolate import CubicSpline
-from scipy.interpolate import RectBivariateSpline
-from scipy.optimize import brentq
-from scipy.optimize import fsolve
+from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.optimize import brentq, fsolve
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
+from ros_pad.contact import LARGE_PAD, force_limit, inflate, press
 from ros_pad.contact.pad import Array
 from ros_pad.errors import NoEquilibrium
 from ros_pad.pace import Progress
-from studies.drawing import GREEN
-from studies.drawing import PALE
-from studies.drawing import VERMILION
+from studies.drawing import GREEN, PALE, VERMILION
 from studies.work_precision import measured
-from studies.work_precision.comparison import WIDTH
-from studies.work_precision.comparison import Method
-from studies.work_precision.comparison import Problem
-from studies.work_precision.comparison import Result
-from studies.work_precision.comparison import draw
-from studies.work_precision.comparison import inches
-from studies.work_precision.comparison import run
+from studies.work_precision.comparison import WIDTH, Method, Problem, Result, draw, inches, run
 
 PAD = LARGE_PAD
 BASELINE = 'fsolve, good start'

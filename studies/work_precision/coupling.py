@@ -13,8 +13,7 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import matplotlib
@@ -23,14 +22,10 @@ from matplotlib.figure import Figure
 from ros_pad.capillary import press_wet
 from ros_pad.contact.dome import press
 from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Pad
+from ros_pad.contact.pad import LARGE_PAD, Pad
 from ros_pad.errors import PadError
 from studies import command
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLUE, GREEN, STYLE, VERMILION
 
 PRESSURES = (50e3, 55e3, 60e3, 65e3, 70e3, 75e3, 80e3, 85e3)  # Pa gauge
 SHARES = (0.03, 0.1, 0.3)  # of p π r²

@@ -13,8 +13,7 @@ import math
 import pathlib
 import subprocess
 import tempfile
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ros_pad.errors import ConfigError

@@ -16,8 +16,7 @@ import subprocess
 import sys
 import time
 import urllib.parse
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -26,8 +25,7 @@ import numpy as np
 
 from ros_pad.contact import Foot
 from ros_pad.errors import PadError
-from ros_pad.reports.explore import FIELDS
-from ros_pad.reports.explore import Inputs
+from ros_pad.reports.explore import FIELDS, Inputs
 from ros_pad.reports.explore_page import answer
 from ros_pad.reports.files import save
 from studies import command

@@ -10,43 +10,34 @@ from 150 and 300 rings with a tolerance of 1e-8.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
-from dataclasses import asdict
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import HalfSpace
-from ros_pad.contact import Membrane
-from ros_pad.contact import Squeezed
-from ros_pad.contact import film_thickness
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import squeeze
-from ros_pad.contact import trapped_film
+from ros_pad.contact import (
+    LARGE_PAD,
+    HalfSpace,
+    Membrane,
+    Squeezed,
+    film_thickness,
+    inflate,
+    press,
+    squeeze,
+    trapped_film,
+)
 from ros_pad.contact.resistance import Foot
 from ros_pad.contact.squeeze import dome_dimple
 from ros_pad.simulation import Scene
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop import loops
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLUE, GREEN, ORANGE, PALE, STYLE, VERMILION
 from studies.samples import runs
-from studies.work_precision.comparison import Method
-from studies.work_precision.comparison import Problem
-from studies.work_precision.comparison import Result
-from studies.work_precision.comparison import run
-from studies.work_precision.comparison import table
+from studies.work_precision.comparison import Method, Problem, Result, run, table
 
 RADIUS, LOAD, DEPTH = 1.5e-3, 0.3, 3e-4  # m, N, m
 MEAN = LOAD / (math.pi * RADIUS**2)

@@ -30,18 +30,12 @@ force and moment for the limit surface of a sliding contact; an evenly pressed d
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import sqrt
-from operator import add
-from operator import mul
-from operator import sub
+from operator import add, mul, sub
 
-from ros_pad.configuration import choice
-from ros_pad.configuration import number
-from ros_pad.simulation.planar_step import Pushed
-from ros_pad.simulation.planar_step import newton
-from ros_pad.simulation.planar_step import push
+from ros_pad.configuration import choice, number
+from ros_pad.simulation.planar_step import Pushed, newton, push
 
 Twist = tuple[float, float, float]
 _Row = tuple[float, float, float, float, float]

@@ -28,8 +28,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,13 +37,10 @@ from scipy.optimize import nnls
 
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.planar_robot import GRAVITY
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
+from ros_pad.simulation.scene import LeggedBody, Scene
 from studies import command
 from studies.samples import share_interval
-from studies.work_precision.friction import RigidStep
-from studies.work_precision.friction import least_energy
-from studies.work_precision.friction import least_in_ball
+from studies.work_precision.friction import RigidStep, least_energy, least_in_ball
 
 SOLVED = 1e-6
 """Residual up to which a problem counts as solved."""

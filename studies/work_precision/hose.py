@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import functools
 import timeit
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
@@ -18,17 +17,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.simulation import Hose
-from ros_pad.simulation import PneumaticChannel
-from ros_pad.simulation import RegulatorModel
+from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel
 from ros_pad.simulation.pneumatics import time_to
 from studies import command
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import PALE
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, PALE, STYLE, VERMILION
 
 BORES = {1e-3: VERMILION, 2e-3: BLUE, 4e-3: GREEN}  # m
 LENGTHS = tuple(np.geomspace(0.1, 20.0, 24).tolist())

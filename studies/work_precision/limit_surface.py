@@ -16,10 +16,8 @@ import math
 import pathlib
 import sys
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 from unittest import mock
 
 import matplotlib
@@ -28,20 +26,13 @@ from matplotlib.figure import Figure
 
 from ros_pad.capillary.mesh import hexagonal
 from ros_pad.contact.dome import press
-from ros_pad.contact.resistance import DISC_TURNING_RADIUS
-from ros_pad.contact.resistance import DOMED
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import DISC_TURNING_RADIUS, DOMED, Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
 from studies.closed_loop.loops import walk
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import ORANGE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, ORANGE, SKY, STYLE, VERMILION
 
 FEET = ('large19', 'large37', 'large331', 'small217')
 PITCH = 3.0

@@ -11,26 +11,23 @@ from 0.01 to 3 capillary lengths, are compared with the exact meniscus of a wide
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
-from typing import Any
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_pad.capillary import Face
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wall
-from ros_pad.capillary import bath_meniscus
-from ros_pad.capillary import layers
-from ros_pad.capillary import pattern_surface
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.errors import MeshError
-from ros_pad.errors import NoSurface
+from ros_pad.capillary import (
+    Face,
+    Mesh,
+    Wall,
+    bath_meniscus,
+    layers,
+    pattern_surface,
+    wet,
+    wet_pattern,
+)
+from ros_pad.contact.meniscus import GRAVITY, Liquid
+from ros_pad.errors import MeshError, NoSurface
 from studies import command
 
 TENSION, DENSITY = 0.073, 1000.0

@@ -24,9 +24,7 @@ import pathlib
 import re
 import statistics
 import sys
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,32 +35,17 @@ from matplotlib.ticker import LogLocator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ros_pad.capillary import Face
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wall
-from ros_pad.capillary import pattern_surface
-from ros_pad.capillary import wet_pattern
+from ros_pad.capillary import Face, Mesh, Wall, pattern_surface, wet_pattern
 from ros_pad.contact import bridge
-from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.contact.meniscus import Liquid
+from ros_pad.contact.meniscus import GRAVITY, Liquid
 from ros_pad.errors import ConfigError
 from ros_pad.pace import Progress
 from ros_pad.reports.style import legend
 from studies import command
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PAPER_STYLE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, SKY, VERMILION
 from studies.machine import spent_time
-from studies.work_precision import capillary
-from studies.work_precision import evolver
-from studies.work_precision.capillary import REST
-from studies.work_precision.capillary import SPHERE
+from studies.work_precision import capillary, evolver
+from studies.work_precision.capillary import REST, SPHERE
 
 PITCHES = (3.4e-3, 4.4e-3, 6e-3, 9e-3)  # m, in turn hexagonal and square
 LIQUIDS = (

@@ -13,29 +13,13 @@ from matplotlib.figure import SubFigure
 from scipy.optimize import brentq
 
 from ros_pad.configuration import shared_folder
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact.laws import Law
-from ros_pad.contact.laws import highest_dome
-from ros_pad.contact.laws import rubber_laws
-from ros_pad.contact.laws import stiffness_law
-from ros_pad.contact.laws import with_constant
+from ros_pad.contact import LARGE_PAD, Material, Pad, force_limit, inflate, press
+from ros_pad.contact.laws import Law, highest_dome, rubber_laws, stiffness_law, with_constant
 from ros_pad.contact.measurements import Measurements
 from ros_pad.contact.pad import Array
 from ros_pad.errors import InvalidInput
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PURPLE
-from studies.drawing import VERMILION
-from studies.work_precision.comparison import Method
-from studies.work_precision.comparison import Problem
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, VERMILION
+from studies.work_precision.comparison import Method, Problem
 
 THICKNESS = 0.4e-3  # m, of the thesis' pad
 QUANTITIES = ('height', 'gap', 'contact radius', 'force limit')

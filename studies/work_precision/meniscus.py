@@ -16,28 +16,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from scipy.optimize import fsolve
-from scipy.special import k0e
-from scipy.special import k1e
+from scipy.optimize import brentq, fsolve
+from scipy.special import k0e, k1e
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import WATER
-from ros_pad.contact import Liquid
-from ros_pad.contact import Pressed
-from ros_pad.contact import bridge
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import meniscus
-from ros_pad.contact import press
+from ros_pad.contact import (
+    LARGE_PAD,
+    WATER,
+    Liquid,
+    Pressed,
+    bridge,
+    force_limit,
+    inflate,
+    meniscus,
+    press,
+)
 from ros_pad.contact.meniscus import GRAVITY
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
-from studies.work_precision.comparison import Method
-from studies.work_precision.comparison import Problem
-from studies.work_precision.comparison import Result
-from studies.work_precision.comparison import chart
-from studies.work_precision.comparison import run
+from studies.work_precision.comparison import Method, Problem, Result, chart, run
 
 # The sphere is the dome of the large pad at 75 kPa; the liquid is water.
 RADIUS = inflate(LARGE_PAD, 75e3).sphere_radius

@@ -14,8 +14,7 @@ block and D its determinant, ``I1 = S + e²``, ``I2 = S e² + D²`` and ``J = D 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np

@@ -11,8 +11,7 @@ import dataclasses
 import itertools
 import math
 import random
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -25,25 +24,19 @@ from scipy.optimize import brentq
 from ros_pad.contact.pad import Array
 from ros_pad.pace import Progress
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_robot import GRAVITY
-from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.pneumatics import ATMOSPHERE
-from ros_pad.simulation.pneumatics import REFERENCE_DENSITY
-from ros_pad.simulation.pneumatics import REFERENCE_PRESSURE
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
-from ros_pad.simulation.pneumatics import conductance
+from ros_pad.simulation.planar_robot import GRAVITY, PlanarRobot
+from ros_pad.simulation.pneumatics import (
+    ATMOSPHERE,
+    REFERENCE_DENSITY,
+    REFERENCE_PRESSURE,
+    Hose,
+    PneumaticChannel,
+    RegulatorModel,
+    conductance,
+)
 from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import RailBody
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import Tow
-from studies.work_precision.friction import Contact
-from studies.work_precision.friction import Twist
-from studies.work_precision.friction import creeping
-from studies.work_precision.friction import elastic
-from studies.work_precision.friction import exact_stick
+from ros_pad.simulation.scene import LeggedBody, RailBody, Scene, Tow
+from studies.work_precision.friction import Contact, Twist, creeping, elastic, exact_stick
 
 Step = Callable[[Twist, float, float, Sequence[Contact], float, Twist], Twist]
 

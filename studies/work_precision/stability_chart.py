@@ -12,21 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PAPER_STYLE
-from studies.drawing import PURPLE
-from studies.drawing import VERMILION
-from studies.work_precision.stability import ILL
-from studies.work_precision.stability import KICK
-from studies.work_precision.stability import NEEDS_MUJOCO
-from studies.work_precision.stability import STABLE
-from studies.work_precision.stability import Outcome
-from studies.work_precision.stability import linear_limit
-from studies.work_precision.stability import step_limits
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PAPER_STYLE, PURPLE, VERMILION
+from studies.work_precision.stability import (
+    ILL,
+    KICK,
+    NEEDS_MUJOCO,
+    STABLE,
+    Outcome,
+    linear_limit,
+    step_limits,
+)
 
 # Colours and markers of the plain methods, in the order of a case; line styles of ours.
 _NAIVE = ((VERMILION, 'o'), (ORANGE, 's'), (PURPLE, 'D'), (BLUE, '^'), (PALE, 'v'))

@@ -26,21 +26,13 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.interpolate import CubicSpline
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact import inflate
-from ros_pad.contact import thickness
-from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.hyperelastic import shapes
+from ros_pad.contact import Material, Pad, inflate, thickness
+from ros_pad.contact.hyperelastic import pressure_end, shapes
 from ros_pad.contact.pad import Array
 from studies import command
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
+from studies.drawing import BLACK, BLUE, STYLE, VERMILION
 
 EDGES = {'bonded': BLUE, 'clamped': VERMILION}
 REFERENCE = command.ROOT / 'test' / 'reference' / 'fe_free.json'
@@ -77,8 +69,7 @@ class Curve:
 
 def curve(edge: str, ratio: float, law: tuple[float, float]) -> Curve:
     """Compute a solid to the largest height of the correction, also past a maximum pressure."""
-    from studies.work_precision.solid import Rubber
-    from studies.work_precision.solid import Solid
+    from studies.work_precision.solid import Rubber, Solid
 
     start = time.perf_counter()
     paths = []
@@ -212,9 +203,7 @@ def errors(solid: Curve) -> dict[str, Any]:
 
 def reference() -> list[dict[str, Any]]:
     """Return the reference rows with the height of our solid, and of the correction."""
-    from studies.work_precision.solid import NoConvergence
-    from studies.work_precision.solid import Rubber
-    from studies.work_precision.solid import Solid
+    from studies.work_precision.solid import NoConvergence, Rubber, Solid
 
     results = []
     for row in command.each(json.loads(REFERENCE.read_text())['rows'], 'reference', 'row'):
@@ -250,8 +239,7 @@ def reference() -> list[dict[str, Any]]:
 
 def thin() -> list[dict[str, Any]]:
     """Return solids over the membrane at a height of 0.3 radii, less 1, by thickness."""
-    from studies.work_precision.solid import Rubber
-    from studies.work_precision.solid import Solid
+    from studies.work_precision.solid import Rubber, Solid
 
     pressure = float(_membrane((0.0, 0.0))(0.3)[0])
     rows = []

@@ -17,39 +17,23 @@ import yaml
 
 pytest.importorskip('rclpy', reason='rclpy is needed: it serializes the messages')
 
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import PoseStamped
-from geometry_msgs.msg import TwistWithCovarianceStamped
-from geometry_msgs.msg import WrenchStamped
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseStamped, TwistWithCovarianceStamped, WrenchStamped
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
-from std_msgs.msg import Bool
-from std_msgs.msg import Float64
-from std_msgs.msg import String
+from std_msgs.msg import Bool, Float64, String
 
-from ros_pad.bags import BagReader
-from ros_pad.bags import BagWriter
-from ros_pad.bags import annotate
-from ros_pad.bags import metadata
-from ros_pad.bags import storage
-from ros_pad.bags.definitions import message_definition
-from ros_pad.bags.definitions import type_hash
+from ros_pad.bags import BagReader, BagWriter, annotate, metadata, storage
+from ros_pad.bags.definitions import message_definition, type_hash
 from ros_pad.bags.wire import Wire
-from ros_pad.errors import BagError
-from ros_pad.errors import InvalidInput
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.errors import BagError, InvalidInput
+from ros_pad.records import ESTIMATE, PRESSURE, SAMPLE, Block
 
 QOS = """
 - history: keep_last

@@ -14,23 +14,15 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from ros_pad.bags import topics
 from ros_pad.bags.codec import MessageType
-from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.fields import FieldWriter
-from ros_pad.bags.fields import field_of
-from ros_pad.bags.topics import FRAME
-from ros_pad.bags.topics import STAMP
-from ros_pad.bags.topics import Topic
-from ros_pad.errors import BadMessage
-from ros_pad.errors import UnknownEncoding
+from ros_pad.bags.fields import FieldReader, FieldWriter, field_of
+from ros_pad.bags.topics import FRAME, STAMP, Topic
+from ros_pad.errors import BadMessage, UnknownEncoding
 
 BOOL = 'std_msgs/msg/Bool'
 JOINT_STATE = 'sensor_msgs/msg/JointState'

@@ -21,12 +21,9 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import Writer
 from rclpy.serialization import serialize_message
-from std_msgs.msg import Float64
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
-from ros_pad.bags import BagReader
-from ros_pad.bags import BagWriter
-from ros_pad.bags import recovery
+from ros_pad.bags import BagReader, BagWriter, recovery
 from ros_pad.cli import main
 from ros_pad.errors import BagError
 from ros_pad.trials.label import RECORDED_AT

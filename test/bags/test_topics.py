@@ -6,20 +6,21 @@ import re
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from ros_pad.bags import topics
 from ros_pad.bags.codec import MessageType
 from ros_pad.bags.fields import FieldReader
-from ros_pad.bags.topics import FRAME
-from ros_pad.bags.topics import OF_LEGS
-from ros_pad.bags.topics import RECORDS
-from ros_pad.bags.topics import STAMP
-from ros_pad.bags.topics import TRIAL
-from ros_pad.bags.topics import Topic
-from ros_pad.bags.topics import from_record
-from ros_pad.bags.topics import to_record
+from ros_pad.bags.topics import (
+    FRAME,
+    OF_LEGS,
+    RECORDS,
+    STAMP,
+    TRIAL,
+    Topic,
+    from_record,
+    to_record,
+)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TOPICS = [each for each in vars(topics).values() if isinstance(each, Topic)]

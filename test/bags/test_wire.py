@@ -5,20 +5,13 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores, get_typestore
 
-from ros_pad.bags.wire import TYPE
-from ros_pad.bags.wire import Wire
-from ros_pad.bags.wire import legs_of
+from ros_pad.bags.wire import TYPE, Wire, legs_of
 from ros_pad.errors import BadMessage
-from ros_pad.records import COMMAND
-from ros_pad.records import KINDS
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import COMMAND, KINDS, SAMPLE, Block
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 LEGS = (1, 4)
@@ -117,8 +110,7 @@ def test_names_in_another_order_and_missing_ones_are_read(big):
 
 def test_a_message_that_rclpy_serialises_is_read():
     pytest.importorskip('rclpy')
-    from rclpy.serialization import deserialize_message
-    from rclpy.serialization import serialize_message
+    from rclpy.serialization import deserialize_message, serialize_message
     from sensor_msgs.msg import JointState
 
     wire, block = Wire(SAMPLE, LEGS), block_of(SAMPLE)

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ros_pad.capillary.bath import Wall
-from ros_pad.capillary.bath import bath_meniscus
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.capillary.bath import Wall, bath_meniscus
+from ros_pad.contact.meniscus import WATER, Liquid
+from ros_pad.errors import InvalidInput, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow

@@ -5,17 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from ros_pad.capillary.bath import Wall
-from ros_pad.capillary.bath import bath_meniscus
+from ros_pad.capillary.bath import Wall, bath_meniscus
 from ros_pad.capillary.coupling import press_wet
 from ros_pad.contact.dome import press
-from ros_pad.contact.meniscus import WATER
-from ros_pad.contact.meniscus import Liquid
-from ros_pad.contact.pad import LARGE_PAD
-from ros_pad.contact.pad import Pad
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
-from ros_pad.errors import NoSurface
+from ros_pad.contact.meniscus import WATER, Liquid
+from ros_pad.contact.pad import LARGE_PAD, Pad
+from ros_pad.errors import InvalidInput, NoEquilibrium, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow

@@ -9,25 +9,23 @@ import timeit
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_pad.capillary import Face
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import Wall
-from ros_pad.capillary import bath_meniscus
-from ros_pad.capillary import pattern_surface
-from ros_pad.capillary import sections
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
+from ros_pad.capillary import (
+    Face,
+    Mesh,
+    Wall,
+    bath_meniscus,
+    pattern_surface,
+    sections,
+    wet,
+    wet_pattern,
+)
 from ros_pad.capillary.layers import BALANCES
 from ros_pad.capillary.mesh import revolved
-from ros_pad.contact import WATER
-from ros_pad.contact import Liquid
-from ros_pad.contact import hysteresis_force
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.contact import WATER, Liquid, hysteresis_force
+from ros_pad.errors import InvalidInput, MeshError
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow

@@ -5,15 +5,11 @@ import types
 import numpy as np
 import pytest
 
-from ros_pad.capillary.bath import Wall
-from ros_pad.capillary.bath import bath_meniscus
+from ros_pad.capillary.bath import Wall, bath_meniscus
 from ros_pad.capillary.faces import Face
-from ros_pad.capillary.menisci import bath_surface
-from ros_pad.capillary.menisci import pattern_surface
+from ros_pad.capillary.menisci import bath_surface, pattern_surface
 from ros_pad.contact.meniscus import Liquid
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
-from ros_pad.errors import NoSurface
+from ros_pad.errors import InvalidInput, MeshError, NoSurface
 
 # The quick tests of liquid are those of surfaces and meshes.
 pytestmark = pytest.mark.slow

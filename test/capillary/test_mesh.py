@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from ros_pad.capillary import Mesh
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import MeshError
+from ros_pad.errors import InvalidInput, MeshError
 
 R, B = 1.55e-3, 0.583e-3
 CUBE_POINTS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 1e-3

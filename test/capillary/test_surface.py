@@ -10,12 +10,8 @@ from scipy.optimize import brentq
 
 from ros_pad.capillary.faces import Face
 from ros_pad.capillary.menisci import spanned
-from ros_pad.capillary.surface import Line
-from ros_pad.capillary.surface import Rails
-from ros_pad.capillary.surface import System
-from ros_pad.capillary.surface import minimise
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoSurface
+from ros_pad.capillary.surface import Line, Rails, System, minimise
+from ros_pad.errors import InvalidInput, NoSurface
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 BRIDGES = json.loads((REFERENCE / 'sphere_plane_bridge.json').read_text())['rows']

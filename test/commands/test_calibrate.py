@@ -4,8 +4,7 @@ import pathlib
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.contact import Foot
 
 THESIS = str(configuration.shared_folder() / 'measurements' / 'thesis.csv')

@@ -13,8 +13,7 @@ import sys
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.commands import completion
 from ros_pad.control import POLICIES
 

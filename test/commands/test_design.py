@@ -7,8 +7,7 @@ import pathlib
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 
 # A sole on which few of the drawn radii fit, so that a figure takes little time.
 SMALL = ['--radius', '5e-4', '--area', '2e-6']

@@ -13,13 +13,11 @@ import subprocess
 import sys
 import webbrowser
 from types import SimpleNamespace
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.commands import doctor
 from ros_pad.commands.doctor import Finding
 from ros_pad.simulation.fidelity import Promises

@@ -9,8 +9,7 @@ import shutil
 import pytest
 from mcap.reader import make_reader
 
-from ros_pad import cli
-from ros_pad import configuration
+from ros_pad import cli, configuration
 from ros_pad.bags import BagReader
 
 SAMPLE = configuration.shared_folder().parent / 'bags' / 'hexapod_patches' / 'bag'

@@ -21,13 +21,11 @@ import pytest
 
 from ros_pad import cli
 from ros_pad.commands.command import INTERRUPTED
-from ros_pad.commands.sweep import parameters
-from ros_pad.commands.sweep import seeds
+from ros_pad.commands.sweep import parameters, seeds
 from ros_pad.errors import InvalidInput
 from ros_pad.trials.sweep import Sweep
 from ros_pad.trials.sweep.execution import run_job
-from ros_pad.trials.sweep.table import Results
-from ros_pad.trials.sweep.table import write_tables
+from ros_pad.trials.sweep.table import Results, write_tables
 
 CAP = 300.0  # s: no test waits longer for an event, however slow the machine
 LEG = ['sweep', 'leg_wet_flat', '--workers', '2', '--set', 'cycles=2']

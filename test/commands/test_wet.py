@@ -7,12 +7,9 @@ import pathlib
 
 import pytest
 
-from ros_pad import cli
-from ros_pad import configuration
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import wet
-from ros_pad.contact import THESIS_LIQUID
-from ros_pad.contact import WATER
+from ros_pad import cli, configuration
+from ros_pad.capillary import Mesh, wet
+from ros_pad.contact import THESIS_LIQUID, WATER
 
 DOME = ['wet', 'dome', '--radius', '1.55e-3', '--contact-radius', '0.6e-3']
 SMALL = ['--rings', '16', '--sectors', '24']

@@ -7,15 +7,13 @@ import pathlib
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from ros_pad.contact.bridge import bridge as any_bridge
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoBridge
+from ros_pad.errors import InvalidInput, NoBridge
 
 bridge = functools.partial(any_bridge, method='young_laplace')
 

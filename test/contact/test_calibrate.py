@@ -9,23 +9,25 @@ import numpy as np
 import pytest
 
 from ros_pad import configuration
-from ros_pad.contact import Foot
-from ros_pad.contact import Material
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import tangential_resistance
-from ros_pad.contact.calibrate import calibrate
-from ros_pad.contact.calibrate import foot_file
-from ros_pad.contact.calibrate import stiffness_of
+from ros_pad.contact import (
+    Foot,
+    Material,
+    MeasuredLimit,
+    Pad,
+    force_limit,
+    inflate,
+    press,
+    tangential_resistance,
+)
+from ros_pad.contact.calibrate import calibrate, foot_file, stiffness_of
 from ros_pad.contact.film import Film
-from ros_pad.contact.measurements import ForceLimits
-from ros_pad.contact.measurements import FreeDomes
-from ros_pad.contact.measurements import Friction
-from ros_pad.contact.measurements import Measurements
-from ros_pad.contact.measurements import PressedDomes
+from ros_pad.contact.measurements import (
+    ForceLimits,
+    FreeDomes,
+    Friction,
+    Measurements,
+    PressedDomes,
+)
 from ros_pad.errors import InvalidInput
 
 THESIS = Measurements.read(configuration.shared_folder() / 'measurements' / 'thesis.csv')

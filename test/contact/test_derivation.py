@@ -7,18 +7,11 @@ from collections.abc import Callable
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from mpmath import mp
-from mpmath import mpf
+from mpmath import mp, mpf
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import WATER
-from ros_pad.contact import Pad
-from ros_pad.contact import inflate
-from ros_pad.contact import meniscus
-from ros_pad.contact import press
+from ros_pad.contact import LARGE_PAD, WATER, Pad, inflate, meniscus, press
 from ros_pad.contact.dome import largest_tension
 
 R, K, GAMMA = mpf('1.5e-3'), mpf(40), mpf('0.006')

@@ -7,19 +7,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Liquid
-from ros_pad.contact import Pad
-from ros_pad.contact import design
-from ros_pad.contact import design_pressure
-from ros_pad.contact import foot_force
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import pads_in
-from ros_pad.contact import pressure_for
-from ros_pad.contact import rise_height
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact import (
+    LARGE_PAD,
+    Liquid,
+    Pad,
+    design,
+    design_pressure,
+    foot_force,
+    force_limit,
+    inflate,
+    pads_in,
+    pressure_for,
+    rise_height,
+)
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 READINGS = ('corrected', 'thesis')
 SOLE = math.pi * 0.017**2

@@ -8,17 +8,12 @@ import sys
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Pad
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact import LARGE_PAD, Pad, inflate, press
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ros_pad.contact.film import Film
-from ros_pad.contact.film import film_thickness
+from ros_pad.contact.film import Film, film_thickness
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 

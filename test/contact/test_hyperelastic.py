@@ -8,18 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ros_pad.contact import Material
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import pressure_for
-from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.hyperelastic import rim_angle
+from ros_pad.contact import Material, MeasuredLimit, Pad, force_limit, inflate, press, pressure_for
+from ros_pad.contact.hyperelastic import pressure_end, rim_angle
 from ros_pad.contact.limits import largest_pressure
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 LAWS = {'Yeoh': 'yeoh', 'Mooney-Rivlin': 'mooney_rivlin', 'Ogden': 'ogden'}

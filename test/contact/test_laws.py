@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import f as fisher
 
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact.laws import compare
-from ros_pad.contact.laws import pressure_for_height
-from ros_pad.contact.laws import rubber_laws
-from ros_pad.contact.laws import stiffness_law
-from ros_pad.contact.laws import two_constants_law
+from ros_pad.contact import Material, Pad
+from ros_pad.contact.laws import (
+    compare,
+    pressure_for_height,
+    rubber_laws,
+    stiffness_law,
+    two_constants_law,
+)
 from ros_pad.errors import InvalidInput
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'

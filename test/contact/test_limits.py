@@ -8,22 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import SMALL_PAD
-from ros_pad.contact import Material
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
-from ros_pad.contact import design
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import pressure_for
-from ros_pad.contact.limits import criteria
-from ros_pad.contact.limits import largest_pressure
-from ros_pad.contact.limits import resized
+from ros_pad.contact import (
+    LARGE_PAD,
+    SMALL_PAD,
+    Material,
+    MeasuredLimit,
+    Pad,
+    design,
+    force_limit,
+    inflate,
+    press,
+    pressure_for,
+)
+from ros_pad.contact.limits import criteria, largest_pressure, resized
 from ros_pad.contact.pad import DOME_PRESSURE
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 CRITERIA = ('thickness', 'wall', 'flattening', 'max_depth', 'measured')
 OF_ANY_CAP = CRITERIA[:4]

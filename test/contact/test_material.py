@@ -8,17 +8,10 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.capillary.coupling import press_wet
-from ros_pad.contact import WATER
-from ros_pad.contact import Foot
-from ros_pad.contact import Material
-from ros_pad.contact import Pad
-from ros_pad.contact import design
-from ros_pad.contact import inflate
+from ros_pad.contact import WATER, Foot, Material, Pad, design, inflate
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.material import equibiaxial
-from ros_pad.contact.material import tensions
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.material import equibiaxial, tensions
+from ros_pad.errors import ConfigError, InvalidInput
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference'
 YEOH = (26258.18995463, 1854.39136388, -35.05189509)

@@ -6,21 +6,13 @@ import sys
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import assume
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import root
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import Pad
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact.membrane import LARGEST_PRESSURE
-from ros_pad.contact.membrane import LARGEST_SHARE
-from ros_pad.contact.membrane import press_membrane
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.contact import LARGE_PAD, Pad, inflate, press
+from ros_pad.contact.membrane import LARGEST_PRESSURE, LARGEST_SHARE, press_membrane
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 LENGTHS = ('height', 'depth', 'contact_radius', 'sphere_radius', 'gap')
 UNIT = Pad(1.0, 1.0)  # then pressure is P, and force is pi P times the share in contact

@@ -9,17 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import THESIS_LIQUID
-from ros_pad.contact import WATER
-from ros_pad.contact import Liquid
-from ros_pad.contact import Pressed
-from ros_pad.contact import bridge
-from ros_pad.contact import capillary_pull
-from ros_pad.contact import contact_angle
-from ros_pad.contact import hysteresis_force
-from ros_pad.contact import meniscus
-from ros_pad.contact import press
+from ros_pad.contact import (
+    LARGE_PAD,
+    THESIS_LIQUID,
+    WATER,
+    Liquid,
+    Pressed,
+    bridge,
+    capillary_pull,
+    contact_angle,
+    hysteresis_force,
+    meniscus,
+    press,
+)
 from ros_pad.errors import InvalidInput
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'reference'

@@ -4,10 +4,7 @@ import math
 
 import pytest
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import SMALL_PAD
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
+from ros_pad.contact import LARGE_PAD, SMALL_PAD, MeasuredLimit, Pad
 from ros_pad.errors import InvalidInput
 
 

@@ -11,14 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros_pad import configuration
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
+from ros_pad.contact import LARGE_PAD, MeasuredLimit, Pad
 from ros_pad.contact.hyperelastic import pressure_end
-from ros_pad.contact.resistance import Foot
-from ros_pad.contact.resistance import tangential_resistance
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.contact.resistance import Foot, tangential_resistance
+from ros_pad.errors import ConfigError, InvalidInput
 
 FEET = [name for name in configuration.names('feet') if name.startswith('large')]
 THICK = 1.0e-3  # m, a film too thick for dry contact

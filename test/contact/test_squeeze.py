@@ -4,15 +4,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
-from ros_pad.contact.squeeze import HalfSpace
-from ros_pad.contact.squeeze import Membrane
-from ros_pad.contact.squeeze import dome_dimple
-from ros_pad.contact.squeeze import dry_share
-from ros_pad.contact.squeeze import squeeze
-from ros_pad.contact.squeeze import trapped_film
+from ros_pad.contact.squeeze import (
+    HalfSpace,
+    Membrane,
+    dome_dimple,
+    dry_share,
+    squeeze,
+    trapped_film,
+)
 from ros_pad.errors import InvalidInput
 
 RADIUS, LOAD, MODULUS, WATER = 1.5e-3, 0.3, 395e3, 1.0e-3

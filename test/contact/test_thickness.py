@@ -5,18 +5,11 @@ import pathlib
 import numpy as np
 import pytest
 
-from ros_pad.contact import Material
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact import inflate
-from ros_pad.contact import press
-from ros_pad.contact import pressure_for
+from ros_pad.contact import Material, MeasuredLimit, Pad, force_limit, inflate, press, pressure_for
 from ros_pad.contact.hyperelastic import pressure_end
 from ros_pad.contact.limits import largest_pressure
 from ros_pad.contact.thickness import HIGHEST
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import InvalidInput, NoEquilibrium
 
 REFERENCE = pathlib.Path(__file__).parent.parent / 'reference' / 'fe_free.json'
 ROWS = json.loads(REFERENCE.read_text())['rows']

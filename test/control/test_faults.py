@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 
-from ros_pad.control.faults import KINDS
-from ros_pad.control.faults import Kind
-from ros_pad.control.faults import joined
-from ros_pad.control.faults import text
+from ros_pad.control.faults import KINDS, Kind, joined, text
 from ros_pad.estimation import doubt as doubts
 
 

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.control.footprints import Footprints
-from ros_pad.control.footprints import FrictionFelt
+from ros_pad.control.footprints import Footprints, FrictionFelt
 from ros_pad.errors import InvalidInput
 
 

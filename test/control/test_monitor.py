@@ -12,8 +12,7 @@ import pytest
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import PadMonitor
 from ros_pad.control.monitor import RunningMedian
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
+from ros_pad.errors import InvalidInput, TransportError
 from ros_pad.regulators import SimulatedRegulator
 
 FOOT = Foot.load('large37')

@@ -5,24 +5,23 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.control import POLICIES
-from ros_pad.control import Choice
-from ros_pad.control import LiftOff
-from ros_pad.control import MorphologyController
-from ros_pad.control import adaptive
-from ros_pad.control import dome
-from ros_pad.control import first_morphologies
-from ros_pad.control import flat
-from ros_pad.control import oracle
-from ros_pad.control import policy_named
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
-from ros_pad.errors import PadError
+from ros_pad.control import (
+    POLICIES,
+    Choice,
+    LiftOff,
+    MorphologyController,
+    adaptive,
+    dome,
+    first_morphologies,
+    flat,
+    oracle,
+    policy_named,
+)
+from ros_pad.errors import InvalidInput, LimitError, PadError
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N

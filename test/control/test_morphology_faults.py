@@ -5,15 +5,11 @@ import math
 import re
 
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.control import Choice
-from ros_pad.control import MorphologyController
-from ros_pad.control import dome
-from ros_pad.control import flat
+from ros_pad.control import Choice, MorphologyController, dome, flat
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import DOUBTS
 

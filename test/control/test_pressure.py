@@ -3,15 +3,13 @@ import dataclasses
 import math
 
 import pytest
-from hypothesis import assume
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from ros_pad.contact import force_limit
 from ros_pad.contact.resistance import Foot
 from ros_pad.control import dome_pressure
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
+from ros_pad.errors import InvalidInput, LimitError
 
 FOOT = Foot.load('large37')
 

@@ -5,13 +5,10 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Foot
-from ros_pad.control import MorphologyController
-from ros_pad.control import flat
+from ros_pad.control import MorphologyController, flat
 from ros_pad.control.stage import DecisionStage
 from ros_pad.estimation import doubt as doubts
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import Block
+from ros_pad.records import ESTIMATE, PRESSURE, Block
 
 CODES = {row.kind: code for code, row in reversed([*enumerate(doubts.TABLE)])}
 

@@ -6,9 +6,7 @@ import pytest
 from scipy import stats
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation.alarm import FAST_SLIP
-from ros_pad.estimation.alarm import SLOW_SLIP
-from ros_pad.estimation.alarm import SlipAlarm
+from ros_pad.estimation.alarm import FAST_SLIP, SLOW_SLIP, SlipAlarm
 
 NEVER = 1e6  # nats, a threshold that is never reached
 

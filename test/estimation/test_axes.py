@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import SENSOR_FAULTS
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import doubt
-from ros_pad.estimation.axes import TURNS
-from ros_pad.estimation.axes import Axes
-from ros_pad.estimation.axes import SharedAxes
+from ros_pad.estimation import SENSOR_FAULTS, FootEstimator, doubt
+from ros_pad.estimation.axes import TURNS, Axes, SharedAxes
 from ros_pad.estimation.scales import DELAY
 
 FOOT = Foot.load('large37')

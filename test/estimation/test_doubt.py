@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import DOUBTS
-from ros_pad.estimation import SENSOR_FAULTS
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import Tuning
-from ros_pad.estimation import doubt
+from ros_pad.estimation import DOUBTS, SENSOR_FAULTS, FootEstimator, Tuning, doubt
 from ros_pad.estimation.scales import FrictionPrior
 
 FOOT = Foot.load('large37')

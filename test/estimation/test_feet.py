@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from ros_pad.contact import Foot
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import Tuning
+from ros_pad.estimation import FootEstimator, Tuning
 from ros_pad.estimation.feet import FeetEstimator
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import PRESSURE, SAMPLE, Block
 
 FOOT, LOAD, PERIOD_NS = Foot.load('large37'), 6.8, 4_000_000
 ALONE = Tuning(learn_friction=False)

@@ -6,14 +6,12 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import Tuning
+from ros_pad.estimation import FootEstimator, Tuning
 from ros_pad.estimation.friction import GroundFilter
 from ros_pad.estimation.watch import LONGEST_GAP
 

@@ -3,19 +3,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation.friction import GRID
-from ros_pad.estimation.friction import Evidence
-from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.scales import EDGES
-from ros_pad.estimation.scales import FrictionPrior
-from ros_pad.estimation.scales import FrictionScales
+from ros_pad.estimation.friction import GRID, Evidence, GroundFilter, GroundModel
+from ros_pad.estimation.scales import EDGES, FrictionPrior, FrictionScales
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
 STILL = 0.0  # m/s

@@ -9,15 +9,9 @@ import pytest
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import DOUBTS
-from ros_pad.estimation import SENSOR_FAULTS
-from ros_pad.estimation import ContactMotion
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import Tuning
-from ros_pad.estimation import doubt
+from ros_pad.estimation import DOUBTS, SENSOR_FAULTS, ContactMotion, FootEstimator, Tuning, doubt
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import SAMPLE, Block
 
 FOOT = Foot.load('large37')
 LOAD = 6.8  # N

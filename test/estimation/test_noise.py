@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation import Tuning
+from ros_pad.estimation import FootEstimator, Tuning
 from ros_pad.estimation.noise import SensorNoise
 
 FOOT = Foot.load('large37')

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ros_pad.estimation.friction import Evidence
-from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
-from ros_pad.estimation.scales import CLASSES
-from ros_pad.estimation.scales import GRID
-from ros_pad.estimation.scales import Felt
-from ros_pad.estimation.scales import FrictionPrior
-from ros_pad.estimation.scales import FrictionScales
-from ros_pad.estimation.scales import Scale
+from ros_pad.estimation.friction import Evidence, GroundFilter, GroundModel
+from ros_pad.estimation.scales import CLASSES, GRID, Felt, FrictionPrior, FrictionScales, Scale
 
 PRIOR = FrictionPrior(flat_dry=0.8, flat_wet=0.12, dome=0.41)
 NOTHING = np.zeros(len(GRID))

@@ -6,13 +6,10 @@ import pytest
 
 from ros_pad.contact import Foot
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import Tuning
-from ros_pad.estimation import doubt
+from ros_pad.estimation import Tuning, doubt
 from ros_pad.estimation.feet import LARGEST_FORCE
 from ros_pad.estimation.stage import EstimationStage
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import PRESSURE, SAMPLE, Block
 
 MS = 1_000_000
 FOOT, LOAD = Foot.load('large37'), 6.83

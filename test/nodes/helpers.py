@@ -8,27 +8,18 @@ from collections.abc import Callable
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import PointStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.serialization import deserialize_message
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Header
 
-from ros_pad.bags.wire import Wire
-from ros_pad.bags.wire import legs_of
+from ros_pad.bags.wire import Wire, legs_of
 from ros_pad.nodes import topics
-from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.stamps import split
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
-from ros_pad.records import Kind
+from ros_pad.nodes.stamps import nanoseconds, split
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE, Block, Kind
 
 MS = 1_000_000
 SECOND = 1_000 * MS

@@ -6,17 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers import MS
-from helpers import header
-from helpers import overrides
-from helpers import record
-from hypothesis import given
-from hypothesis import settings
+from helpers import MS, header, overrides, record
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from rclpy.logging import LoggingSeverity
-from rclpy.logging import set_logger_level
-from sensor_msgs.msg import Imu
-from sensor_msgs.msg import JointState
+from rclpy.logging import LoggingSeverity, set_logger_level
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from ros_pad.errors import ConfigError

@@ -16,26 +16,19 @@ from collections import Counter
 import numpy as np
 import pytest
 import rclpy
-from helpers import MS
-from helpers import overrides
-from helpers import pressure
+from helpers import MS, overrides, pressure
 from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
-from ros_pad import cli
-from ros_pad import configuration
-from ros_pad import trials
-from ros_pad.bags import BagReader
-from ros_pad.bags import BagWriter
+from ros_pad import cli, configuration, trials
+from ros_pad.bags import BagReader, BagWriter
 from ros_pad.bags.wire import Wire
-from ros_pad.errors import BagError
-from ros_pad.errors import PadError
+from ros_pad.errors import BagError, PadError
 from ros_pad.estimation import doubt as doubts
-from ros_pad.nodes import composed
-from ros_pad.nodes import topics
+from ros_pad.nodes import composed, topics
 from ros_pad.nodes.composed import ComposedTrial
 from ros_pad.nodes.recorder import RecorderNode
 from ros_pad.records import KINDS

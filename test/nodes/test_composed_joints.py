@@ -6,19 +6,14 @@ import dataclasses
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 
-from ros_pad import configuration
-from ros_pad import trials
-from ros_pad.bags import BagReader
-from ros_pad.bags import annotate
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad import configuration, trials
+from ros_pad.bags import BagReader, annotate
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import composed
-from ros_pad.records import ESTIMATE
-from ros_pad.records import SAMPLE
+from ros_pad.records import ESTIMATE, SAMPLE
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import replay_body
 from ros_pad.trials.node_settings import NodeSettings

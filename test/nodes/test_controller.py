@@ -7,10 +7,7 @@ import re
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import LOAD
-from helpers import MS
-from helpers import estimate
-from helpers import pressure
+from helpers import LOAD, MS, estimate, pressure
 
 from ros_pad.nodes import topics
 from ros_pad.nodes.controller import ControllerNode

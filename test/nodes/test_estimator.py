@@ -7,23 +7,15 @@ import numpy as np
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import LOAD
-from helpers import MS
-from helpers import SECOND
-from helpers import overrides
-from helpers import pressure
-from helpers import record
-from helpers import sample
+from helpers import LOAD, MS, SECOND, overrides, pressure, record, sample
 
 from ros_pad.errors import ConfigError
 from ros_pad.estimation.doubt import text
-from ros_pad.estimation.scales import GRID
-from ros_pad.estimation.scales import Felt
+from ros_pad.estimation.scales import GRID, Felt
 from ros_pad.nodes import topics
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.messages import Messages
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import SAMPLE, Block
 
 ERROR, OK, WARN = DiagnosticStatus.ERROR, DiagnosticStatus.OK, DiagnosticStatus.WARN
 HIDDEN = (math.nan, math.nan, math.nan)

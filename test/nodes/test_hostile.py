@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
-from helpers import MS
-from helpers import SECOND
-from helpers import command
-from helpers import encoded
-from helpers import estimate
-from helpers import overrides
-from helpers import position
-from helpers import pressure
-from helpers import sample
-from helpers import wrench
-from hypothesis import given
-from hypothesis import settings
+from helpers import (
+    MS,
+    SECOND,
+    command,
+    encoded,
+    estimate,
+    overrides,
+    position,
+    pressure,
+    sample,
+    wrench,
+)
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy._rclpy_pybind11 import RCLError  # rclpy has no public name for it
-from rclpy.logging import LoggingSeverity
-from rclpy.logging import set_logger_level
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import FluidPressure
@@ -33,22 +33,18 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ros_pad.bags import topics as schemas
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
-from ros_pad.nodes import regulator
-from ros_pad.nodes import topics
+from ros_pad.errors import InvalidInput, TransportError
+from ros_pad.nodes import regulator, topics
 from ros_pad.nodes.controller import ControllerNode
 from ros_pad.nodes.estimator import EstimatorNode
 from ros_pad.nodes.frames import check_frame
 from ros_pad.nodes.merge import MergeNode
 from ros_pad.nodes.messages import Messages
 from ros_pad.nodes.regulator import RegulatorNode
-from ros_pad.nodes.simulator import HIGHEST
-from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.nodes.simulator import HIGHEST, SimulatorNode
 from ros_pad.nodes.views import ViewsNode
 from ros_pad.records import Block
-from ros_pad.regulators import BACKENDS
-from ros_pad.regulators import Reading
+from ros_pad.regulators import BACKENDS, Reading
 
 CEILING = 80e3
 LEGS = (1, 2)

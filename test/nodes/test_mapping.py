@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from sensor_msgs.msg import Imu
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 
 from ros_pad.bags import BagReader
 from ros_pad.errors import ConfigError

@@ -5,12 +5,9 @@ import math
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
-from visualization_msgs.msg import Marker
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_pad.nodes.markers import ARRAY
-from ros_pad.nodes.markers import FORCE_SCALE
-from ros_pad.nodes.markers import WalkMarkers
+from ros_pad.nodes.markers import ARRAY, FORCE_SCALE, WalkMarkers
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.scene import Scene
 

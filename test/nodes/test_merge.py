@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TwistWithCovarianceStamped
-from helpers import LOAD
-from helpers import MS
-from helpers import fluid
-from helpers import header
-from helpers import position
-from helpers import sample
-from helpers import wrench
+from helpers import LOAD, MS, fluid, header, position, sample, wrench
 
 from ros_pad.bags import topics as schemas
 from ros_pad.errors import ConfigError

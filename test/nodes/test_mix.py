@@ -3,11 +3,7 @@
 
 import math
 
-from helpers import LOAD
-from helpers import fluid
-from helpers import overrides
-from helpers import position
-from helpers import wrench
+from helpers import LOAD, fluid, overrides, position, wrench
 from rclpy.node import Node
 
 from ros_pad.bags import topics as schemas

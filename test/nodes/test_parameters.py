@@ -12,20 +12,14 @@ import sys
 import pytest
 import yaml
 from rcl_interfaces.msg import Parameter as RosParameter
-from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.msg import ParameterEvent, ParameterType, ParameterValue
 from rclpy.node import Node
 from rclpy.parameter import Parameter as Override
 
 from ros_pad.configuration import shared_folder
 from ros_pad.errors import ConfigError
 from ros_pad.nodes.controller import ControllerNode
-from ros_pad.nodes.parameters import AMBIENT_PRESSURE
-from ros_pad.nodes.parameters import FOOT
-from ros_pad.nodes.parameters import LEGS
-from ros_pad.nodes.parameters import Parameter
-from ros_pad.nodes.parameters import declare
+from ros_pad.nodes.parameters import AMBIENT_PRESSURE, FOOT, LEGS, Parameter, declare
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.regulators import SimulatedRegulator
 

@@ -9,9 +9,7 @@ import rclpy
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
+from ros_pad.errors import ConfigError, InvalidInput, TransportError
 from ros_pad.nodes.process import run
 
 

@@ -20,8 +20,7 @@ from rclpy.node import Node
 
 from ros_pad.bags import BagReader
 from ros_pad.bags.wire import Wire
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.nodes import qos, topics
 
 pytestmark = pytest.mark.realtime
 

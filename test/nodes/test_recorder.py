@@ -11,40 +11,27 @@ import warnings
 import numpy as np
 import pytest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
-from helpers import MS
-from helpers import SECOND
-from helpers import encoded
-from helpers import header
-from helpers import overrides
+from helpers import MS, SECOND, encoded, header, overrides
 from helpers import record as record_of
 from rcl_interfaces.msg import Parameter as RosParameter
-from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import HistoryPolicy
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 import ros_pad
-from ros_pad.bags import BagReader
-from ros_pad.bags import BagWriter
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.bags import BagReader, BagWriter
+from ros_pad.errors import BagError, ConfigError
+from ros_pad.nodes import qos, topics
 from ros_pad.nodes.recorder import RecorderNode
-from ros_pad.records import ESTIMATE
-from ros_pad.records import SAMPLE
-from ros_pad.records import Block
+from ros_pad.records import ESTIMATE, SAMPLE, Block
 from ros_pad.trials import label
 
 QUIET = {'start_parameter_services': False, 'enable_rosout': False}

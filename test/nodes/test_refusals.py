@@ -5,15 +5,7 @@ import struct
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import MS
-from helpers import command
-from helpers import encoded
-from helpers import estimate
-from helpers import fluid
-from helpers import position
-from helpers import pressure
-from helpers import sample
-from helpers import wrench
+from helpers import MS, command, encoded, estimate, fluid, position, pressure, sample, wrench
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 

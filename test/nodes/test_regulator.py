@@ -10,14 +10,9 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import AMBIENT
-from helpers import MS
-from helpers import command
-from helpers import overrides
-from lifecycle_msgs.msg import State
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
-from lifecycle_msgs.srv import GetState
+from helpers import AMBIENT, MS, command, overrides
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
@@ -26,14 +21,11 @@ from std_srvs.srv import Trigger
 
 from ros_pad import configuration
 from ros_pad.control.faults import Kind
-from ros_pad.errors import ConfigError
-from ros_pad.errors import TransportError
+from ros_pad.errors import ConfigError, TransportError
 from ros_pad.nodes import regulator as module
 from ros_pad.nodes import topics
 from ros_pad.nodes.regulator import RegulatorNode
-from ros_pad.regulators import BACKENDS
-from ros_pad.regulators import Reading
-from ros_pad.regulators import SimulatedRegulator
+from ros_pad.regulators import BACKENDS, Reading, SimulatedRegulator
 from ros_pad.regulators.protocol import permitted
 from ros_pad.regulators.supervisor import SupervisedChannel
 

@@ -9,14 +9,11 @@ import types
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from helpers import MS
-from helpers import record
+from helpers import MS, record
 
 from ros_pad import configuration
-from ros_pad.nodes import simulator
-from ros_pad.nodes import topics
-from ros_pad.nodes.simulator import HIGHEST
-from ros_pad.nodes.simulator import SimulatorNode
+from ros_pad.nodes import simulator, topics
+from ros_pad.nodes.simulator import HIGHEST, SimulatorNode
 from ros_pad.nodes.stamps import nanoseconds
 from ros_pad.records import PRESSURE
 

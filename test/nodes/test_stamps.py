@@ -5,9 +5,7 @@ from helpers import MS
 from rclpy.node import Node
 
 from ros_pad.nodes.messages import Messages
-from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.stamps import set_stamp
-from ros_pad.nodes.stamps import split
+from ros_pad.nodes.stamps import nanoseconds, set_stamp, split
 
 
 @pytest.mark.parametrize(

@@ -2,19 +2,13 @@
 """If DDS does not connect two ends of a topic, a warning states where, why, and what to change."""
 
 import pytest
-from helpers import command
-from helpers import encoded
-from helpers import overrides
+from helpers import command, encoded, overrides
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import LivelinessPolicy
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 from ros_pad.bags import topics as schemas
-from ros_pad.nodes import qos
-from ros_pad.nodes import topics
+from ros_pad.nodes import qos, topics
 from ros_pad.nodes.regulator import RegulatorNode
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -4,13 +4,7 @@
 import math
 
 import pytest
-from helpers import AMBIENT
-from helpers import LOAD
-from helpers import MS
-from helpers import encoded
-from helpers import estimate
-from helpers import overrides
-from helpers import record
+from helpers import AMBIENT, LOAD, MS, encoded, estimate, overrides, record
 from rclpy.node import Node
 from visualization_msgs.msg import Marker
 
@@ -19,12 +13,8 @@ from ros_pad.errors import ConfigError
 from ros_pad.estimation import doubt as doubts
 from ros_pad.nodes import topics
 from ros_pad.nodes.stamps import nanoseconds
-from ros_pad.nodes.views import SHOWN
-from ros_pad.nodes.views import ViewsNode
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
-from ros_pad.records import PRESSURE
-from ros_pad.records import SAMPLE
+from ros_pad.nodes.views import SHOWN, ViewsNode
+from ros_pad.records import COMMAND, ESTIMATE, PRESSURE, SAMPLE
 
 NAN = math.nan
 SAMPLES = {

@@ -10,17 +10,14 @@ import termios
 import threading
 import time
 import tty
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 from ros_pad.errors import PadError
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import create
-from ros_pad.regulators.emulate import EMULATORS
-from ros_pad.regulators.emulate import Emulator
+from ros_pad.regulators import Regulator, create
+from ros_pad.regulators.emulate import EMULATORS, Emulator
 
 LIMIT = 60.0  # s, enough on slow machines
 PATIENT = {'reply_timeout': 1.0, 'silence': 5.0}  # s: slow machines must not lose devices

@@ -3,13 +3,8 @@ import re
 
 import pytest
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import DeviceFault
-from ros_pad.errors import LimitError
-from ros_pad.errors import ProtocolError
-from ros_pad.errors import TransportError
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import create
+from ros_pad.errors import ConfigError, DeviceFault, LimitError, ProtocolError, TransportError
+from ros_pad.regulators import Regulator, create
 from ros_pad.regulators.alicat import STATUS
 
 # Polls are so rare that one follows each command: a script then knows the whole dialogue.

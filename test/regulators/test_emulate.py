@@ -4,16 +4,17 @@ import time
 
 import pytest
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import TransportError
+from ros_pad.errors import InvalidInput, TransportError
 from ros_pad.regulators import BACKENDS
-from ros_pad.regulators.emulate import EMULATORS
-from ros_pad.regulators.emulate import AlicatEmulator
-from ros_pad.regulators.emulate import Emulator
-from ros_pad.regulators.emulate import FaultSchedule
-from ros_pad.regulators.emulate import SerialTextEmulator
-from ros_pad.regulators.emulate import SmcItvEmulator
-from ros_pad.regulators.emulate import Valve
+from ros_pad.regulators.emulate import (
+    EMULATORS,
+    AlicatEmulator,
+    Emulator,
+    FaultSchedule,
+    SerialTextEmulator,
+    SmcItvEmulator,
+    Valve,
+)
 
 
 def test_every_serial_backend_has_an_emulator():

@@ -3,10 +3,8 @@ import math
 
 import pytest
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import ProtocolError
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import create
+from ros_pad.errors import ConfigError, ProtocolError
+from ros_pad.regulators import Regulator, create
 
 SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
 

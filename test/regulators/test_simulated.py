@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import LimitError
-from ros_pad.errors import TransportError
-from ros_pad.regulators import Reading
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import SimulatedRegulator
-from ros_pad.regulators import create
+from ros_pad.errors import ConfigError, InvalidInput, LimitError, TransportError
+from ros_pad.regulators import Reading, Regulator, SimulatedRegulator, create
 from ros_pad.simulation.pneumatics import PneumaticChannel
 
 

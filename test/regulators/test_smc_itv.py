@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import DeviceFault
-from ros_pad.errors import ProtocolError
-from ros_pad.regulators import Regulator
-from ros_pad.regulators import create
+from ros_pad.errors import ConfigError, DeviceFault, ProtocolError
+from ros_pad.regulators import Regulator, create
 
 SLOW = {'poll_period': 1.0, 'silence': 10.0, 'reply_timeout': 1.0}
 COUNT = 100e3 / 1023

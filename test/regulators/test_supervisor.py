@@ -8,27 +8,16 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_pad.control.faults import KINDS
-from ros_pad.control.faults import Kind
-from ros_pad.control.faults import text
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import ProtocolError
-from ros_pad.errors import TransportError
-from ros_pad.records import COMMAND
-from ros_pad.records import Block
-from ros_pad.regulators import Reading
-from ros_pad.regulators import create
+from ros_pad.control.faults import KINDS, Kind, text
+from ros_pad.errors import InvalidInput, ProtocolError, TransportError
+from ros_pad.records import COMMAND, Block
+from ros_pad.regulators import Reading, create
 from ros_pad.regulators.protocol import permitted
-from ros_pad.regulators.supervision import Supervision
-from ros_pad.regulators.supervision import supply_health
-from ros_pad.regulators.supervisor import Health
-from ros_pad.regulators.supervisor import Level
-from ros_pad.regulators.supervisor import SupervisedChannel
-from ros_pad.regulators.supervisor import SupervisorSettings
+from ros_pad.regulators.supervision import Supervision, supply_health
+from ros_pad.regulators.supervisor import Health, Level, SupervisedChannel, SupervisorSettings
 
 MS = 1_000_000
 TICK_NS = 10 * MS

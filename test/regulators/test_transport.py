@@ -8,13 +8,8 @@ import time
 
 import pytest
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import PadError
-from ros_pad.errors import ProtocolError
-from ros_pad.errors import TransportError
-from ros_pad.regulators import create
-from ros_pad.regulators import serial_device
-from ros_pad.regulators import transport
+from ros_pad.errors import ConfigError, PadError, ProtocolError, TransportError
+from ros_pad.regulators import create, serial_device, transport
 
 QUICK = {'reply_timeout': 0.1, 'silence': 1.0}
 

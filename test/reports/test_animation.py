@@ -13,8 +13,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from ros_pad.reports import animation
-from ros_pad.reports import report
+from ros_pad.reports import animation, report
 from ros_pad.reports.view import view_of
 from ros_pad.simulation.terrain import Floor
 from ros_pad.trials.trial import Trial

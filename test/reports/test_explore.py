@@ -11,26 +11,19 @@ import numpy as np
 import pytest
 
 from ros_pad import cli
-from ros_pad.contact import Film
-from ros_pad.contact import Foot
-from ros_pad.contact import Material
-from ros_pad.contact import MeasuredLimit
-from ros_pad.contact import Pad
-from ros_pad.contact import force_limit
-from ros_pad.contact import tangential_resistance
-from ros_pad.reports.explore import FIELDS
-from ros_pad.reports.explore import STATES
-from ros_pad.reports.explore import Explored
-from ros_pad.reports.explore import Field
-from ros_pad.reports.explore import Inputs
-from ros_pad.reports.explore import explore
-from ros_pad.reports.explore import rows
+from ros_pad.contact import (
+    Film,
+    Foot,
+    Material,
+    MeasuredLimit,
+    Pad,
+    force_limit,
+    tangential_resistance,
+)
+from ros_pad.reports.explore import FIELDS, STATES, Explored, Field, Inputs, explore, rows
 from ros_pad.reports.explore_drawings import picture
 from ros_pad.reports.explore_page import foot_file
-from ros_pad.simulation import Hose
-from ros_pad.simulation import PneumaticChannel
-from ros_pad.simulation import RegulatorModel
-from ros_pad.simulation import Scene
+from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene
 from ros_pad.simulation.pneumatics import time_to
 
 LARGE = Inputs.of(Foot.load('large37'))

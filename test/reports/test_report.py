@@ -15,22 +15,15 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from ros_pad.estimation import DOUBTS
-from ros_pad.reports import files
-from ros_pad.reports import margins
-from ros_pad.reports import reliability
-from ros_pad.reports import report
-from ros_pad.reports import style
+from ros_pad.reports import files, margins, reliability, report, style
 from ros_pad.reports.view import view_of
 from ros_pad.simulation import Scene
 from ros_pad.simulation.terrain import Floor
-from ros_pad.trials import conditions
-from ros_pad.trials import run
+from ros_pad.trials import conditions, run
 from ros_pad.trials.label import described
-from ros_pad.trials.trial import Metrics
-from ros_pad.trials.trial import Trial
+from ros_pad.trials.trial import Metrics, Trial
 
 # HTML elements without a closing tag.
 VOID = {'meta', 'img', 'br', 'hr', 'link', 'input'}

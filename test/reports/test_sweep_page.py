@@ -7,12 +7,10 @@ import sqlite3
 import pytest
 
 from ros_pad import cli
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from ros_pad.reports import sweep_page
 from ros_pad.trials import sweep as sweeps
-from ros_pad.trials.sweep import Sweep
-from ros_pad.trials.sweep import table
+from ros_pad.trials.sweep import Sweep, table
 from ros_pad.trials.sweep.table import Results
 
 SWEEP = Sweep(

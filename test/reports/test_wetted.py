@@ -7,13 +7,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import wet
-from ros_pad.capillary import wet_pattern
+from ros_pad.capillary import Mesh, wet, wet_pattern
 from ros_pad.contact import Liquid
 from ros_pad.errors import InvalidInput
-from ros_pad.reports import wetted
-from ros_pad.reports import wetted_page
+from ros_pad.reports import wetted, wetted_page
 
 LIQUID = Liquid(0.02, 0.011)
 DOME = Mesh.dome(1.55e-3, 0.583e-3, rings=16, sectors=24)

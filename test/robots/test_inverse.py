@@ -7,18 +7,14 @@ import pathlib
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.robots.chains import Chains
-from ros_pad.robots.chains import Joint
-from ros_pad.robots.inverse import FeetSolver
-from ros_pad.robots.inverse import LegSolver
-from ros_pad.robots.rotation import rotation
-from ros_pad.robots.rotation import transform
+from ros_pad.robots.chains import Chains, Joint
+from ros_pad.robots.inverse import FeetSolver, LegSolver
+from ros_pad.robots.rotation import rotation, transform
 
 URDF = pathlib.Path(__file__).resolve().parent.parent / 'reference' / 'robot.urdf'
 ANGLES = st.floats(-3.0, 3.0)

@@ -7,17 +7,12 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.robots import Gait
-from ros_pad.robots import Robot
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import quaternion
-from ros_pad.robots.rotation import rotation
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.robots import Gait, Robot
+from ros_pad.robots.rotation import from_rpy, quaternion, rotation
 from ros_pad.robots.urdf import Urdf
 from ros_pad.simulation.scene import Scene
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import transform
+from ros_pad.robots.rotation import from_rpy, transform
 from ros_pad.sensing import checks
 from studies.sensing import layouts
 

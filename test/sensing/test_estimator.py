@@ -9,8 +9,7 @@ import pytest
 
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import from_rpy
-from ros_pad.robots.rotation import transform
+from ros_pad.robots.rotation import from_rpy, transform
 from ros_pad.sensing import BodyEstimator
 from ros_pad.sensing.plausibility import Shift
 

@@ -11,12 +11,9 @@ import pytest
 
 from ros_pad import configuration
 from ros_pad.bags import BagReader
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimator
-from ros_pad.sensing import Mapping
-from ros_pad.sensing import SensingStage
+from ros_pad.sensing import BodyEstimator, Mapping, SensingStage
 from studies.sensing import layouts
 
 GO2 = Robot.load('go2')

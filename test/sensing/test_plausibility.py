@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from ros_pad.robots import Robot
-from ros_pad.sensing.plausibility import Delay
-from ros_pad.sensing.plausibility import Legs
-from ros_pad.sensing.plausibility import Unloaded
+from ros_pad.sensing.plausibility import Delay, Legs, Unloaded
 
 PERIOD = 0.004
 ARMS = np.array([[0.2, 0.15, -0.3], [0.2, -0.15, -0.3], [-0.2, 0.15, -0.3], [-0.2, -0.15, -0.3]])

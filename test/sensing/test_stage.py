@@ -8,8 +8,7 @@ import pytest
 
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Robot
-from ros_pad.sensing import BodyEstimator
-from ros_pad.sensing import SensingStage
+from ros_pad.sensing import BodyEstimator, SensingStage
 from ros_pad.sensing.stage import sample_of
 
 MS = 1_000_000

@@ -11,8 +11,7 @@ import yaml
 
 from ros_pad import configuration
 from ros_pad.errors import ConfigError
-from ros_pad.simulation import Scene
-from ros_pad.simulation import fidelity
+from ros_pad.simulation import Scene, fidelity
 
 CH3R = yaml.safe_load((configuration.shared_folder() / 'robots' / 'ch3r.yaml').read_text())
 DRY = yaml.safe_load(

@@ -5,25 +5,15 @@ import re
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from ros_pad import configuration
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.simulation import Hose
-from ros_pad.simulation import PneumaticChannel
-from ros_pad.simulation import RegulatorModel
-from ros_pad.simulation import Scene
-from ros_pad.simulation import pneumatics
-from ros_pad.simulation.faults import KINDS
-from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.faults import faults_of
-from ros_pad.simulation.faults import parsed
-from ros_pad.simulation.faults import sensor_faults_of
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.simulation import Hose, PneumaticChannel, RegulatorModel, Scene, pneumatics
+from ros_pad.simulation.faults import KINDS, Fault, faults_of, parsed, sensor_faults_of
 
 AMBIENT = 101325.0
 HOSE = Hose(0.002, 1.0)

@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from ros_pad import configuration
-from ros_pad.contact import Foot
-from ros_pad.contact import MeasuredLimit
+from ros_pad.contact import Foot, MeasuredLimit
 from ros_pad.control.morphology import MARGIN
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.simulation import Scene
-from ros_pad.simulation import fidelity
-from ros_pad.simulation import margin
-from ros_pad.simulation import terms
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.simulation import Scene, fidelity, margin, terms
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.full_robot import FullRobot
 from ros_pad.simulation.planar_robot import PlanarRobot

@@ -10,13 +10,11 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots import Robot
 from ros_pad.simulation import Scene
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import POINT
-from ros_pad.simulation.mujoco_model import SolverSettings
+from ros_pad.simulation.mujoco_model import POINT, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
 from ros_pad.simulation.scene import Tow
 from ros_pad.simulation.terrain import Floor

@@ -8,11 +8,9 @@ import pytest
 
 from ros_pad.errors import InvalidInput
 from ros_pad.robots import Chains
-from ros_pad.simulation import Scene
-from ros_pad.simulation import planar_step
+from ros_pad.simulation import Scene, planar_step
 from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.scene import FloorPlan
-from ros_pad.simulation.scene import Tow
+from ros_pad.simulation.scene import FloorPlan, Tow
 from ros_pad.simulation.terrain import Floor
 
 SHIPPED = Scene.load('hexapod_patches')

@@ -12,14 +12,10 @@ from hypothesis import strategies as st
 
 from ros_pad.contact import Foot
 from ros_pad.contact.film import Film
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.simulation import Scene
-from ros_pad.simulation import compiled
-from ros_pad.simulation import planar_step
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.simulation import Scene, compiled, planar_step
 from ros_pad.simulation.gait import WalkingGait
-from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.planar_robot import model_of
+from ros_pad.simulation.planar_robot import PlanarRobot, model_of
 
 SCENE = Scene.load('hexapod_patches')
 FLOOR = SCENE.floor.build(0)

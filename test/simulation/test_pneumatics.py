@@ -10,10 +10,7 @@ from scipy.optimize import brentq
 from ros_pad.contact.resistance import Foot
 from ros_pad.errors import InvalidInput
 from ros_pad.simulation import pneumatics
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
-from ros_pad.simulation.pneumatics import time_to
+from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel, time_to
 
 FOUR_BY_ONE = Hose(0.004, 1.0)
 BARE = RegulatorModel(dead_time=0.0, dead_band=0.0, quantum=0.0)

@@ -10,12 +10,8 @@ from scipy.optimize import minimize_scalar
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import FootEstimator
 from ros_pad.simulation import Scene
-from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.rail_leg import push
-from ros_pad.simulation.rail_leg import walk_many
-from ros_pad.simulation.scene import FloorPlan
-from ros_pad.simulation.scene import RailBody
-from ros_pad.simulation.scene import RailGait
+from ros_pad.simulation.rail_leg import RailLeg, push, walk_many
+from ros_pad.simulation.scene import FloorPlan, RailBody, RailGait
 from ros_pad.simulation.terrain import Floor
 
 SHIPPED = Scene.load('leg_dry_flat')

@@ -6,13 +6,9 @@ import pytest
 
 from ros_pad.records import SAMPLE
 from ros_pad.simulation.faults import Fault
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Proprioception
-from ros_pad.simulation.robot import contacts_of
-from ros_pad.simulation.scene import Scene
-from ros_pad.simulation.scene import SensorNoise
-from ros_pad.simulation.sensors import BodySensors
-from ros_pad.simulation.sensors import Sensors
+from ros_pad.simulation.robot import FootState, Proprioception, contacts_of
+from ros_pad.simulation.scene import Scene, SensorNoise
+from ros_pad.simulation.sensors import BodySensors, Sensors
 
 NOISE = SensorNoise(rate=250.0, force=0.03, position=1.5e-4)
 WITH_MOMENTS = dataclasses.replace(NOISE, moment=5e-4)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
-from ros_pad.simulation.terrain import Floor
-from ros_pad.simulation.terrain import patch_lengths
+from ros_pad.simulation.terrain import Floor, patch_lengths
 
 FILM = 3e-4
 SEEDS = range(8)

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from ros_pad.errors import InvalidInput
 from studies import command
-from studies.__main__ import STUDIES
-from studies.__main__ import main
+from studies.__main__ import STUDIES, main
 from studies.work_precision import comparison
 
 NUMBERS = np.array([1.0, 4.0, 9.0])

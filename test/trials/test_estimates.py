@@ -13,8 +13,7 @@ from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
 from ros_pad.trials.node_settings import tuning_for
 from studies.closed_loop import loops
-from studies.work_precision.estimator.priors import Condition
-from studies.work_precision.estimator.priors import updates
+from studies.work_precision.estimator.priors import Condition, updates
 from studies.work_precision.estimator.priors import walked as walked_on
 
 PERIOD = 0.004  # s

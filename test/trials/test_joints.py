@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
-from ros_pad import cli
-from ros_pad import trials
+from ros_pad import cli, trials
 from ros_pad.errors import InvalidInput
 from ros_pad.estimation import doubt
 from ros_pad.simulation import fidelity
@@ -18,8 +17,7 @@ from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials.log import TrialLog
 from ros_pad.trials.loop import ClosedLoop
-from ros_pad.trials.node_settings import body_settings_for
-from ros_pad.trials.node_settings import tuning_for
+from ros_pad.trials.node_settings import body_settings_for, tuning_for
 from ros_pad.trials.trial import Trial
 
 PATCHES = Scene.load('hexapod_patches')

@@ -8,12 +8,10 @@ import yaml
 from ros_pad import cli
 from ros_pad.commands import run
 from ros_pad.contact.resistance import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import PadError
+from ros_pad.errors import ConfigError, PadError
 from ros_pad.estimation import Tuning
 from ros_pad.estimation.ground import shared_friction
-from ros_pad.estimation.scales import SCALE_RANGE
-from ros_pad.estimation.scales import Scale
+from ros_pad.estimation.scales import SCALE_RANGE, Scale
 from ros_pad.trials import learnt
 
 FOOT = Foot.load('large37')

@@ -4,10 +4,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ros_pad.control import MorphologyController
-from ros_pad.control import adaptive
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.control import MorphologyController, adaptive
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop as loop_module

@@ -10,12 +10,8 @@ from ros_pad.control import FootFault
 from ros_pad.control.faults import Kind
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.terrain import Floor
-from ros_pad.trials import Trial
-from ros_pad.trials import run
-from ros_pad.trials.metrics import stance_ends
-from ros_pad.trials.metrics import summarise
-from ros_pad.trials.metrics import time_to
-from ros_pad.trials.metrics import wet_accuracy
+from ros_pad.trials import Trial, run
+from ros_pad.trials.metrics import stance_ends, summarise, time_to, wet_accuracy
 
 SCENE = Scene.load('hexapod_patches')
 GATE = 2.0  # N

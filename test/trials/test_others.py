@@ -11,8 +11,7 @@ import pytest
 
 from ros_pad import workers
 from ros_pad.simulation.scene import Scene
-from ros_pad.trials import loop
-from ros_pad.trials import others
+from ros_pad.trials import loop, others
 from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.others import Others
 

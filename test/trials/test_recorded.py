@@ -8,18 +8,13 @@ import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is needed: it serializes the messages')
 
-from geometry_msgs.msg import PointStamped
-from geometry_msgs.msg import PoseStamped
-from geometry_msgs.msg import TwistWithCovarianceStamped
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistWithCovarianceStamped, WrenchStamped
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure
-from std_msgs.msg import Bool
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 
-from ros_pad.bags import BagWriter
-from ros_pad.bags import topics
+from ros_pad.bags import BagWriter, topics
 from ros_pad.bags.wire import Wire
 from ros_pad.errors import BagError
 from ros_pad.simulation import Scene

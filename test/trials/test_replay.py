@@ -15,44 +15,27 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from ros_pad import configuration
-from ros_pad.bags import BagReader
-from ros_pad.bags import BagWriter
-from ros_pad.bags import annotate
-from ros_pad.bags import topics
+from ros_pad.bags import BagReader, BagWriter, annotate, topics
 from ros_pad.bags.codec import message_type
 from ros_pad.bags.fields import FieldWriter
-from ros_pad.bags.wire import Wire
-from ros_pad.bags.wire import legs_of
-from ros_pad.errors import BagError
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.bags.wire import Wire, legs_of
+from ros_pad.errors import BagError, ConfigError, InvalidInput
 from ros_pad.estimation import doubt as doubts
-from ros_pad.records import COMMAND
-from ros_pad.records import ESTIMATE
+from ros_pad.records import COMMAND, ESTIMATE, Block, Field, Kind
 from ros_pad.records import SAMPLE as SAMPLES
-from ros_pad.records import Block
-from ros_pad.records import Field
-from ros_pad.records import Kind
 from ros_pad.simulation.faults import Fault
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import recorded
-from ros_pad.trials.comparison import Stream
-from ros_pad.trials.comparison import compare
-from ros_pad.trials.label import CHANGES
-from ros_pad.trials.label import PARAMETERS
+from ros_pad.trials.comparison import Stream, compare
+from ros_pad.trials.label import CHANGES, PARAMETERS
 from ros_pad.trials.node_settings import NodeSettings
-from ros_pad.trials.replay import open_bag
-from ros_pad.trials.replay import replay
+from ros_pad.trials.replay import open_bag, replay
 
 pytest.importorskip('rosbags', reason='bags of other robots are written with rosbags')
 
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import CompressionFormat
-from rosbags.rosbag2 import CompressionMode
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 SAMPLE = configuration.shared_folder().parent / 'bags' / 'hexapod_patches' / 'bag'
 RENEW = (

@@ -13,17 +13,12 @@ import pytest
 import scipy.stats
 
 from ros_pad import configuration
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import ConfigError, InvalidInput, PadError
 from ros_pad.simulation.scene import Scene
 from ros_pad.trials import loop
 from ros_pad.trials import sweep as sweeps
 from ros_pad.trials.node_settings import tuning_for
-from ros_pad.trials.sweep import Sweep
-from ros_pad.trials.sweep import execution
-from ros_pad.trials.sweep import plan
-from ros_pad.trials.sweep import table
+from ros_pad.trials.sweep import Sweep, execution, plan, table
 from ros_pad.trials.sweep.table import Results
 
 LEG = 'leg_wet_flat'

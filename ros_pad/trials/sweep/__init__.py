@@ -7,14 +7,7 @@ folder, so that a killed sweep can continue where it stopped. At the end the swe
 """
 
 from ros_pad.trials.sweep.execution import run
-from ros_pad.trials.sweep.plan import Job
-from ros_pad.trials.sweep.plan import Row
-from ros_pad.trials.sweep.plan import Sweep
-from ros_pad.trials.sweep.plan import Value
-from ros_pad.trials.sweep.summary import Found
-from ros_pad.trials.sweep.summary import Point
-from ros_pad.trials.sweep.summary import is_sweep
-from ros_pad.trials.sweep.summary import points
-from ros_pad.trials.sweep.summary import read
+from ros_pad.trials.sweep.plan import Job, Row, Sweep, Value
+from ros_pad.trials.sweep.summary import Found, Point, is_sweep, points, read
 
 __all__ = ['Found', 'Job', 'Point', 'Row', 'Sweep', 'Value', 'is_sweep', 'points', 'read', 'run']

@@ -5,38 +5,20 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Generator
-from collections.abc import Iterable
-from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED
-from concurrent.futures import CancelledError
-from concurrent.futures import Executor
-from concurrent.futures import Future
-from concurrent.futures import wait
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager
-from contextlib import ExitStack
-from contextlib import closing
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from typing import Any
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import ros_pad
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from ros_pad.pace import Progress
 from ros_pad.trials import loop
-from ros_pad.trials.sweep.plan import Job
-from ros_pad.trials.sweep.plan import Row
-from ros_pad.trials.sweep.plan import Sweep
-from ros_pad.trials.sweep.table import Results
-from ros_pad.trials.sweep.table import columns_of
-from ros_pad.trials.sweep.table import identity
-from ros_pad.trials.sweep.table import write_tables
-from ros_pad.workers import cores
-from ros_pad.workers import pool
+from ros_pad.trials.sweep.plan import Job, Row, Sweep
+from ros_pad.trials.sweep.table import Results, columns_of, identity, write_tables
+from ros_pad.workers import cores, pool
 
 PATIENCE = 20.0  # s, longest wait for a Dask scheduler or its first worker
 CLUSTER_JOBS = 1000  # trials submitted to a Dask cluster at the same time

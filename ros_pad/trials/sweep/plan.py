@@ -7,28 +7,18 @@ import difflib
 import itertools
 import json
 import os
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
-from typing import Any
-from typing import TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
 
 from ros_pad import configuration
-from ros_pad.configuration import Table
-from ros_pad.configuration import choice
-from ros_pad.configuration import instance
-from ros_pad.control import POLICIES
-from ros_pad.control import policy_named
+from ros_pad.configuration import Table, choice, instance
+from ros_pad.control import POLICIES, policy_named
 from ros_pad.control.policies import PREFIX
 from ros_pad.control.policies import SETTINGS as POLICY_SETTINGS
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.estimation import SETTINGS
-from ros_pad.estimation import Tuning
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.estimation import SETTINGS, Tuning
 from ros_pad.estimation.tuning import attribute
 from ros_pad.simulation import fidelity as levels
 from ros_pad.simulation.scene import Scene

@@ -8,9 +8,7 @@ import math
 import os
 import pathlib
 import sqlite3
-from collections.abc import Iterable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -19,13 +17,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ros_pad.control import POLICIES
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
-from ros_pad.trials.sweep.plan import Row
-from ros_pad.trials.sweep.plan import Sweep
-from ros_pad.trials.sweep.table import RESULTS
-from ros_pad.trials.sweep.table import SCENE
-from ros_pad.trials.sweep.table import aligned
+from ros_pad.errors import InvalidInput, PadError
+from ros_pad.trials.sweep.plan import Row, Sweep
+from ros_pad.trials.sweep.table import RESULTS, SCENE, aligned
 
 
 @dataclass(frozen=True)

@@ -10,21 +10,14 @@ import json
 import os
 import pathlib
 import sqlite3
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import ros_pad
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
-from ros_pad.trials.sweep.plan import Row
-from ros_pad.trials.sweep.plan import Sweep
-from ros_pad.trials.sweep.plan import scene_with
-from ros_pad.trials.trial import Trial
-from ros_pad.trials.trial import fault_lines
+from ros_pad.errors import InvalidInput, PadError
+from ros_pad.trials.sweep.plan import Row, Sweep, scene_with
+from ros_pad.trials.trial import Trial, fault_lines
 
 RESULTS = 'trials.sqlite'
 LAST_COLUMNS = ('level', 'verdict', 'error', 'real_time_factor')

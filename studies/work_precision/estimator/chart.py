@@ -16,24 +16,10 @@ from matplotlib.patches import Patch
 from scipy import stats
 
 from studies.closed_loop.conformal import interval
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
-from studies.work_precision.estimator.conditions import CONFIGURED
-from studies.work_precision.estimator.conditions import NOT_CONFIGURED
-from studies.work_precision.estimator.methods import BAYES
-from studies.work_precision.estimator.methods import CUSUM
-from studies.work_precision.estimator.methods import RATIO
-from studies.work_precision.estimator.methods import SHIPPED
-from studies.work_precision.estimator.methods import SPEED
-from studies.work_precision.estimator.tally import TARGETS
-from studies.work_precision.estimator.tally import Row
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, SKY, STYLE, VERMILION
+from studies.work_precision.estimator.conditions import CONFIGURED, NOT_CONFIGURED
+from studies.work_precision.estimator.methods import BAYES, CUSUM, RATIO, SHIPPED, SPEED
+from studies.work_precision.estimator.tally import TARGETS, Row
 
 _TARGET: dict[str, Any] = {'color': BLACK, 'lw': 0.9, 'ls': '--', 'zorder': 1.5}
 

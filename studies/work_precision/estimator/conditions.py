@@ -4,31 +4,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
-from studies.work_precision.estimator.tally import Row
-from studies.work_precision.estimator.tally import Tally
-from studies.work_precision.estimator.tally import counted
-from studies.work_precision.estimator.tally import row_of
-from studies.work_precision.estimator.tally import row_of_walks
-from studies.work_precision.estimator.walks import FEW_CYCLES
-from studies.work_precision.estimator.walks import LOADED
-from studies.work_precision.estimator.walks import SEEDS
-from studies.work_precision.estimator.walks import Recording
-from studies.work_precision.estimator.walks import World
-from studies.work_precision.estimator.walks import few_recordings
-from studies.work_precision.estimator.walks import full
-from studies.work_precision.estimator.walks import pull
-from studies.work_precision.estimator.walks import record
+from ros_pad.simulation.scene import LeggedBody, Scene
+from studies.work_precision.estimator.tally import Row, Tally, counted, row_of, row_of_walks
+from studies.work_precision.estimator.walks import (
+    FEW_CYCLES,
+    LOADED,
+    SEEDS,
+    Recording,
+    World,
+    few_recordings,
+    full,
+    pull,
+    record,
+)
 
 Disturbance = Callable[[Recording, float, np.random.Generator], Recording]
 

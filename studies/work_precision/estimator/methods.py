@@ -5,27 +5,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ros_pad.contact.resistance import Foot
 from ros_pad.estimation.alarm import SlipAlarm
-from ros_pad.estimation.foot import FootEstimator
-from ros_pad.estimation.foot import Tuning
+from ros_pad.estimation.foot import FootEstimator, Tuning
 from ros_pad.pace import Progress
-from studies.work_precision.estimator.tally import Row
-from studies.work_precision.estimator.tally import Tally
-from studies.work_precision.estimator.tally import count_alarms
-from studies.work_precision.estimator.tally import count_estimates
-from studies.work_precision.estimator.tally import replay
-from studies.work_precision.estimator.tally import row_of
-from studies.work_precision.estimator.walks import Flags
-from studies.work_precision.estimator.walks import Recording
+from studies.work_precision.estimator.tally import (
+    Row,
+    Tally,
+    count_alarms,
+    count_estimates,
+    replay,
+    row_of,
+)
+from studies.work_precision.estimator.walks import Flags, Recording
 
 RATIO, SPEED, CUSUM, BAYES, SHIPPED = (
     'T/N',

@@ -27,13 +27,8 @@ import hashlib
 import math
 import pathlib
 import pickle
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
-from dataclasses import asdict
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import matplotlib
@@ -42,31 +37,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy import ndimage
 
-from ros_pad.estimation import FeetEstimator
-from ros_pad.estimation import FootEstimator
-from ros_pad.estimation.friction import GroundFilter
-from ros_pad.estimation.friction import GroundModel
+from ros_pad.estimation import FeetEstimator, FootEstimator
+from ros_pad.estimation.friction import GroundFilter, GroundModel
 from ros_pad.estimation.ground import shared_friction
-from ros_pad.estimation.scales import SCALE_SD
-from ros_pad.estimation.scales import SPREADS
+from ros_pad.estimation.scales import SCALE_SD, SPREADS
 from ros_pad.estimation.tuning import Tuning
 from ros_pad.reports.files import save
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.soles import Sole
-from ros_pad.simulation.terrain import CELL
-from ros_pad.simulation.terrain import LENGTH
-from ros_pad.simulation.terrain import WIDTH
+from ros_pad.simulation.terrain import CELL, LENGTH, WIDTH
 from ros_pad.trials.loop import ClosedLoop
 from studies import command
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PURPLE
-from studies.drawing import STYLE
-from studies.work_precision.estimator.walks import SETTLED
-from studies.work_precision.estimator.walks import Recording
-from studies.work_precision.estimator.walks import record
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE
+from studies.work_precision.estimator.walks import SETTLED, Recording, record
 
 NAME = 'priors'
 FIRST_SEED, FIRST_DRAW = 70, 300

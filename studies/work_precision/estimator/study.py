@@ -26,8 +26,7 @@ Without MuJoCo all walks are in the plane.
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -35,13 +34,10 @@ from matplotlib.figure import Figure
 
 from ros_pad.commands.folder import new_folder
 from studies import command
-from studies.work_precision.estimator import chart
-from studies.work_precision.estimator import conditions
-from studies.work_precision.estimator import turned
+from studies.work_precision.estimator import chart, conditions, turned
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
-from studies.work_precision.estimator.walks import full
-from studies.work_precision.estimator.walks import recordings
+from studies.work_precision.estimator.walks import full, recordings
 
 PAGE = command.ROOT / 'docs' / 'model' / 'estimation.md'
 

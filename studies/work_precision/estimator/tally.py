@@ -6,23 +6,15 @@ from __future__ import annotations
 import bisect
 import math
 import statistics
-from collections.abc import Iterator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
-from typing import Any
-from typing import TypedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypedDict
 
 import numpy as np
 
 from ros_pad.errors import InvalidInput
-from ros_pad.estimation import FeetEstimator
-from ros_pad.estimation import FootEstimator
-from studies.work_precision.estimator.walks import LOADED
-from studies.work_precision.estimator.walks import SETTLED
-from studies.work_precision.estimator.walks import Flags
-from studies.work_precision.estimator.walks import Floats
-from studies.work_precision.estimator.walks import Recording
+from ros_pad.estimation import FeetEstimator, FootEstimator
+from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, Floats, Recording
 
 MOVING = 5e-3  # m/s: a faster contact slips
 BRIDGED = 0.02  # s: shorter gaps do not split a slip

@@ -9,10 +9,8 @@ doubt.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
-from typing import Any
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,10 +25,7 @@ from ros_pad.trials.node_settings import tuning_for
 from ros_pad.trials.series import Records
 from studies.closed_loop import loops
 from studies.samples import runs
-from studies.work_precision.estimator.walks import LOADED
-from studies.work_precision.estimator.walks import SETTLED
-from studies.work_precision.estimator.walks import Flags
-from studies.work_precision.estimator.walks import full
+from studies.work_precision.estimator.walks import LOADED, SETTLED, Flags, full
 
 CYCLES = 8
 ASKED = 3  # stances within which turned axes are to be found

@@ -14,26 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ros_pad.pace import Progress
-from studies.drawing import BLACK
-from studies.drawing import BLUE
-from studies.drawing import GREEN
-from studies.drawing import ORANGE
-from studies.drawing import PALE
-from studies.drawing import PURPLE
-from studies.drawing import SKY
-from studies.drawing import STYLE
-from studies.drawing import VERMILION
-from studies.work_precision.walk.hexapod import DRAKE
-from studies.work_precision.walk.hexapod import FREE
-from studies.work_precision.walk.hexapod import STIFF
-from studies.work_precision.walk.hexapod import TOP
+from studies.drawing import BLACK, BLUE, GREEN, ORANGE, PALE, PURPLE, SKY, STYLE, VERMILION
+from studies.work_precision.walk.hexapod import DRAKE, FREE, STIFF, TOP
 from studies.work_precision.walk.rail import LEGS
-from studies.work_precision.walk.results import FAILED
-from studies.work_precision.walk.results import WalkResult
-from studies.work_precision.walk.walkers import HEXAPOD
-from studies.work_precision.walk.walkers import RAIL
-from studies.work_precision.walk.walkers import TOWING
-from studies.work_precision.walk.walkers import named
+from studies.work_precision.walk.results import FAILED, WalkResult
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, named
 
 # Methods that are shown walk by walk.
 SHOWN = tuple(

@@ -23,21 +23,16 @@ import numpy as np
 
 from ros_pad.contact.film import Film
 from ros_pad.contact.meniscus import GRAVITY
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.robots.inverse import FeetSolver
 from ros_pad.robots.rotation import Array
 from ros_pad.simulation.full_robot import TIPPED
 from ros_pad.simulation.gait import FootPath
 from ros_pad.simulation.mujoco_model import ROLL_SHARE
-from ros_pad.simulation.robot import FootState
-from ros_pad.simulation.robot import Vector
+from ros_pad.simulation.robot import FootState, Vector
 from ros_pad.simulation.scene import Scene
 from ros_pad.simulation.servos import LOST
-from ros_pad.simulation.soles import CLEAR
-from ros_pad.simulation.soles import LIGHT
-from ros_pad.simulation.soles import SLIP_LOAD
-from ros_pad.simulation.soles import SLIP_SPEED
+from ros_pad.simulation.soles import CLEAR, LIGHT, SLIP_LOAD, SLIP_SPEED
 from ros_pad.simulation.terrain import Floor
 
 _SHALLOW = 5e-3  # m above the ground: below it the height of the ground under a foot stays

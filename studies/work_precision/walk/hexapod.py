@@ -11,25 +11,22 @@ from dataclasses import replace
 from typing import Any
 
 from ros_pad.control.morphology import MorphologyController
-from ros_pad.control.policies import DOME
-from ros_pad.control.policies import FLAT
-from ros_pad.control.policies import policy_named
+from ros_pad.control.policies import DOME, FLAT, policy_named
 from ros_pad.simulation.full_robot import FullRobot
-from ros_pad.simulation.mujoco_model import RECOMMENDED
-from ros_pad.simulation.mujoco_model import SolverSettings
+from ros_pad.simulation.mujoco_model import RECOMMENDED, SolverSettings
 from ros_pad.simulation.planar_robot import PlanarRobot
-from ros_pad.simulation.scene import LeggedBody
-from ros_pad.simulation.scene import Scene
-from studies.work_precision.walk.drake import Contact
-from studies.work_precision.walk.drake import DrakeRobot
-from studies.work_precision.walk.walkers import CYCLES
-from studies.work_precision.walk.walkers import HEXAPOD
-from studies.work_precision.walk.walkers import TOWING
-from studies.work_precision.walk.walkers import Walk
-from studies.work_precision.walk.walkers import Walked
-from studies.work_precision.walk.walkers import Walker
-from studies.work_precision.walk.walkers import named
-from studies.work_precision.walk.walkers import walked
+from ros_pad.simulation.scene import LeggedBody, Scene
+from studies.work_precision.walk.drake import Contact, DrakeRobot
+from studies.work_precision.walk.walkers import (
+    CYCLES,
+    HEXAPOD,
+    TOWING,
+    Walk,
+    Walked,
+    Walker,
+    named,
+    walked,
+)
 
 SETTLE = 0.2  # s: the hexapod stands for this time first
 SAMPLE = 4e-3  # s: time between set-points of the servos of L2

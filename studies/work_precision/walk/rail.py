@@ -12,18 +12,9 @@ from typing import Any
 from scipy.integrate import solve_ivp
 
 from ros_pad.contact.film import Film
-from ros_pad.simulation.rail_leg import RailLeg
-from ros_pad.simulation.rail_leg import walk_many
-from ros_pad.simulation.scene import RailBody
-from ros_pad.simulation.scene import RailGait
-from ros_pad.simulation.scene import Scene
-from studies.work_precision.walk.walkers import CYCLES
-from studies.work_precision.walk.walkers import RAIL
-from studies.work_precision.walk.walkers import Walk
-from studies.work_precision.walk.walkers import Walked
-from studies.work_precision.walk.walkers import Walker
-from studies.work_precision.walk.walkers import named
-from studies.work_precision.walk.walkers import walked
+from ros_pad.simulation.rail_leg import RailLeg, walk_many
+from ros_pad.simulation.scene import RailBody, RailGait, Scene
+from studies.work_precision.walk.walkers import CYCLES, RAIL, Walk, Walked, Walker, named, walked
 
 LEGS = 200  # number of rail legs that walk_many computes at once
 

@@ -6,21 +6,14 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ros_pad.errors import PadError
 from ros_pad.pace import Progress
-from studies.work_precision.walk.walkers import HEXAPOD
-from studies.work_precision.walk.walkers import RAIL
-from studies.work_precision.walk.walkers import TOWING
-from studies.work_precision.walk.walkers import Walk
-from studies.work_precision.walk.walkers import Walked
-from studies.work_precision.walk.walkers import Walker
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING, Walk, Walked, Walker
 
 FAILED = 0.1  # relative error of distance or slip above which a walk has failed
 LEAST = 0.01  # share of the stride: errors of shorter distances are relative to this share

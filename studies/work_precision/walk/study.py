@@ -23,21 +23,16 @@ study stability compares the others.
 from __future__ import annotations
 
 from ros_pad.pace import Progress
-from studies.work_precision.walk.chart import figures
-from studies.work_precision.walk.chart import table
-from studies.work_precision.walk.hexapod import hexapod_walkers
-from studies.work_precision.walk.hexapod import hexapod_walks
-from studies.work_precision.walk.hexapod import towing_walkers
-from studies.work_precision.walk.hexapod import towing_walks
-from studies.work_precision.walk.rail import EVENTS
-from studies.work_precision.walk.rail import LEG
-from studies.work_precision.walk.rail import rail_walkers
-from studies.work_precision.walk.rail import rail_walks
-from studies.work_precision.walk.results import WalkResult
-from studies.work_precision.walk.results import run
-from studies.work_precision.walk.walkers import HEXAPOD
-from studies.work_precision.walk.walkers import RAIL
-from studies.work_precision.walk.walkers import TOWING
+from studies.work_precision.walk.chart import figures, table
+from studies.work_precision.walk.hexapod import (
+    hexapod_walkers,
+    hexapod_walks,
+    towing_walkers,
+    towing_walks,
+)
+from studies.work_precision.walk.rail import EVENTS, LEG, rail_walkers, rail_walks
+from studies.work_precision.walk.results import WalkResult, run
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, TOWING
 
 __all__ = ['figures', 'measure', 'table']
 

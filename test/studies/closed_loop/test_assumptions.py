@@ -11,8 +11,7 @@ import json
 import pathlib
 import re
 from collections.abc import Iterator
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 import yaml

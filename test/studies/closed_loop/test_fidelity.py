@@ -12,9 +12,8 @@ import pytest
 from ros_pad.simulation import fidelity
 from ros_pad.simulation.margin import features
 from ros_pad.simulation.scene import Scene
-from studies.closed_loop import conformal
+from studies.closed_loop import conformal, random_scenes
 from studies.closed_loop import fidelity as study
-from studies.closed_loop import random_scenes
 from studies.command import CHARTS
 
 DOCUMENT = json.loads((CHARTS / 'fidelity.json').read_text(encoding='utf-8'))['robots']

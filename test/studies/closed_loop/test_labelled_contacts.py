@@ -14,8 +14,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from scipy import special
-from scipy import stats
+from scipy import special, stats
 
 from ros_pad.errors import InvalidInput
 from studies import samples

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
-from studies import command
-from studies import samples
+from studies import command, samples
 from studies.__main__ import main
 from studies.closed_loop import labelled_contacts as contacts
 from studies.closed_loop import labelled_pce as study

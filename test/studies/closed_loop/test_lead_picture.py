@@ -8,8 +8,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from ros_pad.reports import style
 from ros_pad.simulation import Scene
 from ros_pad.trials import run

@@ -5,12 +5,9 @@ from dataclasses import replace
 import pytest
 
 from ros_pad.control import policy_named
-from ros_pad.control.policies import Choice
-from ros_pad.control.policies import LiftOff
+from ros_pad.control.policies import Choice, LiftOff
 from ros_pad.simulation import Scene
-from studies.closed_loop import policies
-from studies.closed_loop import quick_walk
-from studies.closed_loop import rivals
+from studies.closed_loop import policies, quick_walk, rivals
 
 STEP = LiftOff(1, 'flat', 9, False, 0.5, (0.0, 0.0), False)
 

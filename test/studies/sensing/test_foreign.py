@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from studies.__main__ import main
-from studies.sensing import foreign
-from studies.sensing import recordings
+from studies.sensing import foreign, recordings
 
 MASS, GRAVITY = 12.0, 9.81
 HEIGHT, START, LAST = 0.4, 2.0, 6.0  # m, s, s

@@ -6,12 +6,9 @@ import pytest
 from scipy.linalg import expm
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import rotation
-from ros_pad.robots.rotation import skew
+from ros_pad.robots.rotation import rotation, skew
 from ros_pad.sensing.body_filter import GRAVITY
-from studies.sensing import rivals
-from studies.sensing import study
-from studies.sensing import walks
+from studies.sensing import rivals, study, walks
 
 GO2 = Robot.load('go2')
 COURSE = walks.Course()

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ros_pad.robots import Chains
-from ros_pad.robots import Robot
+from ros_pad.robots import Chains, Robot
 from ros_pad.sensing import BodyEstimator
 from studies.sensing import walks
 

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 from ros_pad.robots import Robot
-from ros_pad.robots.rotation import cross
-from ros_pad.robots.rotation import matrix
-from studies.sensing import stability
-from studies.sensing import study
-from studies.sensing import walks
+from ros_pad.robots.rotation import cross, matrix
+from studies.sensing import stability, study, walks
 
 GO2 = Robot.load('go2')
 CALM = walks.Course(noise=walks.Noise(*[0.0] * 8))

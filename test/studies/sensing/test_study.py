@@ -6,8 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from studies.sensing import study
-from studies.sensing import walks
+from studies.sensing import study, walks
 
 
 def test_the_estimator_beats_its_rivals_on_a_short_walk(monkeypatch, capsys):

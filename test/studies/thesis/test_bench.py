@@ -10,19 +10,14 @@ import numpy as np
 import pytest
 import yaml
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import NoEquilibrium
+from ros_pad.errors import ConfigError, NoEquilibrium
 from studies.thesis import bench
-from studies.thesis.bench import CODED
-from studies.thesis.bench import TEXT
-from studies.thesis.bench import slip_force
-from studies.thesis.bench_scene import BENCHES
-from studies.thesis.bench_scene import BenchScene
+from studies.thesis.bench import CODED, TEXT, slip_force
+from studies.thesis.bench_scene import BENCHES, BenchScene
 
 TRIALS = {kind: bench.run(f'bench_{kind}') for kind in BENCHES}
 ONE = TRIALS['tangential'].scene.foot

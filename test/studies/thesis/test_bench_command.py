@@ -6,8 +6,7 @@ import pytest
 import yaml
 
 from ros_pad import configuration
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from studies.thesis.bench_command import main
 from studies.thesis.bench_scene import BENCHES
 

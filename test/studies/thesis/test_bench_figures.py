@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import rendered
+from ros_pad.reports.style import PAPER_STYLE, rendered
 from studies.thesis import bench
 from studies.thesis import bench_figures as thesis
 from studies.thesis import bench_page as page

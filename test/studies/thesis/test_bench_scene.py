@@ -10,12 +10,10 @@ import yaml
 
 from ros_pad import configuration
 from ros_pad.contact import Foot
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
+from ros_pad.errors import ConfigError, InvalidInput
 from ros_pad.simulation import Scene
 from studies.thesis import bench_scene as bench
-from studies.thesis.bench_scene import BENCHES
-from studies.thesis.bench_scene import BenchScene
+from studies.thesis.bench_scene import BENCHES, BenchScene
 
 FOLDER = configuration.shared_folder() / 'scenes'
 FILES = {kind: yaml.safe_load((FOLDER / f'bench_{kind}.yaml').read_text()) for kind in BENCHES}

@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from studies.thesis import bench
-from studies.thesis import foot_bench
+from studies.thesis import bench, foot_bench
 from studies.thesis.bench_scene import BenchScene
-from studies.thesis.foot_bench import DOME
-from studies.thesis.foot_bench import FLAT
-from studies.thesis.foot_bench import LINES
-from studies.thesis.foot_bench import NONE
-from studies.thesis.foot_bench import ROUGH
-from studies.thesis.foot_bench import SMOOTH
-from studies.thesis.foot_bench import SUCTION
-from studies.thesis.foot_bench import Pulled
+from studies.thesis.foot_bench import DOME, FLAT, LINES, NONE, ROUGH, SMOOTH, SUCTION, Pulled
 
 REFERENCE = pathlib.Path(__file__).parents[2] / 'reference' / 'free_dome.json'
 SCENE = BenchScene.load('bench_foot')

@@ -9,8 +9,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from ros_pad.contact import WATER
-from ros_pad.reports.style import PAPER_STYLE
-from ros_pad.reports.style import WIDE
+from ros_pad.reports.style import PAPER_STYLE, WIDE
 from studies.thesis import liquid as figures
 
 pytestmark = pytest.mark.slow

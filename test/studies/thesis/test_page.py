@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from ros_pad.errors import InvalidInput
-from ros_pad.errors import PadError
+from ros_pad.errors import InvalidInput, PadError
 from studies.__main__ import main
 from studies.thesis import page as thesis_page
 from studies.thesis.explained import Claim

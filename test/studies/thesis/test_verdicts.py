@@ -6,17 +6,18 @@ import math
 
 import pytest
 
-from studies.thesis import statements
-from studies.thesis import verdicts
-from studies.thesis.explained import NOT_MODELLED
-from studies.thesis.explained import OPEN
-from studies.thesis.explained import REFUTED
-from studies.thesis.explained import REPRODUCED
-from studies.thesis.explained import SAME
-from studies.thesis.explained import TUNED
-from studies.thesis.explained import VERDICTS
-from studies.thesis.explained import Claim
-from studies.thesis.explained import counted
+from studies.thesis import statements, verdicts
+from studies.thesis.explained import (
+    NOT_MODELLED,
+    OPEN,
+    REFUTED,
+    REPRODUCED,
+    SAME,
+    TUNED,
+    VERDICTS,
+    Claim,
+    counted,
+)
 
 CLAIMS = statements.claims()
 CLAIM = Claim(20, 'more', 'less', (1.0,), True, '3.2.2')

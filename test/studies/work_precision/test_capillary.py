@@ -7,8 +7,7 @@ from dataclasses import asdict
 
 import pytest
 
-from ros_pad.capillary import Mesh
-from ros_pad.capillary import wet
+from ros_pad.capillary import Mesh, wet
 from ros_pad.contact import Liquid
 from studies.work_precision import capillary
 

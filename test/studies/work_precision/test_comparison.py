@@ -8,11 +8,7 @@ import pytest
 
 from ros_pad.errors import NoEquilibrium
 from studies.work_precision import comparison
-from studies.work_precision.comparison import Method
-from studies.work_precision.comparison import Problem
-from studies.work_precision.comparison import answer
-from studies.work_precision.comparison import run
-from studies.work_precision.comparison import table
+from studies.work_precision.comparison import Method, Problem, answer, run, table
 
 SQUARES = Problem(
     'square root',

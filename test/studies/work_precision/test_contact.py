@@ -6,14 +6,9 @@ import pathlib
 import numpy as np
 import pytest
 
-from ros_pad.contact import LARGE_PAD
-from ros_pad.contact import force_limit
-from studies.work_precision import contact
-from studies.work_precision import measured
-from studies.work_precision.contact import INVENTED
-from studies.work_precision.contact import REFUSED
-from studies.work_precision.contact import RIGHT
-from studies.work_precision.contact import WRONG
+from ros_pad.contact import LARGE_PAD, force_limit
+from studies.work_precision import contact, measured
+from studies.work_precision.contact import INVENTED, REFUSED, RIGHT, WRONG
 
 pytestmark = pytest.mark.slow
 

@@ -3,8 +3,7 @@ import importlib.util
 import json
 import math
 import pathlib
-from dataclasses import asdict
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -13,13 +12,15 @@ from ros_pad.estimation import FootEstimator
 from ros_pad.records import SAMPLE
 from ros_pad.simulation import Scene
 from ros_pad.trials.node_settings import tuning_for
-from studies.work_precision.estimator import chart
-from studies.work_precision.estimator import conditions
-from studies.work_precision.estimator import methods
-from studies.work_precision.estimator import study
-from studies.work_precision.estimator import tally
-from studies.work_precision.estimator import turned
-from studies.work_precision.estimator import walks
+from studies.work_precision.estimator import (
+    chart,
+    conditions,
+    methods,
+    study,
+    tally,
+    turned,
+    walks,
+)
 from studies.work_precision.estimator.conditions import Change
 from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.walks import Recording

@@ -9,11 +9,7 @@ from scipy.optimize import minimize
 
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.errors import InvalidInput
-from studies.work_precision.friction import Contact
-from studies.work_precision.friction import creeping
-from studies.work_precision.friction import elastic
-from studies.work_precision.friction import exact_stick
-from studies.work_precision.friction import viscous
+from studies.work_precision.friction import Contact, creeping, elastic, exact_stick, viscous
 
 MASS, INERTIA, GRAVITY = 2.0, 0.03, 9.81
 STILL = (0.0, 0.0, 0.0)

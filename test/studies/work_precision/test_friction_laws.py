@@ -7,11 +7,7 @@ import random
 import numpy as np
 import pytest
 
-from studies.work_precision.friction import Contact
-from studies.work_precision.friction import creeping
-from studies.work_precision.friction import elastic
-from studies.work_precision.friction import exact_stick
-from studies.work_precision.friction import viscous
+from studies.work_precision.friction import Contact, creeping, elastic, exact_stick, viscous
 
 pytestmark = pytest.mark.slow
 

@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from ros_pad.contact.resistance import DISC_TURNING_RADIUS
-from ros_pad.contact.resistance import Foot
+from ros_pad.contact.resistance import DISC_TURNING_RADIUS, Foot
 from ros_pad.errors import InvalidInput
 from studies.work_precision import limit_surface
 

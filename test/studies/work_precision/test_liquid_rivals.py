@@ -10,8 +10,7 @@ from scipy.integrate import quad
 from ros_pad.errors import ConfigError
 from studies import command
 from studies.__main__ import main
-from studies.work_precision import evolver
-from studies.work_precision import liquid_rivals
+from studies.work_precision import evolver, liquid_rivals
 
 DOME = evolver.Solid.dome(1.55, 0.583)
 CONE = evolver.Solid.cone(1.6, -0.364)

@@ -5,11 +5,9 @@ import pathlib
 
 import pytest
 
-from ros_pad.contact import Liquid
-from ros_pad.contact import bridge
+from ros_pad.contact import Liquid, bridge
 from ros_pad.errors import NoBridge
-from studies.work_precision import comparison
-from studies.work_precision import meniscus
+from studies.work_precision import comparison, meniscus
 
 pytestmark = pytest.mark.slow
 

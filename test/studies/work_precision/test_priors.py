@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from studies.work_precision.estimator import priors
-from studies.work_precision.estimator.priors import Condition
-from studies.work_precision.estimator.priors import Sample
+from studies.work_precision.estimator.priors import Condition, Sample
 
 
 class Normal:

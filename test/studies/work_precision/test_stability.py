@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from ros_pad.simulation.pneumatics import Hose
-from ros_pad.simulation.pneumatics import PneumaticChannel
-from ros_pad.simulation.pneumatics import RegulatorModel
+from ros_pad.simulation.pneumatics import Hose, PneumaticChannel, RegulatorModel
 from studies.work_precision import stability
-from studies.work_precision.friction import Contact
-from studies.work_precision.friction import creeping
-from studies.work_precision.friction import elastic
+from studies.work_precision.friction import Contact, creeping, elastic
 
 pytestmark = pytest.mark.slow
 

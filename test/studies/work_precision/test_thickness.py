@@ -10,8 +10,7 @@ from studies.work_precision import thickness
 pytest.importorskip('skfem')
 pytestmark = pytest.mark.slow
 
-from studies.work_precision.solid import Rubber  # noqa: E402
-from studies.work_precision.solid import Solid  # noqa: E402
+from studies.work_precision.solid import Rubber, Solid  # noqa: E402
 
 ROWS = json.loads(thickness.REFERENCE.read_text())['rows']
 

@@ -8,23 +8,12 @@ import mpmath
 import numpy as np
 import pytest
 
-from ros_pad.errors import ConfigError
-from ros_pad.errors import InvalidInput
-from ros_pad.simulation import RailLeg
-from ros_pad.simulation import Scene
+from ros_pad.errors import ConfigError, InvalidInput
+from ros_pad.simulation import RailLeg, Scene
 from ros_pad.simulation.full_robot import FullRobot
-from studies.work_precision.walk import chart
-from studies.work_precision.walk import hexapod
-from studies.work_precision.walk import rail
-from studies.work_precision.walk import results
-from studies.work_precision.walk import study
-from studies.work_precision.walk.drake import Contact
-from studies.work_precision.walk.drake import DrakeRobot
-from studies.work_precision.walk.walkers import HEXAPOD
-from studies.work_precision.walk.walkers import RAIL
-from studies.work_precision.walk.walkers import Walk
-from studies.work_precision.walk.walkers import Walked
-from studies.work_precision.walk.walkers import Walker
+from studies.work_precision.walk import chart, hexapod, rail, results, study
+from studies.work_precision.walk.drake import Contact, DrakeRobot
+from studies.work_precision.walk.walkers import HEXAPOD, RAIL, Walk, Walked, Walker
 
 pytestmark = pytest.mark.slow
 
