@@ -117,6 +117,7 @@ WHOLE = serialize_message(wrench(1, frame='leg_1_sole'))
         (WHOLE[:-1], f'{len(WHOLE) - 1} bytes are too few'),
         (WHOLE[:12] + struct.pack('<I', 4000) + WHOLE[16:], 'too few for a text of 4000 bytes'),
     ],
+    ids=['CDR2_BE', 'big endian', 'CDR2 cut', 'cut', 'long frame'],
 )
 def test_messages_of_drivers_that_cannot_be_read_are_refused(bench, merge, data, reason):
     bench.give(WRENCH, data, 1)
