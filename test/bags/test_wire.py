@@ -198,11 +198,7 @@ def test_a_table_is_what_the_messages_are_one_by_one(kind, way):
         messages[7] = others([f'leg_4/{kind.columns[0]}'], [5.0], big=True)
     if way == 'none':
         messages = []
-    gaps = [b'x' * (n % 5) for n in range(len(messages))]
-    data = b''.join(gap + each for gap, each in zip(gaps, messages, strict=True))
-    sizes = np.array([len(each) for each in messages], int)
-    starts = np.cumsum([len(gap) for gap in gaps] + sizes) - sizes if messages else sizes
-    table = wire.table(data, starts, sizes)
+    table = wire.table(messages)
     blocks = [wire.decode(each) for each in messages]
     stamps = [stamp for block in blocks for stamp in block.stamps.tolist()]
     assert table.stamps.tolist() == stamps
@@ -210,7 +206,7 @@ def test_a_table_is_what_the_messages_are_one_by_one(kind, way):
     assert table.rows.shape == (len(stamps), 2)
     if messages:
         with pytest.raises(BadMessage):
-            wire.table(data[:-30], starts, np.append(sizes[:-1], sizes[-1] - 30))
+            wire.table([*messages[:-1], messages[-1][:-30]])
 
 
 def test_legs_of_joints_are_none():
