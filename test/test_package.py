@@ -23,7 +23,7 @@ NODES = {
     f'{node}_node'
     for node in (
         *('body_estimator', 'controller', 'estimator'),
-        *('recorder', 'regulator', 'simulator'),
+        *('merge', 'recorder', 'regulator', 'simulator', 'views'),
     )
 }
 EXECUTABLES = NODES | {'pad'}

@@ -138,7 +138,7 @@ class FeetEstimator:
 FARTHEST = np.array(3 * [math.inf] + 3 * [0.5 * LEAP_DISTANCE])
 """Largest changes of force and position in samples in which nothing leaps."""
 
-LARGEST_FORCE, LARGEST_POSITION = 1e5, 1e6
+LARGEST_FORCE, LARGEST_POSITION, LARGEST_PRESSURE = 1e5, 1e6, 1e7
 """Largest size of a force, N, and moment, N m, and of a position, m."""
 
 NUMBERS = (
@@ -148,7 +148,7 @@ NUMBERS = (
     *((f'velocity {axis}', -1e6, 1e6, 'm/s') for axis in 'xy'),
     *((f'variance {axis}', 0.0, math.inf, 'm²/s²') for axis in 'xy'),
     ('age of the position', 0.0, 1e12, 's'),
-    ('pressure', -1e7, 1e7, 'Pa'),
+    ('pressure', -LARGEST_PRESSURE, LARGEST_PRESSURE, 'Pa'),
     ('deviation', 0.0, 1e6, 'm/s'),
 )
 """Names, limits and units of the numbers of a sample, and of what comes with it. A larger value,

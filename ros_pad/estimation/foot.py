@@ -194,7 +194,7 @@ class FootEstimator:
         ----------
         time : float
             Time of the sample, s, later than that of the last one. When the clock is set back by
-            :data:`LONGEST_GAP` or more, a new stance begins and the posterior stays.
+            0.15 s or more, a new stance begins and the posterior stays.
         force : sequence of 3 floats
             Force of the ground on the foot, N; z is the normal force.
         position : sequence of 3 floats

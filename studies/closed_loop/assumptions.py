@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from ros_pad.control import MorphologyController, adaptive, first_morphologies, policy_named
 from ros_pad.control.footprints import Footprints
 from ros_pad.estimation import Tuning
-from ros_pad.estimation.friction import GroundFilter
+from ros_pad.estimation.friction import GroundModel
 from ros_pad.estimation.stage import EstimationStage
 from ros_pad.pace import CONTROL_PERIOD_NS
 from ros_pad.regulators.simulated import SimulatedRegulator
@@ -61,7 +61,7 @@ class Setup:
     tuning: Tuning = field(default_factory=Tuning)
     limit_error: float = 1.0  # factor on the force limit of the simulated pads
     load_error: float = 1.0  # factor on the load that estimator and controller expect
-    ground: dict[str, Any] = field(default_factory=lambda: defaults(GroundFilter, 'temper'))
+    ground: dict[str, Any] = field(default_factory=lambda: defaults(GroundModel, 'temper'))
     controller: dict[str, Any] = field(
         default_factory=lambda: defaults(MorphologyController, 'margin', 'lift_off_share')
     )
@@ -177,7 +177,7 @@ ASSUMPTIONS = (
     Assumption(TUNING + 'ratio_noise', 'tuning.ratio_noise', 'model error of T/N', ''),
     Assumption(TUNING + 'speed_noise', 'tuning.speed_noise', 'model error of slip speed', 'm/s'),
     Assumption(TUNING + 'turning_rate', 'tuning.turning_rate', 'turning rate of feet', 'rad/s'),
-    Assumption(FILTER + 'GroundFilter.temper', 'ground.temper', 'temper', '', 'odds'),
+    Assumption(FILTER + 'GroundModel.temper', 'ground.temper', 'temper', '', 'odds'),
     Assumption(CONTROL + 'margin', 'controller.margin', 'pressure margin', '', 'excess'),
     Assumption(CONTROL + 'lift_off_share',
                'controller.lift_off_share', 'load gate, controller', ''),

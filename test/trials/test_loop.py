@@ -323,7 +323,7 @@ def test_estimates_are_as_sure_as_they_may_be(policy):
     neither scuff nor push one another.
     """
     loop = ClosedLoop(short(1), policy, 0, 'L1')
-    _, before = loop.pipeline.estimation.estimator.grounds.filters[0].friction
+    _, before = loop.pipeline.estimation.estimator.tracks[0].ground.filter.friction
     walks = [watched(policy, seed) for seed in (0, 1, 2)]
     for rows, _ in walks:
         truth, mean, sd, *_ = rows.T

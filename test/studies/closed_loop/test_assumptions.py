@@ -33,7 +33,7 @@ STATUSES = ('thesis', 'measured', 'data', 'derived', 'assumed', 'chosen')
 TUNED = {
     'estimation/tuning.py': ('Tuning',),
     'estimation/alarm.py': ('SlipAlarm',),
-    'estimation/friction.py': ('GroundFilter',),
+    'estimation/friction.py': ('GroundModel',),
     'control/footprints.py': ('Footprints',),
     'control/morphology.py': ('MorphologyController',),
     'control/policies.py': ('adaptive',),
