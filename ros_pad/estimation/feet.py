@@ -139,7 +139,7 @@ FARTHEST = np.array(3 * [math.inf] + 3 * [0.5 * LEAP_DISTANCE])
 """Largest changes of force and position in samples in which nothing leaps."""
 
 LARGEST_FORCE, LARGEST_POSITION, LARGEST_PRESSURE = 1e5, 1e6, 1e7
-"""Largest size of a force, N, and moment, N m, and of a position, m."""
+"""Largest size of a force, N, and moment, N m, of a position, m, and of a gauge pressure, Pa."""
 
 NUMBERS = (
     *((f'force {axis}', -LARGEST_FORCE, LARGEST_FORCE, 'N') for axis in 'xyz'),
