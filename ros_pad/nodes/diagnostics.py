@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node tells of its health on ``/diagnostics``."""
+"""What a node says of its health on ``/diagnostics``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Diagnostics:
     Attributes
     ----------
     reported : object
-        What was found when it told of it last.
+        What was found when it was last said.
     """
 
     OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

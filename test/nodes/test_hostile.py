@@ -552,3 +552,4 @@ def test_messages_that_are_no_messages_stop_no_node(context, executor, until):
         return channel.answers.accepted
 
     until(answered, what='a set-point after a sound sample')
+    assert channel.answers.accepted
