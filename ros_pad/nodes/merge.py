@@ -84,8 +84,7 @@ class MergeNode(Node):
                     leg,
                 )
         self._diagnostics = Diagnostics(self, messages)
-        messages.follows_clock = True
-        messages.on_tick(WAIT_NS * 1e-9, self._tick)
+        messages.on_tick(WAIT_NS * 1e-9, self._tick, every=True)
 
     def _take(
         self,

@@ -43,8 +43,6 @@ class Messages:
         Returns the node's time, ns.
     simulated : bool
         Whether this is the time of ``/clock``.
-    follows_clock : bool
-        In simulated time, whether ``/clock`` calls :meth:`on_tick` although records come.
     """
 
     def __init__(self, node: Node) -> None:
@@ -52,7 +50,6 @@ class Messages:
         self.now_ns = clock_of(node)
         self.simulated: bool = node.get_parameter('use_sim_time').value
         self._node = node
-        self.follows_clock = False
         self._record_ns = 0
 
     def output(self, topic: Topic, leg: int | None = None) -> Callable[[Any], None]:
@@ -143,12 +140,14 @@ class Messages:
 
         topic.subscription(self._node, take, leg, raw=True, on_mismatch=on_mismatch)
 
-    def on_tick(self, period: float, callback: Callable[[int], None]) -> None:
+    def on_tick(
+        self, period: float, callback: Callable[[int], None], every: bool = False
+    ) -> None:
         """Call a function again and again with the node's time, ns.
 
         In real time a timer calls it every ``period`` seconds; its clock keeps running when the
         time of day is changed. In simulated time nodes live by the stamps of records, see
-        :meth:`advance`, and ``/clock`` calls it where no records come.
+        :meth:`advance`, and ``/clock`` calls it where no records come, or at ``every`` step.
         """
         if not self.simulated:
             steady = NodeClock(clock_type=ClockType.STEADY_TIME)
@@ -158,7 +157,7 @@ class Messages:
         def on_clock(seconds: int, fraction: int) -> None:
             now_ns = seconds * 1_000_000_000 + fraction
             # Which of a record and the clock of its moment comes first must mean nothing.
-            if self.follows_clock or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
+            if every or abs(now_ns - self._record_ns) > TICK_PERIOD_NS:
                 callback(now_ns)
 
         self.receive(topics.CLOCK, on_clock, topics.CLOCK.schema.values)

@@ -122,6 +122,7 @@ class RegulatorNode(LifecycleNode):
         self._check_pace = Pace(_CHECK_PERIOD_NS)
         self._mismatch = ''  # warning of a mismatch of QoS
         self.tick_ns = 0
+        self._record_ns = 0  # stamp of the last command that was answered
         self._elapsed_ns = 0  # the same on the clock that measures the age of commands
         self._starting: bool = self._values['autostart']
         self._problem: Exception | None = None  # why the last configuration failed
@@ -132,7 +133,8 @@ class RegulatorNode(LifecycleNode):
         self.messages.receive_record(topics.COMMAND, legs, self._on_command, self._mismatched)
         self.create_service(Trigger, '~/vent', self._on_vent)
         self.add_on_set_parameters_callback(self._check_options)
-        self.messages.on_tick(min(LONGEST_TICK, 0.5 / self._values['publish_rate']), self._tick)
+        period = min(LONGEST_TICK, 0.5 / self._values['publish_rate'])
+        self.messages.on_tick(period, self._tick, every=True)
         if self._starting:
             self.trigger_configure()
             if self._problem:
@@ -241,14 +243,12 @@ class RegulatorNode(LifecycleNode):
         """Accept set-points from now on, also for pads that were held."""
         for channel in self.channels.values():
             channel.activate(self._elapsed(self.tick_ns))
-        self.messages.follows_clock = False
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Vent every pad and accept no more set-points."""
         for channel in self.channels.values():
             channel.deactivate('the node was deactivated')
-        self.messages.follows_clock = True  # without commands there are no moments but those of it
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -312,17 +312,15 @@ class RegulatorNode(LifecycleNode):
         self._mismatch = ''
         if not self.channels:  # the devices are closed
             return
-        now_ns = self.messages.now_ns()
-        if not self.messages.simulated or self.messages.follows_clock:
-            self.supervision.command(block, now_ns, self._elapsed(now_ns))
+        clock_ns = self.messages.now_ns()
+        if not (self._simulated_time and self.active):
+            self.supervision.command(block, clock_ns, self._elapsed(clock_ns))
             return
-        clock_ns = now_ns
-        if 0 < self.tick_ns - clock_ns <= TICK_PERIOD_NS:
-            now_ns = self.tick_ns  # an earlier record came before /clock: time does not go back
+        now_ns = self.tick_ns if self._ahead_of(clock_ns) else clock_ns
         if abs(block.last_ns - clock_ns) <= TICK_PERIOD_NS:
             # The record may come before the message of /clock of its moment.
             now_ns = max(now_ns, block.last_ns)
-            self.messages.advance(block.last_ns)
+            self._record_ns = block.last_ns
         self._supervise(now_ns)
         answer = self.supervision.read(block.last_ns, now_ns)
         self.supervision.command(block, now_ns, now_ns)
@@ -336,8 +334,18 @@ class RegulatorNode(LifecycleNode):
         """Return the time for the age of commands, ns: simulated, or of the monotonic clock."""
         return now_ns if self._simulated_time else time.monotonic_ns()
 
+    def _ahead_of(self, clock_ns: int) -> bool:
+        """Return whether a record was ahead of a simulated time, ns, which does not go back."""
+        return self._simulated_time and 0 <= self.tick_ns - clock_ns <= TICK_PERIOD_NS
+
     def _tick(self, now_ns: int) -> None:
+        if self.active and self._ahead_of(now_ns):
+            return
         self._supervise(now_ns)
+        # In simulated time commands are answered at once: no readings come between them.
+        answers = self._simulated_time and self.active
+        if answers and abs(now_ns - self._record_ns) <= TICK_PERIOD_NS:
+            return
         if self._pace.due(now_ns) and self.channels:
             self._send(self.supervision.read(now_ns, self._elapsed_ns))
 
