@@ -59,13 +59,13 @@ class _Layout(NamedTuple):
         All that comes between the stamp and the number of values.
     names : tuple of str
         Names of the numbers of a record, beginning with the time.
-    places : array of int
+    places : slice or array of int
         Place of each of them, but the time, among all numbers of a record.
     """
 
     head: bytes
     names: tuple[str, ...]
-    places: np.ndarray
+    places: slice | np.ndarray
 
     @property
     def start(self) -> int:
@@ -114,16 +114,17 @@ class Wire:
         self._own = self._last = self._layout(head, message.name)
 
     def _layout(self, head: bytes, names: Sequence[str]) -> _Layout:
-        places = np.array([self._all.index(name) for name in names[1:]], np.intp)
-        return _Layout(head, tuple(names), places)
+        places = [self._all.index(name) for name in names[1:]]
+        whole = places == list(range(len(self._all)))
+        return _Layout(head, tuple(names), slice(None) if whole else np.array(places, np.intp))
 
     def encode(self, block: Block) -> bytes:
         """Return the message of a block."""
         stamps, rows = block
-        first, places = int(stamps[0]), self._own.places
-        values = np.empty((len(stamps), len(places) + 1))
+        first = int(stamps[0])
+        values = np.empty((len(stamps), len(self._own.names)))
         values[:, 0] = (stamps - first) * 1e-9
-        values[:, 1:] = rows.view('f8').reshape(len(stamps), -1)[:, places]
+        values[:, 1:] = rows.view('f8').reshape(len(stamps), -1)[:, self._own.places]
         return self._own.message(first, values)
 
     def decode(self, data: bytes) -> Block:
@@ -185,12 +186,8 @@ class Wire:
 
     def _rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows of a table of numbers with their time."""
-        places = self._last.places
-        if len(places) == len(self._all) and np.array_equal(places, np.arange(len(places))):
-            numbers = np.ascontiguousarray(values[:, 1:], 'f8')
-        else:
-            numbers = np.full((len(values), len(self._all)), np.nan)
-            numbers[:, places] = values[:, 1:]
+        numbers = np.full((len(values), len(self._all)), np.nan)
+        numbers[:, self._last.places] = values[:, 1:]
         return numbers.view(self.kind.dtype)
 
     def _values(self, data: bytes) -> tuple[list[int], np.ndarray]:

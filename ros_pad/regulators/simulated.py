@@ -118,6 +118,7 @@ class SimulatedRegulator:
         hose = Hose(hose_diameter, hose_length, hose_conductance)
         self._faults = parsed(faults)
         self._channel = PneumaticChannel(model, hose, pad_volume, faults=self._faults)
+        self._copy, self._copied = self._channel, -math.inf  # of which time it is, s
         self._disturbance = 0.0
         self._disturbance_time = -math.inf
         self._is_open = False
@@ -227,9 +228,10 @@ class SimulatedRegulator:
         rest = self._advance()
         if not rest:
             return self._channel
-        channel = copy.copy(self._channel)
-        channel.step(channel.setpoint, rest)
-        return channel
+        if self._now != self._copied:
+            self._copied, self._copy = self._now, copy.copy(self._channel)
+            self._copy.step(self._copy.setpoint, rest)
+        return self._copy
 
     def _advance(self) -> float:
         """Advance by whole internal steps; return the remaining time, s, below ``STEP``."""
