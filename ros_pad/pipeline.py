@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From samples to commands: the stages of estimation and decision, one after the other.
 
-The closed loop without ROS and replay drive this; nodes drive the same stages, each in a process
-of its own. Supervision is a stage, too, but stays where the regulators are, on its own clock:
+The closed loop without ROS and replay drive this; nodes drive the same stages, one each.
+Supervision is a stage, too, but stays where the regulators are, on its own clock:
 :class:`ros_pad.regulators.supervision.Supervision`.
 """
 

@@ -542,7 +542,7 @@ class MorphologyController:
         leg : int
             Number of the leg.
         load : float
-            Normal force on the foot now, N.
+            Largest normal force on the foot since the last call, N.
         wet_probability : float
             Probability of wet ground below the foot, 0 to 1.
         position : sequence of float

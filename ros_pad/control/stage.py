@@ -27,12 +27,12 @@ _ROW = COMMAND.dtype
 
 
 @dataclass(slots=True)
-class _Inputs:
-    """What is remembered of the inputs of a leg."""
+class _Leg:
+    """What came from a leg until its last decision."""
 
     position: tuple[float, float] = (math.nan, math.nan)
     positioned: float = 0.0  # time of the last estimate with a new position, s
-    largest: float = -math.inf  # largest load since the last decision, N
+    load: float = -math.inf  # largest one since the last decision, N
     pressure: float | None = None  # last reading since the last observation
     observed: float = math.nan  # time of the controller's last observation, s
     doubt: float = 0.0  # code of the doubt, if it is a fault of the sensors
@@ -69,15 +69,15 @@ class DecisionStage:
     ) -> None:
         self.controller = controller
         self._reject = reject
-        self._legs = {leg: _Inputs() for leg in legs}
+        self._legs = {leg: _Leg() for leg in legs}
         self._domes: list[bool] = []  # morphologies of the last command
 
     def pressure(self, record: Block) -> None:
         """Store the readings of a PRESSURE record; NaN is none."""
         pressures = record.rows[-1]['pressure'].tolist()
-        for inputs, pressure in zip(self._legs.values(), pressures, strict=True):
+        for known, pressure in zip(self._legs.values(), pressures, strict=True):
             if not math.isnan(pressure):
-                inputs.pressure = pressure
+                known.pressure = pressure
 
     def decide(self, record: Block) -> Block:
         """Process an ESTIMATE record, and return the COMMAND record of the same time.
@@ -101,11 +101,11 @@ class DecisionStage:
         Return a COMMAND record without set-points if a morphology has changed, else None.
         """
         now, observed = now_ns * 1e-9, False
-        for leg, inputs in self._legs.items():
-            if math.isnan(inputs.observed):
-                inputs.observed = now
-            elif abs(now - inputs.observed) > TICK_PERIOD_NS * 1e-9:
-                self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
+        for leg, known in self._legs.items():
+            if math.isnan(known.observed):
+                known.observed = now
+            elif abs(now - known.observed) > TICK_PERIOD_NS * 1e-9:
+                self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
                 observed = True
         if not observed:
             return None
@@ -116,26 +116,24 @@ class DecisionStage:
     def _decide(self, leg: int, now: float, estimate: tuple[Any, ...]) -> float:
         """Return the set-point of a leg, gauge Pa; NaN if there is none."""
         wetness, load, (x, y), friction, doubt = estimate
-        inputs = self._legs[leg]
-        if inputs.largest < load < math.inf:
-            inputs.largest = load
+        known = self._legs[leg]
+        if known.load < load < math.inf:
+            known.load = load
         if not math.isnan(x + y):
-            inputs.position, inputs.positioned = (x, y), now
+            known.position, known.positioned = (x, y), now
         if not math.isnan(doubt):  # else the last one lasts
-            inputs.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
-        self.controller.observe(leg, now, inputs.take_pressure(now), inputs.doubt)
-        old = now - inputs.positioned > OLD
-        if old or not math.isfinite(load + wetness + sum(inputs.position)):
+            known.doubt = doubt if doubt and doubts.is_fault(doubt) else 0.0
+        self.controller.observe(leg, now, known.take_pressure(now), known.doubt)
+        old = now - known.positioned > OLD
+        if old or not math.isfinite(load + wetness + sum(known.position)):
             return math.nan
         try:
-            setpoint = self.controller.update(
-                leg, inputs.largest, wetness, inputs.position, friction
-            )
+            setpoint = self.controller.update(leg, known.load, wetness, known.position, friction)
         except InvalidInput as error:
             if self._reject:
                 self._reject(leg, error)
             return math.nan
-        inputs.largest = -math.inf
+        known.load = -math.inf
         return setpoint
 
     def _command(self, stamp_ns: int, setpoints: Sequence[float]) -> Block:

@@ -37,7 +37,7 @@ SILENCE = 0.4
 """Time without a sample after which the sensors of a foot count as faulty, s."""
 
 
-class Input:
+class Arrivals:
     """What has come from the sensors of a foot.
 
     Parameters
@@ -190,7 +190,7 @@ class EstimationStage:
     ) -> None:
         self.estimator = FeetEstimator(len(legs), foot, expected_load, tuning)
         self._legs, self._reject, self._pace = legs, reject, Pace(period_ns)
-        self._inputs = [Input(tuning) for _ in legs]
+        self._arrivals = [Arrivals(tuning) for _ in legs]
         self._pressures = [0.0] * len(legs)
         self.samples = self.last_ns = 0
 
@@ -214,7 +214,7 @@ class EstimationStage:
             # Who waits for an estimate receives one, also of feet without samples.
             if due:
                 found.append(self.estimate(stamp_ns))
-                for each in self._inputs:
+                for each in self._arrivals:
                     each.clear()
         return found
 
@@ -226,7 +226,7 @@ class EstimationStage:
         if self._ordinary(stamps, values):
             quiet = self.estimator.quiet(times, values)
             loads = values[:, :, 2].max(axis=0).tolist()
-            for each, mine, load in zip(self._inputs, rows, loads, strict=True):
+            for each, mine, load in zip(self._arrivals, rows, loads, strict=True):
                 each.note(stamps[-1], mine[-1][4:7], load, len(stamps))
         else:
             samples = [
@@ -242,11 +242,11 @@ class EstimationStage:
     @property
     def used(self) -> npt.NDArray[np.int64]:
         """Number of samples used so far, by foot."""
-        return np.array([each.used for each in self._inputs])
+        return np.array([each.used for each in self._arrivals])
 
     def _ordinary(self, stamps: list[int], values: Array) -> bool:
         """Return whether all samples can be used."""
-        last = max(each.time for each in self._inputs)
+        last = max(each.time for each in self._arrivals)
         if stamps[0] * 1e-9 <= last or sorted(set(stamps)) != stamps:
             return False
         # Not a number is not within limits either.
@@ -264,16 +264,16 @@ class EstimationStage:
     def _take(self, place: int, stamp_ns: int, sample: Sample) -> Sample | None:
         """Return the sample of a foot to use, if there is one."""
         try:
-            return self._inputs[place].take(stamp_ns, sample)
+            return self._arrivals[place].take(stamp_ns, sample)
         except InvalidInput as error:
-            self._inputs[place].missing = doubt.REFUSED
+            self._arrivals[place].missing = doubt.REFUSED
             if self._reject:
                 self._reject(self._legs[place], error)
             return None
 
     def tick(self, now_ns: int) -> None:
         """Check at a time, ns, whether samples are missing; call it every `TICK_PERIOD_NS`."""
-        for each in self._inputs:
+        for each in self._arrivals:
             each.tick(now_ns)
 
     @property
@@ -281,13 +281,13 @@ class EstimationStage:
         """Why the ground below each foot is unobservable."""
         return [
             each.silence or track.ground.doubt
-            for each, track in zip(self._inputs, self.estimator.tracks, strict=True)
+            for each, track in zip(self._arrivals, self.estimator.tracks, strict=True)
         ]
 
     def estimate(self, stamp_ns: int) -> Block:
         """Return the present estimates as a record of a time, ns."""
         table = []
-        for each, track in zip(self._inputs, self.estimator.tracks, strict=True):
+        for each, track in zip(self._arrivals, self.estimator.tracks, strict=True):
             now, ground = track.standing, track.ground
             table.append((
                 *each.place, each.load, *now.slip_velocity, now.slip_speed, track.slip.sd,

@@ -140,9 +140,7 @@ class Messages:
 
         topic.subscription(self._node, take, leg, raw=True, on_mismatch=on_mismatch)
 
-    def on_tick(
-        self, period: float, callback: Callable[[int], None], every: bool = False
-    ) -> None:
+    def on_tick(self, period: float, callback: Callable[[int], None], every: bool = False) -> None:
         """Call a function again and again with the node's time, ns.
 
         In real time a timer calls it every ``period`` seconds; its clock keeps running when the

@@ -28,9 +28,7 @@ from ros_pad.nodes.process import run
 from ros_pad.pace import TICK_PERIOD_NS, Pace
 from ros_pad.records import Block
 from ros_pad.regulators import BACKENDS, create
-from ros_pad.regulators.protocol import CEILING
-from ros_pad.regulators.supervision import Supervision, supply_health
-from ros_pad.regulators.supervisor import (
+from ros_pad.regulators.channel import (
     CEILING_TOLERANCE,
     ON_FAULT,
     SLEW_LIMIT,
@@ -39,6 +37,8 @@ from ros_pad.regulators.supervisor import (
     SupervisedChannel,
     SupervisorSettings,
 )
+from ros_pad.regulators.protocol import CEILING
+from ros_pad.regulators.supervision import Supervision, supply_health
 from ros_pad.simulation.faults import faults_of, parsed
 from ros_pad.simulation.scene import Scene
 
@@ -84,7 +84,7 @@ class RegulatorNode(LifecycleNode):
 
     *configure* opens the devices and vents them, *activate* accepts set-points, *deactivate*
     vents the pads, *cleanup* closes the devices. Set-points that
-    :class:`~ros_pad.regulators.supervisor.SupervisedChannel` refuses are reported on
+    :class:`~ros_pad.regulators.channel.SupervisedChannel` refuses are reported on
     ``/diagnostics``. The service ``~/vent`` deactivates the node: the pads stay vented until the
     node is activated again. Options of the backend are parameters ``backend_options.*``.
 
@@ -115,7 +115,6 @@ class RegulatorNode(LifecycleNode):
         self.channels: dict[int, SupervisedChannel] = {}
         self._values = declare(self, PARAMETERS)
         self._foot: Foot = self._values['foot']
-        self._simulated_time: bool = self.get_parameter('use_sim_time').value
         self._check_parameters()
         self.supervision = Supervision(())
         self._pace = Pace(round(1e9 / self._values['publish_rate']))
@@ -144,7 +143,8 @@ class RegulatorNode(LifecycleNode):
 
     def _check_parameters(self) -> None:
         """Refuse values that are not allowed together."""
-        if self._simulated_time and self._values['backend'] != 'simulated':
+        simulated_time = self.get_parameter('use_sim_time').value
+        if simulated_time and self._values['backend'] != 'simulated':
             raise ConfigError(
                 f'node {self.get_name()}: parameter use_sim_time = True is not allowed with'
                 f' backend {self._values["backend"]}: if /clock stops, its pads stay under'
@@ -213,9 +213,9 @@ class RegulatorNode(LifecycleNode):
         """Return the options of the backend: one value for all legs, or a list with one a leg."""
         options: dict[str, Any] = {}
         if self._values['backend'] == 'simulated':
-            started = time.monotonic()
-            clock = self._last_tick if self._simulated_time else lambda: time.monotonic() - started
-            options = {'clock': clock, 'pad_volume': self._foot.air_volume}
+            begun = 0.0 if self.messages.simulated else time.monotonic()
+            now = self._last_tick if self.messages.simulated else time.monotonic
+            options = {'clock': lambda: now() - begun, 'pad_volume': self._foot.air_volume}
             if self._values['scene']:
                 options |= self._values['scene'].regulator_options
         for name in self.get_parameters_by_prefix(BACKEND_OPTIONS):
@@ -313,7 +313,7 @@ class RegulatorNode(LifecycleNode):
         if not self.channels:  # the devices are closed
             return
         clock_ns = self.messages.now_ns()
-        if not (self._simulated_time and self.active):
+        if not (self.messages.simulated and self.active):
             self.supervision.command(block, clock_ns, self._elapsed(clock_ns))
             return
         now_ns = self.tick_ns if self._ahead_of(clock_ns) else clock_ns
@@ -332,18 +332,18 @@ class RegulatorNode(LifecycleNode):
 
     def _elapsed(self, now_ns: int) -> int:
         """Return the time for the age of commands, ns: simulated, or of the monotonic clock."""
-        return now_ns if self._simulated_time else time.monotonic_ns()
+        return now_ns if self.messages.simulated else time.monotonic_ns()
 
     def _ahead_of(self, clock_ns: int) -> bool:
         """Return whether a record was ahead of a simulated time, ns, which does not go back."""
-        return self._simulated_time and 0 <= self.tick_ns - clock_ns <= TICK_PERIOD_NS
+        return self.messages.simulated and 0 <= self.tick_ns - clock_ns <= TICK_PERIOD_NS
 
     def _tick(self, now_ns: int) -> None:
         if self.active and self._ahead_of(now_ns):
             return
         self._supervise(now_ns)
         # In simulated time commands are answered at once: no readings come between them.
-        answers = self._simulated_time and self.active
+        answers = self.messages.simulated and self.active
         if answers and abs(now_ns - self._record_ns) <= TICK_PERIOD_NS:
             return
         if self._pace.due(now_ns) and self.channels:

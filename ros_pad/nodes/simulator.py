@@ -216,7 +216,7 @@ class SimulatorNode(Node):
         # Half a period ahead, because a timer of the same period may come early or late.
         due = self._real_time.due(now_ns + self.period_ns // 2)
         if due:
-            self._send(due)
+            self._advance(due)
         if self.robot.verdict and not self._ended:
             self._ended = True
             self.get_logger().error(
@@ -253,9 +253,9 @@ class SimulatorNode(Node):
         while not due and self.time_ns + samples * self.period_ns < end_ns:
             samples += 1
             due = self._pace.due(self.time_ns + samples * self.period_ns)
-        return self._send(samples) == samples and due
+        return self._advance(samples) == samples and due
 
-    def _send(self, samples: int) -> int:
+    def _advance(self, samples: int) -> int:
         """Advance the robot by some samples, fewer if its walk ends; publish and count them."""
         first_ns = self.time_ns + self.period_ns
         if not self._simulated:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ros_pad.records import PRESSURE, Block
-from ros_pad.regulators.supervisor import Health, Level, SupervisedChannel
+from ros_pad.regulators.channel import Health, Level, SupervisedChannel
 
 _ROW = PRESSURE.dtype
 

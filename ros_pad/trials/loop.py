@@ -26,9 +26,9 @@ from ros_pad.pace import CONTROL_PERIOD_NS, TICK_PERIOD_NS, Pace, Progress
 from ros_pad.pipeline import Pipeline
 from ros_pad.records import SAMPLE, Block
 from ros_pad.regulators import SimulatedRegulator, create
+from ros_pad.regulators.channel import DEFAULTS as SUPERVISION
+from ros_pad.regulators.channel import SupervisedChannel
 from ros_pad.regulators.supervision import Supervision
-from ros_pad.regulators.supervisor import DEFAULTS as SUPERVISION
-from ros_pad.regulators.supervisor import SupervisedChannel
 from ros_pad.sensing import BodyEstimate, SensingStage
 from ros_pad.sensing.stage import estimator_of, sample_of
 from ros_pad.simulation import fidelity as levels

@@ -109,7 +109,9 @@ def quiet():
 def ticks(monkeypatch):
     """Replace timers of ticks; return their callbacks."""
     callbacks = []
-    monkeypatch.setattr(Messages, 'on_tick', lambda self, period, call, **_: callbacks.append(call))
+    monkeypatch.setattr(
+        Messages, 'on_tick', lambda self, period, call, **_: callbacks.append(call)
+    )
     return callbacks
 
 

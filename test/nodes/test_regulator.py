@@ -26,8 +26,8 @@ from ros_pad.nodes import regulator as module
 from ros_pad.nodes import topics
 from ros_pad.nodes.regulator import RegulatorNode
 from ros_pad.regulators import BACKENDS, Reading, SimulatedRegulator
+from ros_pad.regulators.channel import SupervisedChannel
 from ros_pad.regulators.protocol import permitted
-from ros_pad.regulators.supervisor import SupervisedChannel
 
 ERROR, WARN, OK, STALE = (
     getattr(DiagnosticStatus, each) for each in ('ERROR', 'WARN', 'OK', 'STALE')

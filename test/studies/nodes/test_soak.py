@@ -3,7 +3,7 @@ import gc
 
 import pytest
 
-from ros_pad.regulators.supervisor import SupervisedChannel
+from ros_pad.regulators.channel import SupervisedChannel
 from studies.nodes import soak
 
 pytestmark = pytest.mark.slow

@@ -15,9 +15,9 @@ from ros_pad.control.faults import KINDS, Kind, text
 from ros_pad.errors import InvalidInput, ProtocolError, TransportError
 from ros_pad.records import COMMAND, Block
 from ros_pad.regulators import Reading, create
+from ros_pad.regulators.channel import Health, Level, SupervisedChannel, SupervisorSettings
 from ros_pad.regulators.protocol import permitted
 from ros_pad.regulators.supervision import Supervision, supply_health
-from ros_pad.regulators.supervisor import Health, Level, SupervisedChannel, SupervisorSettings
 
 MS = 1_000_000
 TICK_NS = 10 * MS
