@@ -183,11 +183,11 @@ def perform(
             try:
                 status = child.wait(max(0.1, sent + PATIENCE - time.monotonic()))
             except subprocess.TimeoutExpired:
-                one.problems.append(f'{words[0]}: no end after {PATIENCE:g} s')
+                one.problems.append(f'{" ".join(words[:3])}: no end after {PATIENCE:g} s')
                 continue
             one.statuses.append(status)
             if status not in STATUSES:
-                one.problems.append(f'{words[0]}: exit status {status}')
+                one.problems.append(f'{" ".join(words[:3])}: exit status {status}')
         one.ending = time.monotonic() - sent
         errors.seek(0)
         one.errors = errors.read()
