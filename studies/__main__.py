@@ -55,7 +55,6 @@ STUDIES = {
     'nodes': ('nodes.cost', 'time of trials and nodes, beside another checkout (20 min)'),
     'regulators': ('nodes.regulators', 'time of commands and readings of drivers (1 min)'),
     'flood': ('nodes.flood', 'the regulator node under floods of messages (2 min)'),
-    'signals': ('nodes.signals', 'two signals at any moment to nodes and pad run (15 min)'),
     'fuzz': ('nodes.fuzz', 'every parser against random input (needs atheris)'),
 }
 """Module of each study in this package, and a line about it, with its duration on two cores if it
