@@ -53,7 +53,6 @@ STUDIES = {
     ),
     'lead_picture': ('closed_loop.lead_picture', 'picture and figures of the README (2 min)'),
     'nodes': ('nodes.cost', 'time of trials and nodes, beside another checkout (20 min)'),
-    'regulators': ('nodes.regulators', 'time of commands and readings of drivers (1 min)'),
     'flood': ('nodes.flood', 'the regulator node under floods of messages (2 min)'),
     'fuzz': ('nodes.fuzz', 'every parser against random input (needs atheris)'),
 }
