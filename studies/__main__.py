@@ -45,7 +45,6 @@ STUDIES = {
     ),
     'faults': ('closed_loop.faults', 'a walk with faults, with and without monitor (8 min)'),
     'joints': ('closed_loop.joints', 'walks without markers, beside those with them (10 min)'),
-    'turning_feet': ('closed_loop.turning_feet', 'slip alarm from the rate of shanks (2 min)'),
     'labelled_contacts': ('closed_loop.labelled_contacts', 'slip alarm on recorded contacts'),
     'labelled_pce': (
         'closed_loop.labelled_pce',
