@@ -21,7 +21,6 @@ STUDIES = {
         'work_precision.friction_problems',
         'contact problems of other groups (15 min)',
     ),
-    'limit_surface': ('work_precision.limit_surface', 'force and moment of turning soles (6 min)'),
     'stability': ('work_precision.stability', 'where plain methods become unstable (10 s)'),
     'estimator': ('work_precision.estimator.study', 'methods of slip and wetness (20 min)'),
     'thickness': ('work_precision.thickness', 'solids beside the membrane of a pad (5 min)'),
