@@ -22,9 +22,9 @@ force and moment for the limit surface of a sliding contact; an evenly pressed d
     Pseudo-Huber on the slip, φ' = c |z| / √(z² + ε²): fast and smooth, creeps at about ε; sticking
     feet share the load in proportion to their caps.
 ``exact_stick``
-    Rigid-plastic, φ' = c, by projected gradient or block Gauss-Seidel on impulses in balls of
-    radius c dt: feet stick to rounding, and the twist has a bound on its error. This is the
-    reference. The forces of three or more sticking feet are not unique.
+    Rigid-plastic, φ' = c, by projected gradient on impulses in balls of radius c dt: feet stick to
+    rounding, and the twist has a bound on its error. This is the reference. The forces of three or
+    more sticking feet are not unique; these are the smallest ones, if none is at its cap.
 """
 
 from __future__ import annotations
@@ -32,16 +32,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from math import sqrt
-from operator import add, mul, sub
+from operator import mul
 
-from ros_pad.configuration import choice, number
+from ros_pad.configuration import number
 from ros_pad.simulation.planar_step import Pushed, newton, push
 
 Twist = tuple[float, float, float]
 _Row = tuple[float, float, float, float, float]
-
-# Sweeps of Gauss-Seidel after which its convergence counts as too slow.
-CRAWLING = 100
 
 
 class Contact:
@@ -175,41 +172,6 @@ def creeping(
     return vx, vy, turn
 
 
-def viscous(contacts: Sequence[Contact]) -> Twist:
-    """Return the twist of a body without inertia on feet with viscous friction; a linear system.
-
-    This is the cheapest method: the force is proportional to slip and to the foot's cap, unlike in
-    Coulomb's law. Feet then slip such that Σ c s and Σ c (r × s + ρ² (ω + w)) are zero, for any
-    viscosity. It is exact if there is a twist at which no foot slips, and gives no forces. Walkers
-    that slip are modelled like this in arXiv 2310.20669. If the imposed motions of the feet
-    differ, the twist follows their mean; with Coulomb friction, it follows their median.
-
-    Raises
-    ------
-    ArithmeticError
-        When no foot has a cap above 0, or a single point contact leaves the body free to turn.
-    """
-    s = sx = sy = turning = ux = uy = uw = 0.0
-    for c in contacts:
-        s += c.cap
-        sx += c.cap * c.lever_x
-        sy += c.cap * c.lever_y
-        radius = c.turning_radius * c.turning_radius
-        turning += c.cap * (c.lever_x * c.lever_x + c.lever_y * c.lever_y + radius)
-        ux += c.cap * c.motion_x
-        uy += c.cap * c.motion_y
-        uw += c.cap * (c.lever_x * c.motion_y - c.lever_y * c.motion_x + radius * c.motion_turn)
-    # About the centre of the caps, the system separates into three equations.
-    spin = turning - (sx * sx + sy * sy) / s if s > 0.0 else 0.0
-    if spin <= 1e-12 * turning:
-        raise ArithmeticError(
-            f'{len(contacts)} contacts with a sum of caps of {s:g} N leave a body free: caps above'
-            ' 0 N are needed at two places, or at one with a turning radius'
-        )
-    turn = -(uw - (sx * uy - sy * ux) / s) / spin
-    return (turn * sy - ux) / s, -(turn * sx + uy) / s, turn
-
-
 def exact_stick(
     free: Twist,
     mass: float,
@@ -218,7 +180,6 @@ def exact_stick(
     dt: float,
     tolerance: float = 1e-8,
     sweeps: int = 20000,
-    method: str = 'gradient',
 ) -> Twist:
     """Step with rigid-plastic friction, to a proven accuracy; set each contact's force.
 
@@ -231,51 +192,28 @@ def exact_stick(
         3e-8 √(Σ c dt |z|/mass) + 1.5e-8 Σ c dt/mass, which is less for bodies of a kilogram.
     sweeps : int
         Largest number of sweeps over the contacts.
-    method : str
-        ``gradient`` or ``gauss_seidel``. The two find the same twist. Of the possible forces of
-        sticking feet, ``gradient`` finds the smallest ones, if none is at its cap;
-        ``gauss_seidel``, like common solvers, finds forces that depend on the order of contacts.
 
     Raises
     ------
     ArithmeticError
         When the bound is not met after all sweeps.
     InvalidInput
-        For another method, or when the step is not above zero.
+        When the step is not above zero.
 
     Notes
     -----
-    ``gradient`` is projected gradient on all impulses, accelerated, and restarted whenever its
-    last step turns back (Nesterov 1983; O'Donoghue and Candès 2015). ``gauss_seidel`` finds
-    exactly, for one contact after another, the impulse in its ball that minimises the energy while
-    the others are constant. After each sweep it tries a secant step along the change of the last
-    two (Anderson's mixing of depth one) and keeps it if it lowers the energy, because plain sweeps
-    converge slowly where contacts nearly agree on a motion. Steps that still converge slowly are
-    solved by gradient.
+    Projected gradient on all impulses is accelerated, and restarted whenever its last step turns
+    back (Nesterov 1983; O'Donoghue and Candès 2015).
 
     The primal function is strongly convex, so the gap Σ (c dt |z| + p·z) between it and its dual
     bounds the error: ½ mass error² <= gap.
     """
-    choice('method', method, ('gradient', 'gauss_seidel'))
     _check(dt)
     step = RigidStep(free, mass, inertia, contacts, dt, tolerance)
-    impulses, _ = least_energy(step, [0.0] * len(step.rows), sweeps, method)
+    impulses = _gradient(step, sweeps)
     twist = step.twist(impulses)
     _set_forces(contacts, step, impulses, twist, dt)
     return twist
-
-
-def least_energy(
-    step: RigidStep, impulses: list[float], sweeps: int, method: str
-) -> tuple[list[float], int]:
-    """Return impulses that settle a step, from a first guess, and the number of sweeps.
-
-    Method and errors are those of :func:`exact_stick`.
-    """
-    count = 0
-    if method == 'gauss_seidel':
-        impulses, count = _gauss_seidel(step, impulses, min(sweeps, CRAWLING))
-    return _gradient(step, impulses, count, sweeps)
 
 
 class RigidStep:
@@ -322,11 +260,6 @@ class RigidStep:
         vx, vy, turn = self.twist(impulses)
         return [jx * vx + jy * vy + jw * turn + motion for jx, jy, jw, motion, _ in self.rows]
 
-    def energy(self, impulses: Sequence[float]) -> float:
-        """Return the energy, J, whose minimum is searched, at given impulses."""
-        both = map(add, self.slips(impulses), self._at_first)
-        return 0.5 * sum(map(mul, impulses, both))
-
     def in_balls(self, impulses: Sequence[float]) -> list[float]:
         """Return the nearest impulses inside the balls of the contacts."""
         inside = list(impulses)
@@ -346,54 +279,17 @@ class RigidStep:
         self.gap = lost + sum(map(mul, impulses, slip))
         return self.gap <= self._allowed + 4e-16 * lost
 
-    def sweep(self, impulses: Sequence[float]) -> list[float]:
-        """Return impulses after each contact has minimised the energy, one after the other."""
-        (vx, vy, turn), after = self.twist(impulses), list(impulses)
-        for place, limit in self.blocks():
-            block = zip(self.rows[place : place + 3], impulses[place:], strict=False)
-            pulls = [
-                (jx * vx + jy * vy + jw * turn + motion - stiffness * impulse, stiffness)
-                for (jx, jy, jw, motion, stiffness), impulse in block
-            ]
-            for index, impulse in enumerate(least_in_ball(pulls, limit), place):
-                after[index], added = impulse, impulse - impulses[index]
-                jx, jy, jw, _, _ = self.rows[index]
-                vx += jx * added / self.mass
-                vy += jy * added / self.mass
-                turn += jw * added / self._inertia
-        return after
 
-
-def _gauss_seidel(step: RigidStep, impulses: list[float], most: int) -> tuple[list[float], int]:
-    """Return impulses and number of sweeps, until they converge or converge too slowly."""
-    swept, change = impulses, impulses
-    count = 0
-    while count < most and not step.settled(impulses):
-        count += 1
-        last, before = swept, change
-        swept = step.sweep(impulses)
-        change = list(map(sub, swept, impulses))
-        impulses = swept
-        bend = list(map(sub, change, before))
-        if count > 1 and any(bend):
-            share = sum(map(mul, change, bend)) / sum(map(mul, bend, bend))
-            ahead = step.in_balls([s - share * (s - o) for s, o in zip(swept, last, strict=True)])
-            if step.energy(ahead) < step.energy(swept):
-                impulses = ahead
-    return impulses, count
-
-
-def _gradient(
-    step: RigidStep, impulses: list[float], count: int, sweeps: int
-) -> tuple[list[float], int]:
-    """Return settled impulses by accelerated projected gradient, and the number of sweeps.
+def _gradient(step: RigidStep, sweeps: int) -> list[float]:
+    """Return settled impulses by accelerated projected gradient.
 
     Raises
     ------
     ArithmeticError
-        When they do not settle within ``sweeps``, of which ``count`` have been made before.
+        When they do not settle within ``sweeps``.
     """
-    ahead, age, rate = impulses, 1.0, step.rate
+    impulses = ahead = [0.0] * len(step.rows)
+    age, rate, count = 1.0, step.rate, 0
     while not step.settled(impulses):
         if count >= sweeps:
             error = sqrt(2.0 * step.gap / step.mass)
@@ -410,7 +306,7 @@ def _gradient(
         age, older = (1.0, 1.0) if turned > 0.0 else (0.5 + sqrt(0.25 + age * age), age)
         pull = (older - 1.0) / age
         ahead = [p + pull * (p - o) for p, o in zip(impulses, last, strict=True)]
-    return impulses, count
+    return impulses
 
 
 def _set_forces(
@@ -463,29 +359,6 @@ def _directions(contact: Contact, mass: float, inertia: float) -> list[_Row]:
             ex, ey, jw, motion + et * radius * contact.motion_turn, compliance or 1.0
         ))  # fmt: skip
     return rows
-
-
-def least_in_ball(pulls: Sequence[tuple[float, float]], limit: float) -> list[float]:
-    """Minimise Σ (½ d p² + g p) over |p| <= limit, for (g, d) in pulls.
-
-    On the sphere p = -g/(d + λ), with λ the root of |p(λ)| = limit. Newton's method is applied to
-    1/|p|, which is nearly linear and concave, so from below it never passes the root (Moré and
-    Sorensen 1983).
-    """
-    found = [-g / d for g, d in pulls]
-    if sum(map(mul, found, found)) <= limit * limit:
-        return found
-    size = sqrt(sum(g * g for g, _ in pulls))
-    multiplier = max(0.0, size / limit - max(d for _, d in pulls))
-    for _ in range(100):
-        found = [-g / (d + multiplier) for g, d in pulls]
-        square = sum(map(mul, found, found))
-        size = sqrt(square)
-        if size <= limit * (1.0 + 1e-15):
-            break
-        slope = sum(p * p / (d + multiplier) for p, (_, d) in zip(found, pulls, strict=True))
-        multiplier += (size / limit - 1.0) * square / slope
-    return [p * limit / size for p in found]
 
 
 def _check(dt: float) -> None:

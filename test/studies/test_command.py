@@ -38,10 +38,8 @@ def test_all_studies_are_listed(capsys):
 
 @pytest.mark.parametrize('name', STUDIES)
 def test_every_study_has_help(name, capsys):
-    if name in ('nodes', 'real_time', 'recorder', 'soak', 'flood'):
+    if name in ('nodes', 'flood'):
         pytest.importorskip('rclpy')
-    if name == 'turning_feet':
-        pytest.importorskip('mujoco')
     environment = dict(os.environ)
     with pytest.raises(SystemExit) as stop:
         main([name, '--help'])

@@ -14,11 +14,10 @@ time. So walks in the plane (L1), and standing feet that are pulled to and fro, 
 sticks.
 
 Walks with noise that is larger, or configured wrong, are counted on floors on which settings were
-chosen and on others, with intervals over walks. Axes of force or position are turned or mirrored,
-and the stances until that is found are counted; axes that are right must never be in doubt.
+chosen and on others, with intervals over walks.
 
 With --docs the tables of docs/model/estimation.md are replaced as well. --walks 1 takes 2 minutes
-on two cores: one walk of each kind, the ends of each change, and an eighth of the right axes.
+on two cores: one walk of each kind, and the ends of each change.
 
 Without MuJoCo all walks are in the plane.
 """
@@ -34,7 +33,7 @@ from matplotlib.figure import Figure
 
 from ros_pad.commands.folder import new_folder
 from studies import command
-from studies.work_precision.estimator import chart, conditions, turned
+from studies.work_precision.estimator import chart, conditions
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
 from studies.work_precision.estimator.walks import full, recordings
@@ -44,26 +43,16 @@ PAGE = command.ROOT / 'docs' / 'model' / 'estimation.md'
 
 def measure(count: int | None, processes: int) -> dict[str, Any]:
     """Run all parts on so many walks of each kind, or on all; return the JSON."""
-    walks, searches = conditions.walk_cases(count), turned.cases(count)
-    checks = turned.honest_cases(count)
+    walks = conditions.walk_cases(count)
     tasks: list[tuple[Any, ...]] = [(_methods, count)]
     tasks += [(_stress, place, count) for place in range(len(conditions.CHANGES))]
     tasks += [(conditions.tallies, *case) for case in walks]
-    tasks += [(turned.search, *case) for case in searches]
-    tasks += [(turned.check, *case) for case in checks]
     found = iter(command.in_processes(_call, tasks, processes, 'estimator', 'part'))
     rows = next(found)
     for _ in conditions.CHANGES:
         rows += next(found)
     rows += conditions.rows_by_walk(walks, [next(found) for _ in walks])
-    axes = turned.found_of(searches, [next(found) for _ in searches])
-    right = turned.honest_of(checks, [next(found) for _ in checks])
-    return {
-        'walks': count,
-        'rows': [asdict(row) for row in rows],
-        'axes': [asdict(row) for row in axes],
-        'right_axes': [asdict(row) for row in right],
-    }
+    return {'walks': count, 'rows': [asdict(row) for row in rows]}
 
 
 def _call(function: Callable[..., Any], *values: Any) -> Any:
@@ -81,13 +70,7 @@ def _stress(place: int, count: int | None) -> list[Row]:
 def tables(document: dict[str, Any]) -> dict[str, str]:
     """Return the tables of the docs, by the name of their marks."""
     rows = [Row(**row) for row in document['rows']]
-    axes = [turned.Found(**row) for row in document['axes']]
-    right = [turned.Honest(**row) for row in document['right_axes']]
-    return {
-        'walks': chart.walks(rows),
-        'axes': f'{turned.table(axes)}\n\n{turned.honest_table(right)}',
-        'robustness': chart.robustness(rows),
-    }
+    return {'walks': chart.walks(rows), 'robustness': chart.robustness(rows)}
 
 
 def paste(page: pathlib.Path, document: dict[str, Any]) -> None:

@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 
 from ros_pad.estimation import FootEstimator
-from ros_pad.records import SAMPLE
 from ros_pad.simulation import Scene
 from ros_pad.trials.node_settings import tuning_for
-from studies.work_precision.estimator import (
-    chart,
-    conditions,
-    methods,
-    study,
-    tally,
-    turned,
-    walks,
-)
+from studies.work_precision.estimator import chart, conditions, methods, study, tally, walks
 from studies.work_precision.estimator.conditions import Change
 from studies.work_precision.estimator.tally import Tally
 from studies.work_precision.estimator.walks import Recording
@@ -438,38 +429,6 @@ def test_the_docs_have_the_tables_of_the_file():
     for change, measure in chart._DRAWN:
         mine = [row for row in rows if (row.part, row.name) == ('robustness', change)]
         assert any('**' in chart._cell(row, measure) for row in mine), change
-
-
-# --- turned axes --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ('fault', 'force', 'position'),
-    [
-        ('force turned by 90° about z', (-2.0, 1.0, 3.0), (1.0, 2.0, 3.0)),
-        ('x and y of the force exchanged', (2.0, 1.0, 3.0), (1.0, 2.0, 3.0)),
-        ('normal force along y', (1.0, 3.0, -2.0), (1.0, 2.0, 3.0)),
-        ('sign of the force turned', (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)),
-        ('z of the position mirrored', (1.0, 2.0, 3.0), (1.0, 2.0, -3.0)),
-    ],
-)
-def test_faults_of_axes(fault, force, position):
-    rows = SAMPLE.rows(1)
-    rows['force'] = rows['position'] = (1.0, 2.0, 3.0)
-    read = turned.misread(rows, fault)
-    assert tuple(read['force'][0]) == force
-    assert tuple(read['position'][0]) == position
-
-
-def test_feet_are_counted_by_the_stance_in_which_their_axes_were_found():
-    cases = [('a', 'markers', 'held out', seed) for seed in (1, 2)]
-    feet = {fault: [(2, True), (3, True), (4, False)] for fault in turned.FAULTS}
-    none = {fault: [(None, False)] for fault in turned.FAULTS}
-    found = turned.found_of(cases, [feet, none])
-    row = found[0]
-    assert (row.feet, row.within, row.never, row.named) == (4, 2, 1, 2)
-    assert (row.median, row.most) == (3.0, 4)
-    assert '| 50, 4, never 25 |' in turned.table(found)
 
 
 # --- pictures and tables ------------------------------------------------------------------------

@@ -9,14 +9,11 @@ from scipy.optimize import minimize
 
 from ros_pad.contact.resistance import DISC_TURNING_RADIUS
 from ros_pad.errors import InvalidInput
-from studies.work_precision.friction import Contact, creeping, elastic, exact_stick, viscous
+from studies.work_precision.friction import Contact, creeping, elastic, exact_stick
 
 MASS, INERTIA, GRAVITY = 2.0, 0.03, 9.81
 STILL = (0.0, 0.0, 0.0)
 STEPS = {
-    'gauss_seidel': lambda free, mass, inertia, contacts, dt, start: exact_stick(
-        free, mass, inertia, contacts, dt, method='gauss_seidel'
-    ),
     'elastic': elastic,
     'creeping': creeping,
     'exact_stick': lambda free, mass, inertia, contacts, dt, start: exact_stick(
@@ -440,41 +437,3 @@ def test_a_turning_sole_holds_less():
         twist = exact_stick(free, MASS, 1e6, [foot], 1e-3)
     # f/c = 0.6 = s/√(s² + 0.06²) at s = 0.75 * 0.06.
     assert twist[0] == pytest.approx(0.045, rel=1e-3)
-
-
-# --- feet that drag a body without inertia ------------------------------------------------------
-
-
-def test_viscous_feet():
-    """Motions that a body can follow are met exactly, others by least squares."""
-    rng = random.Random(30)
-    for _ in range(200):
-        _, feet, _ = random_step(rng, soles=True)
-        wanted = tuple(rng.uniform(-1, 1) for _ in range(3))
-        for foot in feet:
-            foot.motion_x = -(wanted[0] - wanted[2] * foot.lever_y)
-            foot.motion_y = -(wanted[1] + wanted[2] * foot.lever_x)
-            foot.motion_turn = -wanted[2]
-        if sum(foot.cap > 0.0 for foot in feet) > 1:
-            assert viscous(feet) == pytest.approx(wanted, abs=1e-9)
-    caps, speeds = np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.5, 0.2])
-    feet = [
-        contact(c, (0, r), (-v, 0))
-        for c, v, r in zip(caps, speeds, (0.1, 0, -0.1 / 3), strict=True)
-    ]
-    fitted = np.linalg.lstsq(
-        np.sqrt(caps)[:, None] * [[1, -0.1], [1, 0], [1, 0.1 / 3]], np.sqrt(caps) * speeds
-    )[0]
-    assert viscous(feet) == pytest.approx((fitted[0], 0.0, fitted[1]), abs=1e-12)
-
-
-def test_viscous_feet_need_a_grip():
-    for feet in ([], [contact(0.0, (0.1, 0.0))], [contact(1.0, (0.1, 0.2))]):
-        with pytest.raises(ArithmeticError, match='leave a body free'):
-            viscous(feet)
-    assert viscous([contact(1.0, radius=0.01, spin=-2.0)])[2] == pytest.approx(2.0)
-
-
-def test_methods_are_named():
-    with pytest.raises(InvalidInput, match=r"method = 'jacobi'"):
-        exact_stick(STILL, MASS, INERTIA, [], 0.004, method='jacobi')
