@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
-from studies import command, samples
+from studies import samples
 from studies.__main__ import main
 from studies.closed_loop import labelled_contacts as contacts
 from studies.closed_loop import labelled_pce as study
@@ -101,11 +101,3 @@ def test_a_folder_of_made_up_feet(tmp_path, capsys, monkeypatch):
     # Without a pull no ground can be told from another, and nothing slips.
     assert (ground['alarms'], set(ground['doubt'])) == (0, {'not yet', 'not pulled'})
     assert ground['stances'] == 5
-
-
-def test_the_tables_of_the_documentation_are_those_of_the_stored_figures():
-    kept = json.loads((command.CHARTS / 'labelled_pce.json').read_text(encoding='utf-8'))
-    page = (command.ROOT / 'docs' / 'labelled_contacts.md').read_text(encoding='utf-8')
-    tables = study.table(kept).split('\n\n')
-    assert all(len(table.splitlines()) > 6 for table in (tables[0], tables[1], tables[3]))
-    assert [table for table in (tables[0], tables[1], tables[3]) if table not in page] == []

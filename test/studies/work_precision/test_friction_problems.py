@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from ros_pad.errors import InvalidInput
-from studies import command
 from studies.__main__ import main
 from studies.work_precision import friction_problems as study
 
@@ -145,9 +144,3 @@ def test_the_table_counts_what_is_solved(tmp_path, capsys, monkeypatch):
     for line in lines[2:]:
         kinds = [each for each in kept['kinds'] if each['problems'] in line]
         assert line.count('1 of 1; ') == sum(each['solved'] for each in kinds) >= 2
-
-
-def test_the_table_of_the_documentation_is_that_of_the_stored_figures():
-    kept = json.loads((command.CHARTS / 'friction_problems.json').read_text(encoding='utf-8'))
-    page = (command.ROOT / 'docs' / 'model' / 'friction_step.md').read_text(encoding='utf-8')
-    assert study.table(kept) in page
