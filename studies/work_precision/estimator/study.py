@@ -17,8 +17,8 @@ Walks with noise that is larger, or configured wrong, are counted on floors on w
 chosen and on others, with intervals over walks. Axes of force or position are turned or mirrored,
 and the stances until that is found are counted; axes that are right must never be in doubt.
 
---walks 1 takes 2 minutes on two cores: one walk of each kind, the ends of each change, and an eighth
-of the right axes.
+--walks 1 takes 2 minutes on two cores: one walk of each kind, the ends of each change, and an
+eighth of the right axes.
 
 Without MuJoCo all walks are in the plane.
 """
