@@ -339,10 +339,10 @@ def _percent(share: float) -> str:
     return f'{float(f"{percent:.3g}" if percent >= 10.0 else f"{percent:.2g}"):g} %'
 
 
-def pasted(page: str, document: dict[str, Any]) -> str:
-    """Return the text of a page with other tables between its marks."""
+def pasted(page: str) -> str:
+    """Return the text of a page with another table of the shipped scenes between its marks."""
     before, rest = page.split(MARKS[0])
-    lines = MARKS[0], summary(document), '', shipped(), MARKS[1]
+    lines = MARKS[0], shipped(), MARKS[1]
     return before + '\n'.join(lines) + rest.split(MARKS[1])[1]
 
 
@@ -403,7 +403,7 @@ def main(words: Sequence[str]) -> int:
     document = {'promise': PROMISE, 'robots': robots}
     if options.out == command.CHARTS and options.config == CONFIG:
         Promises.load.cache_clear()
-        save(PAGE, pasted(PAGE.read_text(encoding='utf-8'), document).encode())
+        save(PAGE, pasted(PAGE.read_text(encoding='utf-8')).encode())
     command.write(options.out, 'fidelity', document, {'fidelity': figure(document)})
     command.show(options, document, summary(document))
     return 0

@@ -15,7 +15,7 @@ from studies.thesis.explained import Claim, Explained, counted
 
 PAGE = command.ROOT / 'docs' / 'thesis.md'
 MARK = '<!-- below: python -m studies thesis --table -->\n'
-_HEAD = ('where', 'the thesis states', 'its number', 'here', 'verdict', 'rule, condition')
+_HEAD = ('where', 'the thesis states', 'verdict')
 
 
 def document(figures: Sequence[Explained], text: Sequence[Claim]) -> dict[str, Any]:
@@ -41,11 +41,8 @@ def markdown(kept: Mapping[str, Any]) -> str:
     rows = [
         (
             claim['where'],
-            claim['thesis'],
-            claim['printed'] or '–',
-            claim['ours'],
-            f'**{claim["verdict"]}**',
-            claim['reason'] + (f' [Why]({claim["see"]})' if claim['see'] else ''),
+            claim['thesis'] + (f' ({claim["printed"]})' if claim['printed'] else ''),
+            f'[{claim["verdict"]}]({claim["see"]})' if claim['see'] else claim['verdict'],
         )
         for claim in kept['claims']
     ]

@@ -28,7 +28,7 @@ def test_the_file_of_bounds_has_the_robots_and_ranges_of_the_study():
 
 def test_the_page_has_the_table_of_the_study():
     page = study.PAGE.read_text(encoding='utf-8')
-    assert study.pasted(page, {'robots': DOCUMENT}) == page
+    assert study.pasted(page) == page
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

@@ -56,7 +56,7 @@ def test_walks_that_are_kept_are_not_made_again(tmp_path, monkeypatch):
 def test_the_page_has_the_tables_of_the_last_run():
     document = json.loads((policies.command.CHARTS / 'policies.json').read_text())
     page = policies.PAGE.read_text()
-    assert policies.written(page, policies.table(document)) == page
+    assert policies.written(page, policies.overall(document)) == page
 
 
 def border(policy, morphology):
