@@ -16,15 +16,13 @@ sticks.
 Walks with noise that is larger, or configured wrong, are counted on floors on which settings were
 chosen and on others, with intervals over walks.
 
-With --docs the tables of docs/model/estimation.md are replaced as well. --walks 1 takes 2 minutes
-on two cores: one walk of each kind, and the ends of each change.
+--walks 1 takes 2 minutes on two cores: one walk of each kind, and the ends of each change.
 
 Without MuJoCo all walks are in the plane.
 """
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -37,8 +35,6 @@ from studies.work_precision.estimator import chart, conditions
 from studies.work_precision.estimator.methods import compare
 from studies.work_precision.estimator.tally import Row
 from studies.work_precision.estimator.walks import full, recordings
-
-PAGE = command.ROOT / 'docs' / 'model' / 'estimation.md'
 
 
 def measure(count: int | None, processes: int) -> dict[str, Any]:
@@ -67,22 +63,6 @@ def _stress(place: int, count: int | None) -> list[Row]:
     return conditions.stress(conditions.CHANGES[place], count)
 
 
-def tables(document: dict[str, Any]) -> dict[str, str]:
-    """Return the tables of the docs, by the name of their marks."""
-    rows = [Row(**row) for row in document['rows']]
-    return {'walks': chart.walks(rows), 'robustness': chart.robustness(rows)}
-
-
-def paste(page: pathlib.Path, document: dict[str, Any]) -> None:
-    """Replace the tables between their marks on a page."""
-    text = page.read_text(encoding='utf-8')
-    for name, lines in tables(document).items():
-        before, rest = text.split(f'<!-- {name}:begin -->\n')
-        _, after = rest.split(f'<!-- {name}:end -->')
-        text = f'{before}<!-- {name}:begin -->\n{lines}\n<!-- {name}:end -->{after}'
-    page.write_text(text, encoding='utf-8')
-
-
 def main(words: Sequence[str]) -> int:
     """Measure, print, save and draw."""
     part = command.parser('estimator', __doc__)
@@ -90,16 +70,14 @@ def main(words: Sequence[str]) -> int:
     command.add_processes(part)
     command.add_out(part, None)
     part.add_argument(
-        '--docs', action='store_true', help='write JSON, pictures and tables of the documentation'
+        '--docs', action='store_true', help='write JSON and pictures of the documentation'
     )
     options = part.parse_args(words)
     document = measure(options.walks, options.processes)
     folder = command.CHARTS if options.docs else options.out or new_folder(None, 'chart_estimator')
     rows = [Row(**row) for row in document['rows']]
     kept = command.write(folder, 'estimator', document, figures(rows))
-    if options.docs:
-        paste(PAGE, kept)
-    command.show(options, kept, '\n\n'.join((table(rows), *tables(kept).values())))
+    command.show(options, kept, table(rows))
     return 0
 
 
